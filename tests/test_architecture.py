@@ -268,12 +268,12 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 52_206,
+    "lines of Python": 52_612,
     "files": 229,
-    "functions": 2827,
+    "functions": 2831,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 372_135,
-    "characters a line that is not blank": 51.1,
+    "names, operators, numbers": 372_398,
+    "characters a line that is not blank": 50.7,
     "noqa": 92,
     "lines of TOML, JavaScript, CSS": 6545,
 }

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 class Analysis(Shown):
     """One log, one robot, its observers' estimates, and how they compare with the reference."""
 
-    #: The log with its robot as it was used, payload mounted, friction possibly off, and what is
-    #: known of its free motion.
+    #: The log with its robot as it was used, payload mounted, friction possibly off, and
+    #: what is known of its free motion.
     motion: "FreeMotion"
     observers: tuple[Observer, ...]  #: The observers that ran.
     estimates: tuple[ExternalTorque, ...]  #: Their estimates, in the same order.

@@ -169,7 +169,8 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
     return FoundGains(robot, recording, goal, tuned, spectra, remarks, examinations)
 
 
-#: Whose estimate is the force unless another is named: the paper drives its controller with it.
+#: Whose estimate is the force unless another is named: the paper drives its controller
+#: with it.
 DRIVER = "kfo-fe"
 
 

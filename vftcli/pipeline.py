@@ -105,8 +105,8 @@ def analyse_logs(
 ) -> Iterator["Analysis"]:
     """Analyses of the logs of a command one after the other; what they share is made once.
 
-    The work on each is `analyse` if not given. A log that cannot be analysed is left out where
-    somebody hears of it, else it raises a VftError, as two logs of the same run do.
+    The work on each is `analyse` if not given. A log that cannot be analysed is left out
+    where somebody hears of it, else it raises a VftError, as two logs of the same run do.
     """
     models, work, tell = Runs(), work or analyse, failed or raise_error
     recordings: list[tuple[Path | Recording, Recording]] = []

@@ -19,7 +19,8 @@ from vftcli.signals.remarks import caution
 from vftcli.signals.series import clock_of
 from vftcli.signals.steady_filter import PIECE
 
-#: A log of no more rows is analysed in one piece: there is memory for all that is done with it.
+#: A log of no more rows is analysed in one piece: there is memory for all that is done
+#: with it.
 WHOLE_ROWS = 100_000
 
 
@@ -42,8 +43,9 @@ def analysed_in_blocks(
 ) -> Iterator[tuple[Analysis, slice | None]]:
     """The analyses of a log's blocks, in order; with None for its rows that of the log at last.
 
-    The last holds the estimates of the last block alone. The log is examined in stretches; its
-    clock, its numbers and samples that no arm can have made are looked for in all of it.
+    The last holds the estimates of the last block alone. The log is examined in
+    stretches; its clock, its numbers and samples that no arm can have made are looked for
+    in all of it.
     """
     robot = choice.examiner.robot(stretches(recording), choice.robot)
     log = choice.examiner.taken(recording, robot, choice.read, in_stretches=True)

@@ -52,7 +52,8 @@ class ControlChoice(Choice):
             lambda text: (text,),
         ),
     ] = ()
-    #: What drives the replay: the log's ``sensor`` or ``file:PATH``; None for an observer's wrench.
+    #: What drives the replay: the log's ``sensor`` or ``file:PATH``; None for an
+    #: observer's wrench.
     force: Annotated[
         str | None,
         setting("admittance.force", "sensor|file:PATH", "What drives the replay, if no observer."),
@@ -76,7 +77,8 @@ class ControlChoice(Choice):
         str,
         setting("admittance.loop-torque", "average|instant", "What closed-loop sensors report."),
     ] = "average"
-    #: Parameters the user sets, which go before the robot file's, each ``AXIS.PARAMETER=VALUE``.
+    #: Parameters the user sets, which go before the robot file's, each
+    #: ``AXIS.PARAMETER=VALUE``.
     assignments: Annotated[
         tuple[str, ...],
         setting(

@@ -1,8 +1,9 @@
 """The whole loop in simulation: hand, arm and servo, sensing, observer, Algorithm 1, joints, servo.
 
-The arm is the simulator's; the controller sees what a log would hold, noise and all. Between two
-control periods the servo holds the last command. Latencies are from the true force, and as Figs 6
-and 9 time them: from detection to motion, and from the estimate's fall to the turn.
+The arm is the simulator's; the controller sees what a log would hold, noise and all.
+Between two control periods the servo holds the last command. Latencies are from the true
+force, and as Figs 6 and 9 time them: from detection to motion, and from the estimate's
+fall to the turn.
 """
 
 from collections.abc import Sequence
@@ -70,9 +71,10 @@ class ClosedLoop:
 class OnlineKalman:
     """A disturbance Kalman filter run sample by sample at a constant rate, from x̂⁰ = [p⁰; 0].
 
-    A mean torque over the sampling interval enters as it is: the trapezoid over two is half a
-    sample late, which turns every jerk of the arm into a false force. An instantaneous one enters
-    by the trapezoid, as the rest of μ: the numbers are those of `KalmanObserver.estimate`.
+    A mean torque over the sampling interval enters as it is: the trapezoid over two is
+    half a sample late, which turns every jerk of the arm into a false force. An
+    instantaneous one enters by the trapezoid, as the rest of μ: the numbers are those of
+    `KalmanObserver.estimate`.
     """
 
     def __init__(
@@ -163,7 +165,8 @@ class Loop:
     def act(self, zero: tuple[float, float] | None) -> dict[str, Any]:
         """One control period, as a row: Algorithm 1, or rest in the zero's span."""
         t, wrench = self.arm.t, self.sensor.wrench(self.q_measured)
-        # A controller that followed its own drift would never find the zero of a still arm.
+        # A controller that followed its own drift would never find the zero of a still
+        # arm.
         first, last = zero or (np.inf, -np.inf)
         if first <= t <= last:
             self.zeros.append(wrench)
@@ -227,8 +230,8 @@ def run_closed_loop(
 ) -> ClosedLoop:
     """A scenario's contacts against an arm under admittance control, from the trajectory's start.
 
-    The torque is the "average" over the sampling interval, or the last "instant". In the unloaded
-    span `zero` [s] the arm holds still, and its mean wrench is removed.
+    The torque is the "average" over the sampling interval, or the last "instant". In the
+    unloaded span `zero` [s] the arm holds still, and its mean wrench is removed.
     """
     if torque not in {"average", "instant"}:
         raise ParameterError(f"torque is {torque!r}; it is average or instant")
@@ -316,7 +319,8 @@ class Latency:
     reaction: float | None
     #: Time from the estimate's fall below the threshold until the flange goes no farther.
     turn: float | None
-    #: Whether the flange was at rest when the force came, without which `motion` says nothing.
+    #: Whether the flange was at rest when the force came, without which `motion` says
+    #: nothing.
     rested: bool
 
 

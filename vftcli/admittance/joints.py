@@ -14,9 +14,11 @@ from vftcli.signals.pose import exp_matrix
 ITERATIONS = 12
 #: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-6
-#: λ² of the damped step is this times the error, so that it vanishes where the pose is reached.
+#: λ² of the damped step is this times the error, so that it vanishes where the pose is
+#: reached.
 DAMPING = 1e-3
-#: If the error after three steps is still this share of what it was, the pose is out of reach.
+#: If the error after three steps is still this share of what it was, the pose is out of
+#: reach.
 STALLED = 0.7
 LARGEST_STEP = 0.2  #: Longest joint step of one iteration. [rad]
 
@@ -63,8 +65,8 @@ class FlangeSolver:
     def reach(self, rotation: Array, translation: Array, guess: Array) -> tuple[Array, bool]:
         """Joint positions at a pose, from a guess nearby, and whether the pose is reached.
 
-        A step is Jᵀ(JJᵀ + λ²I)⁻¹e in base axes, cut at the joint limits; where the pose is not
-        reached the joints are those of the last step.
+        A step is Jᵀ(JJᵀ + λ²I)⁻¹e in base axes, cut at the joint limits; where the pose
+        is not reached the joints are those of the last step.
         """
         pin, model, data, frame = self.pin, self.model, self.data, self.frame
         q, error, sizes = guess, np.empty(6), [np.inf, np.inf, np.inf]
@@ -92,7 +94,8 @@ class FlangeSolver:
 class JointPath:
     """Joint positions along the motions of N controllers."""
 
-    #: Positions; where a pose is out of reach the arm waits at the last it reached. (T, N, n) [rad]
+    #: Positions; where a pose is out of reach the arm waits at the last it reached.
+    #: (T, N, n) [rad]
     q: Array
     reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
     speed: Array  #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
@@ -113,7 +116,8 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
             if k and same[k - 1]:
                 before = last
             else:
-                # Straight on from the two poses before: the arm moves evenly between periods.
+                # Straight on from the two poses before: the arm moves evenly between
+                # periods.
                 guess = 2.0 * last - before if good else last
                 found, good = try_pose(solver, goal, point, guess, last)
                 last, before = found, last if good else found

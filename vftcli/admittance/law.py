@@ -1,11 +1,12 @@
 """The variable-parameter law (47), its parameters (Tables III and IV), energy, and stability.
 
-In the recovery phase an axis has K = αK_d e^{|v|/v₀}, M = M_d e^{−|v|/v₀}/α, B = 2ξ√(MK), so that
-B = 2ξ√(M_d K_d) is constant. The traditional controller has α = 1, no v in K and M, and B = B_d.
-The printed energy (52) rises; W falls.
+In the recovery phase an axis has K = αK_d e^{|v|/v₀}, M = M_d e^{−|v|/v₀}/α, B = 2ξ√(MK),
+so that B = 2ξ√(M_d K_d) is constant. The traditional controller has α = 1, no v in K and
+M, and B = B_d. The printed energy (52) rises; W falls.
 
-Semi-implicit Euler (49)–(51) is stable if 2TsB/M + Ts²K/M < 4, and M falls and K rises with speed.
-Without a speed limit the law escapes: from far enough it becomes infinitely fast in finite time.
+Semi-implicit Euler (49)–(51) is stable if 2TsB/M + Ts²K/M < 4, and M falls and K rises
+with speed. Without a speed limit the law escapes: from far enough it becomes infinitely
+fast in finite time.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,7 +54,8 @@ MAY_BE_ENDLESS = ("threshold", "speed_limit")
 #: Keys of ``[admittance]`` that are not one number an axis.
 PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
 KINDS = ("traditional", "variable")
-#: Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside |z| = 1.
+#: Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside
+#: |z| = 1.
 DISCRETE_BOUND = 4.0
 UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
@@ -62,8 +64,9 @@ UNITS = ("m", "m", "m", "rad", "rad", "rad")
 class Admittance:
     """Parameters of the variable-parameter law (45)–(51) and of Algorithm 1.
 
-    Translational axes are in kg, N·s/m, N/m, N, m/s; rotational ones in kg·m², N·m·s/rad, N·m/rad,
-    N·m, rad/s. Every array is (6,), in the order of `AXES`; one number is that of all axes.
+    Translational axes are in kg, N·s/m, N/m, N, m/s; rotational ones in kg·m², N·m·s/rad,
+    N·m/rad, N·m, rad/s. Every array is (6,), in the order of `AXES`; one number is that
+    of all axes.
     """
 
     mass: Array  #: M_d.
@@ -71,11 +74,11 @@ class Admittance:
     stiffness: Array  #: K_d.
     alpha: Array  #: α of (47).
     threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
-    #: ξ of (47), which the paper does not print; None, and NaN for an axis, is B_d/(2√(M_d K_d)),
-    #: the damping ratio of the drag phase.
+    #: ξ of (47), which the paper does not print; None, and NaN for an axis, is
+    #: B_d/(2√(M_d K_d)), the damping ratio of the drag phase.
     xi: Array | None = None
-    #: Share of the threshold by which the force has to fall below it before an axis that is dragged
-    #: recovers; 0 is the paper's.
+    #: Share of the threshold by which the force has to fall below it before an axis that
+    #: is dragged recovers; 0 is the paper's.
     hysteresis: Array | float = 0.0
     speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
     speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
@@ -141,7 +144,8 @@ def from_table(
         ParameterError: If a parameter is missing for an axis, unknown or out of range.
     """
     groups = [(name, table.get(name, {})) for name in ("position", "rotation")]
-    # What has a default begins with it; ξ, which has none of its own, and all else with NaN.
+    # What has a default begins with it; ξ, which has none of its own, and all else with
+    # NaN.
     values: dict[str, Any] = {
         name: np.full(6, getattr(Admittance, name, None), float) for name in PER_AXIS
     }
@@ -255,7 +259,8 @@ class Controller:
     def complaints(self, size: Array | float = np.inf) -> Iterator[Remark]:
         """Its instabilities, in releases from rest of a size (6,) [m, rad] or in all motion."""
         where, limited = Where(self.name), np.isfinite(self.parameters.speed_limit)
-        # Without a speed limit the number is infinite, and the escape says what that means.
+        # Without a speed limit the number is infinite, and the escape says what that
+        # means.
         at_limit = np.where(limited, self.recovery, 0.0)
         numbers = {"law-unstable-in-drag": self.drag, "law-unstable-at-limit": at_limit}
         for code, number in numbers.items():
@@ -310,13 +315,14 @@ def kinetic_shape(u: Array) -> Array:
 def energy(controller: Controller, x: Array, v: Array) -> Array:
     """The Lyapunov function of each axis in a recovery phase. (…, 6) [J]
 
-    Of deviations x (…, 6) [m, rad] and velocities v (…, 6) [m/s, rad/s] it is
-    W = ½K_d x² + (M_d v₀²/α²) φ(|v|/v₀), with Ẇ = −B e^{−|v|/v₀} v²/α ≤ 0; for the traditional
-    controller ½K_d x² + ½M_d v². For rotation the sum over three axes of equal K_d falls, since x
-    is the rotation vector log(R R_dᵀ) and v the angular velocity.
+    Of deviations x (…, 6) [m, rad] and velocities v (…, 6) [m/s, rad/s] it is W = ½K_d
+    x² + (M_d v₀²/α²) φ(|v|/v₀), with Ẇ = −B e^{−|v|/v₀} v²/α ≤ 0; for the traditional
+    controller ½K_d x² + ½M_d v². For rotation the sum over three axes of equal K_d falls,
+    since x is the rotation vector log(R R_dᵀ) and v the angular velocity.
     """
     p, varies = controller.parameters, controller.rate > 0.0
-    # The traditional controller has no speed scale; its branch below does not use the quotient.
+    # The traditional controller has no speed scale; its branch below does not use the
+    # quotient.
     rate = np.where(varies, controller.rate, 1.0)
     shape = np.where(varies, kinetic_shape(abs(v) * rate) / rate**2, 0.5 * v**2)
     return 0.5 * p.stiffness * x**2 + p.mass * shape / controller.alpha**2
@@ -342,11 +348,11 @@ def discrete_number(mass: Array, damping: Array, stiffness: Array, period: float
 def escape_factor(xi: float) -> float:
     """Y*(ξ): the release Y*·v₀√(M_d/K_d)/α from rest is the last that does not escape.
 
-    In y = xα√(K_d/M_d)/v₀ and u = |v|/v₀ the law without force is du/ds = e^u(e^u y − 2ξu),
-    dy/ds = −u. With z = e^u y its paths obey dz/du = z − u/(z − 2ξu); the one between those that
-    turn back and those that escape comes from infinity along z(z − 2ξu) = u. Followed back to u =
-    0, where it attracts its neighbours, it ends at z = y = Y*. Y*(0) = 1/√2, the bound that holds
-    for every ξ.
+    In y = xα√(K_d/M_d)/v₀ and u = |v|/v₀ the law without force is
+    du/ds = e^u(e^u y − 2ξu), dy/ds = −u. With z = e^u y its paths obey
+    dz/du = z − u/(z − 2ξu); the one between those that turn back and those that escape
+    comes from infinity along z(z − 2ξu) = u. Followed back to u = 0, where it attracts
+    its neighbours, it ends at z = y = Y*. Y*(0) = 1/√2, the bound that holds for every ξ.
     """
     far = 12.0 * min(1.0, 5.0 / max(xi, 1e-12))
     steps = int(max(2000.0, 8.0 * (xi * far) ** 2))  # the path attracts at up to 4ξ²u

@@ -30,8 +30,8 @@ class Phases(NamedTuple):
 def phases(wrench: Array, parameters: Admittance) -> Phases:
     """Split a record (T, 6) [N, N·m] into drag and recovery phases, axis by axis.
 
-    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. An unknown (NaN)
-    force counts as none.
+    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. An
+    unknown (NaN) force counts as none.
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = abs(wrench)
@@ -46,8 +46,9 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
 def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Array:
     """The force that enters (49), by the threshold's mode. (…, 6) [N, N·m]
 
-    "hard" passes the whole force of a dragged axis, "soft" F − F_tsd·sign(F), which starts from
-    zero; an axis that recovers has none. "literal" is Algorithm 1 as printed: all always enters.
+    "hard" passes the whole force of a dragged axis, "soft" F − F_tsd·sign(F), which
+    starts from zero; an axis that recovers has none. "literal" is Algorithm 1 as printed:
+    all always enters.
     """
     if parameters.threshold_mode == "literal":
         return wrench
@@ -60,8 +61,8 @@ def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Arra
 class AxisMotion:
     """Motion of the flange: one row a control period, one column a controller.
 
-    Row k + 1 follows from row k and the force of row k. All components are in base axes; the
-    rotation is the vector log(R R_dᵀ).
+    Row k + 1 follows from row k and the force of row k. All components are in base axes;
+    the rotation is the vector log(R R_dᵀ).
     """
 
     t: Array  #: Time; T control periods after the start come T + 1 rows. (T+1,) [s]
@@ -135,8 +136,9 @@ def run(
 ) -> AxisMotion:
     """The motion under one force record, each axis in the phase the record puts it in.
 
-    Force (T, 6) [N, N·m] and phases (T, 6) are those of `Phases`, the start that of `Recursion`.
-    A law that escapes in finite time ends in infinities, which `AxisMotion.escaped` tells.
+    Force (T, 6) [N, N·m] and phases (T, 6) are those of `Phases`, the start that of
+    `Recursion`. A law that escapes in finite time ends in infinities, which
+    `AxisMotion.escaped` tells.
     """
     state = Recursion(controllers, x, v)
     shape = (len(force) + 1, len(controllers), 6)
@@ -172,7 +174,8 @@ def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
     """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
     found, t = list[Drag](), np.arange(len(phases.dragged), dtype=float) * period
     for axis, dragged in enumerate(phases.dragged.T):
-        # From the last dragged sample of one to the first of the next; stamps are rounded.
+        # From the last dragged sample of one to the first of the next; stamps are
+        # rounded.
         spans = intervals(t, dragged, gap=PAUSE + period - 1e-9)
         ends = [*(begin + 1 for begin, _ in spans[1:]), len(t) + 1]
         numbered = enumerate(zip(spans, ends, strict=False), start=1)
@@ -190,9 +193,10 @@ def rows_of(
 ) -> list[dict[str, Any]]:
     """The comparison as rows, one for each controller, axis and drag.
 
-    `start_s` and `release_s` are on the motion's clock, `time_to_peak_s` and `idle_s` from the
-    drag's start, return times from its release [s]; `work_J` is the hand's in the drag phase. What
-    does not happen before the record ends or the next drag begins is None.
+    `start_s` and `release_s` are on the motion's clock, `time_to_peak_s` and `idle_s`
+    from the drag's start, return times from its release [s]; `work_J` is the hand's in
+    the drag phase. What does not happen before the record ends or the next drag begins is
+    None.
     """
     numbered = list(enumerate(controllers))
     rows = [row_of(one, motion, n, drag, wrench) for n, one in numbered for drag in drags]

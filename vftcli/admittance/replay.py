@@ -48,10 +48,12 @@ from vftcli.virtual_sensor.frames import logged_wrench
 from vftcli.virtual_sensor.sensor_reading import SensorReading, without_zero
 from vftcli.virtual_sensor.solvers import VirtualSensor
 
-#: A step in which W rises by more than this share of its value at the phase's start is told.
+#: A step in which W rises by more than this share of its value at the phase's start is
+#: told.
 RISE = 1e-12
 LONGEST = 600.0  #: Longest release that is computed. [s]
-#: A drag in which the log's arm stays within this distance for so long has a remark. [s, m]
+#: A drag in which the log's arm stays within this distance for so long has a remark.
+#: [s, m]
 RESTING = (2.0, 0.01)
 #: A log whose flange stays this near to its first pose replays as it was: no remark. [m]
 STILL = 0.01
@@ -63,8 +65,9 @@ class Lyapunov:
 
     corrected: Array  #: W, which must not rise in a recovery phase into which no force enters. [J]
     printed: Array  #: V of (52). [J]
-    #: Steps in which W rises by more than `RISE` of its value at the phase's start, for each
-    #: controller; the three axes of a rotation that recover together count together. (N,)
+    #: Steps in which W rises by more than `RISE` of its value at the phase's start, for
+    #: each controller; the three axes of a rotation that recover together count together.
+    #: (N,)
     rises: Indices
 
 
@@ -136,8 +139,8 @@ def replay(
 ) -> Replay:
     """Motions of controllers that hold the arm at a log's first pose, by the log's wrench.
 
-    The wrench is in base axes about the flange point, and counts as none where it is not known;
-    q are the log's joint positions on its clock. (T, n) [rad]
+    The wrench is in base axes about the flange point, and counts as none where it is not
+    known; q are the log's joint positions on its clock. (T, n) [rad]
     """
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
@@ -228,7 +231,8 @@ def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[
     """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
     count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
     clock = t[0] + np.arange(count) * period
-    # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay in step.
+    # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay
+    # in step.
     newest = np.clip(t.searchsorted(clock + 5e-7 + 1e-3 * period, side="right") - 1, 0, None)
     return clock, [column[newest] for column in values]
 
@@ -272,7 +276,8 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
         if len(part) <= long:
             continue
         apart = np.linalg.norm(part[long:] - part[:-long], axis=1)
-        # Round trips bring a moving arm back to where it was, so one coincidence is not rest.
+        # Round trips bring a moving arm back to where it was, so one coincidence is not
+        # rest.
         held = np.linalg.norm(part - part.mean(axis=0), axis=1).max()
         if np.any(apart < near) and (held < near or np.median(apart) < near):
             axis = AXES[drag.axis]

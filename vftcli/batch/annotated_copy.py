@@ -40,7 +40,8 @@ from vftcli.readers.opening import open_log
 from vftcli.signals.errors import LogError
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
-#: Episodes, and files to write, for which no processes are started unasked: that takes seconds.
+#: Episodes, and files to write, for which no processes are started unasked: that takes
+#: seconds.
 FEW = 32
 HERE = WorkersChoice(jobs=0)  #: This process alone.
 Progress = Callable[[str, float, float], None]  #: Receives the stage, and its share of the work.
@@ -68,9 +69,9 @@ def annotate(
 ) -> Record:
     """Write a copy of a dataset with the forces of every frame.
 
-    Frames without an estimate stop the run, or are filled with zeros and marked where the choice
-    goes on anyway; `force` is whether an earlier copy may be replaced. What comes back is the
-    content of ``meta/vftcli.json``.
+    Frames without an estimate stop the run, or are filled with zeros and marked where the
+    choice goes on anyway; `force` is whether an earlier copy may be replaced. What comes
+    back is the content of ``meta/vftcli.json``.
     """
     dataset = open_dataset(path, choice.read.columns)
     check_copy(path, copy, force=force)

@@ -19,8 +19,8 @@ EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 class WorkersChoice(Choice):
     """Place of many pieces of work."""
 
-    #: How many processes of this machine; 0 for this process alone, None for as many as it has
-    #: cores and memory for.
+    #: How many processes of this machine; 0 for this process alone, None for as many as
+    #: it has cores and memory for.
     jobs: Annotated[
         int | None,
         Option(

@@ -1,9 +1,9 @@
 """Pieces of work here or on a Dask cluster, each reported at its end; an error is an outcome too.
 
-What is done is the caller's: a function of one task, at the top of a module, that writes its result
-itself (a temporary file, then a rename) before it returns. Results that only live in the engine are
-lost with a worker, and Dask then does the task again: the function looks first whether its result
-is there. A task is small, and can be pickled.
+What is done is the caller's: a function of one task, at the top of a module, that writes
+its result itself (a temporary file, then a rename) before it returns. Results that only
+live in the engine are lost with a worker, and Dask then does the task again: the function
+looks first whether its result is there. A task is small, and can be pickled.
 """
 
 import hashlib
@@ -135,8 +135,8 @@ def run_tasks(
 ) -> Iterator[Outcome[Task]]:
     """Do some work on every task and tell how each ended, in the order in which they end.
 
-    An error of the work is an outcome like any other. If its worker dies a task runs again, three
-    times in all. Closing the iterator ends what has not begun.
+    An error of the work is an outcome like any other. If its worker dies a task runs
+    again, three times in all. Closing the iterator ends what has not begun.
     """
     rest, begun = iter(groups), time.monotonic()
     if choice.in_process or (choice.jobs is None and choice.address is None):
@@ -314,8 +314,8 @@ def perform_there(work: Work[Task], tasks: Sequence[Task]) -> list[Outcome[Task]
 def settle() -> None:
     """Once in a worker, wait for its nanny.
 
-    Dask sends tasks before the nanny has looked, which it does every 50 ms, whether the process
-    started; one that ends before is not started again.
+    Dask sends tasks before the nanny has looked, which it does every 50 ms, whether the
+    process started; one that ends before is not started again.
     """
     time.sleep(SETTLED)
 

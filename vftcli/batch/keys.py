@@ -1,7 +1,7 @@
 """Keys: what a result is made from, by which a second run knows that it is there.
 
-A key is the sha256 of the log's bytes, of the options, of every file that these name (robot, gains,
-free runs, reference) and of the program's version.
+A key is the sha256 of the log's bytes, of the options, of every file that these name
+(robot, gains, free runs, reference) and of the program's version.
 """
 
 import hashlib

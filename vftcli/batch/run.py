@@ -125,7 +125,8 @@ class BatchRun:
         if first is None:
             self.progress(self.count())
             return
-        # What every worker has to see: the folder, the first log, and what the options name.
+        # What every worker has to see: the folder, the first log, and what the options
+        # name.
         seen = [str(self.folder.path), str(first[0].path)]
 
         def noted(path: Path) -> Path:

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
 #: Evidence and band of a row that is good; a wider band makes it weak.
 SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
-#: Where only forces larger than this are detected along an axis, the pose is blind to it. [N]
+#: Where only forces larger than this are detected along an axis, the pose is blind to it.
+#: [N]
 BLIND = 500.0
 #: A payload of the robot's file is named where it weighs as much as a load to this share.
 SAME_MASS = 0.1
@@ -69,8 +70,8 @@ class Contact(Shown):
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
     peak: float  #: When |F| is largest. [s]
-    #: Whether it lasts so long that it is a load, a wrong payload or a wrong model; its numbers are
-    #: then means over the row, not those of a peak.
+    #: Whether it lasts so long that it is a load, a wrong payload or a wrong model; its
+    #: numbers are then means over the row, not those of a peak.
     is_load: bool = False
     peak_force: float | None  #: |F| at the peak. [N]
     peak_band: float | None  #: Half width of its 95 % band, what the place may change in it. [N]

@@ -31,7 +31,8 @@ from vftcli.virtual_sensor.model_error import (
 )
 from vftcli.virtual_sensor.smoother import BlockLog, Lane, WrenchPrior
 
-#: Length of a block [s]; on a clock with steps that differ by this share it holds so many samples.
+#: Length of a block [s]; on a clock with steps that differ by this share it holds so many
+#: samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
@@ -39,8 +40,8 @@ LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touch
 #: How long it must stay there, and the pause up to which two such stretches are one. [s]
 LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
-#: What tells a contact from an error of the model: motion that is known to be free; the samples
-#: that the fit of the whole log calls free; the drives' dry friction; or nothing.
+#: What tells a contact from an error of the model: motion that is known to be free; the
+#: samples that the fit of the whole log calls free; the drives' dry friction; or nothing.
 Basis = Literal["free motion", "whole log", "friction", "none"]
 #: What the fit of the whole log says of one that is too short for it.
 SHORT_LOG = {"whole-log-too-short", "whole-log-friction-unclear"}
@@ -58,8 +59,8 @@ class FreeStatistics:
     noise: TorqueNoise  #: Noise and model error.
     level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
     own: Mask  #: Samples of the log itself that are known to be free. (T,)
-    #: The log, less a load that the free part carries; less the model error of the whole log where
-    #: the basis is that.
+    #: The log, less a load that the free part carries; less the model error of the whole
+    #: log where the basis is that.
     log: Run
     runs: tuple[Run, ...]  #: Free runs in other logs, less a load that they carry.
     free: tuple[RunSamples, ...]  #: Every free piece, less a load that it carries.
@@ -110,8 +111,9 @@ def free_statistics(motion: FreeMotion, seconds: float) -> FreeStatistics | None
 def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeStatistics | None:
     """Statistics that a log without known free motion lets infer, None where it lets infer none.
 
-    The model error that was fitted to the whole log is subtracted where its guard allows it, then a
-    load. Nothing is inferred without dry friction where it is subtracted from no joint as a whole.
+    The model error that was fitted to the whole log is subtracted where its guard allows
+    it, then a load. Nothing is inferred without dry friction where it is subtracted from
+    no joint as a whole.
     """
     if not (dry_torques(log.robot).any() or (bias.weight >= 1.0).any()):
         return None
@@ -181,8 +183,8 @@ def is_touched(log: Run, own: Mask) -> bool:
 def beyond_threshold(run: Run, level: Array | None) -> Mask:
     """Samples in which a joint's torque lies beyond `LEVEL` standard deviations for a while. (T,)
 
-    The standard deviation is that of the observer's torque in free motion, the level (n,) [N·m];
-    None without any.
+    The standard deviation is that of the observer's torque in free motion, the level (n,)
+    [N·m]; None without any.
     """
     t = run.t
     above = np.any(abs(observed(run)) > LEVEL * expected_torque(run, level), axis=1)
@@ -198,8 +200,8 @@ def observed(run: Run) -> Array:
 def observer_noise(run: Run) -> Array:
     """Standard deviation of the noise of the observer's torque, whatever touches. (n,) [N·m]
 
-    By second differences over twice the observer's time, which white noise has six times: what
-    pushes last longer, and a median passes over what begins and ends in between.
+    By second differences over twice the observer's time, which white noise has six times:
+    what pushes last longer, and a median passes over what begins and ends in between.
     """
     torque = observed(run)
     step = max(round(2.0 / (GAIN * median_step(run.t))), 1)

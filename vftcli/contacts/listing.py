@@ -1,7 +1,7 @@
 """The contacts of a log: found by evidence, measured by the smoother, with what limits them.
 
-Two things look like a contact and are none: what lasts for most of a log is a load, a wrong payload
-or a wrong model, and has a mean; the jerk of a brake looks like a knock.
+Two things look like a contact and are none: what lasts for most of a log is a load, a
+wrong payload or a wrong model, and has a mean; the jerk of a brake looks like a knock.
 """
 
 from collections.abc import Sequence
@@ -58,12 +58,14 @@ from vftcli.virtual_sensor.smoother import (
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
 SHORTEST = 0.5  #: No contact can be told in a log shorter than this. [s]
 SLOWEST = 10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
-#: A contact's evidence must be this much above that of any row in the log's own free part.
+#: A contact's evidence must be this much above that of any row in the log's own free
+#: part.
 FALSE_MARGIN = 1.5
-#: What lies within so long of either end of the log is no contact: filters begin there. [s]
+#: What lies within so long of either end of the log is no contact: filters begin there.
+#: [s]
 AT_ENDS = 0.3
-#: The arm rests around a contact where no joint is as fast as `MOVES` in 95 % of the samples from
-#: so long before it to so long after it. [s]
+#: The arm rests around a contact where no joint is as fast as `MOVES` in 95 % of the
+#: samples from so long before it to so long after it. [s]
 AROUND = 1.0
 
 
@@ -259,7 +261,8 @@ def limits(
         return found
     unseen = [j + 1 for j in np.flatnonzero(~free.noise.seen).tolist()]
     if len(unseen) == run.robot.joints:
-        # At rest the free part shows no friction of motion: the share of F_c that is added does.
+        # At rest the free part shows no friction of motion: the share of F_c that is
+        # added does.
         dry = UNSEEN_SHARE * free.noise.dry
         found.append(caution("free-part-rests", least_N=max(smallest, felt_by(run, dry))))
     elif unseen:
@@ -298,17 +301,19 @@ def without_list(run: Run) -> ContactList:
 
 
 POSES = 20_000  #: Samples that say what a median pose of a log is.
-#: The arm rests at the beginning of a contact if no joint moves for so long on either side. [s]
+#: The arm rests at the beginning of a contact if no joint moves for so long on either
+#: side. [s]
 EDGE = 1.0
 #: Share of the time since the first motion that contacts must fill together to be a load.
 SHARE = 0.5
-#: Several contacts are one load if their forces add up to more than this share of their sizes:
-#: pushes that follow one another come from different sides.
+#: Several contacts are one load if their forces add up to more than this share of their
+#: sizes: pushes that follow one another come from different sides.
 ONE_SIDE = 0.95
 PIECE = 5.0  #: Length of the pieces whose means tell how far the mean may be off. [s]
 BRIEF = 0.3  #: Longest row that a stop explains. [s]
-#: When the arm must have moved, how fast it was, and when it must rest: about the beginning of a
-#: row, which is known to a block. A knock on an arm that stood still is none of this. [s]
+#: When the arm must have moved, how fast it was, and when it must rest: about the
+#: beginning of a row, which is known to a block. A knock on an arm that stood still is
+#: none of this. [s]
 BEFORE, AT_STOP, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
 RINGING = 0.05  #: Share of the speed before that may be left at rest, while the arm rings.
 

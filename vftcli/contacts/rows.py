@@ -32,20 +32,22 @@ from vftcli.signals.series import covered, resample_columns
 from vftcli.virtual_sensor.model_error import ErrorProcess, error_model, error_process
 from vftcli.virtual_sensor.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
 
-#: What the model's own standard deviations of force and moment are multiplied by: the error of the
-#: friction is not Gaussian. Chosen on simulated seeds together, for all logs.
+#: What the model's own standard deviations of force and moment are multiplied by: the
+#: error of the friction is not Gaussian. Chosen on simulated seeds together, for all
+#: logs.
 WIDENED = np.repeat([1.3, 2.0], 3)
 BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
 #: Share of its bend that the peak of a contact may hide that is short beside the others.
 BENT_SHORT = 0.4
 NORMAL = 1.96  #: Half width of a 95 % band in standard deviations.
-#: A contact's wrench changes within this share of its duration, however slow the others are.
+#: A contact's wrench changes within this share of its duration, however slow the others
+#: are.
 OWN_TIME = 0.5
-#: The peak of a contact shorter than this [s] is cut by a log of fewer samples a second [Hz]: a
-#: tap's force lasts some 50 ms.
+#: The peak of a contact shorter than this [s] is cut by a log of fewer samples a second
+#: [Hz]: a tap's force lasts some 50 ms.
 SHORT, SLOW = 0.25, 95.0
-#: A contact's place is inferred from the blocks in which its force is above this share of the peak,
-#: within so long [s] of it.
+#: A contact's place is inferred from the blocks in which its force is above this share of
+#: the peak, within so long [s] of it.
 CORE, CORE_TIME = 0.5, 0.1
 POINT_MOMENT = 1e-3  #: Standard deviation of the moment about the point of a point force. [N·m]
 
@@ -101,8 +103,8 @@ class ContactMeasurement:
     log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
     prior: WrenchPrior  #: How the wrench of the contacts moves.
     test: PseudoContactTest  #: Errors of a wrench in free motion.
-    #: Mean and variance of the model error, bridged across the contacts. (K, n) [N·m], (K, n)
-    #: [(N·m)²]
+    #: Mean and variance of the model error, bridged across the contacts. (K, n) [N·m],
+    #: (K, n) [(N·m)²]
     quiet: tuple[Array, Array]
     bent: float  #: Share of a peak's bend that may be hidden.
 
@@ -197,7 +199,8 @@ class ContactMeasurement:
         k = int(inside.size.argmax())
         peak = run[0] + k
         values, factor = inside.values[k], WIDENED * self.test.widening
-        # What the drives' constants and the blocks' length may hide, as in the wrench of `best`.
+        # What the drives' constants and the blocks' length may hide, as in the wrench of
+        # `best`.
         hidden = hidden_by_blocks(course.values, self.bent)
         hidden = hidden[run[0] - course.first : run[1] - course.first]
         covariances = inside.covariance * np.outer(factor, factor) + hidden

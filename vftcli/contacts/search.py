@@ -1,13 +1,14 @@
 """The search along one log: candidates of two kinds, split, each with its evidence.
 
-The first kind is found by an interacting two-state filter (IMM) in joint space, for any arm and any
-place of contact. Its mode "free" says d = b + n, its mode "contact" d = b + x + n with x of every
-joint an Ornstein–Uhlenbeck process, as large as a push of 30 N and 3 N·m at the flange makes; the
-mode is shared by all joints, the states are each joint's own. It runs forward and backward in time,
-so that ends are as sharp as beginnings, for taps and for leans.
+The first kind is found by an interacting two-state filter (IMM) in joint space, for any
+arm and any place of contact. Its mode "free" says d = b + n, its mode "contact"
+d = b + x + n with x of every joint an Ornstein–Uhlenbeck process, as large as a push of
+30 N and 3 N·m at the flange makes; the mode is shared by all joints, the states are each
+joint's own. It runs forward and backward in time, so that ends are as sharp as
+beginnings, for taps and for leans.
 
-The second is beyond a threshold on a momentum observer: what rises slowly or loads one joint alone,
-which the filter takes for friction.
+The second is beyond a threshold on a momentum observer: what rises slowly or loads one
+joint alone, which the filter takes for friction.
 
 References:
     H. A. P. Blom, Y. Bar-Shalom, "The interacting multiple model algorithm for systems with
@@ -44,12 +45,13 @@ from vftcli.virtual_sensor.model_error import (
 )
 from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan, WrenchPrior
 
-#: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
-#: observer's lag is over, friction has turned. [s]
+#: A torque that stays beyond the threshold for longer than this beside a contact is part
+#: of it: the observer's lag is over, friction has turned. [s]
 LASTING = 1.0
 #: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
-#: Correlation time of a contact's torque and how long a contact lasts: for taps, for leans. [s]
+#: Correlation time of a contact's torque and how long a contact lasts: for taps, for
+#: leans. [s]
 SEARCHES = (0.3, 0.5), (2.0, 3.0)
 #: Stretches in which a long log is searched, and how much of the log before each. [s]
 WARM_UP, STRETCH = 5.0, 10.0
@@ -59,11 +61,12 @@ AT_FIRST = 0.1  #: Probability that a log begins in contact.
 SURE, LIKELY = 0.99, 0.5
 GAP = 0.12  #: Contacts closer than this are one. [s]
 MOST_ODDS = 300.0  #: Log odds are kept within ± this many nats.
-#: A contact is split where the force is below so many standard deviations for so long [s], and
-#: below this share of the peaks on both sides.
+#: A contact is split where the force is below so many standard deviations for so long
+#: [s], and below this share of the peaks on both sides.
 RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
-#: A contact is split too where the force falls below this share of the peaks on both sides, if
-#: these point so far apart (cosine) and each side lasts so long [s]: one hand follows another.
+#: A contact is split too where the force falls below this share of the peaks on both
+#: sides, if these point so far apart (cosine) and each side lasts so long [s]: one hand
+#: follows another.
 HALF, TURNED, APART = 0.5, np.cos(np.radians(60.0)), 0.25
 
 
@@ -121,8 +124,9 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
         if first < last:
             beyond.append((first, last))
     struck = inside.copy()
-    # The filter takes a load that hangs on for many seconds for an error of the model, and sees
-    # only what strikes it in the meantime: before, between and behind that the torque goes on.
+    # The filter takes a load that hangs on for many seconds for an error of the model,
+    # and sees only what strikes it in the meantime: before, between and behind that the
+    # torque goes on.
     for start, stop in beyond:
         within, t = struck[start:stop], blocks.t[start:stop]
         for a, b in runs_of(~within) if within.any() else ():
@@ -156,8 +160,8 @@ def filtered_contacts(
 ) -> Mask:
     """Blocks that the two-state filter calls contact. (K,)
 
-    They are the runs in which the mean of the log odds of both directions is positive, one of them
-    sure.
+    They are the runs in which the mean of the log odds of both directions is positive,
+    one of them sure.
     """
     size = np.sqrt(np.einsum("kij,i->kj", J**2, PUSH**2))
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
@@ -175,8 +179,8 @@ def two_state_odds(
 ) -> list[tuple[Array, Array]]:
     """Log odds of contact of the search for taps and of that for leans, forward and backward.
 
-    A long log is searched in stretches side by side, each after `WARM_UP` seconds of the log before
-    it, in which the filter forgets that it has just begun.
+    A long log is searched in stretches side by side, each after `WARM_UP` seconds of the
+    log before it, in which the filter forgets that it has just begun.
     """
     step, usual, many = steps(blocks), float(np.median(blocks.length)), len(SEARCHES)
     step[0] = usual
@@ -220,13 +224,14 @@ def filtered_odds(
 ) -> Array:
     """Log odds ln P(contact)/P(free) along S searches side by side. (K, S)
 
-    The arrays are (K, S, n): d, decay, added, white and spikes of b, the variance of a contact's
-    torque; dt (K, S, 1) is the time from the block before.
+    The arrays are (K, S, n): d, decay, added, white and spikes of b, the variance of a
+    contact's torque; dt (K, S, 1) is the time from the block before.
     """
     blocks, count, n = d.shape
     time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
     kept = np.exp(-dt[..., 0] / time)[..., None]
-    # Behind a long gap neither mode is certain: 1 exactly would leave 0/0 of a certain one.
+    # Behind a long gap neither mode is certain: 1 exactly would leave 0/0 of a certain
+    # one.
     begins, ends = (np.minimum(-np.expm1(-dt[..., 0] / s), 1.0 - 1e-9) for s in (BETWEEN, lasts))
     often = np.log(spikes) - 0.5 * np.log(SPIKE), np.log1p(-spikes)
     # A stretch begins with what b is like anywhere.

@@ -1,7 +1,8 @@
 """Logs beside thresholds: what a robot compares with them, false alarms, contacts detected.
 
-A robot compares its own estimate with the thresholds it is given, so that one is taken where the
-log has it. Where it has none, a momentum observer of 10 1/s runs: causal, as a robot needs it.
+A robot compares its own estimate with the thresholds it is given, so that one is taken
+where the log has it. Where it has none, a momentum observer of 10 1/s runs: causal, as a
+robot needs it.
 """
 
 from collections.abc import Sequence
@@ -41,9 +42,9 @@ GAIN = 10.0  #: Of the momentum observer. [1/s]
 def compared_signals(run: Run) -> ComparedSignals:
     """What a robot would compare along a log.
 
-    The wrench is the log's own where the robot made it; one in sensor axes is an instrument's,
-    which no threshold of the robot sees. Else it is that of the torque, by least squares in base
-    axes about the flange point.
+    The wrench is the log's own where the robot made it; one in sensor axes is an
+    instrument's, which no threshold of the robot sees. Else it is that of the torque, by
+    least squares in base axes about the flange point.
     """
     # The robot's own estimate asks for no model, which else would check.
     check_joints(run.recording, run.robot)
@@ -89,8 +90,8 @@ class ThresholdDetection:
     """What thresholds would have done along a log with contacts."""
 
     log: str  #: The log.
-    #: What says where the contacts are, None where nothing does: then the alarms themselves are
-    #: listed as contacts.
+    #: What says where the contacts are, None where nothing does: then the alarms
+    #: themselves are listed as contacts.
     reference: str | None = None
     contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
     #: Alarms that touch no contact, None where nothing says where they are.
@@ -133,9 +134,9 @@ def check_contacts(
 ) -> ThresholdDetection:
     """What thresholds would have done along a log: every joint and every axis may raise the alarm.
 
-    A contact is detected if a signal passes its threshold while it lasts; one that has stayed
-    beyond it since before says nothing of it. Contacts that are over before the settling are left
-    out.
+    A contact is detected if a signal passes its threshold while it lasts; one that has
+    stayed beyond it since before says nothing of it. Contacts that are over before the
+    settling are left out.
     """
     t, duration = signals.t, signals.recording.duration - SETTLING
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])

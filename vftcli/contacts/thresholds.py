@@ -1,8 +1,9 @@
 """Thresholds from motion that nobody touched, at a stated rate of false alarms.
 
-The largest maxima of 1 s blocks of a signal lie beyond a level u at λ per hour, by e on average,
-and a level x beyond u is passed at the rate λ exp(−(x − u)/e). A tail that bends (generalised
-Pareto) has one number more to learn from few maxima, and its rare levels came out too low.
+The largest maxima of 1 s blocks of a signal lie beyond a level u at λ per hour, by e on
+average, and a level x beyond u is passed at the rate λ exp(−(x − u)/e). A tail that bends
+(generalised Pareto) has one number more to learn from few maxima, and its rare levels
+came out too low.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +31,8 @@ BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]
 APART = 0.5  #: Passages closer than this are one event. [s]
 KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
 ENOUGH = 5  #: Maxima beyond the level that tell a tail; below four its interval has no lower end.
-#: Readings in a tail: at least so many where there are, more an hour, of so many blocks one.
+#: Readings in a tail: at least so many where there are, more an hour, of so many blocks
+#: one.
 LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
 NORMAL = 1.96  #: Half width of a normal's 95 % in standard deviations.
 
@@ -83,9 +85,9 @@ class Tail(NamedTuple):
     def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
         """The level passed at a rate [1/h], u + e ln(λ/rate), and the ends of its 95 %.
 
-        They are those of e, (1 ± 1.96/√k) e, the lower one u at the least. What happens more often
-        than λ is no matter of the tail: of m times in all it is the m-th largest maximum, of m its
-        95 %, m ± 1.96 √m.
+        They are those of e, (1 ± 1.96/√k) e, the lower one u at the least. What happens
+        more often than λ is no matter of the tail: of m times in all it is the m-th
+        largest maximum, of m its 95 %, m ± 1.96 √m.
         """
         if rate <= self.rate:
             step = self.excess * float(np.log(self.rate / rate))
@@ -114,7 +116,8 @@ def tail_of(maxima: Array) -> Tail | None:
     return Tail(np.sort(maxima)[::-1], count)
 
 
-#: A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates.
+#: A log that holds this many false alarms, at their rate, shows it; a shorter one
+#: extrapolates.
 DUE = 3.0
 LEAST = 1e-9  #: In place of a threshold of zero, so that there is a level. [N·m, N]
 #: A log of this length has enough readings to tell its own tail. [s]
@@ -128,8 +131,8 @@ class ComparedSignals:
 
     recording: Recording  #: The log.
     torque: Array  #: Estimated external torque. (T, n) [N·m]
-    #: Force, then moment, NaN where the pose cannot tell them; no column for an arm of fewer than
-    #: six joints. (T, 6) [N, N·m]
+    #: Force, then moment, NaN where the pose cannot tell them; no column for an arm of
+    #: fewer than six joints. (T, 6) [N, N·m]
     wrench: Array
     of_vendor: bool  #: Whether the torque is the robot's own estimate, not the observer's.
     logged_wrench: bool  #: Whether the wrench is the robot's own, not that of the torque.
@@ -179,8 +182,8 @@ class SignalThreshold(NamedTuple):
     interval: tuple[float, float]  #: 95 % of it.
     rate: float  #: The false alarms that are this signal's share. [1/h]
     log: str  #: The free log that it comes from: the one that needs the highest.
-    #: That log's tail; None where the log is too short for one, and its largest reading stands
-    #: higher than what the others' tails say.
+    #: That log's tail; None where the log is too short for one, and its largest reading
+    #: stands higher than what the others' tails say.
     tail: Tail | None
 
     @property
@@ -210,8 +213,8 @@ class Thresholds(Shown):
 
     rate: float  #: False alarms of a whole set, as of any joint. [1/h]
     joints: tuple[SignalThreshold, ...]  #: One a joint. [N·m]
-    #: One an axis of the wrench, none for an arm of fewer than six joints; one that is wide is
-    #: none. [N, N·m]
+    #: One an axis of the wrench, none for an arm of fewer than six joints; one that is
+    #: wide is none. [N, N·m]
     axes: tuple[SignalThreshold, ...]
     #: That of the force's size, or none; its rate is `rate` itself; as of an axis. [N]
     force: tuple[SignalThreshold, ...]
@@ -257,17 +260,19 @@ class Thresholds(Shown):
             return np.zeros((len(signals.t), 0))
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
-        # A signal that never moved has the threshold zero: whatever it reads then is an alarm.
+        # A signal that never moved has the threshold zero: whatever it reads then is an
+        # alarm.
         return np.asarray(abs(getattr(signals, SETS[name])) / np.maximum(limits, LEAST))
 
 
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     """Thresholds that motion like that of some logs passes at a rate.
 
-    Every signal of a set of n gets rate/n. Several logs are not mixed: every threshold is that of
-    the log which needs the highest, so that the worst day has the rate and the others fewer. A log
-    too short for a tail counts by its largest reading alone, where another is long enough. The rate
-    [1/h] is of all joints together; and as much of all axes.
+    Every signal of a set of n gets rate/n. Several logs are not mixed: every threshold is
+    that of the log which needs the highest, so that the worst day has the rate and the
+    others fewer. A log too short for a tail counts by its largest reading alone, where
+    another is long enough. The rate [1/h] is of all joints together; and as much of all
+    axes.
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")

@@ -1,15 +1,17 @@
 """Windows of a log in which its contacts are weighed, and their wrench is smoothed.
 
-A contact may be at the flange or on a link: joints behind its place do not feel it, and nothing
-else tells where it is. Outside its contact a wrench is pinned to zero, so that the model error is
-learned from the quiet blocks on both sides of a contact, and the contact is measured against that.
-What other contacts load says nothing of it. The prior of the wrench is learned from the contacts.
+A contact may be at the flange or on a link: joints behind its place do not feel it, and
+nothing else tells where it is. Outside its contact a wrench is pinned to zero, so that
+the model error is learned from the quiet blocks on both sides of a contact, and the
+contact is measured against that. What other contacts load says nothing of it. The prior
+of the wrench is learned from the contacts.
 
-Evidence is how much better a contact explains a stretch of log than nothing does, place by place:
-around every candidate the likelihood of the disturbance is found under "nothing", under a wrench at
-the flange and under a force and moment on each link, the forward pass of the smoother with the
-Jacobian of the place. It is the best place's less that of nothing, in nats; the lead of a part of
-the arm is how far its best place is ahead of the best of every other part.
+Evidence is how much better a contact explains a stretch of log than nothing does, place
+by place: around every candidate the likelihood of the disturbance is found under
+"nothing", under a wrench at the flange and under a force and moment on each link, the
+forward pass of the smoother with the Jacobian of the place. It is the best place's less
+that of nothing, in nats; the lead of a part of the arm is how far its best place is ahead
+of the best of every other part.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,7 +30,8 @@ ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of 
 POINTS = 10  #: Points along each link that a force is tried at.
 #: The first link that is tried: on link 1 a force loads one joint, as friction does.
 FIRST_LINK = 2
-#: Lever of the moment that a contact's force may have about the flange or a link's middle. [m]
+#: Lever of the moment that a contact's force may have about the flange or a link's
+#: middle. [m]
 LEAST_LEVER = 0.1
 FORCE_PRIOR = 100.0  #: Standard deviation that a force is given beforehand. [N]
 ALIKE = 4.0  #: Points with a score within this of the best one's fit as well.
@@ -41,7 +44,8 @@ class ContactPlace(NamedTuple):
 
     link: int  #: Number of the link; 0 for the flange.
     lever: float  #: Standard deviation of the moment over that of the force. [m]
-    #: J of its point along the log; columns of joints that do not move it are zero. (K, 6, n)
+    #: J of its point along the log; columns of joints that do not move it are zero.
+    #: (K, 6, n)
     jacobian: Array
 
 
@@ -74,8 +78,8 @@ def link_jacobian(poses: LinkPoses, link: int, share: float) -> Array:
 def arm_parts(joints: int) -> dict[int, ArmPart]:
     """Link → part of the arm, 0 the flange: what cannot be told from the flange is the wrist.
 
-    Of six joints links 4 to 6 are the wrist and link 3 the forearm; of seven joints links 6 and 7,
-    and 4 and 5. What comes before is the upper arm.
+    Of six joints links 4 to 6 are the wrist and link 3 the forearm; of seven joints links
+    6 and 7, and 4 and 5. What comes before is the upper arm.
     """
     forearm, wrist = (3, 4) if joints <= 6 else (4, 6)
     found: dict[int, ArmPart] = {0: "wrist"}
@@ -107,8 +111,8 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
 
     `POINTS` a link are tried, from `FIRST_LINK` on.
 
-    F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows of the point's Jacobian over sd: joints behind the point
-    count with a prediction of zero, which is what tells the place.
+    F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows of the point's Jacobian over sd: joints behind
+    the point count with a prediction of zero, which is what tells the place.
     """
     poses, n = link_poses(chain, q[None]), chain.joints
     links = np.arange(FIRST_LINK, n + 1).repeat(POINTS)
@@ -138,17 +142,20 @@ MOST_LANES = 96  #: Lanes that are worked on at once.
 START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
 FORCES, MOMENTS = (3.0, 300.0), (0.1, 50.0)  #: Smallest and largest standard deviation. [N], [N·m]
-#: Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free motion one
-#: reversal of friction reached 15, everything else but abrupt stops stayed below 6.
+#: Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free
+#: motion one reversal of friction reached 15, everything else but abrupt stops stayed
+#: below 6.
 LEAST_EVIDENCE = 12.0
-#: Least evidence where the arm moves and no free motion is known: what the model errs by in motion
-#: reaches 82 nats on logs of six arms; from 75 to 200 nats the same contacts are found.
+#: Least evidence where the arm moves and no free motion is known: what the model errs by
+#: in motion reaches 82 nats on logs of six arms; from 75 to 200 nats the same contacts
+#: are found.
 LEAST_IN_MOTION = 120.0
 LEAST_FORCE = 10.0  #: Smallest standard deviation of a force that is tried. [N]
 LONGEST_TIME = 1.0  #: Longest correlation time of a wrench that comes and goes. [s]
 SIZES = 1.0, 3.0  #: Multiples of the standard deviation that are tried.
-#: A candidate that lasts longer than the first may be a wrench that stays, as a load's, with the
-#: second as its correlation time: one that wanders would have to pay for every block. [s]
+#: A candidate that lasts longer than the first may be a wrench that stays, as a load's,
+#: with the second as its correlation time: one that wanders would have to pay for every
+#: block. [s]
 LASTING, STEADY_TIME = 1.5, 100.0
 
 

@@ -1,11 +1,12 @@
 """The cause of a log that its arm does not explain: the best of all tries.
 
-In one number all faults look alike. So each cause corrects the log in its own way and the log
-is fitted again. Only a cause that leaves much less than the log and all others is named.
+In one number all faults look alike. So each cause corrects the log in its own way and the
+log is fitted again. Only a cause that leaves much less than the log and all others is
+named.
 
-Drivers publish currents, torques, or torques less gravity under one name, some with the sign
-reversed. A reading's rest is relative to the column as logged: relative to the reading
-a slow arm's currents would pass for torques without gravity.
+Drivers publish currents, torques, or torques less gravity under one name, some with the
+sign reversed. A reading's rest is relative to the column as logged: relative to the
+reading a slow arm's currents would pass for torques without gravity.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +36,8 @@ AMBIGUOUS = 1.25  #: A second cause nearer than this ratio of misfits is named t
 CLEAR = 1.5  #: Ratio of misfits by which another reading beats the second best.
 #: Ratio of misfits by which another reading beats the stated one that fits.
 #:
-#: Torques without gravity read as currents leave only 16 % open on a UR5, read right 1.5 %.
+#: Torques without gravity read as currents leave only 16 % open on a UR5, read right 1.5
+#: %.
 OVERWHELMING = 5.0
 #: Misfits below which an effort is as named, and a base as in the robot file.
 #:
@@ -49,8 +51,8 @@ CARRIES = 0.25  #: Least share of gravity in an effort that shows the joint's pl
 OFFSET = 0.1  #: Least offset of a joint's effort, relative to the effort.
 #: Windows of a joint's motion, each way and both, for an offset beyond stiction.
 FORTH_AND_BACK, BOTH = 8, 30
-#: Angle between the fitted "up" and the robot file's of a tilted base [rad], and its weight
-#: then, relative to the robot file's.
+#: Angle between the fitted "up" and the robot file's of a tilted base [rad], and its
+#: weight then, relative to the robot file's.
 TILTED, WEIGHT = np.deg2rad(10.0), (0.6, 1.7)
 #: Least deviation of a drive's factor from 1, of all joints (sound logs stay within .06)
 #: and of one, which a load moves too.
@@ -60,7 +62,8 @@ LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
 SURE = 4.0  #: Least standard deviations of an offset, a factor or missing friction.
 KNOWN = 0.05  #: Largest standard deviation of a factor from motion.
 CLEARER = 1.5  #: Ratio of misfits by which a factor beats a load.
-#: Misfit that a model of the arm leaves of another's; measured efforts leave 1.3 % and more.
+#: Misfit that a model of the arm leaves of another's; measured efforts leave 1.3 % and
+#: more.
 MODELLED = 0.02
 #: Least share of the robot file's friction in any arm, and joints that judge it.
 RUBS, WITHOUT = 0.1, 3

@@ -23,8 +23,8 @@ from vftcli.signals.series import covered, runs_of
 
 #: Multiple of its largest torque that no drive gives: drive constants are uncertain. [1]
 BEYOND = 1.5
-#: Share of the joint's largest torque, and robust deviations of noise, between a bad sample
-#: and its neighbours. [1, -]
+#: Share of the joint's largest torque, and robust deviations of noise, between a bad
+#: sample and its neighbours. [1, -]
 AWAY, FAR = 0.5, 25.0
 FAST = 0.25  #: `AWAY` for velocities, by the joint's largest speed. [1]
 #: Most such samples in a row, and their time; more may be a blow. [-, s]

@@ -33,9 +33,11 @@ REFUSING = NO_FIT | {
     "upside-down", "tilted-base", "time-unit", "clock-rate",
     "velocity-unit", "velocity-of-another-kind", "velocity-sign", "no-friction-in-effort",
 }  # fmt: skip
-#: Findings that say how large a current is: a model of the arm knows better than its numbers.
+#: Findings that say how large a current is: a model of the arm knows better than its
+#: numbers.
 SIZED = CORRECTIONS.keys() - {"torque-with-gravity"}
-#: Findings that every command says: nothing is wrong, and results stand on what is assumed.
+#: Findings that every command says: nothing is wrong, and results stand on what is
+#: assumed.
 ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 
 
@@ -201,7 +203,8 @@ class Examiner:
             RobotError: If the names of its joints are not the robot's.
         """
         recording = unwound(paired(recording, robot), robot)
-        # What no block of a long log shows has no room to be looked for in all of it at once.
+        # What no block of a long log shows has no room to be looked for in all of it at
+        # once.
         blocks = recording.blocks(BLOCK) if in_stretches else ()
         if not in_stretches or any(without_bad_samples(b, robot) is not b for b in blocks):
             recording = without_bad_samples(recording, robot)

@@ -29,9 +29,11 @@ CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
 #:
 #: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
-#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the next.
+#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the
+#: next.
 #:
-#: UR10e logs fit their own to .1–.26 %, the next 30 times worse; FR3 and Panda are 2 apart.
+#: UR10e logs fit their own to .1–.26 %, the next 30 times worse; FR3 and Panda are 2
+#: apart.
 GUESSED, APART = 0.012, 5.0
 HEAVY = 5.0  #: A load from which a measured effort rather is another arm's. [kg]
 #: Torques that a model should explain, the most telling first.
@@ -308,7 +310,8 @@ def vendor_sign(case: Case) -> Iterator[Remark]:
     if recording.tau_ext is None or recording.torque is None:
         return
     vendor = case.windows.mean(recording.tau_ext)
-    # A load that the vendor's model knows and the robot file does not is in neither of them.
+    # A load that the vendor's model knows and the robot file does not is in neither of
+    # them.
     vendor = vendor - np.median(vendor, axis=0)
     if size_of(vendor) < FELT * case.size:
         return

@@ -1,7 +1,7 @@
 """Findings on signals: missing ones, units, signs; those that hold, are zero, clipped or coarse.
 
-A signal is stuck where it repeats itself to the last bit for half a second while the joint's other
-signals show that it has to change.
+A signal is stuck where it repeats itself to the last bit for half a second while the
+joint's other signals show that it has to change.
 """
 
 from collections.abc import Iterable, Iterator
@@ -23,18 +23,19 @@ ABSURD, FARTHEST = 1e9, 1e18  #: No measurement is this large, in whatever unit,
 #: Sample times between which every recorder's lies, read in whatever unit. [s]
 STEPS = (1e-13, 1e10)
 SOME = 5000  #: Samples that tell how large a signal usually is.
-#: Share of the samples at which an interpolated signal runs straight on; change of slope that
-#: is none, relative to it; and share of values that have to change.
+#: Share of the samples at which an interpolated signal runs straight on; change of slope
+#: that is none, relative to it; and share of values that have to change.
 STRAIGHT, BEND, MOVED = 0.6, 1e-3, 0.1
 #: Two turns and a little: no joint of these arms goes further from its zero. [rad]
 LARGE_ANGLE = 13.0
 LARGE_CURRENT = 60.0  #: No joint of these arms draws this much; readings in mA do. [A]
-#: Time, and steps, for which a stuck signal has to repeat itself; way within that time by which
-#: a joint surely moves, at 20 mrad/s. [s, -, rad]
+#: Time, and steps, for which a stuck signal has to repeat itself; way within that time by
+#: which a joint surely moves, at 20 mrad/s. [s, -, rad]
 LONG, MANY, WAY = 0.5, 10, 0.01
 #: A signal's stuck stretch is this many times as long as nearly all its other repeats.
 UNUSUAL = 10.0
-#: Deviation of a speed from a constant acceleration, beyond which its effort changes. [rad/s]
+#: Deviation of a speed from a constant acceleration, beyond which its effort changes.
+#: [rad/s]
 BENT = 0.005
 TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
 #: Steps of the positions that are worth telling: .02 rad/s at 100 Hz. [rad]
@@ -72,7 +73,8 @@ def signal_findings(recording: Recording) -> Iterator[Remark]:
         yield warning("no-velocity")
     if not efforts_of(recording):
         yield warning("no-effort")
-    # Radians and ampere are never so large. The last joint of some arms turns without end.
+    # Radians and ampere are never so large. The last joint of some arms turns without
+    # end.
     largest = float(abs(recording.q[:, : max(1, recording.joints - 1)]).max())
     if largest > LARGE_ANGLE:
         yield warning("degrees", largest_rad=largest)
@@ -99,8 +101,8 @@ def thinly(recording: Recording, count: int) -> slice:
 def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
     """Share of a signal's samples (T, n) in straight motion, and where any bends.
 
-    The share is 0 where hardly one moves; the samples are those from the second to the last but
-    one. (T - 2,)
+    The share is 0 where hardly one moves; the samples are those from the second to the
+    last but one. (T - 2,)
     """
     slope = np.diff(value, axis=0) / np.diff(t)[:, None]
     bent = abs(np.diff(slope, axis=0)) > BEND * (abs(slope[1:]) + abs(slope[:-1]))
@@ -258,7 +260,8 @@ def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, in
         first, last = edges_of(same[:, j])
         lengths = last - first
         long = (t[last] - t[first] >= LONG) & (lengths >= MANY)
-        # Repeats of a coarse resolution come in all lengths, those of a stuck signal stand out.
+        # Repeats of a coarse resolution come in all lengths, those of a stuck signal
+        # stand out.
         usual = np.sort(lengths[~long])
         least = UNUSUAL * usual[int(0.95 * len(usual))] if usual.size else 0.0
         for a, b in zip(first[long].tolist(), last[long].tolist(), strict=True):
@@ -295,8 +298,9 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
         zeros[name] = zero & ~value.any(axis=0) if zero.any() else zero
     for name, value in efforts_of(recording):
         zero = zeros[name]
-        # Without noise a joint that never moves may need no torque at all: most columns of a
-        # sensor are rougher than motion. Steps of white noise differ by √3 times their own size.
+        # Without noise a joint that never moves may need no torque at all: most columns
+        # of a sensor are rougher than motion. Steps of white noise differ by √3 times
+        # their own size.
         steps = np.diff(value[:, ~zero], axis=0)
         rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
         measured = zero.all() or rough.mean() > 0.5
@@ -321,7 +325,8 @@ def is_clipped(value: Array, position: Array, least: int) -> bool:
         # A drive saturates far from zero; one that often repeats a small value rests.
         if size == 0 or abs(extreme) < 0.5 * size or count < least:
             continue
-        # The rounded top of a smooth effort of coarse resolution is wide on the next level too.
+        # The rounded top of a smooth effort of coarse resolution is wide on the next
+        # level too.
         if np.count_nonzero(up == up[~at].max()) > 0.2 * count:
             continue
         long = (position[a:b] for a, b in runs_of(at) if b - a >= least)

@@ -1,8 +1,8 @@
 """Findings on the clock, and on logged velocity beside position: unit, order, lateness.
 
-Short windows fit the logged velocity as q̇(t) ≈ a·v(t) − a·τ·v̇(t): v is the derivative of
-the position, a the gain, τ the delay. Both sides get Hann's weights φ; by
-∫φ v̇ dt = −∫φ' v dt nothing is resampled and no noise amplified.
+Short windows fit the logged velocity as q̇(t) ≈ a·v(t) − a·τ·v̇(t): v is the derivative
+of the position, a the gain, τ the delay. Both sides get Hann's weights φ; by ∫φ v̇
+dt = −∫φ' v dt nothing is resampled and no noise amplified.
 """
 
 from collections.abc import Iterator
@@ -18,8 +18,8 @@ from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.rest import MOVES, NONZERO
 from vftcli.signals.series import gaps_of, runs_of
 
-#: Length of a window: short beside motion, long beside noise of single samples and an arm's
-#: vibration. [s]
+#: Length of a window: short beside motion, long beside noise of single samples and an
+#: arm's vibration. [s]
 WINDOW = 0.2
 #: Steps of a window of a slow log, and of a fast one after thinning.
 LEAST_STEPS, MOST_STEPS = 8, 40
@@ -38,8 +38,8 @@ SURE = 4.0  #: Standard errors, too, that a deviation must exceed.
 #: Lag that is named, or a longer sample time: a robot's velocity filter needs 2–3 ms, a
 #: host's stamps up to 6. [s]
 LATE = 0.008
-#: Ratio of open shares at which another joint's position beats the own with a lag, and the
-#: largest gain error of the own for this.
+#: Ratio of open shares at which another joint's position beats the own with a lag, and
+#: the largest gain error of the own for this.
 ANOTHER, ALIKE = 0.25, 0.3
 OPEN = 0.1  #: Largest open share of a velocity for its gain to count.
 DAMPED_MOST = 0.15  #: Below this gain a velocity is not late: its size differs.
@@ -52,11 +52,11 @@ DEGREES, CLOSE = 180 / np.pi, 0.06
 BEYOND = 1.5
 #: Gain of a gear, not of a clock: arms have 30 to 160.
 GEARED = 10.0
-#: Gain → unit of the stamps; milliseconds read as seconds make the derivative a thousand times
-#: too small.
+#: Gain → unit of the stamps; milliseconds read as seconds make the derivative a thousand
+#: times too small.
 UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns", 1e-3: "s", 1e-6: "s", 1e-9: "s"}
-#: Share of moving steps with a repeated velocity that is held: half the rate repeats one in two,
-#: sound logs up to a third.
+#: Share of moving steps with a repeated velocity that is held: half the rate repeats one
+#: in two, sound logs up to a third.
 HELD = 0.55
 TINY = 1e-300  #: Least divisor; the dividend is 0 too.
 STEPS, BLOCK = 8000, 500  #: Most steps, in blocks.
@@ -144,8 +144,8 @@ def spread_of(v: Array) -> Array:
 def weighed_means(recording: Recording) -> Array:
     """Hann-weighted means over windows spread over the log. (4, W, n)
 
-    Of the position's derivative v, the logged velocity [rad/s], then −v̇ by the first and the
-    second [rad/s²]. Windows across a gap or of tiny steps are left out.
+    Of the position's derivative v, the logged velocity [rad/s], then −v̇ by the first and
+    the second [rad/s²]. Windows across a gap or of tiny steps are left out.
     """
     t, dq, step = recording.t, recording.require("dq"), recording.median_step
     length = round(WINDOW / step) if USUAL[0] < step < USUAL[1] else UNUSUAL_STEPS
@@ -283,7 +283,8 @@ def held_shares(recording: Recording) -> dict[int, float]:
 
 
 SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
-#: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
+#: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly
+#: wrong.
 JITTER = 0.05
 GAP_STEPS = 4.0  #: A step this many times the median is a gap.
 LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]

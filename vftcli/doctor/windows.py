@@ -1,8 +1,8 @@
 """Model torque over short windows of a log, and least squares over them.
 
-Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, since ṗ = Cᵀq̇ − g + τ, and no
-acceleration has to be differentiated. Gravity is kept apart, as a matrix times the direction that
-is up, so that its direction can be fitted.
+Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, since
+ṗ = Cᵀq̇ − g + τ, and no acceleration has to be differentiated. Gravity is kept apart, as
+a matrix times the direction that is up, so that its direction can be fitted.
 
 Least squares set contact aside, with terms that cannot be negative. A round of trimming
 only adds up the normal equations of the windows that are kept.
@@ -28,7 +28,8 @@ GRAVITY = [0, 3, 6]  #: Those of them at which gravity is asked: between them it
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
 FAST = 0.8  #: Mean direction of a window in which a joint moves.
-#: Mass [kg] and first moment [kg·m] that a load may well have, before the log says anything.
+#: Mass [kg] and first moment [kg·m] that a load may well have, before the log says
+#: anything.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
 KEPT = 0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
 ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
@@ -40,7 +41,8 @@ class Terms(NamedTuple):
 
     columns: Array  #: Torque per unit of each coefficient. (W, n, k)
     positive: bool = False  #: Whether they only make sense above zero, as friction's do.
-    #: Standard deviations that they have before any data, one for all or (k,); inf for none.
+    #: Standard deviations that they have before any data, one for all or (k,); inf for
+    #: none.
     prior: Array | float = np.inf
 
 
@@ -223,8 +225,9 @@ MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are no loads but another a
 TELLING = 0.9  #: Share of the misfit that a load must leave at most, or it only adds freedom.
 #: Range of gravity's torque, relative to the effort, from which the poses tell a load.
 VARIED = 0.3
-#: A cause shows in a window where it makes this many times what the fit leaves over; it is refuted
-#: there where the log without it leaves less than this share of what is left with it.
+#: A cause shows in a window where it makes this many times what the fit leaves over; it
+#: is refuted there where the log without it leaves less than this share of what is left
+#: with it.
 FELT, REFUTED = 4.0, 0.6
 LASTING = 0.95  #: Share of the windows in which a cause that lasts must not be refuted.
 

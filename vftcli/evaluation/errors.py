@@ -1,7 +1,7 @@
 """Errors of estimates against a reference: one tidy table, the unit in each column's name.
 
-Several logs of one arm are one experiment, with pooled rows below those of each log; over the
-joints of a log there is one mean, of those with a reference to be trusted.
+Several logs of one arm are one experiment, with pooled rows below those of each log; over
+the joints of a log there is one mean, of those with a reference to be trusted.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,11 +19,12 @@ from vftcli.signals.parsing import check_kind
 from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
 
-#: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.
+#: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the
+#: samples.
 #:
-#: `coverage_95` is the share of samples within the estimate's 95 % band, where it has one;
-#: `missing` the share without an answer, which counts as the answer 0, so that nothing hides by
-#: failing.
+#: `coverage_95` is the share of samples within the estimate's 95 % band, where it has
+#: one; `missing` the share without an answer, which counts as the answer 0, so that
+#: nothing hides by failing.
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
     "observer": pl.String,
@@ -47,7 +48,8 @@ SCHEMA: dict[str, type[pl.DataType]] = {
 }
 
 TRUSTED_SHARE = 0.5  #: A joint's reference is trusted if at least this share of its samples is.
-#: Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30 %.
+#: Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30
+#: %.
 LEAST = 10
 POOLED = "pooled"  #: Name of the pooled rows in the column `recording`.
 
@@ -86,15 +88,16 @@ class Scored(NamedTuple):
     reference: Array  #: (T,) [N·m]
     moving: Mask  #: Whether the joint moves, so that the reference may be relied on. (T,)
     floor: float  #: The reference's own error, NaN where it is not known. [N·m]
-    #: Bootstrap draws of the mean squared errors, one column an observer, all in the same blocks:
-    #: for comparing observers.
+    #: Bootstrap draws of the mean squared errors, one column an observer, all in the same
+    #: blocks: for comparing observers.
     paired: Resampled
-    #: Draws of each observer in blocks of its own length, so that its interval does not depend on
-    #: who else is asked.
+    #: Draws of each observer in blocks of its own length, so that its interval does not
+    #: depend on who else is asked.
     own: tuple[Resampled, ...]
     lag: Array  #: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
     within: Array  #: Samples with an error within each observer's 95 % band. (m,)
-    #: Samples in which it has a band and the joint moves: `within` is a part of them. (m,)
+    #: Samples in which it has a band and the joint moves: `within` is a part of them.
+    #: (m,)
     banded: Array
 
     @property

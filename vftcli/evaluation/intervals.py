@@ -51,9 +51,10 @@ class Resampled(NamedTuple):
 def resample(squares: Array, length: int) -> Resampled:
     """Mean squares of moving-block bootstrap repetitions of squared errors. (T, m) [(N·m)²]
 
-    Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from the
-    series closed to a ring, so that every sample counts alike (Politis and Romano's circular
-    variant of Künsch's moving blocks); all columns share blocks of a length [samples].
+    Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from
+    the series closed to a ring, so that every sample counts alike (Politis and Romano's
+    circular variant of Künsch's moving blocks); all columns share blocks of a length
+    [samples].
     """
     samples = len(squares)
     blocks = max(1, round(samples / length))
@@ -78,8 +79,8 @@ def block_lengths(squares: Array) -> Indices:
 def correlation_time(x: Array) -> Array:
     """Autocorrelation's integral up to its first value below 0.05. (m,) [samples]
 
-    1 for white noise. Lags: `FIRST_LAGS`, then fourfold until every column has fallen or half of
-    the log is reached.
+    1 for white noise. Lags: `FIRST_LAGS`, then fourfold until every column has fallen or
+    half of the log is reached.
     """
     most = max(len(x) // 2, 1)
     columns = np.ascontiguousarray((x - x.mean(axis=0)).T)
@@ -100,10 +101,11 @@ def correlation_time(x: Array) -> Array:
 def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, float]:
     """95 % interval of an RMSE from bootstrap draws of its mean square. [N·m]
 
-    The scatter of a mean square is a share of the true value, not of the observed one: a log with
-    few contacts shows both a small mean and a small scatter. With h, that share times Student's
-    quantile for the number of blocks, the true value is at most observed/(1 − h); downwards, where
-    the mean square is skewed, its logarithm is used: observed·e^{−h}.
+    The scatter of a mean square is a share of the true value, not of the observed one: a
+    log with few contacts shows both a small mean and a small scatter. With h, that share
+    times Student's quantile for the number of blocks, the true value is at most
+    observed/(1 − h); downwards, where the mean square is skewed, its logarithm is used:
+    observed·e^{−h}.
     """
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")
@@ -115,9 +117,9 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
 def student_quantile(p: float, freedom: int) -> float:
     """Student's t below which a share p > 0.5 lies.
 
-    With t = √ν tan θ the share between 0 and t is c ∫ cos^(ν−1) over [0, θ], which is concave in θ:
-    Newton's steps from θ = (p − ½)/c come to the root from below. SciPy has it too, and its import
-    takes as long as an analysis.
+    With t = √ν tan θ the share between 0 and t is c ∫ cos^(ν−1) over [0, θ], which is
+    concave in θ: Newton's steps from θ = (p − ½)/c come to the root from below. SciPy has
+    it too, and its import takes as long as an analysis.
     """
     c = np.exp(lgamma(0.5 * (freedom + 1)) - lgamma(0.5 * freedom)) / np.sqrt(np.pi)
     nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE)
@@ -133,8 +135,9 @@ def paired_significance(
 ) -> pl.DataFrame:
     """Every pair of observers on every joint: difference of RMSE, its interval, and p.
 
-    Both observers' errors are resampled in the same blocks, so that what they share (contacts,
-    the reference's own error) cancels. A sample without an answer counts as the answer 0.
+    Both observers' errors are resampled in the same blocks, so that what they share
+    (contacts, the reference's own error) cancels. A sample without an answer counts as
+    the answer 0.
     """
     rows = []
     for j in range(reference.joints):

@@ -160,7 +160,8 @@ def compare_with(
 
 STEP_TIME = 3.0  #: Length of the step that response times are read from. [s]
 REACHED = 0.9  #: Share of a step at which it counts as seen.
-#: Contacts by a person's deliberate action lie below this frequency, the rest is noise. [Hz]
+#: Contacts by a person's deliberate action lie below this frequency, the rest is noise.
+#: [Hz]
 FAST = 5.0
 
 
@@ -170,8 +171,8 @@ class Facts(NamedTuple):
     name: str  #: The observer.
     response: float  #: Time until 90 % of a step is seen, the slowest joint. [s]
     delay: float  #: Delay behind a slow ramp, the slowest joint. [s]
-    #: Noise of the estimate, mean of joints: the drive torque's white noise through the observer's
-    #: own response. [N·m]
+    #: Noise of the estimate, mean of joints: the drive torque's white noise through the
+    #: observer's own response. [N·m]
     noise: float
     #: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
     passed: float
@@ -224,7 +225,8 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
     return np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
 
 
-#: Use of an observer, the deciding number in words, its name in `Facts`, and the paper's advice.
+#: Use of an observer, the deciding number in words, its name in `Facts`, and the paper's
+#: advice.
 GUIDELINES = (
     (
         *("collision detection", "shortest response", "response"),

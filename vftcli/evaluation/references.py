@@ -34,20 +34,22 @@ from vftcli.virtual_sensor.frames import NOTHING, Mounting, from_base, in_base_a
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 from vftcli.virtual_sensor.solvers import VirtualSensor
 
-#: Cutoff of the open torque's low-pass: a hand's push lasts longer, reversals do not. [Hz]
+#: Cutoff of the open torque's low-pass: a hand's push lasts longer, reversals do not.
+#: [Hz]
 CUTOFF = 2.0
 #: Multiple of a joint's median open torque from which it sticks out.
 #:
-#: Free UR10e logs reach more on joints with friction missed for a moment (13.8), but below
-#: their dry friction; logs of hands, and simulated pushes, reach 17–100.
+#: Free UR10e logs reach more on joints with friction missed for a moment (13.8), but
+#: below their dry friction; logs of hands, and simulated pushes, reach 17–100.
 STANDING_OUT = 8.0
-#: Multiple of a joint's dry friction up to which friction may be what is open; free UR10e logs
-#: reach 1.15, logs of hands 1.8–7.
+#: Multiple of a joint's dry friction up to which friction may be what is open; free UR10e
+#: logs reach 1.15, logs of hands 1.8–7.
 OF_FRICTION = 1.5
-#: Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open. [N·m]
+#: Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open.
+#: [N·m]
 LEAST = 2.0
-#: Multiple of its limit from which open torque is plainly no model error: a free UR10 reaches
-#: 1.14, hands and pushes 2.1 and more.
+#: Multiple of its limit from which open torque is plainly no model error: a free UR10
+#: reaches 1.14, hands and pushes 2.1 and more.
 PLAIN = 1.5
 SHORTEST = 2.0  #: Shorter logs have no quiet level. [s]
 
@@ -66,8 +68,8 @@ class ShownContact(NamedTuple):
 def touches(run: Run) -> tuple[ShownContact, ...]:
     """Contacts seen in a log, in order of time; unseen ones may exist.
 
-    The torque that the model leaves open is low-passed and compared with its own quiet level:
-    friction that is missed spreads over a log, a contact sticks out.
+    The torque that the model leaves open is low-passed and compared with its own quiet
+    level: friction that is missed spreads over a log, a contact sticks out.
     """
     recording, robot = run.recording, run.robot
     # Motor friction that nobody models hides contact and looks like one.
@@ -103,7 +105,8 @@ def touched_remarks(run: Run) -> tuple[Remark, ...]:
     begin, end = max(spans, key=lambda span: span[1] - span[0])
     values = {
         "torque_Nm": worst.torque, "quiet_Nm": worst.quiet, "spans": len(found),
-        # Rounded inwards, so that the span that is offered holds nothing of what it leaves out.
+        # Rounded inwards, so that the span that is offered holds nothing of what it
+        # leaves out.
         "begin_s": np.ceil(10.0 * begin) / 10.0, "end_s": np.floor(10.0 * end) / 10.0,
     }  # fmt: skip
     where = Where(joints=(worst.joint + 1,), span=(worst.start, worst.stop))
@@ -115,8 +118,8 @@ class ReferenceLoad:
     """Torque and wrench that estimates are judged by, on the log's clock."""
 
     torque: ExternalTorque  #: The reference torque of every joint.
-    #: The wrench it was made from, in base axes about the flange point, as force on the robot; None
-    #: where the reference is a torque to begin with.
+    #: The wrench it was made from, in base axes about the flange point, as force on the
+    #: robot; None where the reference is a torque to begin with.
     wrench: Wrench | None = None
 
 
@@ -150,8 +153,8 @@ def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting) -> 
     return load_of(wrench, recording, robot, "sensor", caution("reference-sensor"))
 
 
-#: One of `NAMES` of a choice → what makes it of a log, its free motion, and where tool and sensor
-#: sit.
+#: One of `NAMES` of a choice → what makes it of a log, its free motion, and where tool
+#: and sensor sit.
 REFERENCES: dict[str, Callable[[FreeMotion, Mounting], ReferenceLoad]] = {
     "zero": lambda motion, _: zero_reference(motion.log),
     "vendor": lambda motion, _: vendor_reference(motion.log.recording),
@@ -181,8 +184,9 @@ def file_reference(
 ) -> ReferenceLoad:
     """External torque, wrench or both from a table on the log's own clock.
 
-    A file without torques gives those of its wrench, Jᵀ w. A wrench is read as one in base axes
-    about the flange point unless ``wrench[FRAME]=…`` in the columns says otherwise.
+    A file without torques gives those of its wrench, Jᵀ w. A wrench is read as one in
+    base axes about the flange point unless ``wrench[FRAME]=…`` in the columns says
+    otherwise.
     """
     table = read_reference(path, columns)
     # The recording counts from its first sample, a reference file from the log's zero.
@@ -213,7 +217,8 @@ def file_reference(
 
 def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:
     """Columns (M, k) at a file's times [s], interpolated to the log's, NaN beyond. (T, k)"""
-    # Half a sample more at either end: stamps of one clock, written by two programs, round apart.
+    # Half a sample more at either end: stamps of one clock, written by two programs,
+    # round apart.
     slack = 0.5 * recording.median_step
     inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
     if not inside.any():
@@ -281,7 +286,8 @@ def reference_wrench(
     A sensor's or a file's stays; any other reference is a torque, solved by least squares.
     """
     torque = reference.torque
-    # Plain least squares whatever the estimates' solver is: a reference is not to be smoothed.
+    # Plain least squares whatever the estimates' solver is: a reference is not to be
+    # smoothed.
     solved = replace(sensor, solver="pinv").wrench(torque, recording.q, robot.chain)
     if reference.wrench is None:
         return replace(solved, name=torque.name, sd=None, remarks=())

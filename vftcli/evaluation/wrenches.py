@@ -23,8 +23,9 @@ from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose, null_space, wr
 
 #: Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
 #:
-#: `band_share` is the share of the samples with a 95 % band that holds the reference, `missing`
-#: that without an answer where the pose can tell one, which counts as the answer 0.
+#: `band_share` is the share of the samples with a 95 % band that holds the reference,
+#: `missing` that without an answer where the pose can tell one, which counts as the
+#: answer 0.
 WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
     **SCHEMA,
     "axis": pl.String,
@@ -71,10 +72,11 @@ def evaluate_wrenches(
     return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
 
 
-#: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench" or "list".
+#: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench"
+#: or "list".
 #:
-#: One to one: of the true contacts some are found; of those missed some are merged, which run into
-#: others. Rows that are neither credited nor false alarms are splits.
+#: One to one: of the true contacts some are found; of those missed some are merged, which
+#: run into others. Rows that are neither credited nor false alarms are splits.
 CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
     "observer": pl.String,

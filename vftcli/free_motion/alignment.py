@@ -49,10 +49,10 @@ class Alignment(NamedTuple):
 def align(recording: Recording, free: Recording) -> Alignment:
     """Shift at which `free` passes the recording's joint positions.
 
-    A coarse shift minimises the mean squared position difference over all overlaps of at least
-    `LEAST_OVERLAP`, by FFT on a common uniform clock. Gauss–Newton steps, robust against contacts,
-    then refine shift and ratio of rates on the logs' own clocks. A motion that repeats fits at
-    every whole period: the shift with most overlap wins.
+    A coarse shift minimises the mean squared position difference over all overlaps of at
+    least `LEAST_OVERLAP`, by FFT on a common uniform clock. Gauss–Newton steps, robust
+    against contacts, then refine shift and ratio of rates on the logs' own clocks. A
+    motion that repeats fits at every whole period: the shift with most overlap wins.
     """
     check_same_arm(recording, free)
     closest = aligned_at(recording, free, *best_fit(recording, free))
@@ -144,8 +144,9 @@ def check_same_arm(recording: Recording, free: Recording) -> None:
 def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     """The shared part of two logs' motions, None if too short.
 
-    At the shift most of the recording's motion is within `SAME_TRAJECTORY`; this must be at
-    least `LEAST_OVERLAP` of it. The partners are unbroken stretches of a second or more.
+    At the shift most of the recording's motion is within `SAME_TRAJECTORY`; this must be
+    at least `LEAST_OVERLAP` of it. The partners are unbroken stretches of a second or
+    more.
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
     q = resample_columns(t, recording.t, recording.q)
@@ -228,8 +229,8 @@ def refined(
 ) -> tuple[float, float]:
     """Shift [s] and clock rate, refined on the logs' own clocks.
 
-    Gauss–Newton on q_free(rate·t + shift) = q(t), each joint weighted by its spread, samples
-    by Cauchy's weight against contacts; as they are without information.
+    Gauss–Newton on q_free(rate·t + shift) = q(t), each joint weighted by its spread,
+    samples by Cauchy's weight against contacts; as they are without information.
     """
     slope = np.gradient(free.q, free.t, axis=0)
     for _ in range(15):

@@ -9,7 +9,8 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.option import LOG, Choice, Option, interval, setting
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
-#: Rungs of the alignment ladder, from the lowest; `vftcli.free_motion.difference.RUNGS` makes them.
+#: Rungs of the alignment ladder, from the lowest; `vftcli.free_motion.difference.RUNGS`
+#: makes them.
 ALIGNMENTS = ("commanded", "period", "phase", "model")
 
 

@@ -21,7 +21,8 @@ LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there
 
 #: Positions return if a quarter of them come back within this share of their own spread.
 #:
-#: A quarter: a soft servo is off its path while it is pushed, which may be most of the time.
+#: A quarter: a soft servo is off its path while it is pushed, which may be most of the
+#: time.
 RETURNS = 0.015
 
 #: A valley is worth refining if a quarter of the samples come back within this share.
@@ -34,11 +35,13 @@ ENOUGH = 2560  #: Samples that choose and refine a period: more of them only tak
 #: Spans this many times what the samples fill at their usual step are gaps, not motion.
 SPARSE = 10.0
 
-#: A sample is on the repeated path if it is there again one period away, within this. [rad]
+#: A sample is on the repeated path if it is there again one period away, within this.
+#: [rad]
 ON_PATH = 0.1
 COMPLETE = 0.97  #: Share of a cycle that must be in the log for it to count as whole.
 
-#: A cycle is free too if its difference from the freest is within this many expected errors.
+#: A cycle is free too if its difference from the freest is within this many expected
+#: errors.
 ALIKE = 1.5
 MOST_PAIRED = 8  #: Free cycles that are paired with the others, at most.
 SETTLES = 2.0  #: Time around a cycle in which filters settle. [s]
@@ -55,10 +58,11 @@ class Period(NamedTuple):
 def find_period(recording: Recording, stated: float | None = None) -> Period:
     """Find the time after which the joint positions return.
 
-    The mean squared distance between the log and itself later (the autocorrelation with its
-    overlap accounted for) has a valley at every multiple of the period. The first valley from
-    which enough samples return is refined below the sample time by Gauss–Newton steps on all
-    its multiples together, robust against contacts that push the arm off its path.
+    The mean squared distance between the log and itself later (the autocorrelation with
+    its overlap accounted for) has a valley at every multiple of the period. The first
+    valley from which enough samples return is refined below the sample time by
+    Gauss–Newton steps on all its multiples together, robust against contacts that push
+    the arm off its path.
 
     The search stays within `AROUND` of a stated period. [s]
     """
@@ -171,9 +175,9 @@ def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
 def refined_period(t: Array, q: Array, period: float) -> float:
     """Refine a period below the sample time, on the log's own clock. [s]
 
-    Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES` multiples the log
-    holds, each joint weighted by its own spread, samples by Cauchy's weight, so that pushes do not
-    pull the period.
+    Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES`
+    multiples the log holds, each joint weighted by its own spread, samples by Cauchy's
+    weight, so that pushes do not pull the period.
     """
     # Interpolation goes along time, column by column.
     q = np.asfortranarray(q)
@@ -228,10 +232,10 @@ class Cycles(NamedTuple):
 def segment(recording: Recording, period: Period) -> Cycles:
     """Find where the repeated path begins and ends; the log may start amid a cycle.
 
-    A sample is on the path if one period later or earlier the arm is at this place, or if the
-    log is so short that neither is in it. Contacts push it off for a moment only, so the path
-    begins with the first sample after which at least three quarters of a cycle are on it, and ends
-    likewise.
+    A sample is on the path if one period later or earlier the arm is at this place, or if
+    the log is so short that neither is in it. Contacts push it off for a moment only, so
+    the path begins with the first sample after which at least three quarters of a cycle
+    are on it, and ends likewise.
     """
     t, q = moving_part(recording)
     seconds = period.seconds
@@ -277,8 +281,8 @@ class FreeCycles(NamedTuple):
     """Cycles assumed free."""
 
     numbers: tuple[int, ...]  #: Counted from 0.
-    #: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of one that
-    #: lies in a gap; None where they were given. (cycles,)
+    #: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of
+    #: one that lies in a gap; None where they were given. (cycles,)
     residuals: Array | None
 
     @property
@@ -301,7 +305,8 @@ class FreeCycles(NamedTuple):
             found = fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
         if count <= MOST_PAIRED:
             return [found]
-        # The mean of k cycles with independent noise adds 1/k of one cycle's to the square.
+        # The mean of k cycles with independent noise adds 1/k of one cycle's to the
+        # square.
         wider = float(np.sqrt((1.0 + 1.0 / MOST_PAIRED) / (1.0 + 1.0 / count)) - 1.0)
         return [found, fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider)]
 
@@ -309,8 +314,8 @@ class FreeCycles(NamedTuple):
 def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
     """The cycle of smallest residual, and those that differ by noise alone.
 
-    The residual of a cycle is the root mean square of torque minus the model's, low-passed, of
-    each joint relative to that joint's smallest, averaged over the joints.
+    The residual of a cycle is the root mean square of torque minus the model's,
+    low-passed, of each joint relative to that joint's smallest, averaged over the joints.
     """
     number = cycles.number(motion.t)
     if cycles.whole < 1:

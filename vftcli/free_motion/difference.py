@@ -145,8 +145,8 @@ def differences(
 def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
     """τ_ext = τ_free − τ (+ model − model_free) at pairs, low-passed if asked.
 
-    With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one, the
-    bracket is exact; without it the two motions are assumed equal.
+    With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one,
+    the bracket is exact; without it the two motions are assumed equal.
     """
     motion, known = pair.motion, pair.known
     if np.count_nonzero(known) < 16:
@@ -169,8 +169,8 @@ def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
 def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
     """The difference with the least expected error, the simpler of equals; the floor of each.
 
-    Compared is the mean over trusted joints of expected error in motion, relative to the lowest
-    rung's. Only the best so far is kept: of a long log not all have room at once.
+    Compared is the mean over trusted joints of expected error in motion, relative to the
+    lowest rung's. Only the best so far is kept: of a long log not all have room at once.
     """
     steps = iter(made)
     chosen = next(steps)
@@ -234,9 +234,9 @@ def error_model(
 def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
     """Noise of a difference. (n,) [N·m]
 
-    Without a low-pass from second differences: for white noise of deviation σ on a smooth signal
-    x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, at least
-    `LEAST_BAND`, as contacts fill lower ones; assumed as dense throughout.
+    Without a low-pass from second differences: for white noise of deviation σ on a smooth
+    signal x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, at
+    least `LEAST_BAND`, as contacts fill lower ones; assumed as dense throughout.
     """
     if cutoff is None:
         return np.asarray(rms(x[:-2] - 2.0 * x[1:-1] + x[2:], moving[1:-1]) / np.sqrt(6.0))
@@ -262,10 +262,10 @@ def noise_below(
 def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
     """Coloured noise of a low-passed difference (S, n) from its quietest pieces. (n,) [N·m]
 
-    Real noise is denser at low frequencies than above contacts. In a piece of `PIECE` it is the
-    deviation from a straight line, a slow load's course; `QUIET` of the pieces are assumed without
-    a fast contact. Slower wander does not count: this errs low. Zero for fewer than
-    `LEAST_PIECES`.
+    Real noise is denser at low frequencies than above contacts. In a piece of `PIECE` it
+    is the deviation from a straight line, a slow load's course; `QUIET` of the pieces are
+    assumed without a fast contact. Slower wander does not count: this errs low. Zero for
+    fewer than `LEAST_PIECES`.
     """
     size = round(PIECE / step)
     count = len(t) // size

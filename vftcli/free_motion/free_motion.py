@@ -1,8 +1,8 @@
 """Motion that nobody touched beside a log: its own spans and cycles, other runs; its load.
 
-A payload that the model lacks pulls in the free part too. Taken for noise it makes every tuned
-gain slow and every band wide; it is an external torque, and stays in the estimates. The free
-part's disturbance is fitted with a load's weight, its friction beside it,
+A payload that the model lacks pulls in the free part too. Taken for noise it makes every
+tuned gain slow and every band wide; it is an external torque, and stays in the estimates.
+The free part's disturbance is fitted with a load's weight, its friction beside it,
 
     d = J_Fᵀ(q) [m g; m c × g] + a tanh(q̇/v₀) + o,
 
@@ -210,10 +210,12 @@ LEAST = 0.4  #: A load from which it is one: drive constants that are 3 % off lo
 SURE = 4.0  #: Standard deviations that it has to be.
 PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
 CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
-#: Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 through. [s]
+#: Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13
+#: through. [s]
 HEARD = 2.0
 RATE = 30.0  #: RunSamples a second that are weighed.
-#: Time over which the model's errors resemble one another: so much counts as one sample. [s]
+#: Time over which the model's errors resemble one another: so much counts as one sample.
+#: [s]
 MEMORY = 0.3
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
 PASSES = 4  #: Fits, each with the joints' errors that the last one left.
@@ -323,8 +325,8 @@ def columns(piece: RunSamples) -> tuple[Array, Array] | None:
 def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
     """Weights of columns (m,), their standard deviations, and the rms that is left (n,) [N·m].
 
-    Regularised least squares of the disturbance d (S, n) [N·m] on A (S, n, m), each joint weighed
-    by what the fit leaves of it; the prior (m,) is of the weights about zero.
+    Regularised least squares of the disturbance d (S, n) [N·m] on A (S, n, m), each joint
+    weighed by what the fit leaves of it; the prior (m,) is of the weights about zero.
     """
     together = max(1.0, MEMORY * RATE)
     spread = root_mean_squares(d) + 1e-6

@@ -29,7 +29,8 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import REST, faster
 
 BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
-#: Standard errors from which on a change is believed: contacts alone rarely look like one.
+#: Standard errors from which on a change is believed: contacts alone rarely look like
+#: one.
 SURE = 3.0
 
 
@@ -60,10 +61,10 @@ def two_cycle_difference(
 def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     """The two-cycle difference of a log and its free motion, with its own error.
 
-    Where position and velocity repeat, gravity, inertia and friction cancel and what is left is
-    the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The free run is one
-    or more cycles of the log, which then have no reference of their own unless there are two,
-    or other logs of the motion.
+    Where position and velocity repeat, gravity, inertia and friction cancel and what is
+    left is the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The
+    free run is one or more cycles of the log, which then have no reference of their own
+    unless there are two, or other logs of the motion.
     """
     log, choice = motion.log, motion.choice
     clocks, remarks = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
@@ -103,7 +104,8 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     )
 
 
-#: "found" and, where a period is stated, "commanded" → one pairing a free run; and how found.
+#: "found" and, where a period is stated, "commanded" → one pairing a free run; and how
+#: found.
 Partners = tuple[Mapping[str, Sequence[Pairing]], list[Remark]]
 
 
@@ -197,9 +199,10 @@ def error_ratio(found: Difference, where: Mask) -> Array:
 def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     """Change of dry friction since the free run, 0 if maybe chance. (n,) [N·m]
 
-    Joints warm up between two logs, and then friction does not cancel. The change is the mean of
-    the difference (T, n) [N·m] times the sign of the velocity. Contacts do not follow the sign of
-    the velocity over a whole log; its scatter over pieces of `BLOCK` says how sure the mean is.
+    Joints warm up between two logs, and then friction does not cancel. The change is the
+    mean of the difference (T, n) [N·m] times the sign of the velocity. Contacts do not
+    follow the sign of the velocity over a whole log; its scatter over pieces of `BLOCK`
+    says how sure the mean is.
     """
     t, n = motion.t, tau.shape[1]
     piece = ((t - t[0]) / BLOCK).astype(np.int64)

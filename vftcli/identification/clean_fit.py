@@ -29,8 +29,8 @@ LOAD_EXPLAINS = 0.8  #: Least share of the misfit that a load explains.
 UNKNOWN_LOAD = 0.5  #: Smallest suspected load. [kg]
 #: A joint carries weight if its gravity torque varies by this share of the largest.
 HEAVY = 0.1
-#: Least ratio of the profile's rest to free links' for another arm: right links leave 1.0 to 2.5
-#: where friction or contact hide the torque, wrong ones 4 to 12.
+#: Least ratio of the profile's rest to free links' for another arm: right links leave 1.0
+#: to 2.5 where friction or contact hide the torque, wrong ones 4 to 12.
 OTHER_LINKS = 3.0
 THIRDS = 3  #: Stretches of a log compared for a warm-up.
 #: Least fall of dry friction from the first to the last stretch.

@@ -47,8 +47,9 @@ FITS: dict[str | None, Callable[[Training], MethodResult]] = {
     "targets": targets_method,
     None: chosen_method,
 }
-#: One row a log, model and joint: RMS of measured less predicted torque, in motion. `log_index`
-#: counts the logs from 1, training first: two files of one name stay two logs.
+#: One row a log, model and joint: RMS of measured less predicted torque, in motion.
+#: `log_index` counts the logs from 1, training first: two files of one name stay two
+#: logs.
 RESIDUALS = pl.Schema(
     {"log": str, "log_index": int, "role": str, "model": str}
     | {"joint": int, "rms_Nm": float, "samples": int}
@@ -61,7 +62,8 @@ WORSE = 1.5  #: Times the training's residual from which a held-out joint is rem
 BEHIND = 1.01
 NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
 SLOWNESS = 0.1  #: Velocity difference that counts as much as that distance, as a time. [s]
-#: Share of a log's samples on another's trajectory from which on it repeats that trajectory.
+#: Share of a log's samples on another's trajectory from which on it repeats that
+#: trajectory.
 REPEATED = 0.8
 #: One row a number: its value, standard deviation, and what the profile said.
 PARAMETERS = pl.Schema(get_type_hints(Number))
@@ -179,8 +181,8 @@ def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     """Whether friction explains joint j's (from 0) residual beyond training's.
 
-    Coulomb and viscous friction and an offset are fitted to the residual; where they explain
-    `EXPLAINS` of it, friction is named as its cause.
+    Coulomb and viscous friction and an offset are fitted to the residual; where they
+    explain `EXPLAINS` of it, friction is named as its cause.
     """
     motion, residual, size = trace.motion, trace.residual, float(trace.rms[j])
     where = Where(motion.recording.name, (j + 1,))

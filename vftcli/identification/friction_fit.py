@@ -46,12 +46,13 @@ NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
 BOUNDED = ("coulomb", "viscous")
 
 #: Velocities are reversed if both terms push, the bound leaves this many times the power,
-#: and by more than this share of the joint's largest torque: a right model's error pushes by up
-#: to .7 % of it; friction is 2 % (a Panda's wrist) to 20 % (a UR's).
+#: and by more than this share of the joint's largest torque: a right model's error pushes
+#: by up to .7 % of it; friction is 2 % (a Panda's wrist) to 20 % (a UR's).
 TURNED, PUSH = 2.0, 0.02
 
 SLIDING = 3e-3  #: Smoothing of the sign beside presliding. [rad/s]
-#: Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]
+#: Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6
+#: Hz. [Hz]
 LISTENING = 2.0
 MARGIN = 1.01  #: A simpler model wins within this factor of the best error.
 #: A shorter presliding length wins within this factor of the best, none over all.
@@ -77,8 +78,8 @@ class JointData(NamedTuple):
 
     joint: int  #: Joint, from 0.
     y: Array  #: Torque of friction and rotor. (M,) [N·m]
-    #: Columns beside friction: q̈ for an unknown rotor inertia, the rigid-body torque for an
-    #: unknown drive constant. (M, f)
+    #: Columns beside friction: q̈ for an unknown rotor inertia, the rigid-body torque for
+    #: an unknown drive constant. (M, f)
     fixed: Array
     weights: Array  #: 0 for empty samples, 1 elsewhere. (M,)
     logs: Sequence[PreparedLog]  #: The logs.
@@ -130,8 +131,8 @@ class JointFit(NamedTuple):
     scores: dict[Shape, float]
     constant: bool  #: Whether the drive constant was fitted too.
     presliding: PreslidingScore  #: The presliding length of all joints.
-    #: RMS that the model, and the profile's friction and rotor, miss of stretches left out;
-    #: NaN if not compared. [N·m]
+    #: RMS that the model, and the profile's friction and rotor, miss of stretches left
+    #: out; NaN if not compared. [N·m]
     errors: tuple[float, float] = (np.nan, np.nan)
 
     @property
@@ -183,8 +184,8 @@ def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: boo
 def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     """The equations of joint j (from 0) over all logs.
 
-    For an unknown drive constant the rigid body's torque is a column; its coefficient would be 1
-    with the profile's right constant. Else it is subtracted.
+    For an unknown drive constant the rigid body's torque is a column; its coefficient
+    would be 1 with the profile's right constant. Else it is subtracted.
     """
 
     def joined(signal: Callable[[PreparedLog], Array]) -> Array:
@@ -219,8 +220,8 @@ def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array
 def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
     """One presliding length for the whole arm by cross-validation, or none.
 
-    An observer's band decides: in a wider one a slow step drowns in noise. Of the nearly best the
-    shortest wins: it forgets its start soonest.
+    An observer's band decides: in a wider one a slow step drowns in noise. Of the nearly
+    best the shortest wins: it forgets its start soonest.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
     # One way only, the play operator is constant.
@@ -255,8 +256,8 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
 def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shape, float]]:
     """The simplest of a joint's nearly best models, and all errors. [N·m]
 
-    First the richest plain model decides the smoothing, then the logarithm's bend, then the
-    terms. A parabola competes only if it rises up to the joint's own speed.
+    First the richest plain model decides the smoothing, then the logarithm's bend, then
+    the terms. A parabola competes only if it rises up to the joint's own speed.
     """
     length = length if data.reverses else 0.0
     rich, plain = tellable_terms(RICHEST, data), Shape(tellable_terms(PLAIN, data))

@@ -1,18 +1,18 @@
 r"""The links' parameters by least squares: what motion shows, and the nearest physical links.
 
-Of the stacked equations only the R factor of their QR decomposition is kept, chunk by chunk:
-memory does not grow with the log. Base parameters are the combinations of inertial parameters that
-any motion shows at all.
+Of the stacked equations only the R factor of their QR decomposition is kept, chunk by
+chunk: memory does not grow with the log. Base parameters are the combinations of inertial
+parameters that any motion shows at all.
 
 A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
 
 .. math:: P = \begin{bmatrix} \tfrac12 \mathrm{tr}(I)\,1 - I & h \\ h^T & m \end{bmatrix}
 
-is positive definite (P. Wensing, S. Kim, J.-J. Slotine, IEEE RA-L 3(1), 2018). The distance to the
-profile is the log-determinant divergence tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4 (T. Lee, P. Wensing,
-F. Park, IEEE T-RO 36(1), 2020): it has no units, does not depend on the frame, is convex in the
-parameters, and grows without bound towards the edge, so that Newton's method never leaves the
-physical models and finds the one optimum.
+is positive definite (P. Wensing, S. Kim, J.-J. Slotine, IEEE RA-L 3(1), 2018). The
+distance to the profile is the log-determinant divergence tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4
+(T. Lee, P. Wensing, F. Park, IEEE T-RO 36(1), 2020): it has no units, does not depend on
+the frame, is convex in the parameters, and grows without bound towards the edge, so that
+Newton's method never leaves the physical models and finds the one optimum.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,8 +45,8 @@ MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
 #: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0
 STEPS = 100  #: Newton steps at most; a dozen or two are usual.
-#: Decrement at which Newton's method stops: the cost is a log-likelihood, where 1 is one standard
-#: deviation of one parameter, so that the rest to go is nothing.
+#: Decrement at which Newton's method stops: the cost is a log-likelihood, where 1 is one
+#: standard deviation of one parameter, so that the rest to go is nothing.
 SETTLED = 1e-3
 #: A profile's link is made at least this thick, so that a distance to it exists. [m]
 SMALLEST_RADIUS = 1e-3
@@ -176,9 +176,10 @@ class Grouping(NamedTuple):
 def group_parameters(layout: ParameterColumns) -> Grouping:
     """Base parameters of an arm's unknowns, by rank-revealing QR.
 
-    The regressor of random states, seeded, is decomposed with column pivoting; R = [R₁ R₂] gives
-    β = R₁⁻¹ R₂ (M. Gautier, "Numerical calculation of the base inertial parameters of robots",
-    J. Robotic Systems 8(4), 1991). Friction coefficients stand for themselves.
+    The regressor of random states, seeded, is decomposed with column pivoting;
+    R = [R₁ R₂] gives β = R₁⁻¹ R₂ (M. Gautier, "Numerical calculation of the base inertial
+    parameters of robots", J. Robotic Systems 8(4), 1991). Friction coefficients stand for
+    themselves.
     """
     from scipy.linalg import qr
 

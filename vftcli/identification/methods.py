@@ -150,8 +150,9 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
 def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
     """Coefficients of joint j (from 0), sd by its last drive constant, and this.
 
-    Torque was made from currents with the profile's K. Where the rigid body's torque comes out as
-    scale times what it must be, the true K is K / scale, and so are all coefficients beside it.
+    Torque was made from currents with the profile's K. Where the rigid body's torque
+    comes out as scale times what it must be, the true K is K / scale, and so are all
+    coefficients beside it.
     """
     scale, scale_sd = float(values[-1]), float(sd[-1])
     if scale <= LEAST_SLOPE:
@@ -289,8 +290,8 @@ def profile_constant(robot: Robot, j: int) -> float:
 
 #: Share of undetermined base parameters from which a motion is narrow.
 NARROW = 0.7
-#: That share where the weakest pull predicts best, as of rounds of one motion: each knows the
-#: others, whatever the links are.
+#: That share where the weakest pull predicts best, as of rounds of one motion: each knows
+#: the others, whatever the links are.
 MOST = 0.5
 #: Share of a joint's torque that its profile's links must leave before others are sought.
 MATTERS = 0.02
@@ -372,8 +373,8 @@ def with_vector(
 def chosen_method(data: Training) -> MethodResult:
     """Result of "friction", or of "base" where the profile's links are not the arm's.
 
-    The links are freed where they leave `OTHER_LINKS` times what free ones leave, the logs tell
-    them, and nothing suggests a load.
+    The links are freed where they leave `OTHER_LINKS` times what free ones leave, the
+    logs tell them, and nothing suggests a load.
     """
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)

@@ -41,8 +41,8 @@ MOST_NAMED = 4  #: Logs called by name; episodes may be thousands.
 STRETCHES = 12  #: Independent stretches of a motion.
 REACH = 1.0  #: Farthest centre of mass from the flange. [m]
 LOOKED_AT = 400  #: Most samples of a motion among which poses are counted.
-#: Shortest motion: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7 of
-#: their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
+#: Shortest motion: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7
+#: of their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
 LONG = 10.0
 #: Weighings with the load on the arm: a third moves mass and centre by less than .1 %.
 ROUNDS = 3
@@ -118,9 +118,10 @@ class JointsFit(NamedTuple):
     def cluster_covariance(self, clusters: Sequence[slice | Indices]) -> Array:
         """Covariance of x with residuals that clusters share. (k, k)
 
-        The pull of each of B clusters of rows on the solution makes G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
-        B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized
-        linear models", Biometrika 73(1), 1986).
+        The pull of each of B clusters of rows on the solution makes G
+        (Σ_b A_bᵀ r_b r_bᵀ A_b) G · B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger,
+        "Longitudinal data analysis using generalized linear models", Biometrika 73(1),
+        1986).
         """
         inverse, rest = self.inverse, self.left * self.weights
         pulls = np.array([np.einsum("knp,kn->p", self.A[c], rest[c]) for c in clusters])
@@ -138,8 +139,8 @@ class JointsFit(NamedTuple):
     def gain_covariance(self, y: Array, gain: float) -> Array:
         """Covariance of x by drive constants of a relative deviation. (k, k)
 
-        Half of their variance belongs to all joints (gear, warmth) and scales the mass; half to
-        each one. The torque y (N, n) is what is explained.
+        Half of their variance belongs to all joints (gear, warmth) and scales the mass;
+        half to each one. The torque y (N, n) is what is explained.
         """
         # Each joint's torque adds its part to the solution.
         shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse
@@ -234,9 +235,9 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from poses at rest, by torque beyond the robot's own gravity.
 
-    Stiction acts in every pose: the residual shows its size, many poses average it. The model's
-    errors and a day's effect on the drives are alike in all poses of a log: with several logs,
-    their difference is part of the standard deviations.
+    Stiction acts in every pose: the residual shows its size, many poses average it. The
+    model's errors and a day's effect on the drives are alike in all poses of a log: with
+    several logs, their difference is part of the standard deviations.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
@@ -287,8 +288,8 @@ def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
 def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from motion, by torque beyond the robot's own weight.
 
-    The columns of `vftcli.free_motion.free_motion` hold only a load's weight. A second weighing
-    carries the load found, so that its inertia does not count as weight.
+    The columns of `vftcli.free_motion.free_motion` hold only a load's weight. A second
+    weighing carries the load found, so that its inertia does not count as weight.
     """
     names = names_of(recordings)
     q = np.concatenate([recording.q for recording in recordings])
@@ -372,8 +373,8 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )
         return fit
-    # A pair repeats a motion: in both logs some joint travels further than it would at rest. Two
-    # episodes of a dataset carry one load.
+    # A pair repeats a motion: in both logs some joint travels further than it would at
+    # rest. Two episodes of a dataset carry one load.
     moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
     if len(logs) == 2 and moved and not all(r.source.part for r in logs):
         try:

@@ -1,7 +1,7 @@
 """The shape of a joint's friction: a sum of known terms times coefficients.
 
-A term is evaluated on the log as it was recorded and then filtered like the torque, so that a
-reversal is rounded alike on both sides of the equation.
+A term is evaluated on the log as it was recorded and then filtered like the torque, so
+that a reversal is rounded alike on both sides of the equation.
 """
 
 import itertools
@@ -16,7 +16,8 @@ from vftcli.signals.arrays import Array
 SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)  #: Velocities over which the sign may be smoothed. [rad/s]
 #: Velocities over which a Stribeck term may fade. [rad/s]
 STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
-#: Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1. [rad/s]
+#: Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1.
+#: [rad/s]
 LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
 #: Speeds of the points between which UR's controllers draw friction as a line. [rad/s]
 BENDS = (0.01, 0.5, 1.5, 3.2)
@@ -37,8 +38,8 @@ POINT = "point"  #: Head of a bent line's terms: point1 is the torque at its fir
 class Shape(NamedTuple):
     """The structure of one joint's friction: which terms, and its nonlinear numbers."""
 
-    #: Keys of the robot file that hold coefficients, in order; those that begin with `POINT`
-    #: are the torques of a bent line.
+    #: Keys of the robot file that hold coefficients, in order; those that begin with
+    #: `POINT` are the torques of a bent line.
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
     stribeck_velocity: float = 0.05  #: Velocity over which the Stribeck term fades. [rad/s]
@@ -98,8 +99,8 @@ class Shape(NamedTuple):
 def bent(speed: float) -> Shape | None:
     """The bent line for a motion up to a speed [rad/s], None of fewer than two points.
 
-    Between its points the line is straight, so that a motion well beyond one of them tells the
-    next one too; behind its last point it goes on as it came.
+    Between its points the line is straight, so that a motion well beyond one of them
+    tells the next one too; behind its last point it goes on as it came.
     """
     reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
     count = 1 + int(np.argmin([*reached, False]))

@@ -1,9 +1,10 @@
 """Method "targets": a UR controller's own model of its arm, by its targets.
 
 The controller logs the torque of its inverse dynamics (target_moment) and the current it
-expects (target_current). At rest their ratio is K; in motion target_moment less the maker's
-rigid body is J q̈, and K·target_current − target_moment is the controller's friction. Free motion
-is not needed: a hand on the arm changes the measured effort, not the target.
+expects (target_current). At rest their ratio is K; in motion target_moment less the
+maker's rigid body is J q̈, and K·target_current − target_moment is the controller's
+friction. Free motion is not needed: a hand on the arm changes the measured effort, not
+the target.
 """
 
 from collections.abc import Sequence
@@ -50,13 +51,14 @@ WRITTEN = tuple(
     Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend) for bend in LOGARITHMIC_VELOCITIES
 )
 UNASKED = 0.5  #: Least share of motion with a target velocity: below it a hand led the arm.
-#: Most of the law in a joint's friction under a guiding hand; programs feed .8 to 1.3 of it
-#: forward, by temperature and load.
+#: Most of the law in a joint's friction under a guiding hand; programs feed .8 to 1.3 of
+#: it forward, by temperature and load.
 GUIDED = 0.4
 SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of samples, which must agree too. [rad/s]
 SETTLE = 0.1  #: Cut at both ends of a rest. [s]
 STEADY = 5e-3  #: Largest relative change of the target current in a rest.
-#: Largest relative difference of gravity without a remark: a third of that of 9.82 to 9.81 m/s².
+#: Largest relative difference of gravity without a remark: a third of that of 9.82 to
+#: 9.81 m/s².
 SAME_GRAVITY = 3e-4
 
 
@@ -267,8 +269,8 @@ def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
 def controller_friction(j: int, log: ControllerTargets, constant: float) -> FrictionLaw | None:
     """Best shape of K·target_current − target_moment, coefficients, sd.
 
-    The controller's own law is a bent line: its points where the motion spans them, elsewhere
-    a logarithm. None at rest.
+    The controller's own law is a bent line: its points where the motion spans them,
+    elsewhere a logarithm. None at rest.
     """
     speed = abs(log.dq[:, j])
     fast = float(np.quantile(speed, 0.9))
@@ -296,8 +298,8 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
 def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) -> None:
     """Raise if a hand led the arm: the controller then uses less friction.
 
-    Logged target velocities are then zero while the arm moves. Without them the friction fed
-    forward is a fraction of the law, .1 to 1.1 by joint: one joint far below the law
+    Logged target velocities are then zero while the arm moves. Without them the friction
+    fed forward is a fraction of the law, .1 to 1.1 by joint: one joint far below the law
     shows the hand.
     """
     moves = faster(recording.require("dq"), SLIDES)

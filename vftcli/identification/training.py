@@ -72,8 +72,8 @@ class PreparedLog:
     dq: Array  #: Velocities. (M, n) [rad/s]
     ddq: Array  #: Accelerations. (M, n) [rad/s²]
     tau: Array  #: Drive torque, friction included. (M, n) [N·m]
-    #: Weight of every sample and joint, 0 where it tells nothing: in a long stop of the joint, in a
-    #: gap of the clock, in a contact. (M, n)
+    #: Weight of every sample and joint, 0 where it tells nothing: in a long stop of the
+    #: joint, in a gap of the clock, in a contact. (M, n)
     weights: Array
     #: Friction columns that were made for this robot. (M,) each
     columns: dict[tuple[str, int, tuple[float, ...]], Array] = field(default_factory=dict)
@@ -164,7 +164,8 @@ def prepare(recording: Recording, robot: Robot, cutoff: float = CUTOFF) -> Prepa
     """Filter, differentiate and decimate a log, one column at a time."""
     torque, dq = drive_torque(recording, robot), recording.require("dq")
     t, each = recording.t, stride(cutoff, recording.median_step)
-    # Before the first and after the last movement stiction holds what no model of velocity knows.
+    # Before the first and after the last movement stiction holds what no model of
+    # velocity knows.
     moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, each) if moving.size else np.arange(0)
 

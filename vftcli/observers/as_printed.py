@@ -1,14 +1,14 @@
 """Printed variants of the paper, run by `--as-printed` to show its errata.
 
-FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ, a share of the
-momentum that leaks into the estimate; and the filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, which forgets
-−ωe^{−ωt}p₀ of (26).
+FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ, a
+share of the momentum that leaks into the estimate; and the filter starts from Y₂⁰ = 0,
+τ̂⁰ = ωp⁰, which forgets −ωe^{−ωt}p₀ of (26).
 
-GMO (35): it feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = .343 and is unstable from 2
-on.
+GMO (35): it feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = .343 and is
+unstable from 2 on.
 
-KFO: u = μᵗ alone (40). The zero-order hold (44) has −A_c in its lower-right block, not −A_cᵀ: the
-noise Qᵗ = M₁₂M₁₁ᵀ comes out unsymmetric, with A_τ = 0
+KFO: u = μᵗ alone (40). The zero-order hold (44) has −A_c in its lower-right block, not
+−A_cᵀ: the noise Qᵗ = M₁₂M₁₁ᵀ comes out unsymmetric, with A_τ = 0
 
     [[Q_p Ts + (Q_τ − Q_p)Ts³/2, (Q_τ − Q_p)Ts²/2], [Q_τ Ts², Q_τ Ts]],
 
@@ -106,8 +106,8 @@ def printed_hold_steps(
 ) -> tuple[Array, Array, KalmanState]:
     """τ̂ and √P₂₂ with the noise of (44) as printed, sample by sample. (T, n) each
 
-    d (T, n) [N·m·s] is the input, each entry of the model (T, n), and the state that before the
-    block; where the log begins, its prior.
+    d (T, n) [N·m·s] is the input, each entry of the model (T, n), and the state that
+    before the block; where the log begins, its prior.
     """
     tau, sd = np.zeros((2, *d.shape))
     (error, torque), P = state

@@ -56,9 +56,9 @@ class ObserverChoice(Choice):
 
     GROUP = ESTIMATE
 
-    #: The observers, keys of `vftcli.observers.table.OBSERVERS`, "best" first. None given:
-    #: `DEFAULT`, or the paper's four where their own formulas or one footing for all of them is
-    #: asked for.
+    #: The observers, keys of `vftcli.observers.table.OBSERVERS`, "best" first. None
+    #: given: `DEFAULT`, or the paper's four where their own formulas or one footing for
+    #: all of them is asked for.
     names: Annotated[
         tuple[str, ...],
         Option(
@@ -83,7 +83,8 @@ class ObserverChoice(Choice):
             completes=names_at("observers.table:NUMBERS"),
         ),
     ] = field(default_factory=dict)
-    #: Which gains the observers have that bring none of their own: `PAPER_GAINS` or `LOG_GAINS`.
+    #: Which gains the observers have that bring none of their own: `PAPER_GAINS` or
+    #: `LOG_GAINS`.
     gains: Annotated[
         "str | Path | Goal",
         Option(

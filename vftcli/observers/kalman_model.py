@@ -3,16 +3,17 @@ r"""Disturbance Kalman filter: A, B, Q, R and gains L (36)–(44), settled or at
 For one joint: state x = [p; τ_ext], input μ, output p, ẋ = A_c x + B_c μ + w with
 A_c = [[0, 1], [0, −a]]. With diagonal R and Q an n-joint filter is n such filters.
 
-On a clock that jitters the gains follow every step. The covariance recursion is run over blocks of
-samples side by side, all blocks of a piece at once. Where a block starts follows exactly from what
-it makes of any other start: if the posterior P it starts from changes by Δ, the one at its end
-changes by
+On a clock that jitters the gains follow every step. The covariance recursion is run over
+blocks of samples side by side, all blocks of a piece at once. Where a block starts
+follows exactly from what it makes of any other start: if the posterior P it starts from
+changes by Δ, the one at its end changes by
 
     Φ Δ (I + O Δ)⁻¹ Φᵀ,  Φ ← (I − LC)A Φ,  O ← O + uuᵀ/S,  u = (CAΦ)ᵀ
 
-with Φ and O from one pass from any start (the closed-loop transition, and the information that the
-block's samples have on its start). So one pass over the samples from a guess, some rounds over the
-blocks' ends, and one pass from the right starts give what the plain loop gives.
+with Φ and O from one pass from any start (the closed-loop transition, and the information
+that the block's samples have on its start). So one pass over the samples from a guess,
+some rounds over the blocks' ends, and one pass from the right starts give what the plain
+loop gives.
 
 References:
     B. D. O. Anderson, J. B. Moore, "Optimal Filtering", Prentice-Hall, 1979, Sec. 4.5, for the
@@ -166,9 +167,10 @@ class KalmanState(NamedTuple):
 def steady(model: Discrete, decay: Array) -> Gains:
     """Gains of the stationary filter: stabilising solution of the discrete Riccati equation.
 
-    For A_τ = 0 in closed form, λ = Ts√(Q₂₂/R), β = (Q₁₁ − TsQ₁₂)/R, y = ½(λ + √(λ² + 16 + 4β)),
-    r = ½(y − √(y² − 4)), L₁ = 1 − r², L₂ = λr/Ts; for A_τ ≠ 0 by SciPy's solver, joint by joint.
-    The prior follows from the gains: P₁₁ = R L₁/(1−L₁), P₁₂ = R L₂/(1−L₁).
+    For A_τ = 0 in closed form, λ = Ts√(Q₂₂/R), β = (Q₁₁ − TsQ₁₂)/R,
+    y = ½(λ + √(λ² + 16 + 4β)), r = ½(y − √(y² − 4)), L₁ = 1 − r², L₂ = λr/Ts; for A_τ ≠ 0
+    by SciPy's solver, joint by joint. The prior follows from the gains: P₁₁ = R
+    L₁/(1−L₁), P₁₂ = R L₂/(1−L₁).
     """
     step, a12, a22, q11, q12, q22, R = model
     if np.any(decay > 0.0):
@@ -182,7 +184,8 @@ def steady(model: Discrete, decay: Array) -> Gains:
     else:
         lam, beta = step * np.sqrt(q22 / R), (q11 - step * q12) / R
         y = 0.5 * (lam + np.sqrt(lam**2 + 16.0 + 4.0 * beta))
-        # 1 − r² and 1/r² − 1 lose digits when r is near 1: both follow from √(y² − 4) instead.
+        # 1 − r² and 1/r² − 1 lose digits when r is near 1: both follow from √(y² − 4)
+        # instead.
         root = np.sqrt(np.maximum((y - 2.0) * (y + 2.0), 0.0))
         r = 2.0 / (y + root)
         l1, l2 = r * root, lam * r / step
@@ -223,8 +226,8 @@ def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
 
         eᵗ = (1−L₁)(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹),  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹)
 
-    from e⁰ = 0, τ̂⁰ = 0, which is x̂⁰ = [p⁰; 0]. It is the same filter without the cancellation of
-    two large momenta.
+    from e⁰ = 0, τ̂⁰ = 0, which is x̂⁰ = [p⁰; 0]. It is the same filter without the
+    cancellation of two large momenta.
     """
     (f11, f12), (f21, f22) = closed_loop(gains, model)
     return np.array([[f11, -f12], [-f21, f22]]), np.array([f11, gains.l2])
@@ -233,8 +236,8 @@ def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
 def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
     """Gains of one piece, it and its models in blocks. (length, n, blocks) each
 
-    `entering` is the covariance after the sample before the piece, `guess` where blocks start
-    before they know better. (n,)
+    `entering` is the covariance after the sample before the piece, `guess` where blocks
+    start before they know better. (n,)
     """
     blocks = model.r.shape[2]
     starts = np.stack(guess)[..., None].repeat(blocks, axis=2)
@@ -245,7 +248,8 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
         (o11, o12), (_, o22) = information
         # After k rounds the first k blocks are exact, so this ends, mostly long before.
         for _ in range(blocks):
-            # The posterior at the end after a start changed by Δ: X = Δ(I + OΔ)⁻¹ in full.
+            # The posterior at the end after a start changed by Δ: X = Δ(I + OΔ)⁻¹ in
+            # full.
             a, b, c = starts - guessed
             delta = a * c - b * b
             whole = 1.0 + o11 * a + 2.0 * o12 * b + o22 * c + (o11 * o22 - o12 * o12) * delta
@@ -290,8 +294,9 @@ def kalman_steps(
 ) -> tuple[Array, Array, KalmanState]:
     """τ̂ and √P₂₂ of a block with the input d [N·m·s], gains by each step's sample time. (T, n)
 
-    `model_of` makes the discrete model of sample times [s] and joints, `guess` is the stationary
-    posterior (n,), and `state` that before the block; where the log begins, after its first sample.
+    `model_of` makes the discrete model of sample times [s] and joints, `guess` is the
+    stationary posterior (n,), and `state` that before the block; where the log begins,
+    after its first sample.
     """
     samples, n = d.shape
     tau, sd = empty_series(samples, n), empty_series(samples, n)

@@ -1,16 +1,17 @@
 r"""The paper's four observers: filtered dynamics, momentum, two Kalman filters.
 
-All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and μ = τ + Cᵀq̇ − g − F_f. Their
-one input is the momentum gained over a sample beyond the model:
+All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and
+μ = τ + Cᵀq̇ − g − F_f. Their one input is the momentum gained over a sample beyond the
+model:
 
     dᵗ = pᵗ − pᵗ⁻¹ − ½Ts(μᵗ + μᵗ⁻¹).
 
     FDO, GMO   τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a),  a = ½K Ts
     KFO        νᵗ = eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹,  eᵗ = (1−L₁)νᵗ,  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
 
-from zero at the log's first sample. `kalman_model` holds A, Q, R and L, also on a clock that
-jitters, `as_printed` the paper's printed variants. An observer runs over a block and returns its
-state; a whole log is one block.
+from zero at the log's first sample. `kalman_model` holds A, Q, R and L, also on a clock
+that jitters, `as_printed` the paper's printed variants. An observer runs over a block and
+returns its state; a whole log is one block.
 """
 
 from abc import abstractmethod
@@ -76,9 +77,9 @@ class FirstOrderState(NamedTuple):
 class FirstOrderObserver(BlockObserver):
     """τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a), a = K·Ts/2, common to FDO and GMO.
 
-    Past a gap (`GAP` nominal steps) so long that a > 1 the state would change its sign: there the
-    filter starts afresh, and a remark says so. Gains with a > 1 at the nominal step restart
-    nothing.
+    Past a gap (`GAP` nominal steps) so long that a > 1 the state would change its sign:
+    there the filter starts afresh, and a remark says so. Gains with a > 1 at the nominal
+    step restart nothing.
     """
 
     @abstractmethod
@@ -115,8 +116,9 @@ class FirstOrderObserver(BlockObserver):
     def tuning(self, step: float, joints: int) -> Tuning:
         """Cutoff, delay 1/K and −3 dB frequency at a sample time. [s]
 
-        The bilinear transform warps frequency: tan(ωTs/2) = K·Ts/2 at the −3 dB point of the filter
-        alone; the exact response of sampled momentum is in `frequency_response`.
+        The bilinear transform warps frequency: tan(ωTs/2) = K·Ts/2 at the −3 dB point of
+        the filter alone; the exact response of sampled momentum is in
+        `frequency_response`.
         """
         rate = self.rates(joints)
         return Tuning(
@@ -140,14 +142,14 @@ class FirstOrderObserver(BlockObserver):
 class FilteredDynamicsObserver(FirstOrderObserver):
     r"""FDO (19)–(29): low-pass filtered :math:`\dot p - \mu`, no derivative.
 
-    τ̂ = F₁{−μ} + F₂{p} + ωp with F₁ = ω/(s+ω) and F₂ = −ω²/(s+ω), discretised by the bilinear
-    transform with a = ωTs/2 (27)–(29):
+    τ̂ = F₁{−μ} + F₂{p} + ωp with F₁ = ω/(s+ω) and F₂ = −ω²/(s+ω), discretised by the
+    bilinear transform with a = ωTs/2 (27)–(29):
 
         Y₁ᵗ = k₁Y₁ᵗ⁻¹ − k₂(μᵗ + μᵗ⁻¹),  Y₂ᵗ = k₁Y₂ᵗ⁻¹ + k₃(pᵗ + pᵗ⁻¹),  τ̂ = Y₁ + Y₂ + ωp
 
-    k₁ = (1−a)/(1+a), k₂ = a/(1+a), k₃ = −ωa/(1+a), from Y₁⁰ = 0 and Y₂⁰ = −ωp⁰, so that τ̂⁰ = 0.
-    With k₃ + ω = ω/(1+a) and k₃ − k₁ω = −ω/(1+a) they are the momentum observer with K = ω,
-    at every sample time. The printed k₃ and start are errata: `as_printed`.
+    k₁ = (1−a)/(1+a), k₂ = a/(1+a), k₃ = −ωa/(1+a), from Y₁⁰ = 0 and Y₂⁰ = −ωp⁰, so that
+    τ̂⁰ = 0. With k₃ + ω = ω/(1+a) and k₃ − k₁ω = −ω/(1+a) they are the momentum observer
+    with K = ω, at every sample time. The printed k₃ and start are errata: `as_printed`.
 
     Raises:
         ParameterError: If the cutoff is not positive.
@@ -225,10 +227,10 @@ class KalmanObserver(BlockObserver):
     r"""KFO (36)–(44): Kalman filter on x = [p; τ_ext], ṗ = μ + τ_ext + w_p, τ̇_ext = A_ττ_ext + w_τ.
 
     With diagonal R, Q_p and Q_τ it is n two-state filters with gains independent of data.
-    The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the stationary
-    prior: a constant sample time has no transient of the gains. On an uneven clock each step
-    propagates the covariance with its own A, B, Q and R. The estimate's `sd` is √P₂₂, the filter's
-    own error.
+    The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the
+    stationary prior: a constant sample time has no transient of the gains. On an uneven
+    clock each step propagates the covariance with its own A, B, Q and R. The estimate's
+    `sd` is √P₂₂, the filter's own error.
 
     For A_τ = 0, A_c² = 0 and both discretisations share A and B; only Q differs.
 
@@ -243,7 +245,8 @@ class KalmanObserver(BlockObserver):
     #: a in A_τ = −a, of either sign. (n,) [1/s]
     decay: Array | float = 0.0
     noise_convention: str = "density"  #: A key of `NOISE_CONVENTIONS`.
-    #: P⁻ of the first sample: P₁₁, P₁₂, P₂₂ of each joint; None for the stationary one. (3, n)
+    #: P⁻ of the first sample: P₁₁, P₁₂, P₂₂ of each joint; None for the stationary one.
+    #: (3, n)
     initial_covariance: Array | None = None
     #: Use μᵗ alone (40), the literal noise convention, (44)'s printed block.
     as_printed: bool = False
@@ -349,8 +352,8 @@ class KalmanObserver(BlockObserver):
     def tuning(self, step: float, joints: int) -> Tuning:
         """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)), exact delay.
 
-        Q and R are the convention's effective densities at this sample time; the delay to a ramp
-        is L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
+        Q and R are the convention's effective densities at this sample time; the delay to
+        a ramp is L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
         """
         d, model = self.densities(joints), self.model(step, joints)
         gains = self.steady(step, joints)

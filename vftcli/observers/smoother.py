@@ -1,14 +1,14 @@
 """Rauch–Tung–Striebel smoother on the disturbance Kalman filter: `kfo-rts`.
 
-In a complete log an estimate at t may use later samples. The smoother is the Kalman filter's
-fixed-interval answer, run backwards in Bryson and Frazier's form. It needs only the innovations ν
-and inverts only numbers:
+In a complete log an estimate at t may use later samples. The smoother is the Kalman
+filter's fixed-interval answer, run backwards in Bryson and Frazier's form. It needs only
+the innovations ν and inverts only numbers:
 
     λ̃ᵗ = Aᵀ[(I − LC)ᵀ λ̃ᵗ⁺¹ − Cᵀ νᵗ⁺¹/Sᵗ⁺¹],  λ̃ = 0 at the last sample,  x̂ₛᵗ = x̂ᵗ − Pᵗ λ̃ᵗ
 
-with P the filter's posterior and S its innovation variance. In the long run it is the two-sided
-filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap: it knows the
-future.
+with P the filter's posterior and S its innovation variance. In the long run it is the
+two-sided filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap: it
+knows the future.
 
 References:
     H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
@@ -64,7 +64,8 @@ class KalmanSmoother(Shown):
         F = closed_loop(gains, model)
         b = -np.array([np.ones_like(a12), a12])
         tau -= from_the_end(F.swapaxes(0, 1), b, nu / S, np.array([p12, p22]))
-        # Λ̃ᵗ = Fᵀ(Λ̃ᵗ⁺¹)F + AᵀCᵀCA/S of its entries 11, 12, 22; P₂₂ less [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ
+        # Λ̃ᵗ = Fᵀ(Λ̃ᵗ⁺¹)F + AᵀCᵀCA/S of its entries 11, 12, 22; P₂₂ less [P₁₂ P₂₂] Λ̃
+        # [P₁₂ P₂₂]ᵀ
         (f11, f12), (f21, f22) = F
         information = np.array(
             [

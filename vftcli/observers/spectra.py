@@ -1,25 +1,26 @@
 """Spectra of the model's rest over the free and the loaded part of a log.
 
-The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged over a
-sample, plus everything else: noise, friction and model error. Its spectrum over the free part, S_n,
-is the error's; what the loaded part has beyond it, S_τ = (S_d − S_n)₊, is the external torque's.
-Above 5 Hz it is so only as far as contacts reach: their spectra fall, and a drive that chatters
-under load makes a plateau there, which counts as noise. From the two follows the error of every
-linear estimator with frequency response H:
+The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged
+over a sample, plus everything else: noise, friction and model error. Its spectrum over
+the free part, S_n, is the error's; what the loaded part has beyond it,
+S_τ = (S_d − S_n)₊, is the external torque's. Above 5 Hz it is so only as far as contacts
+reach: their spectra fall, and a drive that chatters under load makes a plateau there,
+which counts as noise. From the two follows the error of every linear estimator with
+frequency response H:
 
     rms² = ∫ |1 − H|² S_τ + |H|² S_n df
 
-H is complex, so that delay counts. The spectra are one-sided and not detrended: a constant error is
-an error too.
+H is complex, so that delay counts. The spectra are one-sided and not detrended: a
+constant error is an error too.
 
 One model gives every estimate's error sample by sample, whatever its own covariance says,
 
     sd² = e² + ∫|1 − H|² S_τ df + c²,
 
-with e² the mean square of what the estimator reads where nothing touches the arm, bias and model
-error included, a resting joint's and a moving joint's apart; and c the standard deviation of a
-subtracted correction. A resting joint holds stiction that no estimator sees: there e is at least
-the share of the dry friction that drives were measured to hold.
+with e² the mean square of what the estimator reads where nothing touches the arm, bias
+and model error included, a resting joint's and a moving joint's apart; and c the standard
+deviation of a subtracted correction. A resting joint holds stiction that no estimator
+sees: there e is at least the share of the dry friction that drives were measured to hold.
 """
 
 from collections.abc import Sequence
@@ -44,13 +45,13 @@ IMPACT = 1.0  #: A loaded part of which nothing lasts longer is one of impacts. 
 #: How far the average of neighbouring frequencies reaches, as a share of the frequency.
 NEIGHBOURS = 0.2
 SLOW = 5.0  #: Up to here the measured spectrum of the external torque holds. [Hz]
-#: Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
-#: and the 4 of one that has no jumps and no corners.
+#: Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque
+#: that jumps and the 4 of one that has no jumps and no corners.
 FALL = 2.5
 
-#: A free part that was found is believed if on most joints the loaded part has this share of its
-#: power below `SLOW` beyond the free one's. Reference runs show 0.96 and more, those that are in
-#: contact all the time 0.82 and less.
+#: A free part that was found is believed if on most joints the loaded part has this share
+#: of its power below `SLOW` beyond the free one's. Reference runs show 0.96 and more,
+#: those that are in contact all the time 0.82 and less.
 QUIETER = 0.85
 
 
@@ -89,8 +90,8 @@ class Spectra:
     def external(self) -> Array:
         """S_τ, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
 
-        It is the excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times the excess
-        up to there.
+        It is the excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times
+        the excess up to there.
         """
         f = self.frequency[:, None]
         slow = (self.frequency > 0.0) & (self.frequency <= SLOW)
@@ -183,10 +184,11 @@ def looks_free(spectra: Spectra) -> bool:
 
 ENOUGH = 50  #: Free samples of a resting or a moving joint that its own mean square needs.
 
-#: Share of the dry friction by which friction in motion may be off, where no free motion shows it.
+#: Share of the dry friction by which friction in motion may be off, where no free motion
+#: shows it.
 #:
-#: On a UR10e the maker's friction differs by .05 to .25 of itself from what the drives show that
-#: day.
+#: On a UR10e the maker's friction differs by .05 to .25 of itself from what the drives
+#: show that day.
 UNSEEN = 0.2
 
 
@@ -201,11 +203,12 @@ class FreeError(NamedTuple):
 def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
     """The mean squares of an estimator's free samples, of which there is one at least.
 
-    Where a joint rests, or moves, in fewer than `ENOUGH` of them, all of them speak for it: a
-    moving joint then adds `UNSEEN` of its dry friction, because friction in motion was not seen.
+    Where a joint rests, or moves, in fewer than `ENOUGH` of them, all of them speak for
+    it: a moving joint then adds `UNSEEN` of its dry friction, because friction in motion
+    was not seen.
 
-    `read` is the estimate in them, NaN where unknown (S, n) [N·m], `resting` whether a joint rests
-    (S, n), and dry friction is 0 where nothing is known of it. (n,) [N·m]
+    `read` is the estimate in them, NaN where unknown (S, n) [N·m], `resting` whether a
+    joint rests (S, n), and dry friction is 0 where nothing is known of it. (n,) [N·m]
     """
     known = np.isfinite(read)
     kinds = np.array([known, known & ~resting, known & resting])

@@ -185,9 +185,10 @@ def build_gmo(setup: Setup, name: str) -> Built:
 def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tuple[str, ...]]:
     """A first-order observer's gain (n,) [1/s], and a remark's code if not given.
 
-    It is then the inverse of the Kalman filter's delay, a file's R and Q read as densities;
-    `FALLBACK_RATE` where no gains are given at all; and on a slow clock at most 2/Ts, which takes
-    each sample's raw disturbance as it is: from there on the observer would overshoot.
+    It is then the inverse of the Kalman filter's delay, a file's R and Q read as
+    densities; `FALLBACK_RATE` where no gains are given at all; and on a slow clock at
+    most 2/Ts, which takes each sample's raw disturbance as it is: from there on the
+    observer would overshoot.
     """
     given = parameters_given(setup, name, name)
     if parameter in given:
@@ -211,8 +212,9 @@ def read_as(convention: str, setup: Setup) -> Setup:
 def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ...]]:
     """A Kalman observer with the parameters of this name.
 
-    R and Q of a file are read as "discrete" unless a convention is named: with that reading the
-    paper's gains win joints 1 to 3, as its Table I says. Without a file they are densities.
+    R and Q of a file are read as "discrete" unless a convention is named: with that
+    reading the paper's gains win joints 1 to 3, as its Table I says. Without a file they
+    are densities.
     """
     given = parameters_given(read_as("discrete", setup), "kfo", name)
     convention = str(given.pop("noise_convention", "density"))

@@ -1,7 +1,8 @@
 """Gains for a goal: least error by a log's spectra, one delay or bandwidth, few false alarms.
 
-A Kalman filter's ω_n trades the external torque that its lag leaves out against the noise that
-passes. Both follow from the spectra of the log's free and loaded part, without a guess:
+A Kalman filter's ω_n trades the external torque that its lag leaves out against the noise
+that passes. Both follow from the spectra of the log's free and loaded part, without a
+guess:
 
     ω_n = argmin ∫ |1 − H(ω_n)|² S_τ + |H(ω_n)|² S_n df,  joint by joint, ζ = 1/√2
 
@@ -26,15 +27,16 @@ from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.shown import Shown
 
 SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
-#: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother
-#: passes 1/(1 + (ω/ω_n)⁴). A joint without a push may be pushed next. [rad/s]
+#: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the
+#: smoother passes 1/(1 + (ω/ω_n)⁴). A joint without a push may be pushed next. [rad/s]
 SLOWEST_BEST = 9.0
 FASTEST = 2.0  #: Largest natural frequency to try, times the sample time. [rad]
 TRIED = 96  #: Natural frequencies to try, evenly in logarithm.
 LEAST_SHARE = 1e-3  #: Least R as a share of the noise in the free part. [1]
 FINEST = 1e-6  #: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
 HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
-#: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth at −3 dB.
+#: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth
+#: at −3 dB.
 GOALS = {
     "auto": "auto",
     "delay": "delay=S (seconds)",
@@ -115,8 +117,8 @@ def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve
 def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
     """A warning on joints (n,) at a bound of the natural frequencies tried (G,), if any. [rad/s]
 
-    At the slowest the spectra do not separate external torque from noise; at the fastest, not
-    noise from external torque.
+    At the slowest the spectra do not separate external torque from noise; at the fastest,
+    not noise from external torque.
     """
     low, high = float(grid[0]), float(grid[-1])
     reached = (("slowest", rate <= low, low), ("fastest", rate >= high, high))
@@ -130,10 +132,11 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     """R at which the innovations have the variance the filter expects. (n,)
 
-    Gains depend on Q/R alone; R scales the covariance. The innovation is the estimate's jump,
-    ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may be zero, or too small where few
-    impacts extrapolate S_d, and no filter runs on R = 0: R is at least `LEAST_SHARE` of S_n's R and
-    the noise of `FINEST`, a torque that is constant over a sample.
+    Gains depend on Q/R alone; R scales the covariance. The innovation is the estimate's
+    jump, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may be zero, or too
+    small where few impacts extrapolate S_d, and no filter runs on R = 0: R is at least
+    `LEAST_SHARE` of S_n's R and the noise of `FINEST`, a torque that is constant over a
+    sample.
     """
     n, unit = len(omega_n), kalman_filter(omega_n)
     settled = unit.steady(spectra.step, n)
@@ -262,7 +265,8 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
             f"no gain gives {observer.name} a {goal.name} of {goal.value:g} {unit} at "
             f"{1.0 / step:.4g} Hz; choose {limit}"
         )
-    # Both measures are monotonic in the gain, so that halving its logarithm finds the one crossing.
+    # Both measures are monotonic in the gain, so that halving its logarithm finds the one
+    # crossing.
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
         above = (excess(middle) > 0.0) == rising
@@ -300,7 +304,8 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
             f"alarm.threshold has {len(threshold)} values; give one, or one for each of {n} joints"
         )
     first_order = rates(momentum, spectra, goal)
-    # FDO has one rate for all joints: the smallest mean error, or what the slowest joint allows.
+    # FDO has one rate for all joints: the smallest mean error, or what the slowest joint
+    # allows.
     shared = float(first_order.min())
     if goal.name == "auto":
         curve = error_curve(momentum, spectra)
@@ -377,8 +382,8 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
 def crossings(power: Array, frequency: Array, threshold: Array) -> Array:
     """Crossings of ±threshold an hour by a Gaussian signal of this spectrum. (n,)
 
-    Rice's formula, ν = (σ̇/2πσ) e^{−(h∓m)²/2σ²} for each side, the power at 0 Hz a constant offset
-    m: an estimate, as friction is no Gaussian noise.
+    Rice's formula, ν = (σ̇/2πσ) e^{−(h∓m)²/2σ²} for each side, the power at 0 Hz a
+    constant offset m: an estimate, as friction is no Gaussian noise.
 
     References:
         S. O. Rice, "Mathematical analysis of random noise", Bell Syst. Tech. J. 23–24, 1944–45.

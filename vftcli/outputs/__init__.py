@@ -6,10 +6,11 @@ from typing import Annotated
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import WRITE, Choice, setting
 
-#: How much of a log its recording holds: every sample, of a long one its levels, or no recording.
+#: How much of a log its recording holds: every sample, of a long one its levels, or no
+#: recording.
 #:
-#: Levels are the lowest and highest samples of many stretches, and every sample where contacts
-#: begin.
+#: Levels are the lowest and highest samples of many stretches, and every sample where
+#: contacts begin.
 FULL, LEVELS, NONE = "full", "levels", "none"
 
 

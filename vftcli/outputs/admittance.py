@@ -94,8 +94,9 @@ def write_admittance(
 def motion_table(replay: Replay) -> pl.DataFrame:
     """Everything along time, flat columns; what is not known is null.
 
-    ``t`` [s]; ``force/fx``… [N, N·m]; ``x/<controller>/x``… [m, rad]; ``v/<controller>/x``…;
-    ``q/<controller>/1``… [rad]; ``reached/<controller>`` 1 or 0; ``logged/x``… [m, rad].
+    ``t`` [s]; ``force/fx``… [N, N·m]; ``x/<controller>/x``… [m, rad];
+    ``v/<controller>/x``…; ``q/<controller>/1``… [rad]; ``reached/<controller>`` 1 or 0;
+    ``logged/x``… [m, rad].
     """
     motion, columns = replay.motion, {"t": replay.motion.t}
     columns |= {f"force/{a}": padded(replay.wrench[:, k]) for k, a in enumerate(FORCES)}
@@ -216,7 +217,8 @@ def render_admittance(
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
     """Every controller with its colour: the traditional one's is that of the page's ink."""
-    # Every variable controller its own colour, again from the start when there are no more.
+    # Every variable controller its own colour, again from the start when there are no
+    # more.
     spare = iter(SPARE * len(replay.controllers))
     return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
 

@@ -1,7 +1,7 @@
 """BatchFolder: what many logs made, a file a log, and the tables that gather them.
 
-``rows/<key[:2]>/<key>.parquet`` is the last file that a log's result gets: where it is, the result
-is complete. ``logs/<key[:2]>/<key>/`` holds what else was made of the log.
+``rows/<key[:2]>/<key>.parquet`` is the last file that a log's result gets: where it is,
+the result is complete. ``logs/<key[:2]>/<key>/`` holds what else was made of the log.
 """
 
 import json
@@ -129,7 +129,8 @@ class BatchFolder:
             with atomic(self.path / name, force=True) as temporary, ExitStack() as stack:
                 writer = None
                 for piece in pieces:
-                    # What other programs read: text of the kind that Arrow has always had.
+                    # What other programs read: text of the kind that Arrow has always
+                    # had.
                     table = piece.to_arrow(compat_level=pl.CompatLevel.oldest())
                     if writer is None:
                         writer = ParquetWriter(temporary, table.schema, compression="zstd")

@@ -1,8 +1,8 @@
 """Can it be believed? What supports an answer and what limits it, each with its remedy.
 
 Everything comes from the analysis' data: the examinations, the contact list, the robot's
-friction, the clock, which joints rest, and whether anything measures the force independently. The
-terminal, the page and ``run.json`` show the same items.
+friction, the clock, which joints rest, and whether anything measures the force
+independently. The terminal, the page and ``run.json`` show the same items.
 """
 
 import shlex
@@ -55,8 +55,8 @@ LIST_SUBJECTS = {
     "free-part-misses-joints": "free motion",
     "no-wrench-of-few-joints": "wrench",
 }
-#: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a sign or
-#: the effort is another.
+#: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a
+#: sign or the effort is another.
 MOST_UNEXPLAINED = 0.5
 FULL_OF_REST = 0.5  #: A joint that rests in more than this share of the log is said to rest.
 
@@ -75,8 +75,8 @@ class Ground(NamedTuple):
     subject: str  #: What it is about, in one to three words.
     sentence: str  #: What is known of it.
     remedy: str | None = None  #: A command that would mend it, None where there is none.
-    #: Whether it was found in this log, rather than true of every log like it: what the one line of
-    #: a log among several tells.
+    #: Whether it was found in this log, rather than true of every log like it: what the
+    #: one line of a log among several tells.
     of_log: bool = True
 
     @property

@@ -1,8 +1,9 @@
 """Charts: what page, recording and figures for papers draw, in which colours, at which samples.
 
-Every chart is drawn as SVG (`page/shell.py`), one small picture a joint or axis, for print and for
-readers without a script; with a script the plotting library draws the chosen one large beside them.
-Of a long log the lowest and the highest sample of every stretch stay.
+Every chart is drawn as SVG (`page/shell.py`), one small picture a joint or axis, for
+print and for readers without a script; with a script the plotting library draws the
+chosen one large beside them. Of a long log the lowest and the highest sample of every
+stretch stay.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -60,8 +61,8 @@ class ChartLine(NamedTuple):
     leads: bool = False  #: Whether it is the line to look at: drawn thicker.
     shown: bool = True  #: Whether it is drawn at once, rather than when asked for.
     x: Array | None = None  #: Its own horizontal places, None for the chart's. (T,)
-    #: Where the ribbon is grey: no contact is listed there, so that it says what would show. None
-    #: for nowhere. (T,)
+    #: Where the ribbon is grey: no contact is listed there, so that it says what would
+    #: show. None for nowhere. (T,)
     quiet: Mask | None = None
 
 
@@ -169,9 +170,10 @@ def drawn_line(
 def thinned(t: Array, values: Array, stretches: int) -> tuple[Array, Array]:
     """A series with at most two samples a stretch, and the first and last of the log.
 
-    The lowest and highest sample of every stretch keep their own time and value, so that no spike
-    is lost and none is made. A log of at most twice as many samples is kept whole. The line breaks,
-    by a NaN, where a stretch holds no known value and where the clock has a gap.
+    The lowest and highest sample of every stretch keep their own time and value, so that
+    no spike is lost and none is made. A log of at most twice as many samples is kept
+    whole. The line breaks, by a NaN, where a stretch holds no known value and where the
+    clock has a gap.
     """
     gaps, index = gaps_of(t, GAP_STEPS), np.arange(len(t))
     if len(t) > 2 * stretches:
@@ -204,9 +206,9 @@ def level_rows(
 ) -> Index | None:
     """Sample numbers of a plot with one clock for all lines, None for all. (P,)
 
-    Of every stretch the lowest and highest sample of every line stay, and the first unknown one,
-    so that no spike is lost and no gap closed; and every sample of the spans `whole` [s]. A log of
-    which that would leave out nothing is kept whole.
+    Of every stretch the lowest and highest sample of every line stay, and the first
+    unknown one, so that no spike is lost and no gap closed; and every sample of the spans
+    `whole` [s]. A log of which that would leave out nothing is kept whole.
     """
     if len(t) <= 2 * values.shape[1] * stretches:
         return None
@@ -231,13 +233,15 @@ def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
     count = -(-samples // width)
     start = np.arange(count) * width
     low, high = np.zeros((2, count, n), dtype=np.intp)
-    # The last stretch is filled with unknowns. One column at once: of a long log all have no room.
+    # The last stretch is filled with unknowns. One column at once: of a long log all have
+    # no room.
     padded = np.full(count * width, np.nan)
     for j, column in enumerate(values.T):
         padded[:samples] = column
         cut = padded.reshape(count, width)
         unknown = np.isnan(cut)
-        # argmin of a stretch without a known value is its first sample, which is NaN: a break.
+        # argmin of a stretch without a known value is its first sample, which is NaN: a
+        # break.
         low[:, j] = np.where(unknown, np.inf, cut).argmin(axis=1) + start
         high[:, j] = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
     return low, high

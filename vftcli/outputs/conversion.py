@@ -1,14 +1,14 @@
 """Logs as files: any as a flat table or an MCAP, a simulated one with its truth beside it.
 
-An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove; estimates become one too. Topics of
-`estimates.mcap`:
-`/joint_states` (positions, velocities, measured drive torque as effort),
-`/vftcli/external/<observer>` and `/vftcli/external/reference` (external torque as effort), all
-sensor_msgs/JointState; `/vftcli/wrench/<observer>` and `/vftcli/wrench/reference`
-(geometry_msgs/WrenchStamped, NaN where the pose cannot tell it); `/vftcli/contacts/log`
-(foxglove_msgs/Log) where each contact begins and ends; `/vftcli/contacts` (std_msgs/String, the
-JSON of contacts.json) once, kept for who comes late. Hyphens, which ROS names may not hold, become
-underscores. All of it is CDR: a channel of JSON messages in a ros2 file ends rosbags' reader.
+An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove; estimates become one too.
+Topics of `estimates.mcap`: `/joint_states` (positions, velocities, measured drive torque
+as effort), `/vftcli/external/<observer>` and `/vftcli/external/reference`
+(external torque as effort), all sensor_msgs/JointState; `/vftcli/wrench/<observer>` and
+`/vftcli/wrench/reference` (geometry_msgs/WrenchStamped, NaN where the pose cannot tell
+it); `/vftcli/contacts/log` (foxglove_msgs/Log) where each contact begins and ends;
+`/vftcli/contacts` (std_msgs/String, the JSON of contacts.json) once, kept for who comes
+late. Hyphens, which ROS names may not hold, become underscores. All of it is CDR: a
+channel of JSON messages in a ros2 file ends rosbags' reader.
 """
 
 import json
@@ -166,7 +166,8 @@ def source_stamps(recording: Recording) -> Nanoseconds:
 def stamps_of(recording: Recording) -> Nanoseconds:
     """The log's own stamps, from 0 where ROS cannot count them. (T,) [ns]"""
     stamps = source_stamps(recording)
-    # A log may count from any time, even below zero; a viewer needs stamps that ROS can hold.
+    # A log may count from any time, even below zero; a viewer needs stamps that ROS can
+    # hold.
     countable = stamps[0] >= 0 and stamps[-1] // 10**9 <= LAST_STAMP
     return stamps if countable else stamps - stamps[0]
 
@@ -270,8 +271,8 @@ def write_csv(recording: Recording, path: Path) -> None:
 def recorded_topics(recording: Recording) -> Iterator[OutputTopic]:
     """The topics of a log: /joint_states, and one /vftcli/… for each further signal.
 
-    The effort of /joint_states is the torque, or of a log that has no torque the motor current or
-    the torque without gravity, as UR's driver publishes them.
+    The effort of /joint_states is the torque, or of a log that has no torque the motor
+    current or the torque without gravity, as UR's driver publishes them.
     """
     names = recording.joint_names or tuple(f"joint_{j + 1}" for j in range(recording.joints))
     efforts = (recording.torque, recording.current, recording.torque_without_gravity)

@@ -263,13 +263,15 @@ def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Ite
         if not samples:
             continue
         recording, reference = group["recording"][0], group["reference"][0]
-        # A force axis has its number in newtons, a moment axis in newton-metres; never both.
+        # A force axis has its number in newtons, a moment axis in newton-metres; never
+        # both.
         values = group.select("observer", "axis", rmse=pl.coalesce("rmse_N", "rmse_Nm"))
         found: dict[str, dict[str, float | None]] = {}
         for name, axis, value in values.iter_rows():
             found.setdefault(name, {})[axis] = value
         rows: Rows = [(name, *map(own.get, AXES)) for name, own in found.items()]
-        # The paper compares with a sensor; beside a simulated truth its bounds mean nothing.
+        # The paper compares with a sensor; beside a simulated truth its bounds mean
+        # nothing.
         if reference == "sensor" and (limits := published.get(recording)):
             force, moment = limits["wrench_rmse_N"], limits["wrench_rmse_Nm"]
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
@@ -297,8 +299,8 @@ def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
 def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame:
     """The errors with a column `overridden` where results were wanted though they mean nothing.
 
-    It holds the codes of the findings, of all logs together in pooled rows; without any such
-    finding the table is as it was.
+    It holds the codes of the findings, of all logs together in pooled rows; without any
+    such finding the table is as it was.
     """
     found = {a.recording.name: refused_codes(a.examinations) for a in analyses}
     codes = {name: ", ".join(each) for name, each in found.items() if each}

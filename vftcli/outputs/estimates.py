@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 
 ALL = slice(None)  #: All rows of a table.
-#: An analysis and which of its rows are written; None where all of them went by in blocks.
+#: An analysis and which of its rows are written; None where all of them went by in
+#: blocks.
 Group = tuple[Analysis, slice | None]
 #: Rows from which on a table is written as several groups, and rows of such a group.
 LONG, GROUP_ROWS = 1 << 17, 1 << 15
@@ -35,14 +36,14 @@ LONG, GROUP_ROWS = 1 << 17, 1 << 15
 def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     """Time, motion, every observer's torque and the reference's, one flat column each.
 
-    Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``… [N·m];
-    ``sd/<observer>/1``… [N·m] where the observer gives one; ``tau_ext/reference/1``… [N·m];
-    ``contact``, the row's number in the list of contacts or null, where they are listed; where a
-    wrench is asked for, and of ``best`` where contacts are listed, ``wrench/<observer>/fx``…``mz``
-    [N, N·m], null where the pose cannot tell it, ``wrench_sd/<observer>/fx``…,
-    ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; by the solver ``map``, what it says of
-    the masked samples is apart in ``wrench_masked/<observer>/fx``….
-    What is not known is null.
+    Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``…
+    [N·m]; ``sd/<observer>/1``… [N·m] where the observer gives one;
+    ``tau_ext/reference/1``… [N·m]; ``contact``, the row's number in the list of contacts
+    or null, where they are listed; where a wrench is asked for, and of ``best`` where
+    contacts are listed, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
+    cannot tell it, ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and
+    ``sigma_min`` [m]; by the solver ``map``, what it says of the masked samples is apart
+    in ``wrench_masked/<observer>/fx``…. What is not known is null.
     """
     return frame_of(columns(analysis, rows))
 
@@ -193,15 +194,16 @@ def write_estimate_folder(
 ) -> tuple[Analysis, str]:
     """Write `estimates.parquet`, `run.json` and the extras into a folder, all or nothing.
 
-    Of a long log its groups are given, with CSV as the only extra. What comes back is the analysis
-    of the whole log, and the text of `run.json`.
+    Of a long log its groups are given, with CSV as the only extra. What comes back is the
+    analysis of the whole log, and the text of `run.json`.
     """
     with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
         table = folder / "estimates.parquet"
         if isinstance(analysis, Analysis):
             record = run_record(analysis, command)
             write_estimates(table, analysis)
-            # After the record: it names the packages that are loaded, and these made no number.
+            # After the record: it names the packages that are loaded, and these made no
+            # number.
             write_extras(folder, "", analysis, choice)
         else:
             csv = folder / "estimates.csv" if "csv" in choice.extras else None

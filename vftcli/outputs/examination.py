@@ -124,8 +124,8 @@ def health_record(
 ) -> list[dict[str, Any]]:
     """Findings of a run's logs for `run.json`: the log's first, then others'.
 
-    `overridden` are the codes with which results mean little, though they were wanted anyway;
-    `fitting` is whether the robot had to be the log's.
+    `overridden` are the codes with which results mean little, though they were wanted
+    anyway; `fitting` is whether the robot had to be the log's.
     """
     return [
         {

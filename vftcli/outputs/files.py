@@ -1,9 +1,9 @@
 """Files written whole or not at all, never over an input, nor unasked.
 
-New files are made in a temporary folder beside their places and renamed in the end. Several files
-that belong together have a seal: `run.json`, with the digest of every other one. It goes before
-the first of them changes and comes when the last is in its place, so that a folder without it is
-known to be incomplete, whenever a run was killed.
+New files are made in a temporary folder beside their places and renamed in the end.
+Several files that belong together have a seal: `run.json`, with the digest of every other
+one. It goes before the first of them changes and comes when the last is in its place, so
+that a folder without it is known to be incomplete, whenever a run was killed.
 """
 
 import hashlib
@@ -108,8 +108,8 @@ def write_text(path: Path, text: str, force: bool = False) -> None:
 
 def put_text(path: Path, text: str) -> None:
     """Write a text, equal bytes on every system, even with half a letter."""
-    # On Windows the same bytes as elsewhere: digests of outputs can be compared. A file name may
-    # hold bytes that are no letter, which UTF-8 refuses.
+    # On Windows the same bytes as elsewhere: digests of outputs can be compared. A file
+    # name may hold bytes that are no letter, which UTF-8 refuses.
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
@@ -119,11 +119,11 @@ EARLIER = "earlier"  #: Folder, in the temporary one, of the files that make roo
 class OutputFolder:
     """A folder that gets all of its files at once, when the block ends well.
 
-    Until then they are in a temporary folder on its file system; if the block fails, it goes,
-    and with it every folder that was made for it. ``folder / "name"`` is where to write a file.
-    With `force`, those of `names` that an earlier run left and this one does not write are removed,
-    and every file that the earlier run's seal lists, so that all files of the folder belong
-    together.
+    Until then they are in a temporary folder on its file system; if the block fails, it
+    goes, and with it every folder that was made for it. ``folder / "name"`` is where to
+    write a file. With `force`, those of `names` that an earlier run left and this one
+    does not write are removed, and every file that the earlier run's seal lists, so that
+    all files of the folder belong together.
     """
 
     def __init__(self, path: Path, force: bool = False, names: Iterable[str] = ()) -> None:
@@ -170,7 +170,8 @@ class OutputFolder:
             self.made = [p for p in (self.path, *self.path.parents) if not p.exists()][::-1]
             self.path.mkdir(parents=True, exist_ok=True)
             check_writable(self.path)
-            # Inside the folder, so that the files only change their names when they are moved.
+            # Inside the folder, so that the files only change their names when they are
+            # moved.
             self.temporary = self._partial.enter_context(partial_folder(self.path))
         except OSError as error:
             self._discard()
@@ -202,7 +203,8 @@ class OutputFolder:
         """Every file that an earlier run may have left and that must not outlive it."""
         declared = {self.path / name for name in self.names}
         listed = [sealed_files(path) for path in declared if is_seal(path)]
-        # A killed run had moved the seal of the one before it out of the way, first of all.
+        # A killed run had moved the seal of the one before it out of the way, first of
+        # all.
         killed = self.path.glob(f"{PARTIAL}/{EARLIER}/0")
         return declared.union(*listed, *(sealed_files(path, self.path) for path in killed))
 

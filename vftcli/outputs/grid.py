@@ -1,9 +1,9 @@
 """Grid: one table of results, shown on the terminal, in Markdown, in LaTeX or in HTML.
 
-Whoever has a table to show makes a Grid of it; how a table looks is decided here and, for HTML, in
-the pages' templates, and so is what must be escaped: names and words come from files, and may hold
-any letter. Rows for machines, whose values are not rounded, are written by `csv_rows` and
-`json_rows`: what is not known is null or empty.
+Whoever has a table to show makes a Grid of it; how a table looks is decided here and, for
+HTML, in the pages' templates, and so is what must be escaped: names and words come from
+files, and may hold any letter. Rows for machines, whose values are not rounded, are
+written by `csv_rows` and `json_rows`: what is not known is null or empty.
 """
 
 import csv
@@ -86,8 +86,8 @@ class Grid:
     quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
     unit: str = ""  #: Their unit, where it is one.
     summaries: int = 0  #: How many rows at the end sum up those above, below a rule.
-    #: Whether numbers may bear a mark: the terminal then keeps a place for it, so that digits are
-    #: below digits.
+    #: Whether numbers may bear a mark: the terminal then keeps a place for it, so that
+    #: digits are below digits.
     marked: bool = False
     notes: tuple[str, ...] = ()  #: Lines on what the marks mean, footnotes in LaTeX.
     swatches: bool = False  #: Whether the page shows the colour of the observer that heads a row.
@@ -132,8 +132,8 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
 def terminal(grid: Grid, letters: Callable[[str], str] = str, width: int | None = None) -> str:
     """A table as text, two blanks between columns, each line ended.
 
-    A table wider than `width`, by default the terminal's, breaks its headings, then leaves out
-    columns that are seldom asked for, the last first, and names them below.
+    A table wider than `width`, by default the terminal's, breaks its headings, then
+    leaves out columns that are seldom asked for, the last first, and names them below.
     """
     width = width or shutil.get_terminal_size().columns
     left_out: list[str] = []
@@ -197,8 +197,8 @@ def markdown(grid: Grid) -> str:
 def latex(*grids: Grid) -> str:
     r"""Tables of equal columns as one ``table``, or ``table*``, of the package booktabs.
 
-    Caption, label and footnotes are inside; decimal points are below one another without a
-    further package. Of several grids each has its title above its rows.
+    Caption, label and footnotes are inside; decimal points are below one another without
+    a further package. Of several grids each has its title above its rows.
     """
     first = grids[0]
     caption = (replace(first, title="") if len(grids) > 1 else first).caption or first.title

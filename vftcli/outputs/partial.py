@@ -15,8 +15,8 @@ if sys.platform != "win32":
 PARTIAL = ".vftcli-*.partial"  #: Every temporary folder's name, as a pattern of paths.
 #: What a temporary folder is called; the number is that of the process that made it.
 NAME = re.compile(r"\.vftcli-(\d+)-[0-9a-f]{8}\.partial")
-#: A folder that nobody holds is cleared at this age even if its process number is in use, which by
-#: then is another program's. [s]
+#: A folder that nobody holds is cleared at this age even if its process number is in use,
+#: which by then is another program's. [s]
 UNSURE = 60.0
 
 

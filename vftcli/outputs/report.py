@@ -75,8 +75,8 @@ def write_report(
 ) -> str:
     """Write the report of one log, or a sub-folder a log and above them an index and all errors.
 
-    All files are written or none. What comes back is the text of `run.json`, of several logs one
-    record with their own in it.
+    All files are written or none. What comes back is the text of `run.json`, of several
+    logs one record with their own in it.
     """
     import polars as pl
 

@@ -1,7 +1,8 @@
 """The arm and forces in a Rerun recording: shapes, poses and colours over time, arrows.
 
-The arm is made of capsules, from the chain's own geometry. A contact's arrow is there while it
-lasts, at its place, below `/contacts`, and the links that it touched have its colour.
+The arm is made of capsules, from the chain's own geometry. A contact's arrow is there
+while it lasts, at its place, below `/contacts`, and the links that it touched have its
+colour.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,7 +69,8 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
     shapes: list[list[Capsule]] = []
     for j in range(n + 1):
         shapes.append([])
-        # A joint is a short thick cylinder about its axis, which is z of the link that it moves.
+        # A joint is a short thick cylinder about its axis, which is z of the link that it
+        # moves.
         if j > 0:
             axis = np.array([0.0, 0.0, 2.2 * radii[j]])
             shapes[j].append(Capsule(-0.5 * axis, axis, 1.18 * radii[j], joint=True))
@@ -179,8 +181,8 @@ def send_contacts(
 ) -> None:
     """Send the arrow of each contact, while it lasts, at its place; `scale` newtons are 1 m.
 
-    On the wrist it is the force of `best` at these poses as it runs, in base axes [N], (S, 3);
-    elsewhere, where the flange's would be another, that of the contact's peak.
+    On the wrist it is the force of `best` at these poses as it runs, in base axes [N],
+    (S, 3); elsewhere, where the flange's would be another, that of the contact's peak.
     """
     for contact in found.contacts:
         if contact.wrench is None:

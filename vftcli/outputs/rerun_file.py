@@ -1,7 +1,7 @@
 """A Rerun recording: plots, words and the arm in one file that opens arranged.
 
-Every plot is a chart of one panel and one entity, its key, holding one scalar a line, on the
-timeline `t` in seconds from the log's first sample; words are Markdown documents.
+Every plot is a chart of one panel and one entity, its key, holding one scalar a line, on
+the timeline `t` in seconds from the log's first sample; words are Markdown documents.
 """
 
 import hashlib
@@ -21,7 +21,8 @@ from vftcli.outputs.charts import GREY, INK, REFERENCE, Chart, ChartLine, Span, 
 from vftcli.outputs.files import unwritable
 from vftcli.outputs.rerun_arm import CONTACTS, ROBOT, ArmPoses, Stream, rgba
 
-#: How the names of lines begin that are drawn as bars, and how those end that are a band's edges.
+#: How the names of lines begin that are drawn as bars, and how those end that are a
+#: band's edges.
 BAR, EDGES = "touched: ", ("95 % upper", "95 % lower")
 
 
@@ -78,18 +79,19 @@ def rerun_file(
 ) -> Iterator[Stream]:
     """Write a recording with its plots and words; yield its stream, to draw the arm into it.
 
-    `words` holds the Markdown of every document by its name. The eye sees all `poses` of the arm,
-    in a space of this name; the time panel marks a span. [s]
+    `words` holds the Markdown of every document by its name. The eye sees all `poses` of
+    the arm, in a space of this name; the time panel marks a span. [s]
     """
-    # Equal data make equal recordings: no random id, no time of writing, nor rows put together by
-    # how much time has gone by.
+    # Equal data make equal recordings: no random id, no time of writing, nor rows put
+    # together by how much time has gone by.
     stream = rr.RecordingStream(
         "vftcli",
         recording_id=recording_id(title, tabs, words),
         send_properties=False,
         batcher_config=rr.ChunkBatcherConfig.NEVER(),
     )
-    # Into memory: Rerun writes a file in a thread, which on a full disk stops and is waited for.
+    # Into memory: Rerun writes a file in a thread, which on a full disk stops and is
+    # waited for.
     made = stream.memory_recording()
     shown = blueprint(tabs, words, poses, space, marked)
     stream.send_blueprint(shown, make_active=False, make_default=True)
@@ -142,8 +144,9 @@ def blueprint(
 
     The eye sees the base and all places where the links have been.
 
-    Rerun lets no file say where its time cursor stands: it opens at the first sample. The marked
-    span is visible in the time panel, and a click on a time of the text log goes there.
+    Rerun lets no file say where its time cursor stands: it opens at the first sample. The
+    marked span is visible in the time panel, and a click on a time of the text log goes
+    there.
     """
     corners = poses.translation.reshape(-1, 3)
     # The base at the origin must be visible too.

@@ -1,11 +1,11 @@
 """recording.rrd: contacts, torques, residuals, motion and the arm, arranged for the Rerun viewer.
 
-Entities: `/tau_ext/J1` … (the reference, then every observer), `/residual/J1` … (every estimate
-minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint), `/wrench/fx` … where
-wrenches are known, as in the page's charts; `/robot` with the arm, and the force on it where no
-contacts are listed. Where they are: `/force` with |F|, its band and the spans of the contacts,
-`/force/points` with the peaks, `/contacts/1` … with the arrow and the words of each contact,
-`/remarks` with what limits the list.
+Entities: `/tau_ext/J1` … (the reference, then every observer), `/residual/J1` … (every
+estimate minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint),
+`/wrench/fx` … where wrenches are known, as in the page's charts; `/robot` with the arm,
+and the force on it where no contacts are listed. Where they are: `/force` with |F|, its
+band and the spans of the contacts, `/force/points` with the peaks, `/contacts/1` … with
+the arrow and the words of each contact, `/remarks` with what limits the list.
 """
 
 from collections.abc import Iterable, Iterator
@@ -52,7 +52,8 @@ from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.solvers import ForceArrow, VirtualSensor
 
-#: Stretches of a long log of which a plot keeps the lowest and highest samples of its lines.
+#: Stretches of a long log of which a plot keeps the lowest and highest samples of its
+#: lines.
 STRETCHES = 5000
 AROUND = 1.0  #: Time before and after the start of a contact in which every sample is kept. [s]
 WHOLE_TIME = 20.0  #: Time of which every sample is kept, all contacts together. [s]
@@ -294,9 +295,9 @@ def force_arrow(
 ) -> ForceArrow | None:
     """The force of the virtual sensor at the drawn poses, None for an arm of less than six joints.
 
-    It is that of the wrench that was asked for, its zero removed, as the tables have it; where none
-    was asked for, that of the estimate as it is, at the flange. The drawn poses are those of
-    the log's samples `sampled`. (S,)
+    It is that of the wrench that was asked for, its zero removed, as the tables have it;
+    where none was asked for, that of the estimate as it is, at the flange. The drawn
+    poses are those of the log's samples `sampled`. (S,)
     """
     source, chain = force_source(analysis), analysis.robot.chain
     if source is None or chain.joints < 6:

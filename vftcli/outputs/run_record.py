@@ -153,8 +153,8 @@ def jsonable(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
 def versions() -> dict[str, str]:
     """Versions of the program and of the packages that took part in this run, by name.
 
-    A package that was not imported had no part in the numbers, and looking its version up would
-    cost more than they did.
+    A package that was not imported had no part in the numbers, and looking its version up
+    would cost more than they did.
     """
     found = {"vftcli": VERSION, "python": platform.python_version()}
     for package, module in PACKAGES.items():

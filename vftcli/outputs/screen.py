@@ -1,8 +1,8 @@
 """A command's screen on its logs, and what a terminal can show of it.
 
-Facts, the answer in a sentence, |F| over time as bars, the contacts, whether it can be believed,
-the errors against a reference, and what was written: forty lines at most, whatever the number of
-logs.
+Facts, the answer in a sentence, |F| over time as bars, the contacts, whether it can be
+believed, the errors against a reference, and what was written: forty lines at most,
+whatever the number of logs.
 """
 
 import textwrap
@@ -38,10 +38,11 @@ from vftcli.signals.remarks import sentence
 MOST_LINES = 40  #: Lines of a screen.
 FILE_LINES = 4  #: Of them, those that name what was written: a blank one, two of names, the page.
 
-#: Lines of a ground and rows of the table, None for all; then less and less, till it fits.
+#: Lines of a ground and rows of the table, None for all; then less and less, till it
+#: fits.
 #:
-#: A good ground has a line less than the others, one at least. With none, the good grounds share a
-#: line and the others have one each.
+#: A good ground has a line less than the others, one at least. With none, the good
+#: grounds share a line and the others have one each.
 FORMS = ((None, None), (3, 20), (2, 20), (1, 20), *((0, rows) for rows in range(20, 2, -1)))
 
 MOST_LOGS, WORST = 20, 3  #: Logs that are shown at most, findings below them.

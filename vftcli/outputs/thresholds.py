@@ -10,7 +10,8 @@ from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, terminal, wor
 from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.robot_file import lines_of
 
-#: A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre.
+#: A threshold in a call is a multiple of a hundredth: no robot tells less of a
+#: newton-metre.
 SHARES = 100
 
 
@@ -251,8 +252,8 @@ def toml_text(thresholds: Thresholds) -> str:
     return "".join(lines_of({"thresholds": table})).lstrip()
 
 
-#: Interface of a robot → how many joint torques it takes, None for any number; which thresholds
-#: must be known, "" for none; and its text.
+#: Interface of a robot → how many joint torques it takes, None for any number; which
+#: thresholds must be known, "" for none; and its text.
 INTERFACES: dict[str, tuple[int | None, str, Callable[[Thresholds], str]]] = {
     "libfranka": (7, "axes", libfranka_call),
     "franka_ros": (7, "axes", franka_ros_parameters),

@@ -34,7 +34,8 @@ CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time",
 NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)")
 #: A message's own stamp, or a part of it.
 HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
-#: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them.
+#: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes
+#: them.
 OWN_STAMPS = "t_src_ns"
 #: Field of Recording → names its columns go by, in lower case and without their index.
 ALIASES: dict[str, list[str]] = tables_beside(__file__, "aliases.toml")
@@ -175,8 +176,9 @@ class NamedColumns:
     def others(self, stated: Sequence[Pick]) -> Iterator[Pick]:
         """The signals beside those that a text names.
 
-        Where it names the positions, only what it leaves out and no estimate can do without:
-        velocities, and an effort where it names none; what two groups could be is left out.
+        Where it names the positions, only what it leaves out and no estimate can do
+        without: velocities, and an effort where it names none; what two groups could be
+        is left out.
         """
         known, used = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
         joints = next((len(pick.cells) for pick in stated if pick.signal == "q"), None)
@@ -305,7 +307,8 @@ def table_clock(table: Table, column: int) -> Cell:
     return Cell(column, 0 if column in table.lists else None)
 
 
-#: The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are alphabetical.
+#: The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are
+#: alphabetical.
 UR_NAMES = (
     "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
     "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
@@ -322,9 +325,9 @@ HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}  #: Stem of Franka's jo
 def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
     """Positions of the arm's joints among `names`, base to tip.
 
-    Franka and UR joints are found by name wherever they stand, prefixes and further joints (a
-    gripper's fingers) set aside; UR's words and joints called joint1, joint_2, … where there are no
-    others. Unknown names keep the file's order.
+    Franka and UR joints are found by name wherever they stand, prefixes and further
+    joints (a gripper's fingers) set aside; UR's words and joints called joint1, joint_2,
+    … where there are no others. Unknown names keep the file's order.
     """
     words = [re.sub(r"[_ ]+", " ", name.lower()).strip() for name in names]
     numbers = (NUMBERED.fullmatch(name) for name in names)

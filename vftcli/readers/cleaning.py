@@ -62,19 +62,21 @@ def row_samples(raw: RawLog, rows: int) -> Indices | None:
     return sample
 
 
-#: Values as large as this are no measurement in any unit; anywhere in a log they are refused.
+#: Values as large as this are no measurement in any unit; anywhere in a log they are
+#: refused.
 ABSURD = 1e9
 #: How a log is read without one of its signals.
 LEAVING_OUT = (
     "leave the signal out: with --columns name the others, as in t=t,q=q_{i},dq=dq_{i}, or skip it "
     "with _:6 in a table without a header"
 )
-#: No robot is sampled ten million times a second, nor for six years: behind the farthest start
-#: nanoseconds in 64 bits count no farther. [s]
+#: No robot is sampled ten million times a second, nor for six years: behind the farthest
+#: start nanoseconds in 64 bits count no farther. [s]
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 2e8
 #: A clock starts within 285 years of 1970: nanoseconds in 64 bits count no farther. [s]
 FARTHEST_START = 9e9
-#: How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]
+#: How far a joint goes from its zero, with a little to spare: of seven-joint arms, of
+#: any. [rad]
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 GAP_STEPS = 4.0  #: A step this many times the median is reported as a gap.
 
@@ -89,9 +91,10 @@ def cleaned(
 ) -> Recording:
     """Make a Recording of what a reader found.
 
-    In order: joints without a signal are left out, garbage of a misaligned packet at the start is
-    dropped, values that are no numbers are refused, repeated stamps are dropped, a clock that runs
-    backwards is refused, gaps are counted, and positions that can only be degrees are refused.
+    In order: joints without a signal are left out, garbage of a misaligned packet at the
+    start is dropped, values that are no numbers are refused, repeated stamps are dropped,
+    a clock that runs backwards is refused, gaps are counted, and positions that can only
+    be degrees are refused.
     """
     rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
     raw = measured(raw, path)
@@ -182,7 +185,8 @@ def _without_empty_joints(raw: RawLog) -> RawLog:
 
 #: Rows at the start of a log among which a misaligned packet may have left garbage.
 GARBAGE_ROWS = 100
-#: No joint measurement in SI units is this large; a misread double nearly always is, or is tiny.
+#: No joint measurement in SI units is this large; a misread double nearly always is, or
+#: is tiny.
 GARBAGE_VALUE = 1e6
 
 DENORMAL = 1e-300
@@ -259,7 +263,8 @@ class RestartError(ClockError):
         super().__init__(message)
 
 
-#: A stretch between two restarts of the clock that is shorter is not a recording of its own.
+#: A stretch between two restarts of the clock that is shorter is not a recording of its
+#: own.
 SEGMENT_ROWS = 20
 
 
@@ -348,15 +353,17 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
     return kept(raw, fresh, *remarks)
 
 
-#: Share of samples below which positions of another size are errors, and not of another unit.
+#: Share of samples below which positions of another size are errors, and not of another
+#: unit.
 BAD_SHARE = 0.05
 
 
 def _refuse_degrees(raw: RawLog, path: Path) -> None:
     """Raise a LogError if positions of unstated unit can hardly be radians.
 
-    The robot is not known yet, and a reader knows no robots: what holds for all must do. No joint
-    goes further than two turns from its zero; those of the arms with seven stay within one.
+    The robot is not known yet, and a reader knows no robots: what holds for all must do.
+    No joint goes further than two turns from its zero; those of the arms with seven stay
+    within one.
     """
     q = raw.signals["q"]
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS

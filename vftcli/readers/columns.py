@@ -175,8 +175,8 @@ def _unit_factor(signal: str, unit: str | None) -> float:
 def tick_of(stamps: Array, name: str) -> tuple[float, str]:
     """Length of a tick of unstated unit: from the name, else from the size of stamps and steps.
 
-    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their size;
-    everything else is seconds.
+    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their
+    size; everything else is seconds.
     """
     units = UNITS["t"]
     if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
@@ -207,7 +207,8 @@ EVEN = 20.0  #: How much longer than the median a twentieth of a clock's steps a
 DRIVEN = 0.12
 CLEAR = 1.3  #: How much better than another current it must fit.
 CONSTANTS = (3.0, 400.0)  #: Drive constants of geared joints. [N·m/A]
-#: Slope and cosine between a target and what was measured, of the joint where they are nearest.
+#: Slope and cosine between a target and what was measured, of the joint where they are
+#: nearest.
 ALIKE, NEAR = (0.5, 2.0), 0.9
 
 
@@ -223,9 +224,9 @@ class Guess(NamedTuple):
 def guess_columns(columns: Sequence[Array]) -> Guess | None:
     """What the columns (T,) of a table without a header are by their values, in file order.
 
-    A clock steps evenly, velocities are the derivative of positions, and a controller's target
-    torque is its target current times a constant, but for friction. None where no clock, or no
-    positions with their velocities behind them, are found.
+    A clock steps evenly, velocities are the derivative of positions, and a controller's
+    target torque is its target current times a constant, but for friction. None where no
+    clock, or no positions with their velocities behind them, are found.
     """
     table = np.stack([np.asarray(column[:ROWS], dtype=np.float64) for column in columns], axis=1)
     clock = np.asarray(columns[0][:ROWS])
@@ -295,7 +296,8 @@ def _derivatives(t: Array, table: Array) -> Mask:
         best = np.minimum(best, share)
     best[0] = best[:, 0] = np.inf
     np.fill_diagonal(best, np.inf)
-    # A slow joint's change may look like the integral of several columns: the nearest is its own.
+    # A slow joint's change may look like the integral of several columns: the nearest is
+    # its own.
     alike: Mask = (best < OPEN**2) & (best == best.min(axis=1, keepdims=True))
     return alike
 

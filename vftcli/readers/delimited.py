@@ -128,7 +128,8 @@ class TextTable(Table):
     def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Series]]:
         """The columns of each piece of the text; `kinds` has the polars type of each."""
         for text in self._pieces():
-            # Most texts parse as they are; mending copies them, so it waits for a failure.
+            # Most texts parse as they are; mending copies them, so it waits for a
+            # failure.
             found = self._parse(text, kinds) or self._parse(self._mended(text), kinds)
             if found is None:
                 raise self._diagnosed(kinds)
@@ -285,8 +286,8 @@ STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, n
 class EchoTable(TextTable):
     """A table by ``ros2 topic echo --csv``: a message's fields in their order, without a header.
 
-    Names, positions, velocities and efforts, as many of each or none, follow the header's stamp and
-    frame.
+    Names, positions, velocities and efforts, as many of each or none, follow the header's
+    stamp and frame.
     """
 
     is_headed = False

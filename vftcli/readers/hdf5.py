@@ -50,7 +50,8 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
         raise LogError(f"{name}: its chunks unpack to {size >> 20} MiB each, more than its rows.")
     settings = dataset.id.get_create_plist()
     filters = [settings.get_filter(k)[0] for k in range(settings.get_nfilters())]
-    # Each unpacks what the next has unpacked: two of a kind are a thousandfold of a thousandfold.
+    # Each unpacks what the next has unpacked: two of a kind are a thousandfold of a
+    # thousandfold.
     if set(filters) - {DEFLATE, SHUFFLE, FLETCHER32, LZF} or len(set(filters)) < len(filters):
         raise LogError(
             f"{name}: packed by HDF5's filters {filters}, of which deflate, shuffle, fletcher32 "
@@ -74,7 +75,8 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
                 )
 
 
-#: Groups and datasets that are looked at, and groups inside groups; a log has some hundred.
+#: Groups and datasets that are looked at, and groups inside groups; a log has some
+#: hundred.
 MOST_OBJECTS, DEEPEST = 100_000, 32
 
 
@@ -96,8 +98,8 @@ def opened(file: LogFile) -> Iterator[Any]:
 class Hdf5Table(ArrayTable):
     """The datasets of numbers in an open HDF5 file, or in one group of it, each a column.
 
-    Images, texts, references, links to other files and what claims more than it stores are left
-    out; nothing is read before it is asked for.
+    Images, texts, references, links to other files and what claims more than it stores
+    are left out; nothing is read before it is asked for.
     """
 
     @cached_property

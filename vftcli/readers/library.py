@@ -20,7 +20,8 @@ from vftcli.signals.recording import Recording, refuse_repeated_logs
 
 TRUTH = ".truth.parquet"  #: Ending of what a simulation writes beside its log.
 BATCH = "batch.json"  #: The file by which a folder of `vftcli batch` is known.
-#: The file that lists what a command of ours wrote beside it; beside other files its ending.
+#: The file that lists what a command of ours wrote beside it; beside other files its
+#: ending.
 RECORD = "run.json"
 METADATA = "metadata.yaml"  #: The file that lists the pieces of a bag of ROS 2.
 
@@ -86,8 +87,9 @@ class Library:
 def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
     """Give every path a label that no other of them has.
 
-    A label is the file's name where that is unique, else as many folders before it as tell it from
-    every other path: `a/log.csv` and `b/log.csv`. Spellings of one path have one label.
+    A label is the file's name where that is unique, else as many folders before it as
+    tell it from every other path: `a/log.csv` and `b/log.csv`. Spellings of one path have
+    one label.
     """
     given = [Path(path) for path in paths]
     # Spellings of one path count once, or no tail of it would be unique.
@@ -116,8 +118,9 @@ class LogEntry(NamedTuple):
 class LogCollection:
     """Finds the logs that a command is given.
 
-    A file is a log, whatever it holds. A folder is searched: what no reader knows is left out, and
-    what our own commands wrote. A file or data set of several episodes is a log an episode.
+    A file is a log, whatever it holds. A folder is searched: what no reader knows is left
+    out, and what our own commands wrote. A file or data set of several episodes is a log
+    an episode.
 
     Attributes:
         passed: Files of folders that were left out.
@@ -168,8 +171,8 @@ class LogCollection:
             return
         try:
             reader = reading.recognise(folder, self._choice)
-            # Recorders write metadata.yaml beside the pieces of one recording: without it what
-            # reads as a bag is a folder of several.
+            # Recorders write metadata.yaml beside the pieces of one recording: without it
+            # what reads as a bag is a folder of several.
             several_bags = reader.name == "rosbag2" and not (folder / METADATA).is_file()
             if reader.name != "droid" and not several_bags:
                 yield from self._episodes(folder, reader)
@@ -210,7 +213,8 @@ class LogCollection:
             except LogError:
                 return True
         lines = open_log(path).lines if reader.general else ()
-        # A table of text has numbers in its second or third line; prose reads as one column.
+        # A table of text has numbers in its second or third line; prose reads as one
+        # column.
         if lines and all(len(NUMBER.findall(line)) < FEWEST for line in lines[1:3]):
             return False
         return not stored_observers(path)

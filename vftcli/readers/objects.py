@@ -217,7 +217,8 @@ def _scalar(kind: Data, content: Data = None) -> Data:
     return np.frombuffer(content, dtype=kind.dtype, count=1)[0].item()
 
 
-#: All that a pickle may call, by the names NumPy has pickled it under, each replaced by ours.
+#: All that a pickle may call, by the names NumPy has pickled it under, each replaced by
+#: ours.
 ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
     ("numpy", "ndarray"): Marker,
     ("numpy", "dtype"): PickledType,
@@ -236,8 +237,8 @@ ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
 class ArrayUnpickler(pickle.Unpickler):
     """An unpickler that rebuilds arrays and refuses everything else.
 
-    What it builds is bounded by the size of the pickle: a part may be named again and again in two
-    bytes each.
+    What it builds is bounded by the size of the pickle: a part may be named again and
+    again in two bytes each.
     """
 
     def __init__(self, content: bytes) -> None:
@@ -279,8 +280,8 @@ class ArrayUnpickler(pickle.Unpickler):
     def _settled(self, value: Data, known: dict[int, Built | None], depth: int) -> Built:
         """A value with arrays for pickled arrays, and how many numbers it takes laid out in full.
 
-        A part that is named again is not walked again: a few lists that hold one another a few
-        times over are more than any memory takes.
+        A part that is named again is not walked again: a few lists that hold one another
+        a few times over are more than any memory takes.
         """
         if isinstance(value, PickledArray):
             return value.array, value.array.size
@@ -317,7 +318,8 @@ def load_arrays_only(file: LogFile) -> Data:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # old opcodes' escapes: refused or read
-            # Looked over as a whole first: loading builds objects on the way to what it refuses.
+            # Looked over as a whole first: loading builds objects on the way to what it
+            # refuses.
             _check_opcodes(content)
             unpickler = ArrayUnpickler(content)
             return unpickler.built(unpickler.load())
@@ -337,8 +339,8 @@ def load_arrays_only(file: LogFile) -> Data:
 def _check_opcodes(content: bytes) -> None:
     """Raise Refused for opcodes that no array needs, before anything is built.
 
-    Extension codes and persistent ids reach outside the file; a memo index or a claimed length far
-    beyond the file's size would only fill memory.
+    Extension codes and persistent ids reach outside the file; a memo index or a claimed
+    length far beyond the file's size would only fill memory.
     """
     for opcode, argument, _ in pickletools.genops(content):
         if opcode.name in {"EXT1", "EXT2", "EXT4", "PERSID", "BINPERSID", "INST", "OBJ"}:

@@ -25,11 +25,13 @@ MAGICS: dict[bytes, Wrapping] = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd
 UNPACKED_LIMIT = 128 * 1024 * 1024
 #: A wrapped file may unpack to 128 MiB or to fifty times its size, whichever is more.
 #:
-#: Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded log.
+#: Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded
+#: log.
 UNPACKED_RATIO = 50
 
 CHUNK = 1024 * 1024
-#: zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a time.
+#: zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a
+#: time.
 ZSTD_BYTES = 1024
 
 
@@ -68,7 +70,8 @@ class LogFile:
     """A file or folder as the readers see it: its first bytes already unwrapped."""
 
     path: Path  #: The file or folder.
-    #: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
+    #: The first bytes of the content, after gzip or zstd were taken off; empty for a
+    #: folder.
     head: bytes = b""
     entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
     wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.
@@ -161,8 +164,8 @@ def open_log(path: Path) -> LogFile:
 def unpacked(path: Path, wrapping: Wrapping, enough: float = math.inf) -> tuple[bytes, bool]:
     """What a file unpacks to, or the first bytes of it, and whether its packed data is whole.
 
-    Members of gzip, or frames of zstd, come one after another; of a cut file comes what there is,
-    a bomb is refused.
+    Members of gzip, or frames of zstd, come one after another; of a cut file comes what
+    there is, a bomb is refused.
     """
     new: Callable[[], Any]
     damage: type[Exception]

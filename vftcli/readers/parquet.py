@@ -1,7 +1,7 @@
 """Columns of Arrow's kind, flat or of lists as LeRobot writes them, by pyarrow.
 
-Parquet files, Feather files (version 2) and streams of record batches. On a damaged page of some,
-polars would end the whole process.
+Parquet files, Feather files (version 2) and streams of record batches. On a damaged page
+of some, polars would end the whole process.
 """
 
 import json
@@ -35,7 +35,8 @@ BLOCK_ROWS, BUFFER_BYTES = 1 << 13, 1 << 18
 FILE_MAGIC = b"ARROW1\0\0"  #: How a file of Arrow begins.
 ARROW = (FILE_MAGIC, b"\xff\xff\xff\xff")  #: How a file and a stream of Arrow begin.
 NUMBER = struct.Struct("<q")  #: A whole number in a message.
-#: Places of fields in Arrow's Message, RecordBatch and DictionaryBatch (format/Message.fbs).
+#: Places of fields in Arrow's Message, RecordBatch and DictionaryBatch
+#: (format/Message.fbs).
 MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 0, 2, 3, 1
 
 
@@ -130,14 +131,15 @@ class ColumnarTable(Table):
             raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
         whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
         target = np.int64 if whole else np.float64
-        # Not copied where nothing is to be changed: what is picked of it is copied once more.
+        # Not copied where nothing is to be changed: what is picked of it is copied once
+        # more.
         return plain(values).astype(target, copy=False)
 
     def _check(self, columns: Places) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
 
-        The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
-        whole process.
+        The rows are asked for, not the pages: on a damaged page's description pyarrow
+        ends the whole process.
         """
         # Decoders hand over two columns of one name under that name.
         if any(self.names.count(self.names[c]) > 1 for c in columns):

@@ -39,7 +39,8 @@ class RawLog:
     remarks: "tuple[Remark, ...]" = ()
     payload_mass: float | None = None  #: Mass that the controller counts with. [kg]
     payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
-    #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
+    #: Which of several recordings in the file this is, as "episode 3"; "" for the only
+    #: one.
     part: str = ""
     files: tuple[Path, ...] = ()  #: The files of a folder that it was read from; () for all.
     #: Which rows of the file these are, counted from 0; None for all. (T,)
@@ -49,7 +50,8 @@ class RawLog:
 
 
 ARMS = ("left", "right")  #: Values of ``--arm``.
-#: Value of ``log.effort`` → field of Recording; None where the robot's model has to decide.
+#: Value of ``log.effort`` → field of Recording; None where the robot's model has to
+#: decide.
 EFFORT = {
     "auto": None,
     "current": "current",
@@ -91,8 +93,8 @@ class ReadChoice(Choice):
         tuple[float, float] | None,
         Option("--interval", "A:B", "Use only seconds A to B of the log.", read_interval),
     ] = None
-    #: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the robot; None
-    #: to take what it is called.
+    #: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
+    #: robot; None to take what it is called.
     effort: Annotated[
         str | None,
         setting(
@@ -115,8 +117,8 @@ class ReadChoice(Choice):
     arm: Annotated[
         str | None, Option("--arm", "left|right", "Choose one arm of a two-armed log.")
     ] = None
-    #: "dq" to derive the velocities even where the log has some, "none" never to; None to do so
-    #: where it has none and is fast enough.
+    #: "dq" to derive the velocities even where the log has some, "none" never to; None to
+    #: do so where it has none and is fast enough.
     derive: Annotated[
         str | None,
         setting(

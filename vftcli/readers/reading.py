@@ -39,8 +39,8 @@ class LogFormat(NamedTuple):
     recording: str  #: How a user records one.
     takes: str  #: Which signals are taken from it.
     pitfalls: str  #: What to look out for.
-    #: Module of this room that reads it, imported when it is needed: by its `read`, or by its
-    #: `episodes`, which gives each one's number and the function that reads it.
+    #: Module of this room that reads it, imported when it is needed: by its `read`, or by
+    #: its `episodes`, which gives each one's number and the function that reads it.
     module: str
     begins: str = ""  #: Pattern of the content's first bytes, "" for any.
     line: str = ""  #: Pattern of a text's first line, "" for any.
@@ -52,7 +52,8 @@ class LogFormat(NamedTuple):
     episodes: bool = False  #: Whether a file may hold several recordings.
     columns: str = ""  #: The columns that its program writes, in the grammar of ``--columns``.
     joints: int = 0  #: How many joints such a log has, 0 for any number.
-    #: Columns of which the last values are the payload's mass and, if there, its centre of mass.
+    #: Columns of which the last values are the payload's mass and, if there, its centre
+    #: of mass.
     payload: str = ""
     clock: str = ""  #: Which clock its stamps are from, in words; "" for the column's name.
     remedy: str = ""  #: What to do where clock or positions are missing.
@@ -203,7 +204,8 @@ def _reader(file: LogFile, choice: ReadChoice) -> LogFormat:
 
 
 def _recognised(file: LogFile) -> LogFormat:
-    # A general format would take nearly any text, also that of a vendor: it is asked last.
+    # A general format would take nearly any text, also that of a vendor: it is asked
+    # last.
     found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
     if not found and known_kind(file) is None:
         found = [r for r in FORMATS.values() if r.general and r.recognises(file)]

@@ -84,8 +84,8 @@ class Pick(NamedTuple):
 class Picks(NamedTuple):
     """All signals of a table and its clock, or its rate [Hz] where it has no clock.
 
-    `constants` are columns of which the last value counts; `origin` is the column of the log's own
-    stamps [ns] in a table whose clock starts at zero.
+    `constants` are columns of which the last value counts; `origin` is the column of the
+    log's own stamps [ns] in a table whose clock starts at zero.
     """
 
     signals: tuple[Pick, ...]
@@ -263,8 +263,8 @@ def require_positions(table: Table, picks: Picks) -> Picks:
     return picks
 
 
-#: Bytes of a signal that wait in memory. A longer one lies in a nameless file in the system's
-#: folder for temporary files, and is an array all the same.
+#: Bytes of a signal that wait in memory. A longer one lies in a nameless file in the
+#: system's folder for temporary files, and is an array all the same.
 HELD = 1 << 23
 
 

@@ -1,9 +1,9 @@
 """A log's free part and spectra, and its observers' input less the bias.
 
-The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer runs.
-`best` runs on what is left, tuned on the spectra of that; the other observers do where
-``bias.method=whole-log`` asks for it. Nothing here refuses a log: what cannot be done is said,
-and `best` is made of what is left.
+The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer
+runs. `best` runs on what is left, tuned on the spectra of that; the other observers do
+where ``bias.method=whole-log`` asks for it. Nothing here refuses a log: what cannot be
+done is said, and `best` is made of what is left.
 """
 
 from dataclasses import dataclass, field, replace
@@ -39,11 +39,11 @@ class Baseline:
     missing: Remark | None = None
     #: A load that the free part carries and the model lacks, None where none shows.
     load: FreeLoad | None = None
-    #: The bias of the whole log, off the terms where its guards apply it; None where none was
-    #: fitted.
+    #: The bias of the whole log, off the terms where its guards apply it; None where none
+    #: was fitted.
     correction: WholeLogBias | None = None
-    #: Whether the free part is what the fit of that bias takes for free: no contact that comes and
-    #: goes, though a load that stays may be in it.
+    #: Whether the free part is what the fit of that bias takes for free: no contact that
+    #: comes and goes, though a load that stays may be in it.
     by_fit: bool = False
     #: Its parts in use, those not in use, and the substitute for a free part.
     on_correction: tuple[Remark, ...] = ()
@@ -73,8 +73,8 @@ class Baseline:
     def tunable(self) -> Spectra | None:
         """The spectra if gains may come from them, else None.
 
-        Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran to the
-        slowest.
+        Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran
+        to the slowest.
         """
         return None if self.by_fit and self.load is not None else self.spectra
 
@@ -166,8 +166,8 @@ class FreeReading(NamedTuple):
 
     observer: Observer  #: The observer.
     estimate: ExternalTorque  #: Its estimate of the log.
-    #: What it reads in the free samples, of all pieces in a row, less a load that the free part
-    #: carries. (S, n) [N·m]
+    #: What it reads in the free samples, of all pieces in a row, less a load that the
+    #: free part carries. (S, n) [N·m]
     samples: Array
     resting: Mask  #: Whether a joint rests in them. (S, n)
 

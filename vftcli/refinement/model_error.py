@@ -1,9 +1,10 @@
 """Possible errors of a robot's model: columns, their sizes, their torque.
 
-The raw disturbance d is the external torque less the model's error, d = τ_ext − A δx. The columns A
-are the inertial parameters of every link, the rotor inertias, the drive constants and the friction
-of every joint. Each δx has mean zero and a standard deviation that follows from the robot's own
-numbers: a maker's table is good to some percent, friction to a fifth.
+The raw disturbance d is the external torque less the model's error, d = τ_ext − A δx. The
+columns A are the inertial parameters of every link, the rotor inertias, the drive
+constants and the friction of every joint. Each δx has mean zero and a standard deviation
+that follows from the robot's own numbers: a maker's table is good to some percent,
+friction to a fifth.
 """
 
 from dataclasses import dataclass, replace
@@ -33,7 +34,8 @@ from vftcli.signals.series import median_step
 CUTOFF = 6.0  #: What is faster is noise, or contact: the model's error follows the motion. [Hz]
 PLAY = 0.3e-3  #: Presliding length of the friction that may be missing. [rad]
 SMOOTHING = 0.003  #: Velocity over which its sign turns. [rad/s]
-#: A clock that waits longer counts as waiting so long: six times the period of `CUTOFF`. [s]
+#: A clock that waits longer counts as waiting so long: six times the period of `CUTOFF`.
+#: [s]
 WAIT = 1.0
 SHAPES = 5  #: Columns of friction a joint beside its offset.
 #: Speed up to which a joint's friction is looked at where its limit is unknown. [rad/s]
@@ -78,8 +80,8 @@ def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Ar
 def friction_shapes(run: Run, gravity: Array) -> list[Array]:
     """Possible errors of each joint's friction, from the measured motion.
 
-    The smoothed sign, how far the presliding deflection is from it, the sign times the load, the
-    velocity and its signed square. (T, n) each
+    The smoothed sign, how far the presliding deflection is from it, the sign times the
+    load, the velocity and its signed square. (T, n) each
     """
     q, dq = run.q, run.dq
     sign = np.tanh(dq / SMOOTHING)
@@ -89,8 +91,8 @@ def friction_shapes(run: Run, gravity: Array) -> list[Array]:
 def usual_friction(robot: Robot) -> Array:
     """Dry, viscous and quadratic friction by which a model's error is judged. (3, n)
 
-    Other curves are fitted. A sigmoid has neither slope nor bend of its own: seven tenths of its
-    amplitude count as dry. [N·m], [N·m·s/rad], [N·m·s²/rad²]
+    Other curves are fitted. A sigmoid has neither slope nor bend of its own: seven tenths
+    of its amplitude count as dry. [N·m], [N·m·s/rad], [N·m·s²/rad²]
     """
     found = np.zeros((robot.joints, 3))
     dry = dry_friction(robot.friction, robot.joints)

@@ -1,9 +1,10 @@
 """From a log's baseline to finished estimates: bands, limits, the paper's gains against the best.
 
-Bands come from the log's own free samples and spectra, and say what an estimate's error is expected
-to be without a reference: the root mean square of their standard deviation over the log, the mean
-over the joints. Gains from a log's spectra and a clock with gaps may together be more than numbers
-can hold. On such a joint the momentum observer, which adds up its input, replaces it.
+Bands come from the log's own free samples and spectra, and say what an estimate's error
+is expected to be without a reference: the root mean square of their standard deviation
+over the log, the mean over the joints. Gains from a log's spectra and a clock with gaps
+may together be more than numbers can hold. On such a joint the momentum observer, which
+adds up its input, replaces it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,7 +40,8 @@ from vftcli.signals.shown import Shown
 #: The cause that is not part of an error's sum: it says what a standing joint may hide.
 STICTION = "stiction at rest"
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
-#: Codes of the remark that holds what the bands let expect: the gains are off the best, or not.
+#: Codes of the remark that holds what the bands let expect: the gains are off the best,
+#: or not.
 EXPECTED = ("paper-gains-expected", "paper-gains-expected-level")
 #: The same of the remark that holds what a reference says.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
@@ -66,10 +68,11 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
 def stated_band(found: Baseline, reading: FreeReading) -> Array:
     """Band of `best` without spectra, by the robot's own numbers. (T, n) [N·m]
 
-    Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a bias was
-    fitted it is what that leaves of it, and what is read where its fit sees no contact. What the
-    gains leave out of the torque is not known. In a log of a few samples, or of hardly anything but
-    gaps, a moving joint has `UNSEEN` of its dry friction.
+    Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a
+    bias was fitted it is what that leaves of it, and what is read where its fit sees no
+    contact. What the gains leave out of the torque is not known. In a log of a few
+    samples, or of hardly anything but gaps, a moving joint has `UNSEEN` of its dry
+    friction.
     """
     run = found.motion.log
     friction, nothing = run.dry_friction, np.zeros_like(run.dry_friction)
@@ -91,8 +94,8 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
 def known_error(found: Baseline, reading: FreeReading) -> FreeError:
     """An estimator's reading without contact, as far as the log shows it.
 
-    Samples that a fitted bias calls free speak too, as a stated part is short and often at rest:
-    the larger of both counts.
+    Samples that a fitted bias calls free speak too, as a stated part is short and often
+    at rest: the larger of both counts.
     """
     stated = free_error(reading.samples, reading.resting, found.motion.log.dry_friction)
     called = fitted_error(found, reading)
@@ -108,8 +111,8 @@ def known_error(found: Baseline, reading: FreeReading) -> FreeError:
 def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
     """Readings in the correction fit's free samples; None in too few.
 
-    Slow loads that the fit believes in are no error of who reads them, nor is a load that the free
-    part carries where it believes in none.
+    Slow loads that the fit believes in are no error of who reads them, nor is a load that
+    the free part carries where it believes in none.
     """
     run, tau, off = found.motion.log, reading.estimate.tau, found.correction
     if off is None or np.count_nonzero(off.free) < ENOUGH:
@@ -145,10 +148,11 @@ class Budget(NamedTuple):
 def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     """Divide an observer's error into its causes, each estimated from the log.
 
-    Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the observer
-    reads on the free part is model error: friction as far as sign and size of a joint's own
-    velocity explain it, the rest of the model otherwise. Stiction at rest is the dry friction a
-    resting joint may hide, F_c/√3, times the share of its time at rest.
+    Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the
+    observer reads on the free part is model error: friction as far as sign and size of a
+    joint's own velocity explain it, the rest of the model otherwise. Stiction at rest is
+    the dry friction a resting joint may hide, F_c/√3, times the share of its time at
+    rest.
     """
     f, step, n = spectra.frequency, spectra.step, spectra.joints
     response = reading.observer.frequency_response(f, step, n)

@@ -1,19 +1,20 @@
 """The model's error from a whole log: weighted normal equations, a robust fit, its test on folds.
 
-All columns are times their standard deviations: the prior is the unit matrix and the solution
-minimises Σ w (d + A u)² + Σ u². A joint's row has its own columns, a slow load only its two
-knots about a sample: sums go block by block.
+All columns are times their standard deviations: the prior is the unit matrix and the
+solution minimises Σ w (d + A u)² + Σ u². A joint's row has its own columns, a slow load
+only its two knots about a sample: sums go block by block.
 
-A hand that leans on the arm all the time looks like mass. So beside the model's columns there
-are those of external loads that change slowly: a wrench at the flange, forces at elbow and
-wrist on the links before them. By the lever rule these make a force anywhere along the arm.
-The estimate keeps their torque: in doubt a torque is a push.
+A hand that leans on the arm all the time looks like mass. So beside the model's columns
+there are those of external loads that change slowly: a wrench at the flange, forces at
+elbow and wrist on the links before them. By the lever rule these make a force anywhere
+along the arm. The estimate keeps their torque: in doubt a torque is a push.
 
-The first fit weighs samples down for all joints together: several feel a contact. The second
-separates contact from free motion by a threshold and fits the free samples alone, with the loads
-beside the model's error. A correction must predict, not only fit: the free samples are cut into
-contiguous folds, and the others predict each, with the model free in several degrees. Samples in
-motion judge a joint: at rest stiction rules, which no model predicts.
+The first fit weighs samples down for all joints together: several feel a contact. The
+second separates contact from free motion by a threshold and fits the free samples alone,
+with the loads beside the model's error. A correction must predict, not only fit: the free
+samples are cut into contiguous folds, and the others predict each, with the model free in
+several degrees. Samples in motion judge a joint: at rest stiction rules, which no model
+predicts.
 """
 
 from collections.abc import Sequence
@@ -40,8 +41,8 @@ WRENCH = 6  #: Components of the flange's wrench, the first loads.
 class SlowLoads(NamedTuple):
     """Columns of slow external loads along the samples of a fit."""
 
-    #: External torque, sign reversed, of one standard deviation of every component: the flange's
-    #: wrench, then forces along the arm. (S, n, m) [N·m]
+    #: External torque, sign reversed, of one standard deviation of every component: the
+    #: flange's wrench, then forces along the arm. (S, n, m) [N·m]
     torque: Array
     knot: Indices  #: The knot before each sample. (S,)
     share: Array  #: A sample's way to the next one, 0 … 1. (S,)
@@ -181,8 +182,8 @@ class Rows:
     def solution(self, sums: NormalEquations, scale: float = 1.0) -> FittedError:
         """The most likely model error, with loads that make the rows likely.
 
-        The loads' groups are nested, and so are their Cholesky factors: one factor gives every
-        group's objective, c − Σ z² over its columns, z = L⁻¹AᵀWd.
+        The loads' groups are nested, and so are their Cholesky factors: one factor gives
+        every group's objective, c − Σ z² over its columns, z = L⁻¹AᵀWd.
         """
         unknowns, scales = self.unknowns, np.ones(len(sums.right))
         scales[:unknowns] = scale
@@ -302,8 +303,8 @@ LARGEST = 6.0  #: Most scales of a residual.
 #: A joint with less motion than this share is judged by all free samples.
 SELDOM = 0.2
 WORTH = 0.9  #: Most of the unseen error left for a full correction, …
-#: … and least for none; partly between: no sample switches it. A load of 2.8 kg that the fit
-#: cannot separate from the model leaves .95.
+#: … and least for none; partly between: no sample switches it. A load of 2.8 kg that the
+#: fit cannot separate from the model leaves .95.
 WORTHLESS = 0.95
 
 

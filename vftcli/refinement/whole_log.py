@@ -1,8 +1,9 @@
 """The bias of the model from the whole log: what repeats with the motion is no contact.
 
-No free part is needed. The model's error δx is fitted to the raw disturbance d = τ_ext − A δx of
-all of the log, with contacts rejected and slow external loads left in; where it predicts motion
-that it has not seen, b = A δx is subtracted, μ ← μ − b, and any observer runs on the rest.
+No free part is needed. The model's error δx is fitted to the raw disturbance
+d = τ_ext − A δx of all of the log, with contacts rejected and slow external loads left
+in; where it predicts motion that it has not seen, b = A δx is subtracted, μ ← μ − b, and
+any observer runs on the rest.
 """
 
 from dataclasses import dataclass, field, replace
@@ -38,23 +39,26 @@ from vftcli.signals.remarks import Remark, caution, fact, on_joints
 from vftcli.signals.rest import faster
 from vftcli.signals.series import median_step, resample_columns
 
-#: From its first to its last motion a log has to take this long: a shorter one tells inertia from a
-#: push no more, and friction alone is fitted. [s]
+#: From its first to its last motion a log has to take this long: a shorter one tells
+#: inertia from a push no more, and friction alone is fitted. [s]
 LEAST_MOTION = 10.0
 #: A log that moves for less tells nothing: ten times the `CORRELATED` of a residual. [s]
 LEAST_FRICTION = 3.0
-#: An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose.
+#: An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a
+#: pose.
 LEAST_SHARE = 0.1
-#: Up to so many times the error of friction that is expected, rms over a short log, its fit is used
-#: in full, … Pieces of 5 s of UR10e logs reach 1.2 on their worst joint. [1]
+#: Up to so many times the error of friction that is expected, rms over a short log, its
+#: fit is used in full, … Pieces of 5 s of UR10e logs reach 1.2 on their worst joint. [1]
 USUAL = 1.1
-#: … and from so many times on not at all: a hand leads the arm. With a hand of 20 N along the
-#: flange's path the worst joint reads 1.2 to 2.5. [1]
+#: … and from so many times on not at all: a hand leads the arm. With a hand of 20 N along
+#: the flange's path the worst joint reads 1.2 to 2.5. [1]
 LED = 1.4
-#: In a short log a joint's friction is corrected in full if so much of its error is left, …
+#: In a short log a joint's friction is corrected in full if so much of its error is left,
+#: …
 CLEAR = 0.45
-#: … and not at all if so much is: pieces of 5 s of UR10e logs leave .3 to .9, the same led by a
-#: hand .4 to .9, and with both limits they are no worse than a momentum observer. [1]
+#: … and not at all if so much is: pieces of 5 s of UR10e logs leave .3 to .9, the same
+#: led by a hand .4 to .9, and with both limits they are no worse than a momentum
+#: observer. [1]
 UNCLEAR = 0.6
 RATE = 30.0  #: Samples a second that are fitted, …
 LONG = 60.0  #: … up to a log of this length [s], …
@@ -70,12 +74,12 @@ class WholeLogBias:
     #: clearly predicts what it had not seen. (n,)
     weight: Array
     bias: Array  #: Subtracted torque, zero on joints left alone. (T, n) [N·m]
-    #: Standard deviation of the model's error as it was fitted, and of what is taken off where that
-    #: is a part of it: taken off or left alone, by chance. (T, n) [N·m]
+    #: Standard deviation of the model's error as it was fitted, and of what is taken off
+    #: where that is a part of it: taken off or left alone, by chance. (T, n) [N·m]
     sd: Array
     free: Mask  #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
-    #: External torque of the slow loads that the fit believes in, which stays in the estimates;
-    #: zero where it believes in none. (T, n) [N·m]
+    #: External torque of the slow loads that the fit believes in, which stays in the
+    #: estimates; zero where it believes in none. (T, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
     fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing of the log.

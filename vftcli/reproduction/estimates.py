@@ -33,7 +33,8 @@ from vftcli.simulation import load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.solvers import VirtualSensor
 
-#: Variant → how its observers are chosen; the last moves all to FDO's bandwidth, 10 rad/s.
+#: Variant → how its observers are chosen; the last moves all to FDO's bandwidth, 10
+#: rad/s.
 VARIANTS: dict[str, dict[str, Any]] = {
     AS_PRINTED: {"as_printed": True},
     CORRECTED: {},
@@ -79,7 +80,8 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         true, tau = run.truth.wrench[: len(q)], run.truth.tau_ext[: len(q)]
         touched = np.linalg.norm(true[:, :3], axis=1) > UNTOUCHED
         error = (made.wrenches[0].known - real.known)[: len(true), 1]
-        # What the observer makes of the true torque and of nothing else: p is 0, μ is −τ_ext.
+        # What the observer makes of the true torque and of nothing else: p is 0, μ is
+        # −τ_ext.
         ideal = DynamicsTerms(t=made.recording.t[: len(true)], p=np.zeros_like(tau), mu=-tau)
         late = made.observers[0].estimate(ideal)
         missed = replace(late, tau=late.tau - tau)
@@ -194,7 +196,8 @@ def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence
         x = found.motion.x[:, n, :3]
         own = [row for row in found.rows if row["controller"] == controller.kind]
         guided = max((row for row in own if row["axis"] == "x"), key=lambda row: abs(row["peak"]))
-        # Noise beyond the threshold begins drags of its own, which are no end of this one's return.
+        # Noise beyond the threshold begins drags of its own, which are no end of this
+        # one's return.
         begin, end = t.searchsorted((guided["release_s"] - 1e-9, start)).tolist()
         led = Drag(axis=0, number=1, begin=begin, release=begin, end=end)
         before = x[t <= start][-1]

@@ -1,7 +1,8 @@
 """Experiments of a paper, each once a seed, two at a time, and what they gave beside its print.
 
-A run has its own seed and nothing in common with another, so that the numbers do not depend on
-how many run beside one another. They are shown as a page, its Markdown, and figures.
+A run has its own seed and nothing in common with another, so that the numbers do not
+depend on how many run beside one another. They are shown as a page, its Markdown, and
+figures.
 """
 
 import multiprocessing
@@ -32,7 +33,8 @@ from vftcli.reproduction.timing import computing_time
 from vftcli.signals.errors import VftError
 
 MOST_WORKERS = 2  #: Processes beside one another: what a full run was measured with.
-#: Name of an experiment's `run` → what it gives of a seed and the experiment's own arguments.
+#: Name of an experiment's `run` → what it gives of a seed and the experiment's own
+#: arguments.
 RUNS: dict[str, Callable[..., RunResult]] = {
     run.__name__: run
     for run in (

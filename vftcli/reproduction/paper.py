@@ -1,7 +1,7 @@
 """A paper: its tables and figures, their print, and their experiments.
 
-A paper is a file of TOML beside this one; how its experiments run, and how they are shown, is the
-same for all.
+A paper is a file of TOML beside this one; how its experiments run, and how they are
+shown, is the same for all.
 """
 
 import tomllib
@@ -14,8 +14,8 @@ from vftcli.evaluation.published import TABLES
 from vftcli.outputs.charts import Chart
 from vftcli.signals.errors import ParameterError
 
-#: Variants of a value: by the printed formulas; by the corrected ones; these with R and Q read as
-#: densities; the reference's own error.
+#: Variants of a value: by the printed formulas; by the corrected ones; these with R and Q
+#: read as densities; the reference's own error.
 AS_PRINTED, CORRECTED, DENSITY, FLOOR = "as printed", "corrected", "R density", "floor"
 #: Key of a line → variant → value, None where it did not happen.
 Values = dict[str, dict[str, float | None]]
@@ -154,7 +154,8 @@ def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> list[
     ]
 
 
-#: Name at the command line → the paper: another one is one more file and one more name here.
+#: Name at the command line → the paper: another one is one more file and one more name
+#: here.
 PAPERS = {name: load_paper(name) for name in ("huang2025",)}
 
 

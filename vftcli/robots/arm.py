@@ -1,7 +1,8 @@
 """The arm in a description's tree of links and joints: the longest run of joints that turn.
 
-Whatever else moves is locked: fingers behind it, a rail, a lift or a mobile base before it, a
-second arm beside it. What is locked is merged into the link that carries it: a chain.
+Whatever else moves is locked: fingers behind it, a rail, a lift or a mobile base before
+it, a second arm beside it. What is locked is merged into the link that carries it: a
+chain.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,8 +28,8 @@ class TreeJoint:
     """A joint between two links."""
 
     name: str  #: Its name.
-    #: "revolute", "continuous", "prismatic", "fixed", or another kind, which cannot move within an
-    #: arm.
+    #: "revolute", "continuous", "prismatic", "fixed", or another kind, which cannot move
+    #: within an arm.
     kind: str
     parent: str  #: The link that carries it.
     child: str  #: The link that it moves; its frame is the joint's.
@@ -236,8 +237,8 @@ class LumpedArm:
     def along(self, leaf: TreeJoint) -> tuple[TreeJoint, ...]:
         """The joints of the arm on the way to a leaf; none where nothing turns.
 
-        It ends where several branches part, this one a finger by its mass. A joint within the arm
-        that follows another is refused.
+        It ends where several branches part, this one a finger by its mass. A joint within
+        the arm that follows another is refused.
         """
         path = self.tree.path_to(leaf.child)
         run = self.longest(path)

@@ -1,9 +1,9 @@
 """The serial chain: the constants every computation on an arm starts from.
 
-Frame j has its origin *on* axis j, its z along the axis, and turns with link j, whatever the
-convention of the description was (standard DH, modified DH, xyz-rpy, URDF with any axis). Inertials
-are moved into these frames once, when a robot is loaded. The batched kernels, the kinematics and
-the Pinocchio model are all made from this one object.
+Frame j has its origin *on* axis j, its z along the axis, and turns with link j, whatever
+the convention of the description was (standard DH, modified DH, xyz-rpy, URDF with any
+axis). Inertials are moved into these frames once, when a robot is loaded. The batched
+kernels, the kinematics and the Pinocchio model are all made from this one object.
 
 A robot file states its kinematics in one of three ways:
 
@@ -159,8 +159,9 @@ def symmetric(entries: list[float]) -> Array:
 def unphysical(mass: float, inertia: Array) -> str:
     """Why no body can have this mass and tensor about its centre, or "".
 
-    A tensor of a real mass distribution has non-negative principal moments, none larger than the
-    sum of the other two. Published tables are rounded, so 1e-6 of the largest moment is let pass.
+    A tensor of a real mass distribution has non-negative principal moments, none larger
+    than the sum of the other two. Published tables are rounded, so 1e-6 of the largest
+    moment is let pass.
     """
     if why := improper(mass, inertia):
         return why
@@ -193,8 +194,8 @@ def slack_of(inertia: Array) -> float:
 def nearest_tensor(inertia: Array) -> Array:
     """The nearest tensor that a body can have, itself if it can. [kg·m²]
 
-    The second moments Σ = ½ tr(I) 1 − I of a body's mass have no negative eigenvalue; those that
-    are negative become zero.
+    The second moments Σ = ½ tr(I) 1 − I of a body's mass have no negative eigenvalue;
+    those that are negative become zero.
     """
     if not unphysical(0.0, inertia):
         return inertia
@@ -205,7 +206,8 @@ def nearest_tensor(inertia: Array) -> Array:
 
 
 DH = ("a", "d", "alpha", "theta")
-#: Convention → the keys that each joint must have: those of one number, and those of three.
+#: Convention → the keys that each joint must have: those of one number, and those of
+#: three.
 CONVENTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "standard-dh": (DH, ()),
     "modified-dh": (DH, ()),
@@ -276,8 +278,8 @@ def link_poses(chain: Chain, q: Array) -> LinkPoses:
 def flange_jacobian(chain: Chain, q: Array) -> Array:
     """Jacobian of the flange point in base axes. (T, 6, n)
 
-    Velocity [m], then angular velocity; the transpose takes a force and moment ON the robot to
-    joint torques. Pinocchio's LOCAL_WORLD_ALIGNED.
+    Velocity [m], then angular velocity; the transpose takes a force and moment ON the
+    robot to joint torques. Pinocchio's LOCAL_WORLD_ALIGNED.
     """
     poses = link_poses(chain, q)
     axes = poses.rotation[:, :-1, :, 2].transpose(2, 1, 0)

@@ -24,7 +24,8 @@ class RobotChoice(Choice):
 
     GROUP = LOG
 
-    #: Profile name, robot file or description, a robot, None to take what the log settles.
+    #: Profile name, robot file or description, a robot, None to take what the log
+    #: settles.
     name: Annotated[
         "str | Robot | None",
         Option(

@@ -1,11 +1,12 @@
 """Robots from descriptions (URDF, xacro, MJCF), and from a TOML beside them what these cannot say.
 
-The TOML has the description's name with the ending ``.toml``. Its `tip` and `lock` say which arm
-it is and at which angles the rest is held; its ``[[joints]]`` are matched by name.
+The TOML has the description's name with the ending ``.toml``. Its `tip` and `lock` say
+which arm it is and at which angles the rest is held; its ``[[joints]]`` are matched by
+name.
 
-A xacro is a program that writes a URDF: the package xacro expands it, which needs no ROS. Packages
-that it names with $(find NAME) are looked for beside the file and above it, by their `package.xml`.
-A process of its own expands it, since a program need not end.
+A xacro is a program that writes a URDF: the package xacro expands it, which needs no ROS.
+Packages that it names with $(find NAME) are looked for beside the file and above it, by
+their `package.xml`. A process of its own expands it, since a program need not end.
 """
 
 import json
@@ -196,7 +197,8 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
     """What is odd about the links' inertia."""
     if bare := tuple(j + 1 for j, mass in enumerate(chain.mass) if mass == 0.0):
         yield caution("links-without-mass", Where(joints=bare))
-    # What the nearest tensors that a body can have differ by, zero where the tensor was right.
+    # What the nearest tensors that a body can have differ by, zero where the tensor was
+    # right.
     changes = chain.inertia - np.array([body.inertia for _, body in lumped.turned])
     if changed := tuple(j + 1 for j, change in enumerate(changes) if change.any()):
         links = [lumped.joints[j - 1].child for j in changed]
@@ -220,7 +222,8 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
 
 #: Elements within one another: a URDF has four, an MJCF one more than its arm has links.
 DEEPEST = 500
-#: How the tag of an element of xacro begins: a description with one still has to be expanded.
+#: How the tag of an element of xacro begins: a description with one still has to be
+#: expanded.
 NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
 #: A declaration of an argument, which has a default.
 DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
@@ -285,7 +288,8 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     limits = {"seconds": SECONDS, "memory": MEMORY, "packages": dict(packages_near(path))}
     try:
         ended = subprocess.run(
-            # By its path and without the current folder, in which anything may be called xacro.
+            # By its path and without the current folder, in which anything may be called
+            # xacro.
             [sys.executable, "-P", str(Path(__file__).with_name("xacro_child.py"))],
             input=json.dumps({"path": str(path), "arguments": given, **limits}),
             capture_output=True,

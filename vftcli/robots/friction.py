@@ -1,20 +1,21 @@
 """Friction models: torque lost in a joint, by its velocity, its load and what it did before.
 
 Beside each model stands presliding friction a·s, s the state of the play operator
-(`vftcli.robots.running_friction`): a and the Coulomb torque together are the dry friction of steady
-sliding. All but a constant offset follows the joint's temperature where the robot has a law for it:
-a cold gear rubs more than a warm one.
-The law is that of Universal Robots' controllers, a sum of two exponentials that falls with the
-temperature T of the joint in °C,
+(`vftcli.robots.running_friction`): a and the Coulomb torque together are the dry friction
+of steady sliding. All but a constant offset follows the joint's temperature where the
+robot has a law for it: a cold gear rubs more than a warm one. The law is that of
+Universal Robots' controllers, a sum of two exponentials that falls with the temperature T
+of the joint in °C,
 
     s(T) = p₁ e^(p₂ T) + p₃ e^(p₄ T),
 
-by joint size. Friction stated at a reference temperature T₀ is multiplied with s(T)/s(T₀). Logs
-with target current and target torque follow it within 1 % on joints that carry nothing, at 28 to
-38 °C; the numbers themselves were measured for friction at 44 to 45 °C.
+by joint size. Friction stated at a reference temperature T₀ is multiplied with
+s(T)/s(T₀). Logs with target current and target torque follow it within 1 % on joints that
+carry nothing, at 28 to 38 °C; the numbers themselves were measured for friction at 44 to
+45 °C.
 
-A joint at rest holds any torque within its dry friction ±F_c, and nobody sees which: the shares of
-F_c that are allowed for it are at the end of this file.
+A joint at rest holds any torque within its dry friction ±F_c, and nobody sees which: the
+shares of F_c that are allowed for it are at the end of this file.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,11 +30,14 @@ from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, warning
 
-#: Keys of the presliding friction that may stand beside every model: a [N·m] and s₀ [rad].
+#: Keys of the presliding friction that may stand beside every model: a [N·m] and s₀
+#: [rad].
 PRESLIDING = ("presliding", "presliding_length")
-#: Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default. [rad/s]
+#: Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default.
+#: [rad/s]
 SMOOTHING = 0.01
-#: Temperatures that a joint can have; a reading beyond them, as a constant zero, is none. [°C]
+#: Temperatures that a joint can have; a reading beyond them, as a constant zero, is none.
+#: [°C]
 COLDEST, WARMEST = 1.0, 100.0
 
 
@@ -53,8 +57,9 @@ def coulomb_viscous(
 
     f = offset + (f_c + f_l |load| + f_s exp(−(q̇/v_s)²)) tanh(q̇/smoothing) + f_v q̇ + f_2 q̇|q̇|
 
-    with f_l the growth with the torque that the gear carries [1] (`load`, the joint's gravity
-    torque [N·m], like `dq`), f_s dry torque at breakaway above f_c [N·m], which fades over v_s.
+    with f_l the growth with the torque that the gear carries [1] (`load`, the joint's
+    gravity torque [N·m], like `dq`), f_s dry torque at breakaway above f_c [N·m], which
+    fades over v_s.
     """
     torque = dq * (1.0 / smoothing)
     np.tanh(torque, out=torque)
@@ -85,9 +90,9 @@ def coulomb_logarithmic(
 
     f = a ln(1 + |q̇|/b) sign(q̇) + what `coulomb_viscous` makes of the other parameters
 
-    The logarithm is zero at rest, so its sign needs no smoothing. With three numbers (Coulomb
-    torque, a, b) it follows the joint tests of UR arms to .01–.3 N·m, where a signed quadratic
-    falls from 1.1–1.6 rad/s on.
+    The logarithm is zero at rest, so its sign needs no smoothing. With three numbers
+    (Coulomb torque, a, b) it follows the joint tests of UR arms to .01–.3 N·m, where a
+    signed quadratic falls from 1.1–1.6 rad/s on.
     """
     rise = abs(dq)
     rise /= logarithmic_velocity
@@ -128,14 +133,16 @@ def bent_line(
     f = f_1 tanh(q̇/smoothing) + sign(q̇) Σ_k (m_k − m_{k−1}) max(|q̇| − v_k, 0) + what
     `coulomb_viscous` makes of the other parameters,
 
-    with m_k the slope from point k to the next, m_0 = 0: constant up to the first speed, linear
-    between the points, the last stretch continued beyond. Speeds rise; there are at least two.
+    with m_k the slope from point k to the next, m_0 = 0: constant up to the first speed,
+    linear between the points, the last stretch continued beyond. Speeds rise; there are
+    at least two.
     """
     slopes = [
         (f - before) / (v - slower)
         for (slower, v), (before, f) in zip(pairwise(speeds), pairwise(torques), strict=True)
     ]
-    # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last slope.
+    # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last
+    # slope.
     torque = coulomb_viscous(dq, torques[0], **others)
     part = dq * slopes[-1]
     torque += part
@@ -234,8 +241,8 @@ def friction_torque(
 ) -> Array:
     """Friction torque, opposing motion when subtracted. (T, n) [N·m]
 
-    Joint by joint, so that a chunk of one stays in the cache. Along a motion, `RunningFriction`
-    follows the presliding state.
+    Joint by joint, so that a chunk of one stays in the cache. Along a motion,
+    `RunningFriction` follows the presliding state.
 
     Args:
         friction: One model a joint; empty for a frictionless arm.
@@ -282,12 +289,13 @@ def steady_torque(friction: JointFriction, dq: Array) -> Array:
 def falling_speed(friction: JointFriction, limit: float) -> float:
     """Lowest speed up to `limit` where a friction falls, or NaN. [rad/s]
 
-    Dry friction that fades (Stribeck) falls by nature and an offset is no friction: both are left
-    out. What then rises with the velocity also opposes every motion.
+    Dry friction that fades (Stribeck) falls by nature and an offset is no friction: both
+    are left out. What then rises with the velocity also opposes every motion.
     """
     if not np.isfinite(limit):
         return float("nan")
-    # The steps beside rest see a Coulomb torque that pushes; 500 of them see a turn to .2 %.
+    # The steps beside rest see a Coulomb torque that pushes; 500 of them see a turn to .2
+    # %.
     dq = np.linspace(-limit, limit, 1001)
     torque = steady_torque(friction, dq)
     # A hundred-thousandth of the torque is rounding, at a sigmoid's flat ends too.
@@ -322,8 +330,8 @@ def dry_torques(robot: Robot) -> Array:
 def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     """Half the step of a joint's friction where its velocity turns. Like `load`
 
-    It is made of the parameters: at some low speed smoothing, viscous part and fading would
-    count in it. Presliding friction is held at rest, in full or in part.
+    It is made of the parameters: at some low speed smoothing, viscous part and fading
+    would count in it. Presliding friction is held at rest, in full or in part.
     """
     known = joint.parameters
     coulomb = known.get("coulomb", 0.0) + known.get("stribeck", 0.0) + known.get("presliding", 0.0)
@@ -332,23 +340,25 @@ def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     return coulomb + known.get("load_coulomb", 0.0) * np.abs(load)
 
 
-#: Standard deviation of a torque that rests anywhere within ±F_c, as a share of F_c, and of the
-#: difference of two such torques: analytic.
+#: Standard deviation of a torque that rests anywhere within ±F_c, as a share of F_c, and
+#: of the difference of two such torques: analytic.
 ONE_STOP, TWO_STOPS = np.sqrt(1.0 / 3.0), np.sqrt(2.0 / 3.0)
 
-#: The same of two torques where the whole arm rests at the same place after the same motion, as
-#: long as nobody touches it: three runs of one motion of a UR10e differ by .05 to .5 of F_c, .13 in
-#: the mean.
+#: The same of two torques where the whole arm rests at the same place after the same
+#: motion, as long as nobody touches it: three runs of one motion of a UR10e differ by .05
+#: to .5 of F_c, .13 in the mean.
 REPEATED_STOP = 0.13
 
 #: What an observer reads on a joint at rest, rms: on real UR10e logs .31 to .61 of F_c.
 HELD = 0.45
 #: Standard deviation of the wrench smoother's model error at rest, by the same logs.
 REST_SHARE = 0.5
-#: The same of the list of contacts: what it adds at rest to what was learned, the least that these
-#: logs show, and what it draws anew in the block in which a joint comes to rest.
+#: The same of the list of contacts: what it adds at rest to what was learned, the least
+#: that these logs show, and what it draws anew in the block in which a joint comes to
+#: rest.
 CREEP_SHARE, STOP_SHARE = 0.3, 0.7
-#: The same of both for a joint that rests under a contact: the push re-settles its stiction.
+#: The same of both for a joint that rests under a contact: the push re-settles its
+#: stiction.
 PUSHED_SHARE = 0.6
 #: Standard deviation of a momentum observer near a rest: .6 of F_c are the 95 % bound.
 NEAR_REST_SHARE = 0.6 / 1.96

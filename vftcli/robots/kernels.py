@@ -1,9 +1,11 @@
 r"""The momentum form of an arm's dynamics over all samples: p, Cᵀq̇ and g.
 
-With the Christoffel C, :math:`C^T\dot q = \tfrac12\,\partial(\dot q^T M \dot q)/\partial q`: the
-rate at which the kinetic energy would change if only q moved. Turning link j and everything behind
-it by dq_j turns their momenta, so each component is a cross product of the link's own velocity with
-the composite momentum behind it, and no derivative of M is needed. One pass out, one pass back:
+With the Christoffel C,
+:math:`C^T\dot q = \tfrac12\,\partial(\dot q^T M \dot q)/\partial q`: the rate at which
+the kinetic energy would change if only q moved. Turning link j and everything behind it
+by dq_j turns their momenta, so each component is a cross product of the link's own
+velocity with the composite momentum behind it, and no derivative of M is needed. One pass
+out, one pass back:
 
 - out: v_j = R_jᵀ(v_{j−1} + ω_{j−1} × r_j), ω_j = R_jᵀω_{j−1}, γ_j = R_jᵀγ_{j−1}, each turned by
   −q_j, then ω_j += z q̇_j;
@@ -12,17 +14,18 @@ the composite momentum behind it, and no derivative of M is needed. One pass out
   H ← R_j H + m r_j, so that L, K and H are those of link j and all behind it;
 - p_j = K_z + J_j q̇_j, (Cᵀq̇)_j = (K × ω + L × v)_z, −g_j = (H × γ)_z.
 
-γ₀ is the gravity vector itself, J_j the reflected rotor inertia. These are p of (8), Cᵀq̇ of (14)
-and G of (16), exactly rather than by differences; the tests hold them against Pinocchio's mass
-matrix, Coriolis matrix and gravity.
+γ₀ is the gravity vector itself, J_j the reflected rotor inertia. These are p of (8), Cᵀq̇
+of (14) and G of (16), exactly rather than by differences; the tests hold them against
+Pinocchio's mass matrix, Coriolis matrix and gravity.
 
-The equations are recorded once for an arm (`tape`), with its constants in them, and replayed on
-chunks of samples.
+The equations are recorded once for an arm (`tape`), with its constants in them, and
+replayed on chunks of samples.
 
 The torque regressor is rigid-body torque as a matrix times the inertial parameters,
-τ = Y(q, q̇, q̈) φ with ten numbers a link, in the chain's own frames and Pinocchio's order:
-m, m·c (3), then xx, xy, yy, xz, yz, zz of the tensor about the frame's origin. Reflected rotor
-inertia is not part of it (Pinocchio's regressor leaves it out too): it is a column q̈_j of its own.
+τ = Y(q, q̇, q̈) φ with ten numbers a link, in the chain's own frames and Pinocchio's
+order: m, m·c (3), then xx, xy, yy, xz, yz, zz of the tensor about the frame's origin.
+Reflected rotor inertia is not part of it (Pinocchio's regressor leaves it out too): it is
+a column q̈_j of its own.
 """
 
 import threading
@@ -37,11 +40,12 @@ from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, Vector, cons
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import cross, skew
 
-#: Samples worked on at a time: so many that calling an operation costs little beside it; more than
-#: some 6000 gain nothing. Blocks of a long log hold whole chunks.
+#: Samples worked on at a time: so many that calling an operation costs little beside it;
+#: more than some 6000 gain nothing. Blocks of a long log hold whole chunks.
 CHUNK = 8192
 KEPT = 4  #: Programs that are kept, some 4 MB each: those of the arm in hand.
-#: An entry of a rotation, or of an inertia relative to its largest, that is zero but for this.
+#: An entry of a rotation, or of an inertia relative to its largest, that is zero but for
+#: this.
 ROUNDING = 1e-15
 
 
@@ -56,17 +60,18 @@ class MomentumTerms(NamedTuple):
 def felt_bodies(chain: Chain) -> tuple[Array, Array]:
     """Bodies that move as the arm's links do, with as few numbers as possible (base parameters).
 
-    Returned are their inertias J about the origins of the links' frames (n, 3, 3) [kg·m²] and first
-    moments h = m c (n, 3) [kg·m]. Their masses are zero.
+    Returned are their inertias J about the origins of the links' frames (n, 3, 3) [kg·m²]
+    and first moments h = m c (n, 3) [kg·m]. Their masses are zero.
 
-    Joint j cannot feel a body of link j that is symmetric about its axis and has no moment of
-    inertia there: turning it changes neither energy nor momentum. Each link therefore hands the
-    body with J = diag(a, a, 0), a = J_yy, h = (0, 0, h_z) and all its mass to the link before,
-    whose motion is the same but for the turn, and keeps J_yy = 0, h_z = 0, m = 0. What reaches the
-    base never moves. p, Cᵀq̇ and g stay exactly what they were; the links' own energies do not.
+    Joint j cannot feel a body of link j that is symmetric about its axis and has no
+    moment of inertia there: turning it changes neither energy nor momentum. Each link
+    therefore hands the body with J = diag(a, a, 0), a = J_yy, h = (0, 0, h_z) and all its
+    mass to the link before, whose motion is the same but for the turn, and keeps
+    J_yy = 0, h_z = 0, m = 0. What reaches the base never moves. p, Cᵀq̇ and g stay
+    exactly what they were; the links' own energies do not.
 
-    M. Gautier, W. Khalil, "Direct calculation of minimum set of inertial parameters of serial
-    robots", IEEE Trans. Robotics and Automation 6(3), 1990.
+    M. Gautier, W. Khalil, "Direct calculation of minimum set of inertial parameters of
+    serial robots", IEEE Trans. Robotics and Automation 6(3), 1990.
     """
     cross = skew(chain.com)
     J = chain.inertia - chain.mass[:, None, None] * cross @ cross
@@ -185,8 +190,8 @@ def momentum_chunks(
 def cosine_and_sine(q: Array, cosine: Array, sine: Array) -> None:
     """Fill in cosine and sine through the tangent of half the angle. Like `q` [rad]
 
-    With t = tan(q/2), cos q = 2/(1 + t²) − 1 and sin q = 2t/(1 + t²), good to some 1e-16: one
-    transcendental function instead of two, and the one that NumPy vectorises best.
+    With t = tan(q/2), cos q = 2/(1 + t²) − 1 and sin q = 2t/(1 + t²), good to some 1e-16:
+    one transcendental function instead of two, and the one that NumPy vectorises best.
     """
     np.multiply(q, 0.5, out=sine)
     np.tan(sine, out=sine)
@@ -218,9 +223,9 @@ def link_columns(
 ) -> None:
     """Fill the ten columns of one link for the joints up to its own. (j+1, 10, N)
 
-    The link's force is f = m a + (α̂ + ω̂²) h with a less gravity, its moment about the frame's
-    origin n = I α + ω × I ω + h × a; a joint feels axis·n + lever·f, all in the link's axes. A
-    lever is axis × (origin of the link − origin of the joint). (3, j+1, N)
+    The link's force is f = m a + (α̂ + ω̂²) h with a less gravity, its moment about the
+    frame's origin n = I α + ω × I ω + h × a; a joint feels axis·n + lever·f, all in the
+    link's axes. A lever is axis × (origin of the link − origin of the joint). (3, j+1, N)
     """
     out[:, 0] = np.sum(lever * acceleration[:, None], axis=0)
     first_moment = cross(lever, alpha) + cross(omega, cross(omega, lever))
@@ -235,8 +240,8 @@ def link_columns(
 def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
     """The inertial regressor of every sample. (N, n, 10n)
 
-    Only the chain's geometry and gravity are used. Memory is 80 n² bytes a sample: call it on a
-    chunk of a long log.
+    Only the chain's geometry and gravity are used. Memory is 80 n² bytes a sample: call
+    it on a chunk of a long log.
     """
     samples, n = q.shape
     out = np.zeros((n, n, LINK, samples))

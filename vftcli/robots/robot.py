@@ -25,8 +25,8 @@ class JointFriction(Shown):
     """Friction of one joint: a model's name and its parameters."""
 
     model: str = "none"  #: A name in `vftcli.robots.friction.FRICTION_MODELS`, or "none".
-    #: The model's numbers by key, in SI units of torque, rad and rad/s; beside those of the model
-    #: `presliding` [N·m] and `presliding_length` [rad], both or neither.
+    #: The model's numbers by key, in SI units of torque, rad and rad/s; beside those of
+    #: the model `presliding` [N·m] and `presliding_length` [rad], both or neither.
     parameters: Mapping[str, float] = field(default_factory=dict)
     speeds: tuple[float, ...] = ()  #: Speeds of the model "points", rising. [rad/s]
     torques: tuple[float, ...] = ()  #: Friction at these speeds. [N·m]
@@ -96,8 +96,8 @@ class Robot(Shown):
     torque_source: str = "joint_torque"
     #: Joint torque per motor current, gear included. (n,) [N·m/A]
     torque_constant: Array | None = None
-    #: Motor turns per turn of the joint, for a log of the motors' side; None for one of the joints.
-    #: (n,)
+    #: Motor turns per turn of the joint, for a log of the motors' side; None for one of
+    #: the joints. (n,)
     gear: Array | None = None
     #: Share of the motors' torque that arrives behind it, None for all. (n,)
     efficiency: Array | None = None
@@ -105,13 +105,13 @@ class Robot(Shown):
     limits: Limits  #: Joint limits.
     noise: SensorNoise  #: Measurement noise.
     sample_rate_hz: float = float("nan")  #: The vendor's own rate, NaN if not given. [Hz]
-    #: ROS 2 message in which its driver publishes the whole state, "" where it has none but
-    #: JointState.
+    #: ROS 2 message in which its driver publishes the whole state, "" where it has none
+    #: but JointState.
     ros_state: str = ""
     #: Names of joints that turn on and on: their positions may be logged within a turn.
     endless: tuple[str, ...] = ()
-    #: The friction that a simulator's description gives the joints, for ``model.friction=model``;
-    #: empty where there is none.
+    #: The friction that a simulator's description gives the joints, for
+    #: ``model.friction=model``; empty where there is none.
     simulated_friction: tuple[JointFriction, ...] = ()
     payload: Payload | None = None  #: The load mounted on the flange, or None.
     #: Further loads by name, for ``--payload NAME``.

@@ -2,10 +2,11 @@
 
 Every complaint names the line that is wrong.
 
-Numbers beyond the bounds are a slip of the pen or of the unit. The bounds are wide on purpose, an
-order of magnitude or more beyond the largest arm built (2.3 t payload, 12 t of its own, 4.7 m
-reach) and beyond any motion an arm can make: a file inside them may still be wrong, one outside
-them cannot be right. A torque computed from numbers inside them is finite.
+Numbers beyond the bounds are a slip of the pen or of the unit. The bounds are wide on
+purpose, an order of magnitude or more beyond the largest arm built (2.3 t payload, 12 t
+of its own, 4.7 m reach) and beyond any motion an arm can make: a file inside them may
+still be wrong, one outside them cannot be right. A torque computed from numbers inside
+them is finite.
 """
 
 import json
@@ -153,7 +154,8 @@ BOUNDS: dict[str, Bound] = {
     for key in keys.split()
 }
 UNNAMED = either_way(1e6, "")  #: The bound of a number whose key is not listed.
-#: Least mass of all moving bodies together: the lightest arms have servos of a few grams. [kg]
+#: Least mass of all moving bodies together: the lightest arms have servos of a few grams.
+#: [kg]
 LIGHTEST = 0.05
 
 
@@ -191,8 +193,8 @@ class RobotFile:
     def line(self, table: str, index: int | None, key: str) -> int | None:
         """Line of `key` in `table`, from 1, or of the table's header.
 
-        The keys before any table have the name ""; `index` is the ``[[joints]]`` that a table
-        belongs to, from 0, None outside of them.
+        The keys before any table have the name ""; `index` is the ``[[joints]]`` that a
+        table belongs to, from 0, None outside of them.
         """
         header = 1 if table == "" else None
         assigns = re.compile(rf"[\"']?{re.escape(key)}[\"']?\s*=")
@@ -300,7 +302,8 @@ class Section(NamedTuple):
 def robot_text(path: Path, what: str = "robot file") -> str:
     """The text of a robot file, whatever its format."""
     try:
-        # The pipe of a shell's <(…) has no ending; a robot's file has one, and is read twice.
+        # The pipe of a shell's <(…) has no ending; a robot's file has one, and is read
+        # twice.
         if not (path.is_file() or (path.is_fifo() and not path.suffix)):
             raise RobotError(f"{path}: no such {what}")
         if (size := path.stat().st_size) > LARGEST:

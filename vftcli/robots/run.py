@@ -234,7 +234,8 @@ def paired(recording: Recording, robot: Robot) -> Recording:
     done = {remark.code for remark in recording.source.remarks}
     if robot.gear is None or "gear-applied" in done or recording.joints != robot.joints:
         return recording
-    # Logged at the motors: q = q_m / N, τ = N η τ_m. Currents and the vendor's estimate stay.
+    # Logged at the motors: q = q_m / N, τ = N η τ_m. Currents and the vendor's estimate
+    # stay.
     torque = robot.gear if robot.efficiency is None else robot.gear * robot.efficiency
     scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / robot.gear)
     scales |= dict.fromkeys(("torque", "torque_without_gravity", "target_torque"), torque)
@@ -255,7 +256,8 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     jumping = set[int]()
     for signal in ("q", "target_q"):
         if (values := getattr(recording, signal)) is not None:
-            # A sample that is missing is no number; what is wound up behind it would be none.
+            # A sample that is missing is no number; what is wound up behind it would be
+            # none.
             steps = abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
             if turns := [j for j in columns if steps[j] > np.pi]:
                 changed[signal] = smooth = values.copy()
@@ -275,8 +277,8 @@ def listed(names: Sequence[str]) -> str:
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
     """Places of a robot's joints among a log's, None where names do not tell.
 
-    Names are compared as they are; then without a shared prefix and a trailing `_joint`; then by
-    number, or by the order that is known of a maker's names.
+    Names are compared as they are; then without a shared prefix and a trailing `_joint`;
+    then by number, or by the order that is known of a maker's names.
     """
     if all(logged.count(name) == 1 for name in joints):
         return tuple(logged.index(name) for name in joints)

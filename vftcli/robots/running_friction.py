@@ -2,14 +2,14 @@
 
 The teeth of a gear give before they slide, which the angle alone tells.
 
-The play (backlash) operator follows the joint angle q at a distance of at most the presliding
-length s₀,
+The play (backlash) operator follows the joint angle q at a distance of at most the
+presliding length s₀,
 
     cᵗ = clip(cᵗ⁻¹, qᵗ − s₀, qᵗ + s₀),   sᵗ = (qᵗ − cᵗ)/s₀ ∈ [−1, 1],
 
-so that s is the sign of the motion once the joint has moved 2 s₀, and holds its value while the
-joint rests. It is causal and asks for no velocity and no clock: across a gap only the net
-displacement counts.
+so that s is the sign of the motion once the joint has moved 2 s₀, and holds its value
+while the joint rests. It is causal and asks for no velocity and no clock: across a gap
+only the net displacement counts.
 
 References:
     A. Visintin, "Differential Models of Hysteresis", Springer, 1994, Ch. III, for play and stop;
@@ -40,11 +40,11 @@ class Play(NamedTuple):
 def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
     """Deflection s of the play operator; the same in one piece and in stretches.
 
-    A sample is the map x → clip(x, q − s₀, q + s₀). Two such maps make one of the same kind,
-    clip(clip(x, a, b), a′, b′) = clip(x, clip(a, a′, b′), clip(b, a′, b′)), so blocks of samples
-    run side by side and their maps one after another, equal to a loop to the last bit. Without the
-    centre c before the first sample it starts undeflected, c = q⁰, wrong by at most the whole
-    deflection until the joint has moved 2 s₀.
+    A sample is the map x → clip(x, q − s₀, q + s₀). Two such maps make one of the same
+    kind, clip(clip(x, a, b), a′, b′) = clip(x, clip(a, a′, b′), clip(b, a′, b′)), so
+    blocks of samples run side by side and their maps one after another, equal to a loop
+    to the last bit. Without the centre c before the first sample it starts undeflected,
+    c = q⁰, wrong by at most the whole deflection until the joint has moved 2 s₀.
     """
     reach = np.asarray(length, float)
     if not len(q):
@@ -66,7 +66,8 @@ def follow(low: Array, high: Array, start: Array) -> Array:
     blocks = -(-samples // BLOCK)
     low, high = in_blocks(low, blocks), in_blocks(high, blocks)
     for i in range(1, BLOCK):
-        # Both ends of the map so far go through this sample's clip, which both still have to see.
+        # Both ends of the map so far go through this sample's clip, which both still have
+        # to see.
         low[i], high[i] = (clipped(end[i - 1], low[i], high[i]) for end in (low, high))
     ends = follow(low[-1], high[-1], start)
     entering = np.concatenate([start[None], ends[:-1]])
@@ -89,8 +90,8 @@ def in_blocks(limits: Array, blocks: int) -> Array:
 class RunningFriction:
     """The friction of an arm's joints, stretch after stretch of a motion.
 
-    Presliding friction depends on where a joint came from: `centre` is c after the last sample of
-    the joints that have it, None before the first (m,) [rad].
+    Presliding friction depends on where a joint came from: `centre` is c after the last
+    sample of the joints that have it, None before the first (m,) [rad].
     """
 
     def __init__(self, friction: Sequence[JointFriction]) -> None:

@@ -1,8 +1,8 @@
 """Equations recorded once, on values instead of numbers, and replayed on arrays of samples.
 
-Equations written on `Value`s leave a list of operations behind, each on whole rows of samples.
-Whatever they multiply by zero or by one, and whatever nothing asked for depends on, is not in it:
-an arm's special angles and symmetries need no case of their own.
+Equations written on `Value`s leave a list of operations behind, each on whole rows of
+samples. Whatever they multiply by zero or by one, and whatever nothing asked for depends
+on, is not in it: an arm's special angles and symmetries need no case of their own.
 """
 
 import math

@@ -25,8 +25,8 @@ from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.rest import REST, slower
 from vftcli.signals.series import Clock, gaps_of, median_step, resample_columns, runs_of
 
-#: How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through
-#: the constants of a UR10e's maker. [1]
+#: How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg
+#: through the constants of a UR10e's maker. [1]
 CONSTANT_SD, SENSOR_SD = 0.03, 0.01
 STEP = 1e-7  #: Δq of (10). [rad]
 
@@ -45,8 +45,8 @@ def check_joints(recording: Recording, robot: Robot) -> None:
 def effort_name(recording: Recording, robot: Robot) -> str:
     """The signal of `EFFORTS` that the drive torque comes from.
 
-    A robot described by currents whose log has only torques uses the torques, and the other way
-    round if its file has torque constants.
+    A robot described by currents whose log has only torques uses the torques, and the
+    other way round if its file has torque constants.
     """
     ranked = EFFORTS if robot.torque_source == "current" else (*EFFORTS[1:], EFFORTS[0])
     return next((name for name in ranked if getattr(recording, name) is not None), ranked[0])
@@ -65,8 +65,8 @@ def gain_sd(recording: Recording, robot: Robot) -> float:
 def drive_torque(recording: Recording, robot: Robot) -> Array:
     """Torque of the drives at the joints, friction not yet taken off. (T, n) [N·m]
 
-    τ = K i where `effort_name` is current, else the measured torque. Torques without gravity get
-    the gravity torque g(q) of the arm with its payload: τ = e + g(q).
+    τ = K i where `effort_name` is current, else the measured torque. Torques without
+    gravity get the gravity torque g(q) of the arm with its payload: τ = e + g(q).
     """
     check_joints(recording, robot)
     name = effort_name(recording, robot)
@@ -156,8 +156,8 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
     r"""P, Cᵀq̇ and g as the paper prints them, (7)–(16), from inverse dynamics alone.
 
     It is slow (n + 3 calls of RNEA a sample) and good to about 5e-6 N·m, because (11)
-    differentiates numerically. It stays for three purposes: an oracle that shares no code with
-    the kernels, the ``--as-printed`` path, and the baseline of the benchmark.
+    differentiates numerically. It stays for three purposes: an oracle that shares no code
+    with the kernels, the ``--as-printed`` path, and the baseline of the benchmark.
 
     p = rnea(q, 0, q̇, 0) (8); Ṁq̇ ≈ Σᵢ [rnea(q+Δqᵢ, 0, q̇, 0) − p]/Δq · q̇ᵢ (11);
     Cq̇ = rnea(q, q̇, 0, 0) (12); Cᵀq̇ = Ṁq̇ − Cq̇ (14); G = rnea(q, 0, 0, g₀) (16).
@@ -182,7 +182,8 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
     return MomentumTerms(p, coriolis, gravity)
 
 
-#: What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s.
+#: What rounding changes at most, of a speed as a share or of a number of blocks, up to
+#: 1e6 s.
 TIE = 1e-6
 GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch reaches across.
 
@@ -190,8 +191,9 @@ GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch re
 def raw_disturbance(terms: DynamicsTerms) -> Array:
     """The unfiltered external torque d of every sample but the first. (T−1, n) [N·m]
 
-    d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times: the mean over a sample of the
-    external torque and of everything else that the model leaves unexplained.
+    d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times: the mean over a
+    sample of the external torque and of everything else that the model leaves
+    unexplained.
     """
     d = np.diff(terms.p, axis=0)
     d /= np.diff(terms.t)[:, None]
@@ -221,7 +223,8 @@ class Blocks(NamedTuple):
     @property
     def rests(self) -> Mask:
         """Blocks in which each joint rests. (K, n)"""
-        # Steps of an encoder make speeds of just `REST`: they move, whatever rounding makes of it.
+        # Steps of an encoder make speeds of just `REST`: they move, whatever rounding
+        # makes of it.
         return slower(self.velocity, (1.0 - TIE) * REST)
 
     def part(self, chosen: slice) -> "Blocks":
@@ -234,9 +237,10 @@ def disturbance_blocks(
 ) -> Blocks:
     """Block averages d = (s(e′) − s(e))/(e′ − e) with s = p − ∫μ.
 
-    A block of some seconds holds whole samples; what is left at the end of a stretch joins the
-    last block where it is less than half of one. A gap of the clock is a block of its own, its
-    disturbance unknown, and so is what lies between samples `inside` (T,).
+    A block of some seconds holds whole samples; what is left at the end of a stretch
+    joins the last block where it is less than half of one. A gap of the clock is a block
+    of its own, its disturbance unknown, and so is what lies between samples `inside`
+    (T,).
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
@@ -247,7 +251,8 @@ def disturbance_blocks(
     whole[gaps_of(t, GAP)] = False
     if inside is not None:
         whole &= inside[1:] & inside[:-1]
-    # The unbroken runs of intervals give the edges; between two runs one block reaches across.
+    # The unbroken runs of intervals give the edges; between two runs one block reaches
+    # across.
     edges: list[int] = [0]
     known: list[bool] = []
     for start, stop in runs_of(whole):

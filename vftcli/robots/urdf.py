@@ -287,7 +287,8 @@ class MjcfJoint(NamedTuple):
         limits = {key: value for key, value in limits.items() if 0 < value < 1e300}
         if kind != "continuous":
             limits |= {"q_min": model.lowerPositionLimit[q], "q_max": model.upperPositionLimit[q]}
-        # The unit axis in its own frame; the Jacobian of a single joint comes without second axis.
+        # The unit axis in its own frame; the Jacobian of a single joint comes without
+        # second axis.
         data = model.createData()
         self.pin.computeJointJacobians(model, data, self.pin.neutral(model))
         local = self.pin.getJointJacobian(model, data, k, self.pin.ReferenceFrame.LOCAL)

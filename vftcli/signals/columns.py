@@ -1,7 +1,8 @@
 """What the columns of our tables hold, told in the field metadata of Parquet files.
 
-A reader of another language, or a person with no documentation, sees unit, meaning, sign and frame
-beside each column: ``pyarrow.parquet.read_schema(path).field("tau_ext/gmo/1").metadata``.
+A reader of another language, or a person with no documentation, sees unit, meaning, sign
+and frame beside each column:
+``pyarrow.parquet.read_schema(path).field("tau_ext/gmo/1").metadata``.
 """
 
 from collections.abc import Mapping
@@ -51,7 +52,8 @@ def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]
     if kind not in COLUMNS:
         return {}
     unit, meaning = COLUMNS[kind]
-    # What touches an arm in a simulation is a wrench, or a torque, under the contact's own name.
+    # What touches an arm in a simulation is a wrench, or a torque, under the contact's
+    # own name.
     if kind == "contact" and group:
         unit, meaning = TORQUE, "force and moment, or joint torque, of one contact"
     if last in AXES:

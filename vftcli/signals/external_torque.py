@@ -44,8 +44,9 @@ class DynamicsTerms(Shown):
     log_clock: Clock | None = None  #: The whole log's clock where these are a block of it.
     before: Instant | None = None  #: The sample before the first of a later block of a log.
     room: InitVar[Array | None] = None  #: Memory for `d`, if it is there already. (T, n)
-    #: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the model leaves
-    #: unexplained: the one input of every observer. Zero at a log's first sample. (T, n) [N·m·s]
+    #: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the
+    #: model leaves unexplained: the one input of every observer. Zero at a log's first
+    #: sample. (T, n) [N·m·s]
     d: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self, room: Array | None) -> None:
@@ -113,11 +114,12 @@ class ExternalTorque(TimeSeries):
     sd: Array | None = None
     #: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
     floor: Array | None = None
-    #: One standard deviation of the error of `tau` as the log itself shows it, model error and lag
-    #: included; None where no free part is known to measure it on. (T, n) [N·m]
+    #: One standard deviation of the error of `tau` as the log itself shows it, model
+    #: error and lag included; None where no free part is known to measure it on. (T, n)
+    #: [N·m]
     error_sd: Array | None = None
-    #: Whether the joint moves, so that the sample may be relied on; where it stands, stiction hides
-    #: what `tau` cannot know. None where that was not looked at. (T, n)
+    #: Whether the joint moves, so that the sample may be relied on; where it stands,
+    #: stiction hides what `tau` cannot know. None where that was not looked at. (T, n)
     moving: Mask | None = None
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 

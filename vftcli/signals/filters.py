@@ -1,7 +1,7 @@
 """Filters without phase shift on clocks that may be uneven, the noise they pass, spectra.
 
-The filters are SciPy's `butter` and `sosfiltfilt` to rounding, by `steady_filter`: importing
-`scipy.signal` takes longer than all that a log of a minute asks of them.
+The filters are SciPy's `butter` and `sosfiltfilt` to rounding, by `steady_filter`:
+importing `scipy.signal` takes longer than all that a log of a minute asks of them.
 
 References:
     A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, Section 7.2, 2010 (bilinear
@@ -20,16 +20,18 @@ from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.steady_filter import steady_filter
 
-#: Order of the Butterworth filter; run forwards and backwards it attenuates twice as much.
+#: Order of the Butterworth filter; run forwards and backwards it attenuates twice as
+#: much.
 ORDER = 2
-#: Order of one pass where what is behind the filter is differentiated: its noise above the cutoff
-#: has to be gone.
+#: Order of one pass where what is behind the filter is differentiated: its noise above
+#: the cutoff has to be gone.
 STEEP = 4
-#: Steps that differ from their median by a larger share are resampled; a clock that jitters by less
-#: is filtered as an even one.
+#: Steps that differ from their median by a larger share are resampled; a clock that
+#: jitters by less is filtered as an even one.
 UNEVEN = 0.05
 FREQUENCIES = 1024  #: Frequencies at which a filter's power is summed.
-#: An even clock of more than so many times the log's samples would be filled with gaps alone.
+#: An even clock of more than so many times the log's samples would be filled with gaps
+#: alone.
 MOSTLY_GAP = 100
 
 
@@ -38,9 +40,9 @@ def low_pass(
 ) -> Array:
     """Low-pass each column without phase shift. (T, n)
 
-    A Butterworth filter runs forwards and backwards; at its cutoff [Hz] each pass loses 3 dB. The
-    ends are continued by `settling` [s], None for the least that the order needs. A log too short
-    for that is returned as it is.
+    A Butterworth filter runs forwards and backwards; at its cutoff [Hz] each pass loses 3
+    dB. The ends are continued by `settling` [s], None for the least that the order needs.
+    A log too short for that is returned as it is.
     """
     return filter_columns(t, x, butterworth(median_step(t), cutoff, order), settling)
 
@@ -163,11 +165,12 @@ def noise_passed(step: float, cutoff: float | tuple[float, float], slope: int = 
 def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, int]:
     """One-sided density, the mean over Hann-windowed segments, and their number.
 
-    Nothing is detrended. Each unbroken stretch (N, n) is mirrored at its ends by half a segment of
-    `size` samples (even), so that its first and last samples count like all others: a free part is
-    often no longer. It counts by its length, one shorter than a segment also by how much of it is
-    no mirror image: no sample that breaks a long one in two leaves others to speak for all. The
-    density at ``numpy.fft.rfftfreq(size, step)`` is by Hz. (size/2 + 1, n)
+    Nothing is detrended. Each unbroken stretch (N, n) is mirrored at its ends by half a
+    segment of `size` samples (even), so that its first and last samples count like all
+    others: a free part is often no longer. It counts by its length, one shorter than a
+    segment also by how much of it is no mirror image: no sample that breaks a long one in
+    two leaves others to speak for all. The density at ``numpy.fft.rfftfreq(size, step)``
+    is by Hz. (size/2 + 1, n)
     """
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
     joints = stretches[0].shape[1]
@@ -185,6 +188,7 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
             power += share * (spectrum.real**2 + spectrum.imag**2)
         count += len(starts)
     power *= 2.0 * step / float(np.sum(window**2))
-    # The density is one-sided: every frequency stands for its negative too, but 0 and Nyquist's.
+    # The density is one-sided: every frequency stands for its negative too, but 0 and
+    # Nyquist's.
     power[:, [0, -1]] *= 0.5
     return np.ascontiguousarray(power.T), count

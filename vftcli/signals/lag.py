@@ -1,7 +1,7 @@
 """By how much one series runs behind another: the shift at which they fit best.
 
-In every function the late series comes first, the early one second, and a positive lag says that
-the first runs behind.
+In every function the late series comes first, the early one second, and a positive lag
+says that the first runs behind.
 """
 
 from collections.abc import Sequence
@@ -22,8 +22,9 @@ BLOCK = 8192  #: Samples that one Fourier transform takes, unless the lags looke
 def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
     """Delay of each column at which it fits best, NaN where nothing fits. (m, n)
 
-    Maximises the correlation with `early` over the known samples that overlap, for delays from
-    −`LEAD` to `LONGEST`, refined by a parabola. An uneven clock's is in median steps [s].
+    Maximises the correlation with `early` over the known samples that overlap, for delays
+    from −`LEAD` to `LONGEST`, refined by a parabola. An uneven clock's is in median steps
+    [s].
     """
     samples = len(early)
     first = -min(round(LEAD / step), samples // 4)
@@ -62,8 +63,8 @@ def fits(late: Array, early: Array, known: Mask, at: Indices) -> Array:
 def sliding(later: Array, earlier: Array, at: Indices) -> Array:
     """Sum over time of `later` (m, T), so many samples on, times `earlier`. (m, L)
 
-    Each block of `earlier` meets the part of `later` that its successive lags reach, and their
-    cross-spectra are added up before one transform back (overlap-save).
+    Each block of `earlier` meets the part of `later` that its successive lags reach, and
+    their cross-spectra are added up before one transform back (overlap-save).
     """
     samples, first, reach = earlier.shape[1], int(at[0]), len(at) - 1
     # A block no longer than the log, and no shorter than what its lags reach besides.
@@ -126,8 +127,8 @@ class Offset(NamedTuple):
 def time_offset(t: Array, late: Array, early: Array) -> Offset:
     """The lag of `late` behind `early` at which they correlate best.
 
-    All columns (T, k) count by their size: those of a wrench are to be in one unit. Unknown
-    samples are bridged.
+    All columns (T, k) count by their size: those of a wrench are to be in one unit.
+    Unknown samples are bridged.
     """
     step = median_step(t)
     even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
@@ -148,8 +149,8 @@ class LagFit(NamedTuple):
     """How well two series fit at every lag of the first behind the second."""
 
     lag: Indices  #: (L,) [samples]
-    #: Mean squared difference of what overlaps, all columns together; infinite where too little
-    #: does. (L,)
+    #: Mean squared difference of what overlaps, all columns together; infinite where too
+    #: little does. (L,)
     difference: Array
     overlap: Indices  #: Samples that overlap. (L,)
 
@@ -171,7 +172,8 @@ def lag_fit(late: Array, early: Array, least: float) -> LagFit:
 
     At least the share `least` of the shorter one must overlap.
     """
-    # A common offset changes no difference, and without it the sums of squares keep their digits.
+    # A common offset changes no difference, and without it the sums of squares keep their
+    # digits.
     middle = late.mean(axis=0)
     x, y = late - middle, early - middle
     at = np.arange(-(len(y) - 1), len(x))

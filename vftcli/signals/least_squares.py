@@ -9,11 +9,12 @@ import numpy as np
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 
-#: Residuals beyond this many robust standard deviations weigh less (Huber). On normal noise that
-#: is 1.2 % of the samples.
+#: Residuals beyond this many robust standard deviations weigh less (Huber). On normal
+#: noise that is 1.2 % of the samples.
 HUBER = 2.5
 PASSES = 6  #: Reweighting passes.
-#: Eigenvalues of scaled normal equations below this share of the largest tell a solution nothing.
+#: Eigenvalues of scaled normal equations below this share of the largest tell a solution
+#: nothing.
 NULL = 1e-12
 NULL_OF_INVERSE = 1e-10  #: `NULL` of an inverse, in which a single such value outweighs all others.
 SD_PER_MEDIAN = 1.4826  #: Standard deviation of normal noise over the median of its size.
@@ -38,7 +39,8 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
         )
     if not A.shape[1]:
         return ColumnFit(np.zeros(0), np.zeros(0), y, weights)
-    # Iteratively reweighted least squares: what the last fit leaves decides who is an outlier.
+    # Iteratively reweighted least squares: what the last fit leaves decides who is an
+    # outlier.
     outliers = np.ones_like(y)
     for _ in range(PASSES):
         x = normal_equations(A, y, weights * outliers).solution()
@@ -79,8 +81,9 @@ def normal_equations(A: Array, y: Array, weights: Array) -> NormalEquations:
 def shown_directions(gram: Array, null: float) -> tuple[Array, Array]:
     """Eigenvalues and vectors of a scaled AᵀWA that the data shows. (s,), (k, s)
 
-    Columns are scaled to a unit diagonal, since kilograms and N·m·s need not be alike in size; the
-    scale is in the vectors V, so that V diag(1/values) Vᵀ is the inverse of AᵀWA itself.
+    Columns are scaled to a unit diagonal, since kilograms and N·m·s need not be alike in
+    size; the scale is in the vectors V, so that V diag(1/values) Vᵀ is the inverse of
+    AᵀWA itself.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     scale[scale == 0.0] = 1.0
@@ -144,8 +147,9 @@ def folds(samples: int, count: int = FOLDS) -> list[slice]:
 def left_out(lengths: Sequence[int], told: Sequence[bool]) -> list[Array]:
     """The rows that cross-validation leaves out in turn.
 
-    Of several logs that tell something each is left out whole: another log is what a model is for.
-    A single one is cut into fifths. Rows of logs that tell nothing are never left out.
+    Of several logs that tell something each is left out whole: another log is what a
+    model is for. A single one is cut into fifths. Rows of logs that tell nothing are
+    never left out.
     """
     edges = np.cumsum([0, *lengths])
     rows = [

@@ -4,9 +4,10 @@ States x of a size N move from block to block each on its own, and n numbers d s
 
     xᵏ = fᵏ xᵏ⁻¹ + noise of variance qᵏ,    dᵏ = Hᵏᵀ xᵏ + noise of variance Rᵏ.
 
-The state before the first block is zero and certain: f⁰ = 0 starts it with variance q⁰. A state
-with f = q = 0 is pinned, its mean and variance are exactly zero. A block with H = 0 says nothing.
-Any axes between blocks and numbers hold models side by side, as long as each other.
+The state before the first block is zero and certain: f⁰ = 0 starts it with variance q⁰. A
+state with f = q = 0 is pinned, its mean and variance are exactly zero. A block with H = 0
+says nothing. Any axes between blocks and numbers hold models side by side, as long as
+each other.
 
 References:
     H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
@@ -22,7 +23,8 @@ import numpy as np
 from vftcli.signals.arrays import Array
 
 SPIKE = 40.0  #: Variance of a spike, in variances of the innovation.
-#: A state whose predicted variance is no larger is certain: nothing is carried back to it.
+#: A state whose predicted variance is no larger is certain: nothing is carried back to
+#: it.
 LEAST_VARIANCE = 1e-14
 STRETCH = 512  #: Blocks whose innovations and gains back are worked on at once.
 

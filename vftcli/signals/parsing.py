@@ -10,10 +10,11 @@ from typing import Any
 
 from vftcli.signals.errors import ParameterError
 
-#: What no UTF-8 holds: a byte of a file name that is no letter, or half a letter from JSON.
+#: What no UTF-8 holds: a byte of a file name that is no letter, or half a letter from
+#: JSON.
 HALVES = re.compile(r"[\ud800-\udfff]")
-#: Unicode categories that a terminal would act on, or show as nothing: control characters, marks
-#: that turn the direction of writing, ends of lines.
+#: Unicode categories that a terminal would act on, or show as nothing: control
+#: characters, marks that turn the direction of writing, ends of lines.
 HIDDEN = {"Cc", "Cf", "Co", "Zl", "Zp"}
 
 
@@ -41,7 +42,8 @@ def printable(text: str) -> str:
     )
 
 
-#: Share of two words' letters that must agree in order: one slip in four letters, two in eight.
+#: Share of two words' letters that must agree in order: one slip in four letters, two in
+#: eight.
 LIKE = 0.74
 
 

@@ -1,9 +1,10 @@
 """Orientations and poses: matrices, fixed-axis angles, rotation vectors, quaternions, the adjoint.
 
-Rotation vectors and quaternions are for many orientations at once. The deviation of an orientation
-is the rotation vector x̃ = log(R R_dᵀ), updated by R ← exp(ω Ts) R. A quaternion that is only ever
-multiplied changes continuously, and so does the logarithm taken of it: it grows through π without a
-jump, up to a full turn. Quaternions are (w, x, y, z).
+Rotation vectors and quaternions are for many orientations at once. The deviation of an
+orientation is the rotation vector x̃ = log(R R_dᵀ), updated by R ← exp(ω Ts) R. A
+quaternion that is only ever multiplied changes continuously, and so does the logarithm
+taken of it: it grows through π without a jump, up to a full turn. Quaternions are
+(w, x, y, z).
 """
 
 from collections.abc import Sequence
@@ -38,8 +39,8 @@ def inverse(pose: Pose) -> Pose:
 def adjoint(pose: Pose) -> Array:
     """The matrix that takes a wrench in S to F, for the pose of S in F. (..., 6, 6)
 
-    With R the orientation and p the origin of S in F it is [[R, 0], [[p]×R, R]], Pinocchio's
-    ``SE3(R, p).act(Force)``.
+    With R the orientation and p the origin of S in F it is [[R, 0], [[p]×R, R]],
+    Pinocchio's ``SE3(R, p).act(Force)``.
     """
     R, p = np.asarray(pose.rotation), np.asarray(pose.translation)
     X = np.zeros((*R.shape[:-2], 6, 6))
@@ -88,7 +89,8 @@ def rpy_angles(rotation: Array) -> tuple[float, float, float]:
     R = rotation
     level = float(np.hypot(R[0, 0], R[1, 0]))
     pitch = float(np.arctan2(-R[2, 0], level))
-    # The limit leaves the angles nine digits before the quotients of rounding errors take over.
+    # The limit leaves the angles nine digits before the quotients of rounding errors take
+    # over.
     if level < 1e-9:
         return float(np.arctan2(-R[1, 2], R[1, 1])), pitch, 0.0
     return float(np.arctan2(R[2, 1], R[2, 2])), pitch, float(np.arctan2(R[1, 0], R[0, 0]))
@@ -158,8 +160,8 @@ def log_matrix(matrix: Array) -> Array:
 def matrix_quaternion(matrix: Array) -> Array:
     """A unit quaternion x of each rotation matrix. (…, 3, 3) → (…, 4)
 
-    A matrix gives 4 x xᵀ. The row with its largest diagonal entry is as exact near a turn of π
-    as near 0.
+    A matrix gives 4 x xᵀ. The row with its largest diagonal entry is as exact near a turn
+    of π as near 0.
 
     References:
         S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978.

@@ -42,7 +42,8 @@ class Cut(NamedTuple):
     stop: float  #: Time of the last. [s]
     rows: int  #: How many there are.
     joints: tuple[int, ...]  #: The joints whose signals say so, from 1.
-    #: The largest of what says so, in the unit of the finding's words; else its length in s.
+    #: The largest of what says so, in the unit of the finding's words; else its length in
+    #: s.
     size: float
 
 
@@ -73,12 +74,12 @@ class Source(Shown):
     """Where a recording came from and what was done to it on the way in."""
 
     path: Path | None = None  #: The file or bag directory, or None for a recording made in memory.
-    #: What the log is called in tables, unique within a command; the file's name where that is
-    #: unique.
+    #: What the log is called in tables, unique within a command; the file's name where
+    #: that is unique.
     label: str = ""
     format: str = "memory"  #: The reader's name.
-    #: Hex digest of the file's bytes (of all files of a directory, in name order), by which a run
-    #: is known again; reading it waits until it is computed.
+    #: Hex digest of the file's bytes (of all files of a directory, in name order), by
+    #: which a run is known again; reading it waits until it is computed.
     sha256: Awaited = Awaited()
     clock: str = "as given"  #: Which clock the stamps are from, in words.
     t0: float = 0.0  #: The log's own stamp of the first sample. [s]
@@ -86,14 +87,15 @@ class Source(Shown):
     rows: int = 0  #: Samples the file held before any were dropped.
     duplicates: int = 0  #: Rows dropped because their stamp repeated the one before.
     derived: tuple[str, ...] = ()  #: Signals that were made of others here and stand in no log.
-    #: Facts on what was dropped, turned or derived; cautions and warnings on what looks suspicious
-    #: but was left as it is.
+    #: Facts on what was dropped, turned or derived; cautions and warnings on what looks
+    #: suspicious but was left as it is.
     remarks: tuple[Remark, ...] = ()
-    #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
+    #: Which of several recordings in the file this is, as "episode 3"; "" for the only
+    #: one.
     part: str = ""
     cuts: tuple[Cut, ...] = ()  #: Samples that were cut out because no arm can have made them.
-    #: The sample that each of the rows is, or repeats; −1 for one that was dropped otherwise. None
-    #: where each row is the sample of its number. (rows,)
+    #: The sample that each of the rows is, or repeats; −1 for one that was dropped
+    #: otherwise. None where each row is the sample of its number. (rows,)
     row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -154,8 +156,8 @@ class Recording(TimeSeries):
     dq: Array | None = None  #: Joint velocities. (T, n) [rad/s]
     current: Array | None = None  #: Motor currents. (T, n) [A]
     torque: Array | None = None  #: Measured drive torques, gravity included. (T, n) [N·m]
-    #: Drive torques less what holds the arm and its payload against gravity, as newer UR drivers
-    #: publish them. (T, n) [N·m]
+    #: Drive torques less what holds the arm and its payload against gravity, as newer UR
+    #: drivers publish them. (T, n) [N·m]
     torque_without_gravity: Array | None = None
     target_q: Array | None = None  #: Commanded positions. (T, n) [rad]
     target_dq: Array | None = None  #: Commanded velocities. (T, n) [rad/s]
@@ -174,7 +176,8 @@ class Recording(TimeSeries):
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
     source: Source = IN_MEMORY  #: Where it came from and what was repaired.
-    #: True torques and wrenches of a simulated log, the columns those of PATH.truth.parquet.
+    #: True torques and wrenches of a simulated log, the columns those of
+    #: PATH.truth.parquet.
     truth: "pl.DataFrame | None" = None
 
     def __post_init__(self) -> None:
@@ -278,8 +281,8 @@ class Recording(TimeSeries):
     ) -> "Recording":
         """The recording with its effort as a `kind` of `EFFORTS`, and no other.
 
-        `source` names which of the log's efforts it is; None for the one that is called so, or the
-        only one there is.
+        `source` names which of the log's efforts it is; None for the one that is called
+        so, or the only one there is.
         """
         there = [name for name in EFFORTS if getattr(self, name) is not None]
         source = source or (kind if kind in there else None)
@@ -316,8 +319,9 @@ class Recording(TimeSeries):
 def same_run(one: Recording, other: Recording) -> bool:
     """Whether two recordings were read from equal bytes.
 
-    A span of a recording is the same run as the whole. Two recordings that one file holds one
-    after the other are two runs if its clock tells them apart, or if they are two of its parts.
+    A span of a recording is the same run as the whole. Two recordings that one file holds
+    one after the other are two runs if its clock tells them apart, or if they are two of
+    its parts.
     """
     if one is other:
         return True

@@ -7,8 +7,9 @@ the catalogue, `words/*.toml` beside this file, one table a code::
     short = "rests in {share:.0%} of the samples and is marked"
     long = "... where it keeps its stiction, up to about {stiction_Nm:.2g} N·m rms ..."
 
-`short` is one line for the terminal; `long`, which may be left out, is for the page. Both are
-`str.format` templates over the remark's values; a format is applied to each item of a list.
+`short` is one line for the terminal; `long`, which may be left out, is for the page. Both
+are `str.format` templates over the remark's values; a format is applied to each item of a
+list.
 """
 
 import string

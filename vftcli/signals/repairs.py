@@ -1,8 +1,8 @@
 """Repairs of a recording: velocities that it lacks, samples that stand alone.
 
-Such a sample is a transmission error, a wrapped angle, a spike of one current reading. No arm moves
-away and back within two samples, and no drive does: it says nothing of the model or of noise, and
-one is enough to spoil a spectrum or a fit of a whole log.
+Such a sample is a transmission error, a wrapped angle, a spike of one current reading. No
+arm moves away and back within two samples, and no drive does: it says nothing of the
+model or of noise, and one is enough to spoil a spectrum or a fit of a whole log.
 
 References:
     F. R. Hampel, P. J. Rousseeuw, E. M. Ronchetti, W. A. Stahel, "Robust Statistics: The Approach
@@ -21,8 +21,8 @@ from vftcli.signals.remarks import Where, caution, fact
 
 #: Where the derivative is cut off, twice. [Hz]
 #:
-#: Positions of UR10e logs, rounded to 1e-4 rad at 100 Hz, give velocities off by .0024 to .0031
-#: rad/s rms so, and by .10 to .44 as plain differences; 5 and 20 Hz differ little.
+#: Positions of UR10e logs, rounded to 1e-4 rad at 100 Hz, give velocities off by .0024 to
+#: .0031 rad/s rms so, and by .10 to .44 as plain differences; 5 and 20 Hz differ little.
 CUTOFF = 12.0
 OF_NYQUIST = 0.4  #: The same in a slow log, as a share of half its rate.
 #: Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz.
@@ -39,7 +39,8 @@ def with_velocity(recording: Recording) -> Recording:
     if recording.dq is not None or recording.samples < 3:
         return recording
     cutoff = min(CUTOFF, OF_NYQUIST * 0.5 / recording.median_step)
-    # An endless joint that is logged within one turn jumps by it; a motor's count does not.
+    # An endless joint that is logged within one turn jumps by it; a motor's count does
+    # not.
     within = np.ptp(recording.q, axis=0) < ONE_TURN
     q = np.where(within, np.unwrap(recording.q, axis=0), recording.q)
     slopes = np.gradient(q, recording.t, axis=0)
@@ -54,25 +55,28 @@ def is_fast(recording: Recording) -> bool:
 
 
 NEAR = 2  #: A sample is compared with so many before it and so many behind it, by their median.
-#: How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise. One
-#: sample in a hundred may be bad, and three bends in a hundred with it.
+#: How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise.
+#: One sample in a hundred may be bad, and three bends in a hundred with it.
 USUAL = 0.97
-#: Beyond so many times that a sample stands alone: 16 sd of white noise. On 36 sound logs of eight
-#: arms one sample does in most of those of a UR10e, at most 11 in 1896, and none in 24 of them.
+#: Beyond so many times that a sample stands alone: 16 sd of white noise. On 36 sound logs
+#: of eight arms one sample does in most of those of a UR10e, at most 11 in 1896, and none
+#: in 24 of them.
 FAR = 6.0
-#: And beyond this share of what a velocity or an effort spans but for its outer hundredths: of
-#: smooth motion without noise the bends tell nothing. What an angle spans is no measure.
+#: And beyond this share of what a velocity or an effort spans but for its outer
+#: hundredths: of smooth motion without noise the bends tell nothing. What an angle spans
+#: is no measure.
 SPREAD = 0.03
 
-#: Angles and velocities off by less never stand alone: less than what turns the dry friction of a
-#: joint round, on which a gear's teeth give, and less than a speed at which a joint stands.
-#: [rad, rad/s]
+#: Angles and velocities off by less never stand alone: less than what turns the dry
+#: friction of a joint round, on which a gear's teeth give, and less than a speed at which
+#: a joint stands. [rad, rad/s]
 LEAST = {"q": 5e-4, "dq": 1e-2}
 
-#: The first and last samples may be so many times as far off: a line of six samples bends.
+#: The first and last samples may be so many times as far off: a line of six samples
+#: bends.
 END = 4.0
-#: An effort is no further off than so many times what its three closest neighbours in size differ
-#: by: a tap of three samples is a tap. Two samples of one stand alone.
+#: An effort is no further off than so many times what its three closest neighbours in
+#: size differ by: a tap of three samples is a tap. Two samples of one stand alone.
 PEAK = 2.0
 FINEST = 1e-6  #: And efforts off by less: a log in single precision keeps 1e-5 of 100 N·m. [A, N·m]
 
@@ -80,8 +84,8 @@ FINEST = 1e-6  #: And efforts off by less: a log in single precision keeps 1e-5 
 def without_isolated(recording: Recording) -> Recording:
     """A recording without samples that stand alone, said; itself where there are none.
 
-    One a little too far off is drawn to the limit, one twice as far off to its neighbours' median,
-    and it falls straight between: no sample is switched.
+    One a little too far off is drawn to the limit, one twice as far off to its
+    neighbours' median, and it falls straight between: no sample is switched.
     """
     there = [name for name in ("q", "dq", *EFFORTS) if getattr(recording, name) is not None]
     changed = np.zeros(recording.q.shape, bool)
@@ -114,7 +118,8 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
         return made, np.zeros(x.shape, bool)
     bend, travel = 0.5 * abs(x[2:] - 2.0 * x[1:-1] + x[:-2]), 0.5 * abs(x[2:] - x[:-2])
     travel += least
-    # Stamps that jitter bend a moving joint's angles, and those of a resting one not at all.
+    # Stamps that jitter bend a moving joint's angles, and those of a resting one not at
+    # all.
     by_travel = np.quantile(bend / travel, USUAL, axis=0) * travel
     limit = np.maximum(FAR * np.minimum(np.quantile(bend, USUAL, axis=0), by_travel), least)
     # Of two bad samples in a row each bends by half of what it is off.
@@ -139,8 +144,8 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
 def at_an_end(x: Array, limit: Array) -> Array:
     """The first samples, drawn to a line through those of the log's end.
 
-    Slope and places are medians, so that one bad sample moves them by less than what the others
-    differ by.
+    Slope and places are medians, so that one bad sample moves them by less than what the
+    others differ by.
     """
     slope = np.median(np.diff(x, axis=0), axis=0)
     level = x - np.arange(len(x))[:, None] * slope

@@ -8,12 +8,12 @@ import numpy as np
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import grown, median_step, runs_of
 
-#: Speeds between rest and motion, by what each decides. Above the first, more than noise and last
-#: digits, a joint has a direction, and a log's motion begins. [rad/s]
+#: Speeds between rest and motion, by what each decides. Above the first, more than noise
+#: and last digits, a joint has a direction, and a log's motion begins. [rad/s]
 NONZERO = 1e-3
 COMMANDED = 2e-3  #: Below it a controller holds a joint: what it commands has no noise. [rad/s]
-#: Below it stiction holds the joint: above what sensors add to a joint that is held, up to what
-#: the steps of an encoder make over a block of 24 ms. [rad/s]
+#: Below it stiction holds the joint: above what sensors add to a joint that is held, up
+#: to what the steps of an encoder make over a block of 24 ms. [rad/s]
 REST = 0.01
 MOVES = 0.02  #: Above it, twice that, no noise is motion: friction is that of motion. [rad/s]
 SLIDES = 0.05  #: Below it a joint of filtered speed may stick, above it its friction shows. [rad/s]

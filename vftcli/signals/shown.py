@@ -22,8 +22,8 @@ UNKNOWN = "–"  #: What stands for a number that is not known.
 class Shown:
     """A thing whose `repr` is one line, and which a notebook shows as a small table.
 
-    A dataclass that is one is made with ``repr=False``. It says what it is by `_headline`, and what
-    is in it by `_rows`; else both are made of its fields.
+    A dataclass that is one is made with ``repr=False``. It says what it is by
+    `_headline`, and what is in it by `_rows`; else both are made of its fields.
     """
 
     def _headline(self) -> str:

@@ -1,13 +1,15 @@
 """Recursive filters over a whole log, block by block: s_t = F s_{t−1} + g d_t, F (m, m) a joint.
 
-The states x_b at the blocks' starts obey the same kind of recursion with R, the product of a
-block's transitions, summed by doubling: x_b ← x_b + R x_{b−1}, then x_b + R² x_{b−2}, … until the
-filter has forgotten. It is the plain loop's sum in another order, to rounding.
+The states x_b at the blocks' starts obey the same kind of recursion with R, the product
+of a block's transitions, summed by doubling: x_b ← x_b + R x_{b−1}, then x_b + R²
+x_{b−2}, … until the filter has forgotten. It is the plain loop's sum in another order, to
+rounding.
 
-Where coefficients do not change along the log, a block is a triangular Toeplitz matrix of its
-impulse response times the block's inputs, plus what the state at its start still contributes; BLAS
-does that for all blocks at once. Where they do (`recursion`), the blocks are run side by side, each
-from zero; what enters a block is then run through it and added.
+Where coefficients do not change along the log, a block is a triangular Toeplitz matrix of
+its impulse response times the block's inputs, plus what the state at its start still
+contributes; BLAS does that for all blocks at once. Where they do (`recursion`), the
+blocks are run side by side, each from zero; what enters a block is then run through it
+and added.
 """
 
 from collections.abc import Sequence
@@ -18,11 +20,12 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Indices, empty_series
 
-#: Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
-#: at multiples of it give the numbers of the whole log to the last bit.
+#: Samples handled at a time, so that memory does not grow with the log; blocks of a log
+#: that begin at multiples of it give the numbers of the whole log to the last bit.
 PIECE = 1 << 14
 FORGOTTEN = 1e-20  #: Share of a state that counts as nothing: far below its last digit.
-#: Samples in a block, a power of two: the work grows with it, the number of blocks shrinks.
+#: Samples in a block, a power of two: the work grows with it, the number of blocks
+#: shrinks.
 BLOCK = 32
 LENGTH = 36  #: Most samples in a block of `recursion`, the length of its Python loops.
 
@@ -32,9 +35,9 @@ def filtered(
 ) -> tuple[list[Array], Array]:
     """Each wanted·s_t (T, n) of s_t = F_t s_{t−1} + g_t d_t, and the last state (m, n).
 
-    F is (m, m, n) and g (m, n) of the whole log, or (m, m, T, n) and (m, T, n) of every sample; the
-    input d (T, n), the state `start` before the first sample (m, n), weights (m, n), (m, 1) or
-    (m, T, n).
+    F is (m, m, n) and g (m, n) of the whole log, or (m, m, T, n) and (m, T, n) of every
+    sample; the input d (T, n), the state `start` before the first sample (m, n), weights
+    (m, n), (m, 1) or (m, T, n).
     """
     if F.ndim == 3:
         each = [steady_filter(F, g, d, start, weights) for weights in wanted]
@@ -79,8 +82,9 @@ def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> 
 def blocks_of(F: Array, g: Array, wanted: Array) -> tuple[Array, Array, Array, Array]:
     """What a filter of n joints makes of one block; F (n, m, m), g and wanted (n, m).
 
-    Of a block's inputs what is wanted at each sample (n, BLOCK, BLOCK) and the state at its end
-    (n, BLOCK, m); of the state before what is wanted (n, m, BLOCK); and Fᵏ for k = 0 … BLOCK.
+    Of a block's inputs what is wanted at each sample (n, BLOCK, BLOCK) and the state at
+    its end (n, BLOCK, m); of the state before what is wanted (n, m, BLOCK); and Fᵏ for
+    k = 0 … BLOCK.
     """
     n, m = g.shape
     powers = np.empty((n, BLOCK + 1, m, m))
@@ -153,8 +157,8 @@ def spans(samples: int, *, begins: bool) -> list[slice]:
 def recursion(F: Array, x: Array, start: Array) -> Array:
     """States y_t = F_t y_{t−1} + x_t from y_{−1} = `start` (m, n). (m, T, n)
 
-    F (m, m, T, n) holds the transitions of an m-state filter for each of n joints, x (m, T, n) its
-    input.
+    F (m, m, T, n) holds the transitions of an m-state filter for each of n joints, x
+    (m, T, n) its input.
     """
     y = np.empty((len(x), x.shape[2], x.shape[1])).swapaxes(1, 2)
     for span in spans(x.shape[1], begins=False):
@@ -167,8 +171,8 @@ def recursion(F: Array, x: Array, start: Array) -> Array:
 def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(None)) -> Array:
     """One piece of `recursion`, everything in blocks: the states are written over the input y.
 
-    F is (m, m, length, kinds, blocks), y (m, length, n, blocks), the state before the first sample
-    (m, n); `kind` tells which of the kinds each joint is. (n,)
+    F is (m, m, length, kinds, blocks), y (m, length, n, blocks), the state before the
+    first sample (m, n); `kind` tells which of the kinds each joint is. (n,)
     """
     steps, samples = np.moveaxis(F, 2, 0), np.moveaxis(y, 1, 0)
     columns = steps[0].swapaxes(0, 1).copy()  # of the whole block's transition, Φ

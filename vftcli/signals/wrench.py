@@ -21,7 +21,8 @@ from vftcli.signals.shown import TimeSeries
 
 #: Names of the six components, force first, as in column names and tables.
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
-#: Point that a moment refers to → its words; a log may name another, as a link of its own.
+#: Point that a moment refers to → its words; a log may name another, as a link of its
+#: own.
 POINTS = {
     "flange": "the flange point",
     "tool": "the tool's point",
@@ -29,7 +30,8 @@ POINTS = {
     "controller": "the flange point or the tool's, by which sensor the controller has",
     "sensor": "the sensor's origin",
 }
-#: Axes → the point their moments refer to where nothing else is said, if not their own origin.
+#: Axes → the point their moments refer to where nothing else is said, if not their own
+#: origin.
 OWN_POINT = {"base": "flange"}
 #: Whether a force is the environment's on the robot, or the robot's on the environment.
 Sign = Literal["on-robot", "by-robot"]
@@ -39,8 +41,8 @@ Sign = Literal["on-robot", "by-robot"]
 class WrenchFrame:
     """What a log states of its own wrench."""
 
-    #: Whose axes: base, flange, tool or sensor; or the log's own name of a frame, of which nothing
-    #: is known here.
+    #: Whose axes: base, flange, tool or sensor; or the log's own name of a frame, of
+    #: which nothing is known here.
     axes: str
     point: str  #: What its moment refers to: a key of `POINTS`, or again the log's own name.
     sign: Sign = "on-robot"  #: Whose force it is.
@@ -89,7 +91,8 @@ class WrenchFrame:
 
 #: O_F_ext_hat_K of libfranka and what is built on it.
 #:
-#: On a log of an FR3 it equals pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's origin.
+#: On a log of an FR3 it equals pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's
+#: origin.
 FRANKA_FRAME = WrenchFrame("base", "base", "by-robot")
 
 
@@ -111,17 +114,17 @@ class Wrench(TimeSeries):
 
     name: str  #: Short name of the observer or of the reference it comes from.
     t: Array  #: Time on the recording's clock. (T,) [s]
-    #: Force, then moment; also where the pose cannot tell them, so that a blow-up can be seen: use
-    #: `known` for numbers. (T, 6) [N, N·m]
+    #: Force, then moment; also where the pose cannot tell them, so that a blow-up can be
+    #: seen: use `known` for numbers. (T, 6) [N, N·m]
     values: Array
     frame: str  #: Axes and reference point: a key of `vftcli.virtual_sensor.frames.FRAMES`.
     sd: Array | None = None  #: One standard deviation of `values`. (T, 6) [N, N·m]
-    #: Smallest singular value of J with angular rows × 0.3 m, None where no Jacobian was inverted.
-    #: (T,) [m]
+    #: Smallest singular value of J with angular rows × 0.3 m, None where no Jacobian was
+    #: inverted. (T,) [m]
     sigma_min: Array | None = None
     masked: Mask | None = None  #: Samples in which the pose cannot tell the wrench. (T,)
-    #: Norm of the part of the joint torque that no wrench at the flange explains, None for arms of
-    #: six joints. (T,) [N·m]
+    #: Norm of the part of the joint torque that no wrench at the flange explains, None
+    #: for arms of six joints. (T,) [N·m]
     null_space: Array | None = None
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 

@@ -20,7 +20,8 @@ from vftcli.simulation.trajectories import Reference
 
 #: Natural frequency of the position loop by name. [rad/s]
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
-#: Largest natural frequency times step: beyond it the sampled loop is badly damped or unstable.
+#: Largest natural frequency times step: beyond it the sampled loop is badly damped or
+#: unstable.
 FASTEST_LOOP = 0.4
 WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
 CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still moves like an arm.
@@ -34,8 +35,9 @@ ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
 class Servo:
     """τ = τ_ff + M(q) (ω² (q_d − q) + 2ζω (q̇_d − q̇)), saturated at the drives' limits.
 
-    With the nominal inertia as gain one number sets the stiffness, and every mode of the arm has
-    the same bandwidth; gains joint by joint would leave a redundant arm a mode that chatters.
+    With the nominal inertia as gain one number sets the stiffness, and every mode of the
+    arm has the same bandwidth; gains joint by joint would leave a redundant arm a mode
+    that chatters.
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
@@ -123,8 +125,8 @@ class History(JointSignals):
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
-    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`. Of the `steps` of
-    the run so many are `made`.
+    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`. Of the
+    `steps` of the run so many are `made`.
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:

@@ -1,14 +1,14 @@
 """The arm itself: rigid-body dynamics with rotor inertia and true friction, integrated in time.
 
-Friction is τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest (Coulomb,
-load and Stribeck), s the state of the play operator (`vftcli.robots.running_friction`) and
-λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: at rest a joint that gives holds a·s, v₀ is `CREEP`;
-smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇)
-+ sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
+Friction is τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest
+(Coulomb, load and Stribeck), s the state of the play operator
+(`vftcli.robots.running_friction`) and λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: at rest a
+joint that gives holds a·s, v₀ is `CREEP`; smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a
+ln(1 + |q̇|/b) sign(q̇) + sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
 
-Dry friction: in M̃ (v⁺ − v) = g − λ, |λ_j| ≤ ℓ_j, a sliding joint has λ_j = ℓ_j sign(v⁺_j), a
-sticking one v⁺_j = 0. M̃ is positive definite: there is one solution. (J. J. Moreau, "Unilateral
-contact and dry friction in finite freedom dynamics", 1988.)
+Dry friction: in M̃ (v⁺ − v) = g − λ, |λ_j| ≤ ℓ_j, a sliding joint has λ_j = ℓ_j
+sign(v⁺_j), a sticking one v⁺_j = 0. M̃ is positive definite: there is one solution. (J.
+J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics", 1988.)
 """
 
 from collections.abc import Callable, Sequence
@@ -32,14 +32,15 @@ SHAPES = (
 #: What does not grow with the speed for ever.
 DRY = ("coulomb", "load_coulomb", "presliding", "amplitude")
 WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")  #: What does: the film of oil.
-#: Speed below which the dry friction of a joint that gives fades: of forms tried on a UR10e, a·s
-#: beside a sign smoothed over 3 mrad/s leaves a momentum observer least on unseen logs. [rad/s]
+#: Speed below which the dry friction of a joint that gives fades: of forms tried on a
+#: UR10e, a·s beside a sign smoothed over 3 mrad/s leaves a momentum observer least on
+#: unseen logs. [rad/s]
 CREEP = 3e-3
 LARGEST_STEP = 1e-3  #: Largest inner step. [s]
 GUESSES = 12  #: Active-set guesses before the slower sweeps that always converge take over.
 SWEEPS = 2000
-#: Torque of the contacts (n,) [N·m] from the Pinocchio model and data (joint Jacobians and
-#: placements are current) and the velocities, at the middle of the step.
+#: Torque of the contacts (n,) [N·m] from the Pinocchio model and data (joint Jacobians
+#: and placements are current) and the velocities, at the middle of the step.
 External = Callable[[Any, Any, Array], Array]
 
 
@@ -67,8 +68,9 @@ class TrueFriction:
     def dry(self, dq: Array, load: Array | None = None) -> Array:
         """Largest dry friction at velocities (n,) [rad/s] and loads (n,) [N·m]. (n,) [N·m]
 
-        F_c (1 + s exp(−(q̇/v_s)²)), the Stribeck curve of Armstrong-Hélouvry, Dupont and Canudas
-        de Wit, Automatica 30 (1994), and f_l |load| with the gravity torque that the gears carry.
+        F_c (1 + s exp(−(q̇/v_s)²)), the Stribeck curve of Armstrong-Hélouvry, Dupont and
+        Canudas de Wit, Automatica 30 (1994), and f_l |load| with the gravity torque that
+        the gears carry.
         """
         dry = self.coulomb
         if self.stribeck != 0.0:
@@ -120,8 +122,8 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
     """The profile's friction curve with what it leaves out: stiction and the Stribeck peak.
 
     The profile's tanh(q̇/smoothing) becomes a real dry friction. Of a sigmoid, the share
-    `spec.sticking` becomes dry friction of the same plateau, half the amplitude to each side; of
-    the Coulomb torque the share `spec.presliding` becomes presliding friction.
+    `spec.sticking` becomes dry friction of the same plateau, half the amplitude to each
+    side; of the Coulomb torque the share `spec.presliding` becomes presliding friction.
     """
     if not 0.0 <= spec.presliding <= 1.0:
         raise ParameterError(f"friction.presliding is {spec.presliding:g}; it is a share, 0 to 1")
@@ -186,10 +188,10 @@ class Plant:
 
     (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
 
-    λ is the impulse of dry friction, D the slope of the smooth one; of second order in h while no
-    joint begins to stick or slide. Presliding friction is evaluated at q_m. For q_mid, v_mid and a
-    the last step's balance M a + C v + g = τ + τ_ext − τ_f holds exactly; `friction` is against
-    positive motion, `centre` the c of the play operator.
+    λ is the impulse of dry friction, D the slope of the smooth one; of second order in h
+    while no joint begins to stick or slide. Presliding friction is evaluated at q_m. For
+    q_mid, v_mid and a the last step's balance M a + C v + g = τ + τ_ext − τ_f holds
+    exactly; `friction` is against positive motion, `centre` the c of the play operator.
     """
 
     def __init__(
@@ -217,7 +219,8 @@ class Plant:
 
     def advance(self, tau: Array, external: External | None = None) -> None:
         """Move one step on under drive torques `tau` (n,) [N·m] and the contacts' torque."""
-        # The midpoint velocity extrapolates the last acceleration; the first step has none yet.
+        # The midpoint velocity extrapolates the last acceleration; the first step has
+        # none yet.
         if not self.moved:
             signs = self.signs
             self.a = (self.impulses(tau, external) - self.v) / self.step
@@ -267,8 +270,9 @@ def slide_or_stick(
 ) -> tuple[Array, Array, Array]:
     """Velocities after the step, friction impulses, and the direction each joint slides in.
 
-    M̃ (n, n) [kg·m²], impulse g of everything but dry friction, velocities v before the step,
-    largest impulses ℓ of dry friction, directions of the step before as a guess, 0 sticks. (n,)
+    M̃ (n, n) [kg·m²], impulse g of everything but dry friction, velocities v before the
+    step, largest impulses ℓ of dry friction, directions of the step before as a guess, 0
+    sticks. (n,)
     """
     from scipy.linalg.lapack import dposv
 

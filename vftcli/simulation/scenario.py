@@ -24,7 +24,8 @@ from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
 FOLDER = Path(__file__).parent / "scenarios"
 Section = TypeVar("Section")
-#: Largest number of a scenario in any unit; a clock that counts from 1970 begins below it.
+#: Largest number of a scenario in any unit; a clock that counts from 1970 begins below
+#: it.
 LARGEST = 1e10
 #: Type of a field → its kind.
 KINDS = {
@@ -65,11 +66,11 @@ class FrictionSpec:
     sticking: float = 0.0
     presliding: float = 0.0  #: Share of the Coulomb torque that is presliding friction.
     presliding_length: float = 3e-4  #: Deflection at which that is full. [rad]
-    #: Temperature of the joints at the start; not given, that at which the robot's friction was
-    #: taken. [°C]
+    #: Temperature of the joints at the start; not given, that at which the robot's
+    #: friction was taken. [°C]
     temperature_begin: float | None = None
-    #: Temperature at the end, on a straight line from the start; not given, that at the start.
-    #: Friction follows it where the robot has a law. [°C]
+    #: Temperature at the end, on a straight line from the start; not given, that at the
+    #: start. Friction follows it where the robot has a law. [°C]
     temperature_end: float | None = None
 
 
@@ -77,8 +78,8 @@ class FrictionSpec:
 class MismatchSpec:
     """Deviations of the arm from its profile: one standard deviation, relative.
 
-    Each parameter is drawn from the seed, a normal deviate cut at two standard deviations. Zeros
-    make the profile exact.
+    Each parameter is drawn from the seed, a normal deviate cut at two standard
+    deviations. Zeros make the profile exact.
     """
 
     mass: float = 0.0  #: Link masses (tensors scale with them).

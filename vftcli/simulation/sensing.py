@@ -37,10 +37,11 @@ class Measured(NamedTuple):
     """A controller's log, one row a sample."""
 
     stamp: Array  #: Time stamps, jittering. (M,) [s]
-    #: Which sample each row of the log holds; lost ones are missing, repeated ones doubled.
+    #: Which sample each row of the log holds; lost ones are missing, repeated ones
+    #: doubled.
     rows: tuple[int, ...]
-    #: Field of a recording → its signal: what the sensors and the flange's own report, and the
-    #: controller's targets and estimate of contact. (M, n) each
+    #: Field of a recording → its signal: what the sensors and the flange's own report,
+    #: and the controller's targets and estimate of contact. (M, n) each
     signals: dict[str, Array]
 
 
@@ -82,7 +83,8 @@ def sample_run(arm: Arm) -> Samples:
     for name in ("a", "friction"):
         middle = grid[:-1] + 0.5 * arm.scenario.step
         signals[name] = resample_columns(time, middle, getattr(history, name)[:-1])
-    # The mean over the interval, or the last step: exact, for torque is constant over a step.
+    # The mean over the interval, or the last step: exact, for torque is constant over a
+    # step.
     step, total = grid[1], np.zeros_like(history.tau)
     np.cumsum(history.tau[:-1] * step, axis=0, out=total[1:])
     span = max(interval if spec.torque == "average" else 0.0, step)
@@ -191,7 +193,8 @@ def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None
     spec = arm.scenario.force_sensor
     if spec is None:
         return None
-    # Its own generator: mounting a sensor leaves the noise of all other signals as it was.
+    # Its own generator: mounting a sensor leaves the noise of all other signals as it
+    # was.
     rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
     model, data = arm.plant.model, arm.plant.model.createData()
     frame, axes = model.getFrameId("flange"), pin.LOCAL_WORLD_ALIGNED

@@ -17,7 +17,8 @@ TABLE = 0.15  #: Least height of the flange in poses that are drawn. [m]
 ITERATIONS = 100
 #: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-10
-#: Number of joints → a pose from which such an arm can work, the flange looking down. [rad]
+#: Number of joints → a pose from which such an arm can work, the flange looking down.
+#: [rad]
 HOMES: dict[int, tuple[float, ...]] = {
     6: (0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0),
     7: (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854),
@@ -159,8 +160,8 @@ class OffsetsSpec:
     """Straight lines of the flange at constant orientation between stated points, at rest there."""
 
     kind: str = field(default="offsets", init=False)
-    #: Rows (start time, end time, x, y, z): by the end time the flange is displaced from the start
-    #: by (x, y, z) in base axes. [s, m]
+    #: Rows (start time, end time, x, y, z): by the end time the flange is displaced from
+    #: the start by (x, y, z) in base axes. [s, m]
     moves: tuple[tuple[float, float, float, float, float], ...]
     length: float  #: Length of the whole motion. [s]
     start: tuple[float, ...] = ()  #: Joint positions at the offset (0, 0, 0). (n,) [rad]
@@ -190,8 +191,8 @@ class JointMovesSpec:
     """Straight moves in joint space between stated displacements from the start, at rest there."""
 
     kind: str = field(default="joint-moves", init=False)
-    #: Rows (start time, end time, one displacement a joint): by the end time the joints are
-    #: displaced from the start by these. [s, rad]
+    #: Rows (start time, end time, one displacement a joint): by the end time the joints
+    #: are displaced from the start by these. [s, rad]
     moves: tuple[tuple[float, ...], ...]
     length: float  #: Length of the whole motion. [s]
     start: tuple[float, ...] = ()  #: Joint positions at no displacement. (n,) [rad]

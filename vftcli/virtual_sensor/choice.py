@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 FIT = "fit"  #: The word for a sensor pose that is to be estimated from the log.
 START = "start"  #: The word for the unloaded start of the log.
-#: The word for the solver that takes the whole log at once, and needs no observer before it.
+#: The word for the solver that takes the whole log at once, and needs no observer before
+#: it.
 SMOOTHER = "smoother"
 SMOOTHED = ("best",)  #: Observers whose wrench is the smoother's where no other solver is named.
 
@@ -64,8 +65,8 @@ class WrenchChoice(Choice):
             completes=names_at("virtual_sensor.frames:FRAMES"),
         ),
     ] = "flange"
-    #: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the smoother where
-    #: it is the observer's own, and least squares for the others.
+    #: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the
+    #: smoother where it is the observer's own, and least squares for the others.
     solver: Annotated[
         str | None,
         setting(
@@ -84,7 +85,8 @@ class WrenchChoice(Choice):
             "Tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or its [tool.NAME].",
         ),
     ] = None
-    #: The sensor's pose as text or a name in the robot file, "fit", or None for the file's own.
+    #: The sensor's pose as text or a name in the robot file, "fit", or None for the
+    #: file's own.
     sensor_pose: Annotated[
         str | None,
         setting(
@@ -104,8 +106,8 @@ class WrenchChoice(Choice):
             several=True,
         ),
     ] = field(default_factory=ZeroChoice)
-    #: Torque error the covariance starts from: "own", a number or one a joint as text, or None for
-    #: the best that is known. [N·m]
+    #: Torque error the covariance starts from: "own", a number or one a joint as text, or
+    #: None for the best that is known. [N·m]
     torque_sd: Annotated[
         str | None,
         setting(

@@ -23,15 +23,17 @@ LEAVE = 0.6
 HOLD = 0.02  #: A contact must last at least this long, so that one noisy sample is none. [s]
 GAP = 0.25  #: Two contacts closer than this are one: a hand that slips has not let go. [s]
 BAND = 1.3  #: The free band reaches this far beyond the largest departure seen in the free part.
-#: An alarm that begins earlier than this before a true contact, or later than this after its end,
-#: is false, whatever it meets: a slow observer shows a contact for a while after it. [s]
+#: An alarm that begins earlier than this before a true contact, or later than this after
+#: its end, is false, whatever it meets: a slow observer shows a contact for a while after
+#: it. [s]
 EARLY, LATE = 0.1, 1.0
 TRUE_TORQUE = 0.5  #: A true joint torque beyond this is a contact. [N·m]
-#: A true wrench beyond this is a contact, and half a free band at least so wide. (6,) [N, N·m]
+#: A true wrench beyond this is a contact, and half a free band at least so wide. (6,)
+#: [N, N·m]
 WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
 LEAST_TORQUE = 0.5  #: Smallest half width of a free band of joint torques. [N·m]
-#: Contacts of an exact reference closer than this are one; those of a measured one, which has a
-#: floor, as those of an observer. [s]
+#: Contacts of an exact reference closer than this are one; those of a measured one, which
+#: has a floor, as those of an observer. [s]
 TRUE_GAP = 0.12
 
 
@@ -72,8 +74,8 @@ def true_intervals(
 def departure(values: Array, quiet: Array, least: Array | float) -> Array:
     """Largest departure over the columns, in half widths of the free band; 0 if unknown. (T,)
 
-    The band is the median of what is read untouched (S, k) ± `BAND` × its largest departure, at
-    least so much.
+    The band is the median of what is read untouched (S, k) ± `BAND` × its largest
+    departure, at least so much.
     """
     inside = quiet[np.isfinite(quiet).all(axis=1)]
     if len(inside) == 0:
@@ -137,8 +139,8 @@ def overlaps(found: Sequence[Interval], true: Sequence[Interval]) -> Array:
 def assignment(found: Sequence[Interval], true: Sequence[Interval]) -> list[int | None]:
     """Of each true contact the number of the found one that is credited to it, None if missed.
 
-    A found contact is credited to one true contact, so that as many as possible are found, and of
-    the ways to do so to that which overlaps most.
+    A found contact is credited to one true contact, so that as many as possible are
+    found, and of the ways to do so to that which overlaps most.
     """
     given: list[int | None] = [None] * len(true)
     if not found or not true:
@@ -159,8 +161,8 @@ def match_contacts(
 ) -> Detection:
     """Match found contacts one to one with the true ones of a log that lasts `duration` [s].
 
-    What begins within `LATE` of a true contact's end is no false alarm, but credited only where it
-    overlaps one; what begins too early is one, credited or not.
+    What begins within `LATE` of a true contact's end is no false alarm, but credited only
+    where it overlaps one; what begins too early is one, credited or not.
     """
     given, shared = assignment(found, true), overlaps(found, true) > 0.0
     missed = [j for j, i in enumerate(given) if i is None]
@@ -255,10 +257,10 @@ def judge_contacts(
 ) -> tuple[ContactScore, ...]:
     """Every observer's contacts against those of a reference torque.
 
-    An observer whose contacts are listed is judged by its list. The others' are found in their
-    wrenches where they were asked for, else in their joint torques, by a free band: learned in
-    the zero spans, else in the log's own free part, else in free runs, else before the first true
-    contact.
+    An observer whose contacts are listed is judged by its list. The others' are found in
+    their wrenches where they were asked for, else in their joint torques, by a free band:
+    learned in the zero spans, else in the log's own free part, else in free runs, else
+    before the first true contact.
     """
     t = reference.t
     limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
@@ -283,7 +285,8 @@ def judge_contacts(
             free = values[quiet] if quiet.any() else known.beside.get(name, ())
             if not len(free):
                 free = values[learned_free(t, true)]
-            # Observers rise from zero: what they read before they have settled touches nothing.
+            # Observers rise from zero: what they read before they have settled touches
+            # nothing.
             score = np.where(settled, departure(values, np.asarray(free), least), 0.0)
             kind_of_it, found = kind, find_contacts(t, score)
         counts = match_contacts(found, true, float(t[-1] - t[0]))

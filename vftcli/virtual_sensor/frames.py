@@ -1,15 +1,15 @@
 """Frames of a wrench: its axes and the point of its moment; a log's wrench in base axes.
 
-A wrench moves between frames by the adjoint of a pose. With R the orientation of S in F and p the
-origin of S in F, a wrench given in S reads in F
+A wrench moves between frames by the adjoint of a pose. With R the orientation of S in F
+and p the origin of S in F, a wrench given in S reads in F
 
     [F_F; N_F] = [[R, 0], [[p]×R, R]] [F_S; N_S]
 
-which is (56) in its right form (the paper prints R the wrong way round in the lower left block) and
-Pinocchio's ``SE3(R, p).act(Force)``.
+which is (56) in its right form (the paper prints R the wrong way round in the lower left
+block) and Pinocchio's ``SE3(R, p).act(Force)``.
 
-A log may state its wrench's axes, the point of its moment and its sign (`WrenchFrame`); what it
-leaves open is assumed, and the assumption is a remark.
+A log may state its wrench's axes, the point of its moment and its sign (`WrenchFrame`);
+what it leaves open is assumed, and the assumption is a remark.
 """
 
 from collections.abc import Sequence
@@ -134,11 +134,14 @@ def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
     return poses[text]
 
 
-#: What is assumed of a log that states nothing: a sensor's own reading, force on the robot.
+#: What is assumed of a log that states nothing: a sensor's own reading, force on the
+#: robot.
 UNSTATED = WrenchFrame("sensor", "sensor")
-#: As much of a log as counts for one independent sample: friction's errors last as long. [s]
+#: As much of a log as counts for one independent sample: friction's errors last as long.
+#: [s]
 PIECE = 1.0
-#: Evidence from which on the currents' word is believed, that of three standard errors. [nats]
+#: Evidence from which on the currents' word is believed, that of three standard errors.
+#: [nats]
 SURE = 4.5
 
 
@@ -181,7 +184,8 @@ def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wren
     if axes is not None:
         turn = flange @ axes.rotation
         force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (force, moment))
-    # The force acts at the point, so about the flange it has the moment of its lever besides.
+    # The force acts at the point, so about the flange it has the moment of its lever
+    # besides.
     lever = -placed.translation[:, -1]
     if point_pose is not None:
         lever = flange @ point_pose.translation
@@ -200,12 +204,12 @@ def controller_point(
 ) -> tuple[str, tuple[Remark, ...]]:
     """The point of a controller's moment, "flange" or "tool", and why.
 
-    The controller knows its payload and its arm: what the measured currents have beyond its target
-    currents is what touches the arm, each joint with a factor and an offset of its own. It is
-    explained by Jᵀ of the wrench, once about the flange and once about the tool's point. The one
-    that leaves less is used if it is likelier by `SURE`; the flange is used where nothing tells,
-    as an e-Series' own sensor has it. The log's wrench is in base axes, and the tool's point in the
-    flange frame. (3,) [m]
+    The controller knows its payload and its arm: what the measured currents have beyond
+    its target currents is what touches the arm, each joint with a factor and an offset of
+    its own. It is explained by Jᵀ of the wrench, once about the flange and once about the
+    tool's point. The one that leaves less is used if it is likelier by `SURE`; the flange
+    is used where nothing tells, as an e-Series' own sensor has it. The log's wrench is in
+    base axes, and the tool's point in the flange frame. (3,) [m]
     """
     if recording.current is None or recording.target_current is None:
         return "flange", (caution("controller-point-without-currents"),)

@@ -1,16 +1,17 @@
 """The model error b: of each joint d = b + n where nobody touches the arm.
 
-n is white of variance R, b an Ornstein–Uhlenbeck process of variance s² and correlation time T.
-Over blocks of B seconds the spectrum of d is
+n is white of variance R, b an Ornstein–Uhlenbeck process of variance s² and correlation
+time T. Over blocks of B seconds the spectrum of d is
 
     S(f) = B [R + s² (1 − a²)/(1 − 2a cos 2πfB + a²)],    a = exp(−B/T),
 
 and the free part's periodogram P fixes the three by Whittle's likelihood, Σ ln S + P/S.
 
-The smoother of a whole log takes b so (`torque_noise`). A list of contacts is measured against the
-quiet blocks on either side, so there b is modelled closer (`learn_noise`, `error_process`):
-reversals are taken out before the spectrum is learned, what the spectrum misses of the tails
-inflates it, and a joint that comes to rest draws its stiction anew.
+The smoother of a whole log takes b so (`torque_noise`). A list of contacts is measured
+against the quiet blocks on either side, so there b is modelled closer
+(`learn_noise`, `error_process`): reversals are taken out before the spectrum is learned,
+what the spectrum misses of the tails inflates it, and a joint that comes to rest draws
+its stiction anew.
 
 References:
     P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
@@ -40,35 +41,40 @@ from vftcli.signals.series import grown, near, runs_of
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
 REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]
-#: A joint that rests under a contact: the push re-settles its stiction within so long. [s]
+#: A joint that rests under a contact: the push re-settles its stiction within so long.
+#: [s]
 PUSHED_TIME = 0.3
-#: Such a push adds to the variance of motion that of rest, by the drives' share under a push.
+#: Such a push adds to the variance of motion that of rest, by the drives' share under a
+#: push.
 RESETTLED = (PUSHED_SHARE / REST_SHARE) ** 2
-#: A joint that moves in less than the share `SEEN` of the free part's blocks: the model error of
-#: its motion, as a share of F_c, and its least correlation time. [s]
+#: A joint that moves in less than the share `SEEN` of the free part's blocks: the model
+#: error of its motion, as a share of F_c, and its least correlation time. [s]
 UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
 #: Prior of the correlation time T: its median [s] and the spread of ln T.
 USUAL_TIME, TIME_SPREAD = 0.5, 1.5
 LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
 LEAST_BLOCKS = 20  #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
 ASSUMED_SHARE = 0.2  #: Model error of motion as a share of F_c, where no free part is known.
-#: Share of the free part's blocks in which a joint must move for its reversals to be bridged.
+#: Share of the free part's blocks in which a joint must move for its reversals to be
+#: bridged.
 MOVES = 0.3
 #: Shares of the normalised squares ν²/S, and where χ² of one degree has them.
 QUANTILES = (0.9, 2.706), (0.97, 4.709)
-#: Smallest model error that is inferred where no free motion is known: this share of F_c, and so
-#: much [N·m]; its correlation time is no shorter where it is this error. [s]
+#: Smallest model error that is inferred where no free motion is known: this share of F_c,
+#: and so much [N·m]; its correlation time is no shorter where it is this error. [s]
 DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
-#: Where nothing was learned the quietest 60 % of the blocks in which a joint moves count as
-#: free; 60 % of a normal variable lie within so many standard deviations.
+#: Where nothing was learned the quietest 60 % of the blocks in which a joint moves count
+#: as free; 60 % of a normal variable lie within so many standard deviations.
 QUIET, QUIET_SD = 0.6, 0.8416
-#: The block in which a joint comes to rest draws b anew: this share is left of what it was.
+#: The block in which a joint comes to rest draws b anew: this share is left of what it
+#: was.
 STOP_DECAY = float(np.exp(-5.0))
-#: What a joint has just done: it stops if it moved for more than half of this time before, and for
-#: this time after a start b changes within `START_TIME`. [s]
+#: What a joint has just done: it stops if it moved for more than half of this time
+#: before, and for this time after a start b changes within `START_TIME`. [s]
 RECENT = 0.1
 START_TIME = 0.05  #: Correlation time of b while a joint breaks away. [s]
-#: How often a joint's innovation is a spike within so long [s] of its motion, and at rest.
+#: How often a joint's innovation is a spike within so long [s] of its motion, and at
+#: rest.
 SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
 UNKNOWN = 1e9  #: Variance of the white noise of a block that says nothing. [(N·m)²]
 
@@ -120,11 +126,12 @@ def torque_noise(
 ) -> TorqueNoise:
     """Noise of a whole log: from free motion of this log or of others, else assumed.
 
-    At rest the model error is at least `REST_SHARE` of the dry friction, whatever the free part
-    shows: stiction keeps what the last motion, or the last touch, left. The free part counts from
-    its first motion to its last, since rest has a model error of its own; a piece without motion
-    counts as it is. Without any the model error is assumed as shares of the dry friction, and the
-    white noise as neighbouring blocks differ.
+    At rest the model error is at least `REST_SHARE` of the dry friction, whatever the
+    free part shows: stiction keeps what the last motion, or the last touch, left. The
+    free part counts from its first motion to its last, since rest has a model error of
+    its own; a piece without motion counts as it is. Without any the model error is
+    assumed as shares of the dry friction, and the white noise as neighbouring blocks
+    differ.
     """
     dry, pieces = dry_torques(robot), []
     for piece in free:
@@ -142,7 +149,8 @@ def torque_noise(
     bend = log.d[1:-1] - 0.5 * (log.d[2:] + log.d[:-2])
     white = np.full(len(dry), TORQUE_SD**2)
     if len(bend):
-        # The median square of a normal variable is .455 of its mean square; the bend has 1.5 R.
+        # The median square of a normal variable is .455 of its mean square; the bend has
+        # 1.5 R.
         white = np.median(bend**2, axis=0) / (0.455 * 1.5)
     return TorqueNoise(
         white=np.maximum(white, LEAST_NOISE),
@@ -188,7 +196,8 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
     moving = log.known[:, None] & ~log.rests
     asked = moving.mean(axis=0) >= SEEN
     if learned is not None:
-        # The fit calls the quietest samples free; what its friction says is a floor, if it is any.
+        # The fit calls the quietest samples free; what its friction says is a floor, if
+        # it is any.
         asked &= DRY_SHARE * dry < LEAST_ERROR
     for j in np.flatnonzero(asked):
         quiet = np.quantile(abs(log.d[moving[:, j], j]), QUIET) / QUIET_SD
@@ -255,8 +264,8 @@ def periodogram(d: Array, seconds: float) -> Array:
 def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[float, float, float]:
     """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
 
-    The level follows in closed form, so that two numbers are left to search. No correlation time
-    is longer than the longest stretch. Units are Hz, (N·m)²/Hz and s.
+    The level follows in closed form, so that two numbers are left to search. No
+    correlation time is longer than the longest stretch. Units are Hz, (N·m)²/Hz and s.
     """
     cosine = np.cos(2.0 * np.pi * f * seconds)
     low, high = np.log([2.0 * seconds, 1e-2]), np.log([max(longest, 4.0 * seconds), 1e6])

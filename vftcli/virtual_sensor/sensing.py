@@ -1,11 +1,12 @@
 """From a log, its free motion and the estimates to what the virtual sensor says of it.
 
-The joint torque error that a wrench's band starts from is stated, or measured on the log by the one
-model of every band, `vftcli.observers.spectra`: what the estimator reads while nothing touches the
-arm, at rest and in motion apart, and what its lag leaves out of the contacts there are. Where
-neither a free part nor an unloaded span is known there is no band: the observers' own covariance
-assumes a torque that wanders as fast as Q_τ says and a model without error, and differs a
-hundredfold between filters whose estimates are nearly the same.
+The joint torque error that a wrench's band starts from is stated, or measured on the log
+by the one model of every band, `vftcli.observers.spectra`: what the estimator reads while
+nothing touches the arm, at rest and in motion apart, and what its lag leaves out of the
+contacts there are. Where neither a free part nor an unloaded span is known there is no
+band: the observers' own covariance assumes a torque that wanders as fast as Q_τ says and
+a model without error, and differs a hundredfold between filters whose estimates are
+nearly the same.
 """
 
 from collections.abc import Mapping, Sequence
@@ -67,7 +68,8 @@ class FreeLog(NamedTuple):
     """A log as an observer has it, and what nobody touched."""
 
     run: Run  #: The log.
-    #: Samples that nobody touched, less a load that they carry; none where nothing is known.
+    #: Samples that nobody touched, less a load that they carry; none where nothing is
+    #: known.
     free: tuple[RunSamples, ...]
     #: A load that the free samples carry, and with them the whole log; None without one.
     load: FreeLoad | None = None
@@ -98,10 +100,11 @@ def sense(
 ) -> SensorReading:
     """Wrenches of the observers' estimates, in the same order, less their zero, and judged.
 
-    What is asked of the log rather than of an observer (its unloaded start, its sensor's pose, its
-    vendor's convention) is read off the mean disturbance, so that it does not depend on which
-    observers run. The smoother needs the log with its free samples, as the robot's model alone has
-    it (`plain`, found if not given) or as an observer has its own, and a gate where there is one.
+    What is asked of the log rather than of an observer (its unloaded start, its sensor's
+    pose, its vendor's convention) is read off the mean disturbance, so that it does not
+    depend on which observers run. The smoother needs the log with its free samples, as
+    the robot's model alone has it (`plain`, found if not given) or as an observer has its
+    own, and a gate where there is one.
     """
     log, q, t = motion.log, motion.log.q, motion.log.t
     chain = log.robot.chain
@@ -123,7 +126,8 @@ def sense(
         if wrench.name in smoothed:
             wrenches[k] = smoothed_wrench(smoothed[wrench.name], wrench, sensor, log)
             bands += wrenches[k].remarks
-    # Beside a smoothed wrench, what is said of the torques' error names those that it is said of.
+    # Beside a smoothed wrench, what is said of the torques' error names those that it is
+    # said of.
     if others := [w.name for w in wrenches if w.name not in smoothed]:
         where = Where(", ".join(others)) if smoothed else Where()
         bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in on_sds]
@@ -200,8 +204,9 @@ def smooth_all(
 def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) -> SmoothedWrench:
     """The smoothed wrench of one log; the arguments as of `smooth_all`.
 
-    A correction of the model's error is used where the wrench comes and goes. Where the uncorrected
-    log calls for one steady load it is left out, since a load and an error of the model look alike.
+    A correction of the model's error is used where the wrench comes and goes. Where the
+    uncorrected log calls for one steady load it is left out, since a load and an error of
+    the model look alike.
     """
     free = log.known_free(unloaded)
     if gate is not None:
@@ -223,9 +228,10 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
 def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     """The raw disturbance, its mean over `HALF` before and after each sample. (T, n) [N·m]
 
-    What is asked of a log itself is asked of it: no option touches it and no filter delays it. The
-    mean is a difference of its integral, so an uneven clock weighs by time; at the ends of the log
-    it is over what there is. A log of one sample reads nothing.
+    What is asked of a log itself is asked of it: no option touches it and no filter
+    delays it. The mean is a difference of its integral, so an uneven clock weighs by
+    time; at the ends of the log it is over what there is. A log of one sample reads
+    nothing.
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
@@ -257,8 +263,8 @@ def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
 
 
 OWN = "own"  #: The word for the observers' own covariance as the torque error.
-#: Observer → standard deviation, (n,) or (T, n), none of those without a band [N·m]; and where it
-#: comes from, or why there is none.
+#: Observer → standard deviation, (n,) or (T, n), none of those without a band [N·m]; and
+#: where it comes from, or why there is none.
 TorqueError = tuple[dict[str, Array], list[Remark]]
 
 

@@ -22,7 +22,8 @@ from vftcli.virtual_sensor.solvers import VirtualSensor
 
 #: Second to first singular value of the forces below which they lie on one line.
 LEAST_DIRECTIONS = 0.02
-#: A correlation that no independent measurement reaches: the field is made from the torques.
+#: A correlation that no independent measurement reaches: the field is made from the
+#: torques.
 DERIVED = 0.9995
 RESEMBLES = 0.5  #: Below this correlation no convention explains the field.
 
@@ -39,8 +40,8 @@ class PoseFit(NamedTuple):
 def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     """R and p of (56) from two readings of a contact, flange's and sensor's. (T, 6) [N, N·m]
 
-    R solves Wahba's problem on the forces (Kabsch), p the linear least squares of
-    N_F − R N_S = p × F_F, both on departures from the mean: constant offsets do not matter.
+    R solves Wahba's problem on the forces (Kabsch), p the linear least squares of N_F − R
+    N_S = p × F_F, both on departures from the mean: constant offsets do not matter.
     """
     known = np.all(np.isfinite(flange) & np.isfinite(sensor), axis=1)
     ours, theirs = flange[known], sensor[known]
@@ -118,8 +119,8 @@ class AxesFit(NamedTuple):
 def fit_axes(ours: Array, theirs: Array) -> AxesFit:
     """Find the order and signs of axes that take our force to theirs. Offsets do not matter.
 
-    The best orthogonal matrix (improper ones allowed, as loggers swap axes freely) is rounded to
-    the signed permutation with the largest sum of matching entries.
+    The best orthogonal matrix (improper ones allowed, as loggers swap axes freely) is
+    rounded to the signed permutation with the largest sum of matching entries.
     """
     known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
     x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)
@@ -166,7 +167,8 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
     axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
     if not axes.correlation > RESEMBLES:
         return [*remarks, caution("log-wrench-unlike")]
-    # The trace of a signed permutation is 3 for our own axes and −3 for the opposite ones.
+    # The trace of a signed permutation is 3 for our own axes and −3 for the opposite
+    # ones.
     turn = {3: "log-wrench-fits", -3: "log-wrench-fits-turned"}
     remarks.append(
         fact(

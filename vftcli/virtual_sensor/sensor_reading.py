@@ -18,7 +18,8 @@ from vftcli.virtual_sensor.choice import SMOOTHER, ZeroChoice
 from vftcli.virtual_sensor.smoother import SmoothedWrench
 from vftcli.virtual_sensor.solvers import SCALE, VirtualSensor
 
-#: The threshold of the null-space torque is so far above the largest value of the free part.
+#: The threshold of the null-space torque is so far above the largest value of the free
+#: part.
 MARGIN = 1.25
 #: Share of samples above the threshold up to which nothing is said: chance reaches it.
 LEAST_SHARE = 0.001
@@ -87,7 +88,8 @@ class SensorReading(Shown):
     wrenches: tuple[Wrench, ...]  #: One an observer, drift removed where a zero was given.
     masked: Mask  #: Samples in which the pose cannot tell a wrench, whoever observes it. (T,)
     drifts: tuple[Drift, ...] = ()  #: Zero drift, one an unloaded span and observer.
-    #: Samples known to be unloaded: those of the zero spans, or of the unloaded start. (T,)
+    #: Samples known to be unloaded: those of the zero spans, or of the unloaded start.
+    #: (T,)
     free: Mask
     #: What the smoother found, by the observer whose wrench it is.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
@@ -208,9 +210,9 @@ def zero_spans(choice: ZeroChoice, wrench: Wrench) -> tuple[tuple[Span, ...], tu
 def unloaded_start(wrench: Wrench) -> Span | None:
     """The span from the start over which the wrench keeps its first level, None if too short. [s]
 
-    That level is the median of the first half second after `SETTLING`; the span ends where a
-    median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at least
-    `STEPS`. A load that hangs from the first sample on cannot be told from drift.
+    That level is the median of the first half second after `SETTLING`; the span ends
+    where a median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at
+    least `STEPS`. A load that hangs from the first sample on cannot be told from drift.
     """
     t = wrench.t - wrench.t[0]
     known = np.isfinite(wrench.known).all(axis=1)

@@ -1,7 +1,8 @@
 """The virtual force/torque sensor: τ = J_Fᵀ w turned round (46), in a named frame.
 
-Everything is solved at the flange point in base axes with lengths in units of 0.3 m, so that a
-newton and a newton-metre weigh alike: J_s = S J, S = diag(1, 1, 1, 0.3, 0.3, 0.3), w_s = S⁻¹w.
+Everything is solved at the flange point in base axes with lengths in units of 0.3 m, so
+that a newton and a newton-metre weigh alike: J_s = S J, S = diag(1, 1, 1, 0.3, 0.3, 0.3),
+w_s = S⁻¹w.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,12 +23,14 @@ from vftcli.virtual_sensor.frames import Mounting, check_frame, frame_pose, from
 
 LENGTH = 0.3  #: Length by which moments are made comparable with forces. [m]
 SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])  #: Diagonal of S.
-#: Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N. [m]
+#: Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N.
+#: [m]
 LEAST_SIGMA = 0.05
-#: Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,) [N]
+#: Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,)
+#: [N]
 PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
-#: Joint torque error against which the MAP solver weighs its prior where none is known: a weight,
-#: no band. [N·m]
+#: Joint torque error against which the MAP solver weighs its prior where none is known: a
+#: weight, no band. [N·m]
 TORQUE_SD = 0.3
 
 
@@ -53,7 +56,8 @@ def decompose(jacobian: Array) -> Decomposition:
             "leave --wrench and its options out: use the joint torques"
         )
     scaled = SCALE[:, None] * jacobian
-    # The 6×6 product is cheaper to decompose than the 6×n factor, and only the squares are needed.
+    # The 6×6 product is cheaper to decompose than the 6×n factor, and only the squares
+    # are needed.
     squares, U = np.linalg.eigh(scaled @ scaled.swapaxes(1, 2))
     return Decomposition(scaled, U, squares)
 
@@ -92,8 +96,8 @@ def pinv(parts: Decomposition, X: Array) -> Solver:
 def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
     """The most probable wrench under a normal prior of 50 N and 10 N·m about zero.
 
-    w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares where the
-    pose is good, and next to the prior where the pose cannot tell.
+    w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares
+    where the pose is good, and next to the prior where the pose cannot tell.
     """
 
     def solve(sd: Array) -> Solution:
@@ -107,8 +111,8 @@ def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
     return solve
 
 
-#: Name at the command line → what solves for the wrenches of poses, given their Jacobian, and X
-#: (T, 6, 6) that takes a wrench in base axes to the frame asked for.
+#: Name at the command line → what solves for the wrenches of poses, given their Jacobian,
+#: and X (T, 6, 6) that takes a wrench in base axes to the frame asked for.
 SOLVERS: dict[str, Callable[[Decomposition, Array], Solver]] = {
     "pinv": pinv,
     "map": maximum_a_posteriori,
@@ -119,8 +123,8 @@ LEAST_SQUARES = "pinv"  #: The solver where none is asked for.
 def null_space(parts: Decomposition, tau: Array) -> Array:
     """(I − Jᵀpinv(Jᵀ))τ: the torque of τ (T, n, K) that no wrench at the flange explains. [N·m]
 
-    A wrench at the flange leaves it unchanged; a contact further down the arm, or an error of the
-    model, does not. Singular directions count as explained by nothing.
+    A wrench at the flange leaves it unchanged; a contact further down the arm, or an
+    error of the model, does not. Singular directions count as explained by nothing.
     """
     # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
     tall = parts.scaled.swapaxes(1, 2) @ parts.U
@@ -175,14 +179,15 @@ class VirtualSensor(Shown):
     ) -> tuple[Wrench, ...]:
         """The wrench of every estimate at q (T, n) [rad], about the flange, tool or sensor.
 
-        An estimate without a standard deviation of its torques, (n,) or (T, n) [N·m] by its name,
-        has a wrench without band.
+        An estimate without a standard deviation of its torques, (n,) or (T, n) [N·m] by
+        its name, has a wrench without band.
         """
         samples, n = q.shape
         for torque in torques:
             if torque.tau.shape != q.shape:
                 raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
-        # A view: one row stands for every sample. Zero is raised, so that weights stay finite.
+        # A view: one row stands for every sample. Zero is raised, so that weights stay
+        # finite.
         errors = [
             np.broadcast_to(np.maximum(sd.get(torque.name, TORQUE_SD), 1e-6), q.shape)
             for torque in torques

@@ -53,8 +53,8 @@ def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
 def unfinished(copy: Path, key: str) -> Iterator[Path]:
     """The folder in which a copy is made: an earlier run's, if its key is equal, goes on.
 
-    It stays if the block fails after something was done, to go on from; if the block ends well it
-    takes the copy's place, whatever was there before.
+    It stays if the block fails after something was done, to go on from; if the block ends
+    well it takes the copy's place, whatever was there before.
     """
     partial = partial_of(copy)
     work = partial / WORK

@@ -25,7 +25,8 @@ from vftcli.signals.packages import needed
 
 PREFIX = "observation."  #: What the names of observations begin with.
 DATASET = "a dataset of LeRobot"  #: What needs pyarrow.
-#: Key of a Parquet schema's metadata under which the `datasets` library tells its features.
+#: Key of a Parquet schema's metadata under which the `datasets` library tells its
+#: features.
 METADATA = b"huggingface"
 #: Keys of the quantiles.
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
@@ -259,8 +260,8 @@ def statistics_of(values: Single) -> Statistics:
 def pooled(episodes: Sequence[Statistics]) -> Statistics:
     """The statistics of several episodes together, as LeRobot puts them together.
 
-    Mean and standard deviation are those of all frames (law of total variance), quantiles the means
-    of the episodes' own weighted with their frames.
+    Mean and standard deviation are those of all frames (law of total variance), quantiles
+    the means of the episodes' own weighted with their frames.
     """
     table = {key: np.array([one[key] for one in episodes]) for key in episodes[0]}
     count = table.pop("count")

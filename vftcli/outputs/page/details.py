@@ -1,7 +1,7 @@
 """Details of the page of one log: drawings of contacts, and tables below the answer.
 
-Drawn are |F| over the log with its band, and the arm at each contact; the tables are of contacts,
-errors, observers, budget and print.
+Drawn are |F| over the log with its band, and the arm at each contact; the tables are of
+contacts, errors, observers, budget and print.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,8 +28,8 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import VftError
 from vftcli.signals.series import resample_columns, runs_of
 
-#: The chart for a screen, and for a telephone with larger letters; stretches of the line in
-#: each.
+#: The chart for a screen, and for a telephone with larger letters; stretches of the line
+#: in each.
 SHAPES = (
     (Box(width=1024, height=300, left=44, bottom=24, top=28, right=10), 600),
     (Box(width=400, height=260, left=38, bottom=24, top=28, right=8), 200),
@@ -70,7 +70,8 @@ class Timeline(NamedTuple):
     scales: Scales  #: From seconds and newtons to places.
     courses: list[tuple[str, str]]  #: Band and line of contacts with a force.
     numbers: list[tuple[int, float]]  #: Contacts with room for a number, and its place.
-    #: Place of a peak, place of its size in words, and the words, "" without room or size.
+    #: Place of a peak, place of its size in words, and the words, "" without room or
+    #: size.
     peaks: list[tuple[float, float, float, float, str]]
 
 
@@ -294,7 +295,8 @@ def observers_view(analysis: Analysis) -> dict[str, Any]:
             meant = [GridCell("", html=joint_values(column)) for column in columns]
             meant.append(tuning.parameter_count)
         rows.append((name, what, *meant))
-        # The record has parameters as JSON can hold them, also those of a wrapped observer.
+        # The record has parameters as JSON can hold them, also those of a wrapped
+        # observer.
         used[name] = observer_record(observer, None)["parameters"]
     heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
     title = (

@@ -23,8 +23,8 @@ from vftcli.signals.external_torque import COVERS
 from vftcli.signals.wrench import AXES, unit_of
 
 FREQUENCIES = 120  #: Points of a frequency response.
-#: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest
-#: that is shown. [–], [dB]
+#: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and
+#: the lowest that is shown. [–], [dB]
 QUIETEST, LOWEST = 1e-12, -80.0
 #: Colours of the two spectra.
 FREE, LOADED = "#3b7ea1", "#c2410c"
@@ -66,8 +66,9 @@ def lines_of(
 ) -> list[ChartLine]:
     """A line an observer; one is drawn at once, `best` where it ran, with its 95 % band.
 
-    Beside `best` no other bears a band: five would hide one another; where it did not run every
-    line does, if they are `alike`. Given are name, values and standard deviation. (T, n)
+    Beside `best` no other bears a band: five would hide one another; where it did not run
+    every line does, if they are `alike`. Given are name, values and standard deviation.
+    (T, n)
     """
     styles = observer_styles(analysis)
     names = [name for name, *_ in found]

@@ -31,13 +31,15 @@ HERE = Path(__file__).parent
 LEVELS = ("warning", "caution", "fact")  #: Levels of a remark, the most serious first.
 TICKS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
 TICK_ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
-#: Bytes that the large charts of a page may take; a long log's may take more, up to this factor.
+#: Bytes that the large charts of a page may take; a long log's may take more, up to this
+#: factor.
 ROOM, LONG = 350_000, 4.0
 #: Stretches a long log is cut into, two samples each, however many lines there are.
 FEWEST, MOST = 250, 2000
 #: Bytes of a stretch of a line: two samples of a float32 and an int16 as base64.
 POINT = 2 * (4 + 2) * 4 / 3
-#: Steps between a line's lowest and highest value, finer than any screen; the number for NaN.
+#: Steps between a line's lowest and highest value, finer than any screen; the number for
+#: NaN.
 STEPS, UNKNOWN = 65534, -32768
 
 
@@ -105,7 +107,8 @@ def page(
 
 def script_json(data: object) -> str:
     """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
-    # "<" could begin "</script>"; the two separators end a line in JavaScript but not in JSON.
+    # "<" could begin "</script>"; the two separators end a line in JavaScript but not in
+    # JSON.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 

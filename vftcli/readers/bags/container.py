@@ -107,8 +107,8 @@ class MessageCount:
             budget.note(caution("recorder-stopped", kept=kept))
 
 
-#: Records that may be read of a container: no recorded message takes less than some bytes, and
-#: recorded numbers shrink by 3 to 15.
+#: Records that may be read of a container: no recorded message takes less than some
+#: bytes, and recorded numbers shrink by 3 to 15.
 SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
 
 

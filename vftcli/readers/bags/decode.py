@@ -1,9 +1,9 @@
 """Bulk decoding: messages of one layout become arrays at once, the odd ones one by one.
 
-A layout says where the numbers of a serialised ROS message lie. It is found by walking one message
-along its definition. Another message has the same layout if and only if it is as long and all its
-length prefixes are equal; strings are required to be equal too, so that joint names hold for every
-message of a group.
+A layout says where the numbers of a serialised ROS message lie. It is found by walking
+one message along its definition. Another message has the same layout if and only if it is
+as long and all its length prefixes are equal; strings are required to be equal too, so
+that joint names hold for every message of a group.
 """
 
 from collections import defaultdict
@@ -93,7 +93,8 @@ class MessageLayout:
     def _walk(self, path: str, kind: str, depth: int) -> None:
         if depth > MAX_DEPTH:
             raise LayoutError("nested too deeply")
-        # Empty messages take no bytes: a few nested types of them would be visited without end.
+        # Empty messages take no bytes: a few nested types of them would be visited
+        # without end.
         self._visits += 1
         if self._visits > len(self._message) + SPARE_VISITS:
             raise LayoutError("more parts than bytes")
@@ -163,14 +164,15 @@ def _paths_by_name(text: str) -> dict[str, Names]:
 class Kind(NamedTuple):
     """One message type."""
 
-    #: Signal → dotted paths to try in turn; a path of six numbers means force and torque below it.
-    #: `effort` is decided later, by the joints' names.
+    #: Signal → dotted paths to try in turn; a path of six numbers means force and torque
+    #: below it. `effort` is decided later, by the joints' names.
     signals: Mapping[str, Names]
     names: str = ""  #: Path of the joints' names.
     frame: str = ""  #: Path of the frame's name.
     #: Name → paths to try of the load's numbers, of which the last value counts.
     constants: Mapping[str, Names] = {}
-    #: Whether it is Franka's: it leads, its residual is turned, its wrench's frame is known.
+    #: Whether it is Franka's: it leads, its residual is turned, its wrench's frame is
+    #: known.
     franka: bool = False
 
 
@@ -202,7 +204,8 @@ KINDS = {
     "geometry_msgs/WrenchStamped": Kind(_paths_by_name("wrench=wrench"), frame="header.frame_id"),
 }
 
-#: Layouts that messages of one topic may have: joint names, and lengths of lists, hardly vary.
+#: Layouts that messages of one topic may have: joint names, and lengths of lists, hardly
+#: vary.
 LAYOUTS = 512
 #: Random messages of some batches that are walked one by one to confirm their layout.
 CHECKED_ROWS = 4
@@ -250,7 +253,8 @@ class _Topic:
 
     types: Types
     layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
-    #: Times and signals by name, and `place` in the topic, of each layout of the batch at hand.
+    #: Times and signals by name, and `place` in the topic, of each layout of the batch at
+    #: hand.
     parts: dict[_Key, list[Columns]] = field(default_factory=dict)
     #: The times and signals of all batches.
     series: dict[_Key, dict[str, JoinedRows]] = field(default_factory=dict)
@@ -317,7 +321,8 @@ class Decoder:
         for name, paths in kind.constants.items():
             if (last := layout.numbers(paths, *at)[-1]).size:
                 topic.constants[name] = tuple(last.tolist())
-        # Some drivers publish joints alphabetically; every message of a layout has one order.
+        # Some drivers publish joints alphabetically; every message of a layout has one
+        # order.
         own = layout.texts.get(kind.names, ())
         names, signals = along_arm(own, {s: value for s, value in each.items() if value.shape[1]})
         if kind.franka and "tau_ext" in signals:

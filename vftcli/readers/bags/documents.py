@@ -60,8 +60,8 @@ class Documents:
     def streams(self, request: ReadChoice) -> list[Stream]:
         """The channels whose documents are JointState or WrenchStamped messages.
 
-        None where --columns speaks of other fields; no channel where its stamps are no whole
-        seconds and nanoseconds.
+        None where --columns speaks of other fields; no channel where its stamps are no
+        whole seconds and nanoseconds.
         """
         asked = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
         if not asked <= {"", "position", "velocity", "effort"}:
@@ -91,7 +91,8 @@ class Documents:
             left = sorted({other.topic for other in self.found} - {channel.topic})
             said = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
             return replace(raw, remarks=(*raw.remarks, *said))
-        # The fullest channel is the one that was meant; what it lacks is what the user can mend.
+        # The fullest channel is the one that was meant; what it lacks is what the user
+        # can mend.
         raise max(failures, key=lambda failure: failure[0])[1]
 
     def _read(

@@ -1,12 +1,13 @@
 """Records of ROS 1 bags, of MCAP files and of ROS 2's SQLite databases.
 
-ROS 1 bags (http://wiki.ros.org/Bags/Format/2.0) and MCAP files (https://mcap.dev/spec) are read
-from the start, so that a cut or unclosed one reads up to its last chunk. The readers of rosbags and
-mcap need the index at the end, or unpack a chunk to whatever it holds, and take longer.
+ROS 1 bags (http://wiki.ros.org/Bags/Format/2.0) and MCAP files (https://mcap.dev/spec)
+are read from the start, so that a cut or unclosed one reads up to its last chunk. The
+readers of rosbags and mcap need the index at the end, or unpack a chunk to whatever it
+holds, and take longer.
 
-A database is code as much as data: a column may be computed by functions of SQLite from nothing.
-So only stored columns of plain tables are read, no function runs, and what is read is bounded by
-the size of the file.
+A database is code as much as data: a column may be computed by functions of SQLite from
+nothing. So only stored columns of plain tables are read, no function runs, and what is
+read is bounded by the size of the file.
 """
 
 import sqlite3
@@ -276,7 +277,8 @@ TABLES = {
 }
 
 STEPS = 10_000
-#: What SQLite may do for a file: some ten steps a row and topic, and rows of a few bytes or more.
+#: What SQLite may do for a file: some ten steps a row and topic, and rows of a few bytes
+#: or more.
 #:
 #: A tree of pages that hold one another has rows without end.
 SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
@@ -294,7 +296,8 @@ def db3_messages(file: LogFile, budget: ReadBudget) -> Messages:
 def _opened(file: LogFile) -> sqlite3.Connection:
     """The database, read-only; an unpacked one is held in memory."""
     if file.wrapping is None:
-        # Immutable: SQLite must not look for a journal, nor write one beside a user's bag.
+        # Immutable: SQLite must not look for a journal, nor write one beside a user's
+        # bag.
         db = sqlite3.connect(f"{file.path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
     else:
         db = sqlite3.connect(":memory:")

@@ -16,7 +16,8 @@ from vftcli.readers.opening import reason_of
 from vftcli.signals.errors import LogError, OutputError
 from vftcli.signals.parsing import tables_beside
 
-#: The longest definition of an arm's state, Franka's with all its errors, takes some 10 KiB.
+#: The longest definition of an arm's state, Franka's with all its errors, takes some 10
+#: KiB.
 MAX_DEFINITION = 64 * 1024
 #: Primitive type → NumPy's code for it.
 SIZES = {
@@ -128,7 +129,8 @@ def types_for(channel: Channel) -> Types:
     if channel.definition:
         known |= types_of(channel.definition, long_name(channel.type), idl=channel.idl)
     if channel.encoding == "ros1":
-        # ROS 1 has no int32 seconds in a message of their own: time is a primitive of two words.
+        # ROS 1 has no int32 seconds in a message of their own: time is a primitive of two
+        # words.
         time = own_types()["builtin_interfaces/Time"]
         known |= {"builtin_interfaces/Time": time, "builtin_interfaces/Duration": time}
     if channel.type not in known:
@@ -148,8 +150,8 @@ def serialised(
 ) -> Bytes:
     """Many messages of one type and one layout in CDR, little-endian. (T, size)
 
-    The definition is walked once; every message has the same bytes but for the numbers, which are
-    put in column by column.
+    The definition is walked once; every message has the same bytes but for the numbers,
+    which are put in column by column.
     """
     message = Serialiser(types if types is not None else own_types(), values)
     message.walk("", kind)

@@ -27,7 +27,8 @@ TARGETS = re.compile(r"(?i)desired|command|target|goal|reference")
 VENDOR_WRENCH = re.compile(r"(?i)franka|F_ext$|external_wrench")
 #: Topics and types that may hold a wrench: left out, they are named.
 FORCES = re.compile(r"(?i)wrench|force|\bft\b|F_ext")
-#: A wrench further than this many of its own sample times from a pose is not taken for it.
+#: A wrench further than this many of its own sample times from a pose is not taken for
+#: it.
 NEAR = 3.0
 OWN = "/vftcli/"  #: Topics that vftcli itself writes.
 
@@ -265,7 +266,8 @@ def leading(
     # Topics of one rate may differ by the messages lost at either end.
     near = [s for s in found if s.messages >= 0.9 * most]
     best = max(near, key=lambda s: (s.kind.franka, "effort" in s.signals, s.messages))
-    # A stream of as many joints with other names, of the same type and rate, is another arm.
+    # A stream of as many joints with other names, of the same type and rate, is another
+    # arm.
     width, joints = best.width, set(best.names)
     rivals = [
         s for s in near

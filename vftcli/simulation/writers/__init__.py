@@ -1,8 +1,8 @@
 """Simulated logs in the vendors' own formats, flat Parquet tables, and the truth file.
 
-UR's two RTDE recorders: the official client writes one header row, single spaces and CR LF; SDU's
-ur_rtde commas, LF, every double with six decimals. libfranka's `logToCSV`, the layout of 0.9.1 and
-later: commas, six significant digits.
+UR's two RTDE recorders: the official client writes one header row, single spaces and CR
+LF; SDU's ur_rtde commas, LF, every double with six decimals. libfranka's `logToCSV`, the
+layout of 0.9.1 and later: commas, six significant digits.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,11 +26,11 @@ from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
 
-#: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next NAME" the
-#: row that follows, the last repeated: a command is executed one cycle later.
+#: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next
+#: NAME" the row that follows, the last repeated: a command is executed one cycle later.
 Columns = Mapping[str, str | tuple[float, ...]]
-#: The default record_configuration.xml of the official client. The constants are of what the
-#: simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL.
+#: The default record_configuration.xml of the official client. The constants are of what
+#: the simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL.
 CLIENT: Columns = {
     "timestamp": "time",
     "target_q": "target_q",
@@ -113,7 +113,8 @@ def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
     linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
     matrix = np.zeros((len(time), 4, 4))
     matrix[:, :3, :3], matrix[:, :3, 3], matrix[:, 3, 3] = target.rotation, target.position, 1.0
-    # A controller's estimate stays bounded: directions that the pose cannot tell read nothing.
+    # A controller's estimate stays bounded: directions that the pose cannot tell read
+    # nothing.
     force = wrench_of(signals["tau_ext"], actual.jacobian, left_out=LEAST_SIGMA).values
     return {
         **signals,

@@ -33,15 +33,16 @@ Rows = NDArray[np.int64]
 Nanoseconds = NDArray[np.int64]
 
 
-#: Messages of one topic: its name, their type as package/Name, one serialised a row (R, size).
+#: Messages of one topic: its name, their type as package/Name, one serialised a row
+#: (R, size).
 Topic = tuple[str, str, NDArray[np.uint8]]
 
 
 def write_rosbag2(path: Path, simulation: Simulation) -> None:
     """Write the log as a bag folder.
 
-    Effort is the motor current for a UR arm, in ampere, as its driver has it. A flange sensor is a
-    second topic, WrenchStamped in the sensor's frame.
+    Effort is the motor current for a UR arm, in ampere, as its driver has it. A flange
+    sensor is a second topic, WrenchStamped in the sensor's frame.
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
