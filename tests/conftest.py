@@ -20,8 +20,8 @@ settings.load_profile("steady")
 
 BEGUN, SHARED = pytest.StashKey[float](), pytest.StashKey[float]()
 
-DEAR = frozenset({"pushed", "worked_up"})
-"""Fixtures of the session that may take longer: whole reports, .8 s on a quiet machine."""
+DEAR = frozenset({"pushed", "worked_up", "logs_of_one_motion"})
+"""Fixtures of the session that may take longer: whole reports, three simulated logs (.8 s)."""
 
 LOADED_LATE = ("scipy.signal", "polars", "pinocchio", "rerun", "distributed", "matplotlib.figure")
 """What vftcli imports late, .3 to 1.6 s each: charged to no test, whatever the order."""

@@ -169,8 +169,7 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
     return FoundGains(robot, recording, goal, tuned, spectra, remarks, examinations)
 
 
-#: Whose estimate is the force unless another is named: the paper drives its controller
-#: with it.
+#: Observer of the force unless another is named: the paper's controller has it.
 DRIVER = "kfo-fe"
 
 

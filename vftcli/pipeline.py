@@ -144,7 +144,7 @@ def list_touches(
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
-    """A log with its robot, its effort taken for what it is where the robot's model shall say."""
+    """A log with its robot, its effort named by the robot's model where that is asked for."""
     robot = choice.examiner.robot(recording, choice.robot)
     if choice.observers.causal:
         check_logged(recording, "--causal leaves out what looks ahead")

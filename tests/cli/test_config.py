@@ -89,8 +89,8 @@ def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
 
 
 def test_logs_behind_two_dashes_stay_behind_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    taken = config.Taken(Path("a"), ("--robot", "ur5"))
-    monkeypatch.setattr(config, "TAKEN", ContextVar("taken", default=taken))
+    kept = config.FileOptions(Path("a"), ("--robot", "ur5"))
+    monkeypatch.setattr(config, "OPTIONS", ContextVar("file_options", default=kept))
     words = ["report", "--", "-log.csv"]
     kept = ["--robot", "ur5", "--config", "none"]
     assert config.effective(words) == ["report", *kept, "--", "-log.csv"]

@@ -121,12 +121,12 @@ def test_a_load_that_the_model_lacks_is_in_the_headline() -> None:
 
 
 def test_places_that_cannot_be_told_apart_are_named() -> None:
-    def told(*links: int) -> str:
+    def words_of(*links: int) -> str:
         return place_words(contact(where="cannot tell", places=links))
 
-    assert told(2, 3, 6) == "link 2 … link 6"
-    assert told(0, 3, 6) == "link 3 … flange"
-    assert told(2) == "link 2"
+    assert words_of(2, 3, 6) == "link 2 … link 6"
+    assert words_of(0, 3, 6) == "link 3 … flange"
+    assert words_of(2) == "link 2"
     assert place_words(contact()) == "wrist"
 
 

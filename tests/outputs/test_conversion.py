@@ -98,7 +98,7 @@ def test_what_exists_is_kept_and_unknown_endings_are_refused(tmp_path: Path) -> 
 
 
 def test_columns_say_what_they_hold(tmp_path: Path) -> None:
-    """Also whose force the log's own wrench is, which is the robot's here."""
+    """Also the sign of the log's own wrench: the force on the robot here."""
     convert(full(), tmp_path / "x.parquet")
     schema = pq.read_schema(tmp_path / "x.parquet")
     assert all((field.metadata or {}).get(b"unit") for field in schema)

@@ -84,7 +84,7 @@ NAMES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_a", "wrist_b", "wri
 
 
 def log_of(names: tuple[str, ...]) -> Recording:
-    """A log whose column j holds j everywhere. 10 samples"""
+    """A log with j everywhere in column j. 10 samples"""
     t = 0.01 * np.arange(10)
     q = np.tile(np.arange(len(names), dtype=float), (10, 1))
     wrench = np.zeros((10, 6))

@@ -111,9 +111,9 @@ def test_a_toml_beside_the_urdf_must_match_its_joints(tmp_path: Path) -> None:
 def test_a_urdf_that_is_no_serial_revolute_arm_is_refused(
     tmp_path: Path, text: str, words: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(RobotError, match=words) as caught:
+    with pytest.raises(RobotError, match=words) as error:
         load_robot(written(tmp_path, text))
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)
     assert capfd.readouterr() == ("", "")  # the URDF parser's own words stand in the error
 
 
@@ -144,9 +144,9 @@ def test_what_is_no_number_in_a_urdf_is_refused_by_its_link(
 ) -> None:
     text = URDF.format(kind="revolute")
     assert text.count(old) >= 1
-    with pytest.raises(RobotError, match=words) as caught:
+    with pytest.raises(RobotError, match=words) as error:
         load_robot(written(tmp_path, text.replace(old, new, 1)))
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)
     assert capfd.readouterr() == ("", "")
 
 
@@ -277,8 +277,8 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
     assert robot.friction == ()
     (left,) = (r for r in robot.remarks if r.code == "simulator-friction-left")
     assert left.values["damping_Nms_rad"] == [0, 20, 0, 0, 0]
-    taken = RobotChoice(name=str(path), friction="model").load(log)
-    assert taken.friction[1].parameters == {"coulomb": 0.3, "viscous": 20.0}
+    arm = RobotChoice(name=str(path), friction="model").load(log)
+    assert arm.friction[1].parameters == {"coulomb": 0.3, "viscous": 20.0}
     with pytest.raises(RobotError, match=r"model\.friction=model is what an MJCF gives its joints"):
         RobotChoice(name="ur5", friction="model").load(log)
 
@@ -298,9 +298,9 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
 def test_an_mjcf_that_is_no_arm_is_refused(
     text: str, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(RobotError, match=words) as caught:
+    with pytest.raises(RobotError, match=words) as error:
         load_robot(written(tmp_path, text, "arm.xml"))
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)
     assert capfd.readouterr() == ("", "")  # the parser's own words stand in the error
 
 

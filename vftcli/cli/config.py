@@ -37,7 +37,7 @@ Table = dict[str, Any]  #: A table of TOML.
 FILE = "file:"  #: What a reference's file begins with.
 
 
-class Taken(NamedTuple):
+class FileOptions(NamedTuple):
     """What a command took from a file."""
 
     path: Path | None = None  #: The file, None where none was read.
@@ -45,17 +45,17 @@ class Taken(NamedTuple):
     settings: Mapping[str, str] = MappingProxyType({})  #: Name → value of the settings.
 
 
-NOTHING = Taken()  #: What a command took that read no file.
+NOTHING = FileOptions()  #: The options of a command that reads no file.
 
 #: The words of this call, former ones by what they are now.
 WORDS: ContextVar[Sequence[str]] = ContextVar("words", default=())
 #: What this command took from a file.
-TAKEN: ContextVar[Taken] = ContextVar("taken", default=NOTHING)
+OPTIONS: ContextVar[FileOptions] = ContextVar("file_options", default=NOTHING)
 
 
 def effective(words: list[str]) -> list[str]:
     """The words of a command line that does the same without a file of options."""
-    kept = TAKEN.get().words
+    kept = OPTIONS.get().words
     if not kept:
         return words
     # What stands behind -- are logs.
@@ -102,7 +102,7 @@ def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
         for key, value in keys.items()
         if "." in key and any(kind.takes(key) for kind in choices)
     }
-    TAKEN.set(Taken(path, settings=settings))
+    OPTIONS.set(FileOptions(path, settings=settings))
 
 
 def settle(ctx: Any) -> None:  # noqa: ANN401
@@ -110,7 +110,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
 
     What cannot be meant for its logs is left away.
     """
-    path = TAKEN.get().path
+    path = OPTIONS.get().path
     if path is None:
         return
     arguments = [p for p in ctx.command.params if p.param_type_name == "argument"]
@@ -118,7 +118,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
     each_log = (log for one in given for log in (one if isinstance(one, tuple) else (one,)))
     logs = [Path(log) for log in each_log if log is not None]
     typed = [word.partition("=")[0].strip() for word in ctx.params.get("set") or ()]
-    settings = {name: text for name, text in TAKEN.get().settings.items() if name not in typed}
+    settings = {name: text for name, text in OPTIONS.get().settings.items() if name not in typed}
     words = [word for name, text in settings.items() for word in ("--set", f"{name}={text}")]
     for param in ctx.command.params:
         source = ctx.get_parameter_source(param.name)
@@ -132,7 +132,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
                 words.append(f"--{key}")
             elif one is not None:  # what begins as an option does stands behind =
                 words += [f"--{key}={one}"] if one.startswith("-") else [f"--{key}", one]
-    TAKEN.set(Taken(path, tuple(words), settings))
+    OPTIONS.set(FileOptions(path, tuple(words), settings))
     said = shlex.join(words) or "nothing that this command takes and is not typed"
     echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
 
@@ -225,7 +225,7 @@ def key_now(path: Path, key: str, value: Any) -> Table:  # noqa: ANN401 - of TOM
     return {option: taken.replace("VALUE", text) if taken else value}
 
 
-def check_keys(path: Path, whose: str, table: Table, there: Mapping[str, object]) -> None:
+def check_keys(path: Path, owner: str, table: Table, there: Mapping[str, object]) -> None:
     """Check that every key of a table is an option."""
     for key in table:
         if "." in key:
@@ -234,7 +234,7 @@ def check_keys(path: Path, whose: str, table: Table, there: Mapping[str, object]
             raise ParameterError(f"{path}: {key} is not kept in a file; type --{key}")
         if key not in there:
             near = did_you_mean(key, there) or " A key is an option without its dashes, as robot."
-            raise ParameterError(f"{path}: {shown(key)} is no option {whose}.{near}")
+            raise ParameterError(f"{path}: {shown(key)} is no option {owner}.{near}")
 
 
 def tables_of(path: Path) -> Table:

@@ -15,7 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS, former, renewed, with_command
-from vftcli.cli.config import NOTHING, TAKEN, WORDS, config_option, is_configured, settle
+from vftcli.cli.config import NOTHING, OPTIONS, WORDS, config_option, is_configured, settle
 from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
@@ -38,7 +38,7 @@ class GroupedCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words; of an option that there is not, name the nearest if it is near."""
-        TAKEN.set(NOTHING)
+        OPTIONS.set(NOTHING)
         try:
             rest = super().parse_args(ctx, args)
         except Exception as error:

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar, get_args, get_o
 
 import typer
 
-from vftcli.cli.config import TAKEN
+from vftcli.cli.config import OPTIONS
 from vftcli.cli.console import speaking
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
@@ -191,7 +191,7 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     def called(**values: Any) -> None:  # noqa: ANN401
         from vftcli.outputs.files import protected
 
-        kept = TAKEN.get()
+        kept = OPTIONS.get()
         if part.choices:
             typed = settings_of(values.get("set") or (), part.choices)
             values["settings"] = {**kept.settings, **typed}

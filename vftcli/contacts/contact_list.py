@@ -315,7 +315,7 @@ class ContactList(Shown):
         return replace(self, load=carried, contacts=rows)
 
     def without_forces(self) -> "ContactList":
-        """The list of an arm whose joints cannot tell a wrench: times and joint torques."""
+        """The list of an arm with too few joints for a wrench: times and joint torques."""
         nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
         rows, weak = (
             tuple(replace(row, **nothing) for row in part)

@@ -309,7 +309,7 @@ SHARE = 0.5
 #: Several contacts are one load if their forces add up to more than this share of their
 #: sizes: pushes that follow one another come from different sides.
 ONE_SIDE = 0.95
-PIECE = 5.0  #: Length of the pieces whose means tell how far the mean may be off. [s]
+PIECE = 5.0  #: Length of the pieces that show by their means how far the mean may be off. [s]
 BRIEF = 0.3  #: Longest row that a stop explains. [s]
 #: When the arm must have moved, how fast it was, and when it must rest: about the
 #: beginning of a row, which is known to a block. A knock on an arm that stood still is

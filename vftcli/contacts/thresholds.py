@@ -99,7 +99,7 @@ class Tail(NamedTuple):
             most = 0.5 * 3600.0 / BLOCK
             raise ParameterError(
                 f"a rate of {rate:.4g} false alarms per hour of one signal is no alarm's: at most "
-                f"{most:.4g} can be told from maxima of {BLOCK:g} s"
+                f"{most:.4g} can be found from maxima of {BLOCK:g} s"
             )
         ranks = due + np.array([0.0, 1.0, -1.0]) * NORMAL * np.sqrt(due)
         places = np.rint(ranks).astype(int).clip(1, len(self.maxima)) - 1

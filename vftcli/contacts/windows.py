@@ -76,7 +76,7 @@ def link_jacobian(poses: LinkPoses, link: int, share: float) -> Array:
 
 
 def arm_parts(joints: int) -> dict[int, ArmPart]:
-    """Link → part of the arm, 0 the flange: what cannot be told from the flange is the wrist.
+    """Link → part of the arm, 0 the flange: what looks like the flange is the wrist.
 
     Of six joints links 4 to 6 are the wrist and link 3 the forearm; of seven joints links
     6 and 7, and 4 and 5. What comes before is the upper arm.

@@ -235,7 +235,7 @@ def segment(recording: Recording, period: Period) -> Cycles:
     A sample is on the path if one period later or earlier the arm is at this place, or if
     the log is so short that neither is in it. Contacts push it off for a moment only, so
     the path begins with the first sample after which at least three quarters of a cycle
-    are on it, and ends likewise.
+    are on it, and ends the same way.
     """
     t, q = moving_part(recording)
     seconds = period.seconds

@@ -1,6 +1,6 @@
 """Motion that nobody touched beside a log: its own spans and cycles, other runs; its load.
 
-A payload that the model lacks pulls in the free part too. Taken for noise it makes every
+A payload that the model lacks pulls in the free part too. Treated as noise it makes every
 tuned gain slow and every band wide; it is an external torque, and stays in the estimates.
 The free part's disturbance is fitted with a load's weight, its friction beside it,
 

@@ -20,7 +20,7 @@ SURE = 0.05  #: Below this p a difference between two observers is called sure.
 CONTACTS = {
     "recording": "recording",
     "observer": "observer",
-    "signal": "told from",
+    "signal": "seen in",
     "contacts": "contacts",
     "listed_contacts": "rows",
     "found_contacts": "found",

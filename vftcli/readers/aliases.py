@@ -131,7 +131,7 @@ class NamedColumns:
             )
         if not group.cells:
             raise LogError(
-                f"{path}: {name} holds no number in its first row, so its width cannot be told. "
+                f"{path}: {name} holds no number in its first row, so its width is unknown. "
                 "Cut the rows with empty lists out, or leave the column out with --columns."
             )
         return group.cells

@@ -49,7 +49,7 @@ UR = FORMATS["ur-csv"]  #: The columns of UR's real-time data exchange, whoever 
 CB3_CYCLE = 8e-3
 E_SERIES_FIELD = "ft_raw_wrench_0"  #: What only a controller with a sensor on the flange sends.
 RawField = Any  #: A further field of a RawLog.
-BLOCK_ROWS = 1 << 16  #: Rows of arrays that are taken at a time.
+BLOCK_ROWS = 1 << 16  #: Rows of arrays that are read at a time.
 WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
 
 

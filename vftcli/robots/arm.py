@@ -38,7 +38,7 @@ class TreeJoint:
     axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
     #: Fields of `vftcli.robots.robot.Limits` that the description gives.
     limits: Mapping[str, float] = field(default_factory=dict)
-    follows: str = ""  #: The joint whose position this one's follows, "" for one of its own.
+    follows: str = ""  #: The joint that this one follows, "" where it moves by itself.
     multiplier: float = 1.0  #: How far it goes of the other's position.
     offset: float = 0.0  #: Where it is when the other is at zero. [rad or m]
     rotor_inertia: float = 0.0  #: Reflected rotor inertia. [kg·m²]

@@ -285,7 +285,7 @@ def columns(
     return {name: column(joints, prefix + name) for name in kind.__dataclass_fields__}
 
 
-AGREES = 1e-12  #: Relative difference below which a number of the file is taken to be unchanged.
+AGREES = 1e-12  #: Relative difference below which a number of the file counts as unchanged.
 
 
 def robot_toml(robot: Robot, heading: Sequence[str] = ()) -> str:

@@ -247,7 +247,7 @@ def paired(recording: Recording, robot: Robot) -> Recording:
 def unwound(recording: Recording, robot: Robot) -> Recording:
     """The recording without jumps of a turn in the positions of endless joints.
 
-    A position that changes by more than half a turn between two samples was taken back into one.
+    A position that changes by more than half a turn between two samples was wrapped into one.
     """
     columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
     if recording.joints != robot.joints:

@@ -152,13 +152,13 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
 
 
 def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
-    """The friction that the scenario gives an arm whose robot file has none. (n,) each"""
+    """Friction of the scenario, for an arm without any in its robot file. (n,) each"""
     given = {"coulomb": spec.coulomb, "viscous": spec.viscous}
     table = {name: np.array(values) for name, values in given.items() if values is not None}
     for name, values in table.items():
         if robot.friction:
             raise ParameterError(
-                f"friction.{name} is for an arm whose file has no friction; {robot.name!r} has some"
+                f"friction.{name} is for an arm file without friction; {robot.name!r} has some"
             )
         low = len(values) != robot.joints or np.any(values < 0)
         if low or out_of_bounds(name, values.tolist()):

@@ -9,7 +9,7 @@ and the free part's periodogram P fixes the three by Whittle's likelihood, Σ ln
 
 The smoother of a whole log takes b so (`torque_noise`). A list of contacts is measured
 against the quiet blocks on either side, so there b is modelled closer
-(`learn_noise`, `error_process`): reversals are taken out before the spectrum is learned,
+(`learn_noise`, `error_process`): reversals are cut out before the spectrum is learned,
 what the spectrum misses of the tails inflates it, and a joint that comes to rest draws
 its stiction anew.
 

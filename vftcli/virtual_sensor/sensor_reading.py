@@ -212,7 +212,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
 
     That level is the median of the first half second after `SETTLING`; the span ends
     where a median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at
-    least `STEPS`. A load that hangs from the first sample on cannot be told from drift.
+    least `STEPS`. A load that hangs from the first sample on looks like drift.
     """
     t = wrench.t - wrench.t[0]
     known = np.isfinite(wrench.known).all(axis=1)
