@@ -4,13 +4,14 @@ Several logs of one arm are one experiment, with pooled rows below those of each
 the joints of a log there is one mean, of those with a reference to be trusted.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import polars as pl
 
 from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
+from vftcli.evaluation.scores import skill
 from vftcli.signals.arrays import Array, Mask, number_array, root_mean_square
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
@@ -24,7 +25,8 @@ from vftcli.signals.series import median_step
 #:
 #: `coverage_95` is the share of samples within the estimate's 95 % band, where it has
 #: one; `missing` the share without an answer, which counts as the answer 0, so that
-#: nothing hides by failing.
+#: nothing hides by failing. `l1_Nm` is the mean |error|; `skill` is 1 less the RMSE over
+#: the reference's rms, 1 for the reference itself, 0 for an estimate that is always zero.
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
     "observer": pl.String,
@@ -34,6 +36,9 @@ SCHEMA: dict[str, type[pl.DataType]] = {
     "rmse_high_Nm": pl.Float64,
     "bias_Nm": pl.Float64,
     "max_Nm": pl.Float64,
+    "l1_Nm": pl.Float64,
+    "skill": pl.Float64,
+    "reference_rms_Nm": pl.Float64,
     "correlation": pl.Float64,
     "lag_s": pl.Float64,
     "p_vs_best": pl.Float64,
@@ -216,6 +221,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
         if len(error):
             x, draws, paired = np.ascontiguousarray(error[:, k]), joint.own[k], joint.paired.draws
             square, moving = float(np.mean(x**2)), x[joint.moving]
+            level = root_mean_square(joint.reference)
             low, high = interval(square, draws.draws[:, 0], draws.blocks)
             covered = joint.within[k] / joint.banded[k] if joint.banded[k] >= LEAST else np.nan
             here |= {
@@ -224,6 +230,9 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
                 "rmse_high_Nm": number(high),
                 "bias_Nm": number(x.mean()),
                 "max_Nm": number(abs(x).max()),
+                "l1_Nm": number(abs(x).mean()),
+                "skill": number(skill(np.sqrt(square), level)),
+                "reference_rms_Nm": number(level),
                 "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
                 "lag_s": number(joint.lag[k]),
                 "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
@@ -303,6 +312,9 @@ class JointMeans(NamedTuple):
     floor: float  #: Mean of the reference's own error, NaN where it is not known. [N·m]
     #: Joints that are left out, because the reference is not to be trusted there.
     without: tuple[int, ...]
+    #: Observer → mean |error| [N·m], and what it is better than zero, where that is known.
+    l1: Mapping[str, float] = {}
+    skill: Mapping[str, float] = {}
 
     @property
     def least(self) -> tuple[str, float] | None:
@@ -331,4 +343,10 @@ def joint_means(errors: pl.DataFrame) -> JointMeans:
         floors = used.unique("joint")["reference_floor_Nm"].drop_nulls().to_numpy()
         floors = floors[np.isfinite(floors)]
         floor = float(floors.mean()) if len(floors) else floor
-    return JointMeans(dict(means.iter_rows()), floor, tuple(sorted(without)))
+    l1, skills, beside = {}, {}, ("l1_Nm", "reference_rms_Nm")
+    if {*beside} <= {*known.columns}:
+        mean = pl.col("rmse_Nm", *beside).mean()
+        each = known.drop_nulls(beside).group_by("observer").agg(mean)
+        for name, rmse, size, level in each.iter_rows():
+            l1[name], skills[name] = size, skill(rmse, level)
+    return JointMeans(dict(means.iter_rows()), floor, tuple(sorted(without)), l1, skills)

@@ -149,6 +149,13 @@ def block(rows: pl.DataFrame) -> Block:
 def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and their mean across, the floor last."""
     rows: Rows = []
+    # The mean |error|, and 1 less the mean RMSE over the reference's rms, where known.
+    each = (("L1", significant, table.means.l1), ("skill", ".2f", table.means.skill))
+    beside = [
+        (Column(head, form=form, seldom=True), known)
+        for head, form, known in each
+        if np.isfinite([*known.values()]).any()
+    ]
     for name, values, bests, floors in zip(
         table.observers, table.rmse, table.best, table.at_floor, strict=True
     ):
@@ -157,15 +164,17 @@ def rmse_grid(table: Block) -> Grid:
             GridCell(text, bool(best), *(("*", text + ON_PAGE) if at_floor else ()))
             for text, best, at_floor in zip(map(significant, values), bests, floors, strict=True)
         ]
-        rows.append((name, *cells, table.means.errors.get(name)))
+        means = (known.get(name) for _, known in beside)
+        rows.append((name, *cells, table.means.errors.get(name), *means))
     if table.has_floor:
-        rows.append(("floor", *map(float, table.floor), table.means.floor))
+        blank = [""] * len(beside)
+        rows.append(("floor", *map(float, table.floor), table.means.floor, *blank))
     joints = (
         Column(head, symbol=f"$J_{{{j}}}${LATEX_DAGGER * (j in table.untrusted)}")
         for j, head in zip(table.joints, table.joint_heads, strict=True)
     )
     return Grid(
-        (*words("observer"), *joints, Column("mean")),
+        (*words("observer"), *joints, Column("mean"), *(column for column, _ in beside)),
         rows,
         table.title,
         quantity="RMSE",

@@ -1,0 +1,170 @@
+"""Scores of estimates against truth, beside NumPy that shares nothing with them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vftcli as vft
+from vftcli.evaluation.errors import evaluate, joint_means
+from vftcli.evaluation.scores import (
+    LAGS,
+    Score,
+    episodes,
+    lag_sums,
+    parts_of,
+    percentiles,
+)
+from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
+
+#: Both sum the same numbers of order 1 in another order.
+FIXTURE = Path(__file__).parents[2] / "fixtures/ur5_circle.csv"
+CLOSE = {"rel": 1e-9}
+
+
+def oracle(t: Array, tau: Array, truth: Array, inside: Array, sd: Array | None) -> dict[str, float]:
+    """The definitions of docs/benchmark.md, sample by sample."""
+    gaps = np.gradient(t)
+    middle = float(np.median(gaps))
+    w = [min(gap, 5 * middle) for gap in gaps]
+    squares, sizes, level, cells = [], [], [], {}
+    total = sum(w[k] for k in range(len(t)) if inside[k])
+    held = asked = penalty = 0.0
+    for j in range(truth.shape[1]):
+        e2 = e1 = y2 = 0.0
+        for k in range(len(t)):
+            if not inside[k]:
+                continue
+            answer = tau[k, j] if tau[k, j] == tau[k, j] else 0.0
+            error = abs(answer - truth[k, j])
+            e2, e1, y2 = e2 + w[k] * error**2, e1 + w[k] * error, y2 + w[k] * truth[k, j] ** 2
+            cell = cells.setdefault(int((t[k] - t[0]) // 2), [0.0, *[0.0] * truth.shape[1]])
+            cell[0] += w[k] * (j == 0)
+            cell[1 + j] += w[k] * error**2
+            if sd is not None and sd[k, j] == sd[k, j]:
+                band = 1.96 * sd[k, j]
+                asked, held = asked + w[k], held + w[k] * (error <= band)
+                penalty += w[k] * (2 * band + 40 * max(0.0, error - band))
+        squares.append((e2 / total) ** 0.5)
+        sizes.append(e1 / total)
+        level.append((y2 / total) ** 0.5)
+    rows = np.array([cells[k] for k in sorted(cells)])
+    picked = rows[np.random.default_rng(0).integers(0, len(rows), (1000, len(rows)))].sum(axis=1)
+    drawn = np.sqrt(picked[:, 1:] / picked[:, :1]).mean(axis=1)
+    return {
+        "rmse": sum(squares) / len(squares),
+        "l1": sum(sizes) / len(sizes),
+        "skill": 1 - sum(squares) / sum(level),
+        "coverage": held / asked if asked else float("nan"),
+        "interval_score": penalty / asked if asked else float("nan"),
+        "low": float(np.percentile(drawn, 2.5)),
+        "high": float(np.percentile(drawn, 97.5)),
+    }
+
+
+def scored(estimate: ExternalTorque, truth: Array, inside: Array) -> dict[str, float]:
+    """The same numbers of `Score`."""
+    score = Score.of(estimate, truth, inside)
+    low, high = percentiles(score.drawn)
+    named = {name: getattr(score, name) for name in ("skill", "coverage", "interval_score")}
+    means = {"rmse": float(score.rmse.mean()), "l1": float(score.l1.mean())}
+    return {**means, **named, "low": low, "high": high}
+
+
+def made(seed: int = 1, samples: int = 2400) -> tuple[ExternalTorque, Array]:
+    """An estimate with gaps in clock, answers and bands, and the truth."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.choice([0.01, 0.012, 0.2], samples, p=[0.6, 0.39, 0.01]))
+    truth = np.sin(t)[:, None] * [3.0, 1.0, 0.2]
+    tau = truth + rng.normal(0.0, 0.4, truth.shape)
+    tau[rng.random(truth.shape) < 0.05] = np.nan
+    sd = rng.uniform(0.1, 0.6, truth.shape)
+    sd[:200] = np.nan
+    return ExternalTorque(name="made", t=t, tau=tau, error_sd=sd), truth
+
+
+@pytest.mark.parametrize("banded", [True, False])
+def test_scores_are_those_of_plain_loops(banded: bool) -> None:
+    estimate, truth = made()
+    if not banded:
+        estimate = ExternalTorque(name="made", t=estimate.t, tau=estimate.tau)
+    inside = estimate.t > 3.0
+    expected = oracle(estimate.t, estimate.tau, truth, inside, estimate.error_sd)
+    assert scored(estimate, truth, inside) == pytest.approx(expected, nan_ok=True, **CLOSE)
+
+
+@pytest.mark.slow
+def test_scores_of_what_a_log_gives() -> None:
+    """Every observer's torque and band, against another's torque."""
+    estimates = {e.name: e for e in vft.estimate(FIXTURE, "ur5").estimates}
+    truth = estimates["fdo"].tau
+    for name in ("best", "gmo", "kfo-fe"):
+        each = estimates[name]
+        expected = oracle(each.t, each.tau, truth, each.t >= 1.0, each.error_sd)
+        found = scored(each, truth, each.t >= 1.0)
+        assert found == pytest.approx(expected, nan_ok=True, **CLOSE)
+
+
+def test_the_truth_is_perfect_and_nothing_is_zero() -> None:
+    estimate, truth = made()
+    everywhere = np.ones(len(truth), bool)
+    exact = ExternalTorque(name="exact", t=estimate.t, tau=truth)
+    silent = ExternalTorque(name="silent", t=estimate.t, tau=np.full(truth.shape, np.nan))
+    nothing = ExternalTorque(name="zero", t=estimate.t, tau=np.zeros(truth.shape))
+    assert scored(exact, truth, everywhere)["skill"] == 1.0
+    assert scored(exact, truth, everywhere)["l1"] == 0.0
+    by_silence = scored(silent, truth, everywhere)
+    assert by_silence["skill"] == 0.0
+    assert by_silence == pytest.approx(scored(nothing, truth, everywhere), abs=0.0, nan_ok=True)
+    assert Score.of(silent, truth, everywhere).missed == 1.0
+
+
+def test_errors_have_l1_and_skill_of_the_joints_that_count() -> None:
+    estimate, truth = made()
+    reference = ExternalTorque(name="truth", t=estimate.t, tau=truth)
+    means = joint_means(evaluate("log", [estimate], reference))
+    error = np.where(np.isfinite(estimate.tau), estimate.tau, 0.0) - truth
+    rms = np.sqrt(np.mean([error**2, truth**2], axis=1))
+    assert means.l1["made"] == pytest.approx(abs(error).mean())
+    assert means.skill["made"] == pytest.approx(1.0 - rms[0].mean() / rms[1].mean())
+
+
+def test_a_shift_is_read_as_lag() -> None:
+    t = np.arange(0.0, 20.0, 0.01)
+    truth, late = (np.sin(2.0 * (t - shift))[:, None] for shift in (0.0, 0.05))
+    sums = lag_sums(ExternalTorque(name="late", t=t, tau=late), truth, (t > 1) & (t < 18))
+    assert LAGS[sums.argmin()] == pytest.approx(0.05)
+
+
+def test_two_logs_are_one_sum() -> None:
+    (first, truth), (second, other) = made(1), made(2)
+    everywhere = np.ones(len(truth), bool)
+    one, two = Score.of(first, truth, everywhere), Score.of(second, other, everywhere)
+    both = one + two
+    total = one.seconds.sum() + two.seconds.sum()
+    square = (one.rmse**2 * one.seconds.sum() + two.rmse**2 * two.seconds.sum()) / total
+    assert both.rmse == pytest.approx(np.sqrt(square))
+    assert len(both.seconds) == len(one.seconds) + len(two.seconds)
+
+
+def test_episodes_start_end_and_join() -> None:
+    t = np.arange(0.0, 4.0, 0.01)
+    size = np.zeros(len(t))
+    size[100:150] = 2.0  # a contact
+    size[150:155] = 0.1  # a gap of less than 0.1 s
+    size[155:200] = 3.0
+    size[250:251] = 9.0  # too short
+    size[300:320] = 0.9  # below where one starts
+    (found,) = episodes(t, size, 1.0, 0.5)
+    assert found == pytest.approx((1.0, 2.0, 3.0))
+
+
+def test_what_is_near_a_contact_is_in_no_part_but_all() -> None:
+    t = np.arange(0.0, 10.0, 0.01)
+    scored_from_one = t >= 1.0
+    parts = parts_of(t, scored_from_one, [(4.0, 5.0, 1.0)])
+    assert t[parts["contact"]][[0, -1]] == pytest.approx([4.0, 5.0])
+    assert not parts["free"][(t > 3.5) & (t < 5.5)].any()
+    assert parts["all"].sum() == scored_from_one.sum()
+    assert parts["free"].sum() < parts["all"].sum() - parts["contact"].sum()
