@@ -5,6 +5,9 @@ import pytest
 from test_error_process import B, blocks, drawn, noise
 
 from vftcli.contacts.search import (
+    AT_FIRST,
+    BETWEEN,
+    SEARCHES,
     STRETCH,
     WARM_UP,
     filtered_contacts,
@@ -14,8 +17,9 @@ from vftcli.contacts.search import (
 )
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.linear_model import SPIKE
 from vftcli.signals.series import runs_of
-from vftcli.virtual_sensor.model_error import error_process
+from vftcli.virtual_sensor.model_error import ErrorProcess, error_process
 
 
 def joints_of(d: Array) -> tuple[Blocks, Array]:
@@ -59,6 +63,64 @@ def test_one_bad_block_is_no_contact() -> None:
     # Six standard deviations of the innovation.
     d[150] += 1.0
     assert not taken(*joints_of(d)).any()
+
+
+def textbook_odds(d: Array, process: ErrorProcess, size: Array, time: float, lasts: float) -> Array:
+    """Log odds of contact after each block: Blom and Bar-Shalom's cycle, in matrices. (K,)
+
+    The state of a joint is (b, x); the mode "free" does not see x, which is as it may be there.
+    """
+    count, n = d.shape
+    leave = 1.0 - np.exp(-B / np.array([BETWEEN, lasts]))
+    turn = np.array([[1.0 - leave[0], leave[0]], [leave[1], 1.0 - leave[1]]])
+    g, mode = np.exp(-B / time), np.array([1.0 - AT_FIRST, AT_FIRST])
+    mean, P = np.zeros((2, n, 2)), np.zeros((2, n, 2, 2))
+    P[:, :, 1, 1] = size[0] ** 2
+    odds = np.empty(count)
+    for k in range(count):
+        mean[0, :, 1], P[0, :, 0, 1], P[0, :, 1, 0], P[0, :, 1, 1] = 0.0, 0.0, 0.0, size[k] ** 2
+        mixed, before, P_before = turn * mode[:, None], mean.copy(), P.copy()
+        mode = mixed.sum(axis=0)
+        shares = mixed / mode
+        for to, j in np.ndindex(2, n):
+            share = shares[:, to]
+            mean[to, j] = share @ before[:, j]
+            apart = before[:, j] - mean[to, j]
+            P[to, j] = np.einsum("i,iab->ab", share, P_before[:, j])
+            P[to, j] += np.einsum("i,ia,ib->ab", share, apart, apart)
+            f, q = process.decay[k, j], process.added[k, j]
+            q = q / (1.0 - f * f) if k == 0 else q
+            F = np.diag([f, g])
+            mean[to, j] = F @ mean[to, j]
+            P[to, j] = F @ P[to, j] @ F + np.diag([q, (1.0 - g * g) * size[k, j] ** 2])
+            H = np.array([1.0, to])
+            S, nu = H @ P[to, j] @ H + process.white[k, j], d[k, j] - H @ mean[to, j]
+            spike = process.spikes[k, j]
+            wide = SPIKE * S
+            usual = (1.0 - spike) * np.exp(-0.5 * nu**2 / S) / np.sqrt(S)
+            spiked = spike * np.exp(-0.5 * nu**2 / wide) / np.sqrt(wide)
+            mode[to] *= usual + spiked
+            K = P[to, j] @ H / (wide if spiked > usual else S)
+            mean[to, j] += K * nu
+            P[to, j] -= np.outer(K, H @ P[to, j])
+        mode /= mode.sum()
+        odds[k] = np.log(mode[1] / mode[0])
+    return odds
+
+
+def test_the_odds_are_those_of_the_textbook_filter() -> None:
+    """Two joints with a push on one, a slow start on the other: for taps and for leans."""
+    rng = np.random.default_rng(6)
+    d = np.hstack([drawn(150, rng), drawn(150, rng)])
+    d[60:75, 0] += 4.0
+    d[60:75, 1] -= np.linspace(0.0, 3.0, 15)
+    log = blocks(d, np.full_like(d, 0.5))
+    size = np.column_stack([np.linspace(10.0, 20.0, 150), np.linspace(8.0, 4.0, 150)])
+    course = error_process(noise(2), log)
+    found = two_state_odds(log, (course, error_process(noise(2), turned_round(log))), size)
+    for (forward, _), (time, lasts) in zip(found, SEARCHES, strict=True):
+        # The odds reach hundreds of nats, of sums of 300 terms.
+        np.testing.assert_allclose(forward, textbook_odds(d, course, size, time, lasts), atol=1e-8)
 
 
 @pytest.mark.slow

@@ -42,6 +42,27 @@ def test_the_log_of_another_arm_is_told_with_its_name() -> None:
         assert f"--robot {right}" in in_words(finding).remedy
 
 
+@pytest.mark.parametrize(
+    ("name", "load", "own", "beside", "code"),
+    [
+        ("ur5e", 0.0, "ur5", 0.07, "other-robot"),  # it would carry 2.4 kg as a UR5
+        ("ur10", 2.0, "ur16e", 0.05, "unmodelled-load"),  # 2.9 kg as a UR16e, 2 kg as a UR10
+    ],
+)
+def test_of_arms_that_fit_alike_one_that_carries_much_less_is_the_log_s(
+    name: str, load: float, own: str, beside: float, code: str
+) -> None:
+    """A share of every torque that no arm explains: the right one leaves .6 to .8 of the other."""
+    log = moving(name, load=load)
+    current = log.require("current")
+    wave = np.sin(7.0 * log.t[:, None] + np.arange(6.0))
+    current = current + beside * np.sqrt(2.0 * np.mean(current**2, axis=0)) * wave
+    found = arm_findings(replace(log, current=current), load_robot(own))
+    assert codes(found) == [code]
+    misfit = {match.robot: match.misfit for match in found.robots}
+    assert 0.6 < misfit[name] / misfit[own] < 0.8
+
+
 def test_the_vendor_s_residual_tells_a_panda_from_an_fr3() -> None:
     """By the measured torques the two are too much alike."""
     log = replace(moving("panda"), tau_ext=np.full_like(moving("panda").q, 1e-3))

@@ -16,6 +16,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import gain_sd
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -115,6 +116,35 @@ def test_the_fit_finds_the_weights_of_its_own_columns() -> None:
     np.testing.assert_allclose(left, 0.1, rtol=0.15)
     # nine samples count as one: sd = .1·√(9/800)
     np.testing.assert_allclose(sd, 0.1 * np.sqrt(9 / 800), rtol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("mass", "ratio", "seconds", "is_found"),
+    [
+        (3.0, 1.0, 20.0, True),  # 1/√2 of the disturbance is left
+        (0.5, 0.05, 20.0, True),
+        (0.3, 0.05, 20.0, False),  # lighter than what drive constants look like
+        (3.0, 2.0, 60.0, False),  # 2/√5 is left, whatever the standard deviation
+        (3.0, 1.0, 1.1, False),  # four such stretches of .3 s: 3 ± .9 kg
+    ],
+)
+def test_a_load_is_believed_by_its_mass_its_sd_and_what_it_leaves(
+    mass: float, ratio: float, seconds: float, is_found: bool
+) -> None:
+    """A disturbance of 3.2 Hz beside the load's torque, `ratio` times as large on each joint."""
+    t, k = 0.008 * np.arange(round(seconds / 0.008)), np.arange(6.0)
+    phase = t[:, None] * (1.0 + 0.3 * k) + k
+    q = np.array([0.0, -1.35, 1.9, -2.1, -1.57, 0.0]) + 0.6 * np.sin(phase)
+    dq = 0.6 * (1.0 + 0.3 * k) * np.cos(phase)
+    load = load_regressor(ROBOT.chain, q) @ (PAYLOAD * mass / 2.8)
+    beside = np.sqrt(2.0 * np.mean(load**2, axis=0)) * np.sin(20.0 * t[:, None] + 2.0 * k)
+    still = Run(recording=Recording(t=t, q=q, dq=dq, torque=np.zeros_like(q)), robot=ROBOT)
+    terms = DynamicsTerms(t=t, p=np.zeros_like(q), mu=-(load + ratio * beside))
+    found = free_load((RunSamples(still.holding(terms=terms), t >= 0.0),))
+    assert (found is not None) == is_found
+    if found is not None:
+        assert found.mass == pytest.approx(mass, rel=0.01)  # ends of the filter
+        assert found.share == pytest.approx(ratio / np.hypot(1.0, ratio), abs=0.05)
 
 
 def test_what_lies_far_from_a_piece_is_not_heard(

@@ -1,8 +1,9 @@
 """What differs between a log and its free runs, against the plain sums over them."""
 
 import numpy as np
+import pytest
 
-from vftcli.free_motion.paired_runs import REPEATED, STUCK, PairedRuns, pair_with_run
+from vftcli.free_motion.paired_runs import REPEATED, STUCK, PairedRuns, by_phase, pair_with_run
 
 T = 0.008 * np.arange(600)
 
@@ -43,3 +44,29 @@ def test_a_model_that_is_right_misses_nothing(drive_of) -> None:
     wrong = drive_of(T, q, np.cos(T)[:, None], drive_torque=5.0 * q, model_torque=4.0 * q)
     found = PairedRuns(motion=wrong, pairings=[pair_with_run(T, wrong, 0.0)]).misfit
     np.testing.assert_allclose(found, 0.25, rtol=1e-9)  # one of four newton-metres
+
+
+@pytest.mark.parametrize(("late", "moved"), [(0.05, 0.05), (-0.05, -0.05), (0.3, 0.1)])
+def test_phase_finds_the_place_up_to_a_tenth_of_a_second_away(
+    drive_of, late: float, moved: float
+) -> None:
+    """On a circle at constant speed the log is `late` behind the free run of the same clock."""
+
+    def run(t):
+        q, dq = np.column_stack([np.sin(t), np.cos(t)]), np.column_stack([np.cos(t), -np.sin(t)])
+        return drive_of(T, q, dq)
+
+    times = by_phase(run(T - late), pair_with_run(T, run(T), 0.0)).times
+    middle = (T > 0.5) & (T[-1] - 0.5 > T)  # a partner lies within the free run
+    # A Gauss–Newton step is damped by a hundredth, four of them by 1e-8.
+    np.testing.assert_allclose(times[middle], T[middle] - moved, atol=1e-4)
+
+
+def test_no_partner_is_made_up_in_a_gap(drive_of) -> None:
+    """Six steps without a sample are a gap, five are interpolated across."""
+    keep = np.ones(len(T), bool)
+    keep[101:106] = keep[301:305] = False
+    q = np.column_stack([T, -T])[keep]
+    pairing = pair_with_run(T, drive_of(T[keep], q, np.ones_like(q)), 0.004)
+    # Half a step later the last has none either.
+    assert np.flatnonzero(~pairing.known).tolist() == [*range(100, 106), 599]

@@ -90,6 +90,24 @@ def test_a_joint_that_never_reverses_gets_no_offset(prepared):
     assert tellable_terms(PLAIN, data) == ("coulomb", "viscous")
 
 
+@pytest.mark.parametrize(
+    ("pushes", "reverses", "limit", "terms"),
+    [
+        (0.05, True, 100.0, ("offset",)),  # a fit's rest and no friction
+        (0.05, False, 100.0, ()),
+        (3.0, True, 100.0, PLAIN),  # the velocity has the other sign: who reads it is told
+        (3.0, True, 1000.0, ("offset",)),  # as much of a strong joint may be a model's error
+    ],
+)
+def test_what_pushes_is_no_friction_and_competes_with_none(
+    prepared, pushes, reverses, limit, terms
+):
+    truth = {"coulomb": -pushes, "viscous": -pushes, "offset": 0.2 * reverses}
+    data = equations(prepared, truth, reverses=reverses)._replace(torque_limit=limit)
+    shape, scores = choose_shape(data)
+    assert (shape.terms, scores) == (terms, {})
+
+
 def test_growth_with_a_load_there_is_none_of_does_not_compete(prepared):
     light = equations(prepared, {"coulomb": 3.0, "viscous": 5.0}, load=0.1)
     assert light.load_spread < LIGHT
