@@ -17,7 +17,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import installed, needed
 from vftcli.signals.progress import steps
-from vftcli.signals.shown import frame_of, per_joint
+from vftcli.signals.shown import ALL, frame_of, per_joint
 from vftcli.signals.wrench import per_axis
 from vftcli.virtual_sensor.frames import FRAMES
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-ALL = slice(None)  #: All rows of a table.
 #: An analysis and which of its rows are written; None where all of them went by in
 #: blocks.
 Group = tuple[Analysis, slice | None]
@@ -61,8 +60,7 @@ def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
         yield from per_joint("tau_ext/reference", analysis.reference.tau[rows])
         if analysis.reference.sd is not None:
             yield from per_joint("sd/reference", analysis.reference.sd[rows])
-    for name, values in wrench_columns(analysis):
-        yield name, values[rows]
+    yield from wrench_columns(analysis, rows)
     if analysis.contacts is not None:
         t = analysis.t[rows]
         number = np.full(len(t), np.nan)
@@ -71,21 +69,21 @@ def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
         yield "contact", number
 
 
-def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
+def wrench_columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
     """The wrenches, their standard deviations and what the pose can tell, where asked for."""
     sensed = analysis.virtual_sensor
     bounded = sensed is not None and sensed.sensor.solver != "pinv"
     for wrench in analysis.wrenches:
-        yield from wrench.columns()
+        yield from wrench.columns(rows)
         # By plain least squares nothing can be said there; `map` says something finite.
         if bounded and wrench.hidden.any():
-            said = np.where(wrench.hidden[:, None], wrench.values, np.nan)
+            said = np.where(wrench.hidden[rows, None], wrench.values[rows], np.nan)
             yield from per_axis(f"wrench_masked/{wrench.name}", said)
         if wrench.null_space is not None:
-            yield f"null_space/{wrench.name}", wrench.null_space
+            yield f"null_space/{wrench.name}", wrench.null_space[rows]
     sigma = next((w.sigma_min for w in analysis.wrenches if w.sigma_min is not None), None)
     if sigma is not None:
-        yield "sigma_min", sigma
+        yield "sigma_min", sigma[rows]
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:

@@ -20,9 +20,8 @@ from vftcli.signals.arrays import (
 )
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import Clock, clock_of
-from vftcli.signals.shown import Shown, TimeSeries, joined, per_joint
+from vftcli.signals.shown import ALL, Shown, TimeSeries, joined, per_joint
 
-ALL = slice(None)  #: All rows.
 COVERS = 1.96  #: Half width of a 95 % band, in standard deviations.
 
 

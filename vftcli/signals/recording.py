@@ -27,7 +27,7 @@ from vftcli.signals.errors import (
 from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
-from vftcli.signals.shown import Shown, TimeSeries, per_joint
+from vftcli.signals.shown import ALL, Shown, TimeSeries, per_joint
 from vftcli.signals.wrench import WrenchFrame, per_axis
 
 if TYPE_CHECKING:
@@ -206,11 +206,11 @@ class Recording(TimeSeries):
             least, most = float(values.min()), float(values.max())
             yield name, MEANINGS[name], values.shape[1], least, most
 
-    def columns(self) -> Iterator[tuple[str, Array]]:
+    def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
         """Every signal's columns, as ``q/1``, as `vftcli convert` writes them."""
         for name in self.signals:
             split = per_axis if name == "wrench" else per_joint
-            yield from split(COLUMN_NAMES.get(name, name), getattr(self, name))
+            yield from split(COLUMN_NAMES.get(name, name), getattr(self, name)[rows])
 
     @property
     def joints(self) -> int:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 LONGEST = 160  #: Letters of a line at most.
 FEW = 7  #: An array of so many numbers, one a joint, is shown; of a larger one its shape.
+ALL = slice(None)  #: All rows of a table.
 UNKNOWN = "–"  #: What stands for a number that is not known.
 
 
@@ -109,7 +110,7 @@ class TimeSeries(Shown):
 
     t: Array  #: Time. (T,) [s]
 
-    def columns(self) -> Iterator[tuple[str, Array]]:
+    def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
         """Name and values of each column, named as in the files that we write."""
         raise NotImplementedError
 

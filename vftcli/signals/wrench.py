@@ -17,7 +17,7 @@ from vftcli.signals.arrays import (
 )
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
-from vftcli.signals.shown import TimeSeries
+from vftcli.signals.shown import ALL, TimeSeries
 
 #: Names of the six components, force first, as in column names and tables.
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -152,11 +152,12 @@ class Wrench(TimeSeries):
             figures = (values.min, values.max, None if sd is None else sd.max)
             yield axis, unit_of(axis), *(float(f()) if f and sure.any() else None for f in figures)
 
-    def columns(self) -> Iterator[tuple[str, Array]]:
+    def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
         """Every axis, as ``wrench/best/fx``, and its standard deviation."""
-        yield from per_axis(f"wrench/{self.name}", self.known)
-        if self.known_sd is not None:
-            yield from per_axis(f"wrench_sd/{self.name}", self.known_sd)
+        for kind, values in {"wrench": self.values, "wrench_sd": self.sd}.items():
+            if values is not None:
+                known = np.where(self.hidden[rows, None], np.nan, values[rows])
+                yield from per_axis(f"{kind}/{self.name}", known)
 
     @property
     def hidden(self) -> Mask:
