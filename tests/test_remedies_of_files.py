@@ -151,7 +151,7 @@ ROWS = [
     Row("a table without a header. Say what its", judged(
         lambda table: table.select("t", pl.col("^current.$")), header=False),
         "--reference-columns", "t,tau_ext:6"),
-    Row("the reference torques cannot be told", judged(PULL), "--reference-columns",
+    Row("which columns are the reference torques is unclear", judged(PULL), "--reference-columns",
         "t=t,tau_ext=pull{i}"),
     Row("The header was edited", edited_header, "log.format --columns",
         "t[ms]=time,q=" + "|".join(f"state.{'x' if j == 3 else 'q'}[{j}]" for j in range(7))),
@@ -330,7 +330,7 @@ WITHOUT_ROW = {
     NOTHING: (
         "is now --robot", "is what an MJCF gives its joints", "makes no use of …; leave it away",
         "takes one LOG; name free motion",
-        "do not tell those of robot", "Say which: --set log.format=NAME.",
+        "are not named as those of robot", "Say which: --set log.format=NAME.",
     ),
     ELSEWHERE: (
         "a load is found from one pair of logs", "--reference says where a log was touched",

@@ -190,7 +190,7 @@ def test_what_tells_no_forces_is_refused_and_leaves_nothing(dataset: Path, tmp_p
 
     copy = tmp_path / "copy"
     ur5 = ForceChoice(robot=RobotChoice(name="ur5"))
-    with pytest.raises(LogError, match="do not tell those of robot 'ur5'"):
+    with pytest.raises(LogError, match="are not named as those of robot 'ur5'"):
         made(dataset, copy, ur5)
     turned = "q=observation.state,dq=observation.velocity,-tau=observation.effort"
     with pytest.raises(LogError, match="effort"):

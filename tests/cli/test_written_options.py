@@ -88,7 +88,7 @@ def test_an_effort_that_is_not_what_it_is_called_is_written(run, here: Path, sam
 def test_what_is_not_settled_is_there_to_be_taken(run, here: Path, logs: Path) -> None:
     code, _, err = run("inspect", logs / "libfranka_sim" / "pushes.csv.gz", "-o", NAME)
     assert (code, options(here)) == (0, {})
-    assert "which arm it is stands open" in err
+    assert "which arm it is remains open" in err
     assert '# robot = "panda"\n' in (here / NAME).read_text("utf-8")
 
 

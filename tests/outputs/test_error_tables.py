@@ -175,7 +175,7 @@ def test_terminal_table(errors: pl.DataFrame) -> None:
         "------------------------------\n"
         "floor     0.500   1.00   0.750\n"
         "floor: RMSE that the reference itself is known to have\n"
-        "*: within 1.2 × the floor; the reference can tell no more\n"
+        "*: within 1.2 × the floor; the reference is no more accurate than that\n"
         "–: no sample where the reference is known\n"
     )
 

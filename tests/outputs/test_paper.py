@@ -96,7 +96,9 @@ def test_no_files_without_a_form_and_names_beside_a_file() -> None:
 
 def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
     """Seven names of five letters are .625 in each: five a line of 3.5 in, so four and three."""
-    names = {f"abcd{k}": matplotlib.lines.Line2D([], []) for k in range(7)}
+    from matplotlib.lines import Line2D
+
+    names = {f"abcd{k}": Line2D([], []) for k in range(7)}
     bare, _ = sheet(3.5, 1, 1, 1.0, {})
     assert bare.legends == []
     for width, columns, room in ((3.5, 4, 0.35), (7.16, 7, 0.2)):

@@ -133,7 +133,7 @@ def test_a_table_that_the_data_contradict_is_refused(column: str, tmp_path: Path
     import pyarrow as pa
 
     pq.write_table(pa.table(told), table)
-    with pytest.raises(LogError, match="are not those that the table of episodes tells"):
+    with pytest.raises(LogError, match="are not those that the table of episodes names"):
         read(path, episode=1)
 
 
@@ -212,7 +212,7 @@ def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:
     ("name", "text", "words"),
     [
         ("info.json", "{", "not a readable description"),
-        ("episodes.jsonl", '{"episode_index": 0}\n', "a line that tells no episode"),
+        ("episodes.jsonl", '{"episode_index": 0}\n', "a line that names no episode"),
         ("episodes.jsonl", "\xe5", "not text in UTF-8"),
     ],
 )

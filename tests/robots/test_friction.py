@@ -310,7 +310,7 @@ def test_presliding_and_temperature_stand_beside_any_model(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("presliding = 2.0", "presliding = -2.0", r"presliding is -2 N·m; on a robot it lies"),
+        ("presliding = 2.0", "presliding = -2.0", r"presliding is -2 N·m; on a robot it is"),
         ("presliding_length = 3e-4", "presliding_length = 0.0", "presliding_length is 0 rad; on a"),
         ("presliding_length = 3e-4", "presliding_length = 3.0", "presliding_length is 3 rad; on a"),
         ("presliding_length = 3e-4\n", "", "presliding_length is missing; presliding needs it"),
@@ -321,11 +321,11 @@ def test_presliding_and_temperature_stand_beside_any_model(tmp_path: Path) -> No
         ("-0.085741]", "-0.085741, 1.0]", "temperature is .*; it must be 4 finite numbers"),
         ("speeds = [0.01, 0.5, 1.5, 3.2]\n", "", "speeds is missing; it must be a list of at"),
         ("0.01, 0.5, 1.5, 3.2", "0.01", r"speeds is \[0.01\]; it must be a list of at least 2"),
-        ("0.01, 0.5, 1.5, 3.2", "0.01, 0.5, 0.5, 3.2", "speeds is .*; each lies above the one"),
-        ("0.01, 0.5, 1.5, 3.2", "0.0, 0.5, 1.5, 3.2", "speeds is 0 rad/s; on a robot it lies"),
+        ("0.01, 0.5, 1.5, 3.2", "0.01, 0.5, 0.5, 3.2", "speeds is .*; each must be above the one"),
+        ("0.01, 0.5, 1.5, 3.2", "0.0, 0.5, 1.5, 3.2", "speeds is 0 rad/s; on a robot it is"),
         ("0.01, 0.5, 1.5, 3.2", "0.01, 0.5, 1.5", "there are 4 torques for 3 speeds"),
         ("5.73, 9.32", "nan, 9.32", "torques is .*; it must be a list of at least 2 finite"),
-        ("5.73, 9.32", "1e9, 9.32", r"torques is 1e\+09 N·m; on a robot it lies"),
+        ("5.73, 9.32", "1e9, 9.32", r"torques is 1e\+09 N·m; on a robot it is"),
     ],
 )
 def test_what_no_joint_has_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
@@ -399,7 +399,5 @@ def test_a_file_needs_the_models_keys(tmp_path):
         load_robot(path)
     with_velocity = 'model = "coulomb-logarithmic"\nstribeck = 1.0\nstribeck_velocity = 0.0'
     path.write_text(text.replace(model, with_velocity, 1), encoding="utf-8")
-    with pytest.raises(
-        RobotError, match=r"stribeck_velocity is 0 rad/s; on a robot it lies within"
-    ):
+    with pytest.raises(RobotError, match=r"stribeck_velocity is 0 rad/s; on a robot it is within"):
         load_robot(path)

@@ -107,7 +107,7 @@ def test_a_planar_arm_weighs_what_the_textbook_says(tmp_path: Path) -> None:
         ),
         ('"coulomb-viscous"', "{}", r"line 23: joint 2 \(elbow\): model is {}; it must be one of"),
         ('"elbow"', '"shoulder"', "line 16: joint 2 .*: name is 'shoulder', as another joint's"),
-        ("mass = 1.0", "mass = 1e308", r"line 19: .*mass is 1e\+308 kg; on a robot it lies"),
+        ("mass = 1.0", "mass = 1e308", r"line 19: .*mass is 1e\+308 kg; on a robot it is"),
         ("mass = 1.0", f"mass = {10**400}", "line 19: .*mass is 1000.*; it must be a finite"),
         ("viscous = 0.5", "viscous = 1e20", r"line 25: .*viscous is 1e\+20 N·m·s/rad; on a robot"),
         ("coulomb = 1.0", f"coulomb = {10**20}", "line 24: .*coulomb is 1e.20 N·m; on a robot"),

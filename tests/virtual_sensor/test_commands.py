@@ -79,7 +79,7 @@ def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:
         (("--frame", "wrist"), "no frame 'wrist' for a wrench; there is flange"),
         (("--frame", "tool"), "the robot has no tool"),
         (("--set", "virtual-sensor.solver=svd"), "no solver 'svd'"),
-        (("--zero", "500:600"), "lies outside the log"),
+        (("--zero", "500:600"), "is outside the log"),
         (
             ("--frame", "sensor", "--set", "virtual-sensor.sensor=0,0,0,2,0,0,0,1,0,0,0,1"),
             "not a rotation",

@@ -201,7 +201,7 @@ def test_a_log_of_one_sample_leaves_the_prior() -> None:
 def test_fewer_than_six_joints_tell_no_wrench() -> None:
     nothing = np.zeros((9, 5))
     terms = DynamicsTerms(t=np.arange(9.0), p=nothing, mu=nothing)
-    with pytest.raises(RobotError, match="5 joints cannot tell"):
+    with pytest.raises(RobotError, match="5 joint torques cannot determine"):
         smooth_wrench(run_of(terms, nothing))
 
 

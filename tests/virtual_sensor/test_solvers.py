@@ -215,7 +215,7 @@ def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_five_joint_arm_is_refused() -> None:
-    with pytest.raises(RobotError, match="5 joints cannot tell"):
+    with pytest.raises(RobotError, match="5 joint torques cannot determine"):
         decompose(np.zeros((3, 6, 5)))
 
 

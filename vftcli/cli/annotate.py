@@ -56,7 +56,7 @@ def annotate_dataset(
     """Add forces to every frame of a dataset's copy.
 
     Adds observation.external_torque, with --add wrench observation.wrench, and their statistics;
-    what was done stands in COPY/meta/vftcli.json. A run that was cut off goes on where it stopped.
+    COPY/meta/vftcli.json says what was done. A run that was cut off goes on where it stopped.
     With --anyway frames without an answer are 0, and columns ..._valid say so.
 
     Example: vftcli annotate fixtures/panda_episodes -o forces

@@ -87,7 +87,7 @@ def write_options(
     how = "unasked by commands run beside it" if output.name == NAME else f"with --config {output}"
     say(f"wrote {output}: {', '.join(taken) or 'nothing that is settled'}; read {how}")
     if "robot" not in taken:
-        say("which arm it is stands open: name it with --robot, or in the file")
+        say("which arm it is remains open: name it with --robot, or in the file")
     notes = [option.why for option in proposed]
     return {"output": str(output), "options": taken, "notes": notes}
 

@@ -28,8 +28,8 @@ def reproduce(
     """Run the paper's experiments beside its numbers.
 
     On simulated equivalents, with stated seeds. Writes PATH/index.html, reproduction.md and
-    run.json. An experiment that fails is told in its row; the others are written, and the exit
-    code is 1.
+    run.json. An experiment that fails says so in its row; the others are written, and the
+    exit code is 1.
 
     Example: vftcli reproduce huang2025 --only table3
     """

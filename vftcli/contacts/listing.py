@@ -101,13 +101,13 @@ def check_log(run: Run) -> None:
     if recording.median_step * SLOWEST > 1:
         raise ParameterError(
             f"{recording.name} has {1 / recording.median_step:.2g} samples a second; below "
-            f"{SLOWEST:g} a contact comes and goes between them, and nobody can tell whether "
-            "there was one: record faster"
+            f"{SLOWEST:g} a contact can come and go between two samples unseen: record "
+            "faster"
         )
     if recording.duration < SHORTEST:
         raise ParameterError(
             f"{recording.name} lasts {recording.duration:.2g} s; of less than {SHORTEST:g} s "
-            f"no contact can be told, since the first {SETTLED:g} s settle the observer: give a "
+            f"no contact is listed: the observer needs the first {SETTLED:g} s to settle. Give a "
             "longer log"
         )
 

@@ -281,7 +281,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     if not joints:
         longest = max(signals.recording.duration for signals in free)
         raise ParameterError(
-            f"the longest free log has {longest:.3g} s: too few to tell how often a level is "
+            f"the longest free log has {longest:.3g} s: too short to count how often a level is "
             f"passed; record at least {LONG_ENOUGH:g} s, better an hour"
         )
     made = Thresholds(

@@ -91,9 +91,9 @@ def why_slower(recording: Recording, free: Recording, rate: float) -> str:
     paces = [pace(log) for log in (recording, free)]
     if None in paces:
         return (
-            f"{longer} as in {recording.name}: it ran {speed}, or a clock is wrong, which only "
-            f"logged velocities tell. If its speed: {again}. If a clock: correct the time stamps, "
-            "or state them with --columns (t@125Hz, t[ms], t[ns])"
+            f"{longer} as in {recording.name}: it ran {speed}, or a clock is wrong; only "
+            f"logged velocities would show which. If its speed: {again}. If a clock: correct the "
+            "time stamps, or state them with --columns (t@125Hz, t[ms], t[ns])"
         )
     own, theirs = (float(np.log(each)) for each in paces if each is not None)
     if abs(theirs - own) < 0.5 * abs(float(np.log(rate))):

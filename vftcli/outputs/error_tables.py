@@ -159,7 +159,7 @@ def rmse_grid(table: Block) -> Grid:
     for name, values, bests, floors in zip(
         table.observers, table.rmse, table.best, table.at_floor, strict=True
     ):
-        # A star where the reference can tell no more.
+        # A star where the reference is no more accurate than that.
         cells = [
             GridCell(text, bool(best), *(("*", text + ON_PAGE) if at_floor else ()))
             for text, best, at_floor in zip(map(significant, values), bests, floors, strict=True)
@@ -226,7 +226,9 @@ def marks_in_words(found: Sequence[Block]) -> str:
     if any(table.has_floor for table in found):
         lines.append("floor: RMSE that the reference itself is known to have")
     if any(np.any(table.at_floor) for table in found):
-        lines.append(f"*: within {AT_FLOOR:g} × the floor; the reference can tell no more")
+        lines.append(
+            f"*: within {AT_FLOOR:g} × the floor; the reference is no more accurate than that"
+        )
     if any(table.untrusted for table in found):
         lines.append(f"{DAGGER}: {RESTS}")
     lines += dict.fromkeys(f"mean:{t.means.left_out}" for t in found if t.means.without)
@@ -254,7 +256,8 @@ def marks_on_page(found: Sequence[Block]) -> str:
     if any(block.has_floor for block in found):
         text += (
             " The floor is the error the reference itself is known to have: an RMSE within "
-            f"{AT_FLOOR:g} × the floor is <em>at the floor</em>; the reference can tell no more."
+            f"{AT_FLOOR:g} × the floor is <em>at the floor</em>; the reference is no more accurate "
+            "than that."
         )
     if any(block.untrusted for block in found):
         text += f" {DAGGER}: {RESTS}."
@@ -300,7 +303,7 @@ def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
         if not compared_samples(rows):
             yield (
                 f"{rows['recording'][0]} against {rows['reference'][0]}, wrench: nothing to "
-                "compare: in no sample of the reference can the pose tell a wrench (σ_min of J is "
+                "compare: no sample of the reference has a known wrench (σ_min of J is "
                 f"below {LEAST_SIGMA:g} all along); the joints' torques are compared"
             )
 

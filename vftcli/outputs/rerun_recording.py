@@ -277,7 +277,8 @@ def arrow_words(analysis: Analysis) -> str:
     name = source.name if source is not None else "no estimate"
     return (
         f"force on the robot from {name}, as in the tables of the wrench where one was asked for, "
-        f"else at the flange by the pseudo-inverse of Jᵀ; {scale}; none where the pose cannot tell"
+        f"else at the flange by the pseudo-inverse of Jᵀ; {scale}; none where the "
+        "pose leaves it open"
     )
 
 

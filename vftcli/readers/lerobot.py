@@ -268,7 +268,7 @@ def _episodes_of_lines(folder: Path, path: Path) -> Iterable[Episode]:
             row = json.loads(line)
             number, length = int(row[EPISODE]), int(row["length"])
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
-            raise LogError(f"{path}: a line that tells no episode: {line[:60]!r}.") from None
+            raise LogError(f"{path}: a line that names no episode: {line[:60]!r}.") from None
         name = f"episode_{number:06d}.parquet"
         yield Episode(number, length, file=folder / "data" / f"chunk-{number // chunk:03d}" / name)
 
@@ -301,7 +301,7 @@ def _rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     if differs:
         raise LogError(
             f"{file.path}: the rows of episode {episode.number} are not those that the table of "
-            "episodes tells; the dataset is damaged or was edited."
+            "episodes names; the dataset is damaged or was edited."
         )
     table.rows = rows if len(rows) != len(numbers) else None
     return table

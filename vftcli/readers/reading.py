@@ -261,7 +261,7 @@ SHOWN = 4  #: Names of files that a message shows.
 KINDS = (
     (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
     (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI", "a video; give the log that was recorded with it"),
-    (rb"%PDF", "a PDF; give the log it tells of"),
+    (rb"%PDF", "a PDF; give the log that it is about"),
     (rb"RIFF....WAVE|ID3|OggS|fLaC", "a sound; give the log that was recorded with it"),
     (rb"RRF2|RRIO", "a Rerun recording, which vftcli writes and does not read; give the log"),
     (rb"\x7fELF|MZ[^\r\n]{0,60}\0", "a program; give the log that it wrote"),
@@ -269,7 +269,7 @@ KINDS = (
         rb"\s*(<\?xml[^>]*>\s*)?(<!--.*?-->\s*)*<(robot|mujoco|sdf)\b",
         "a robot's description, no log; give it with --robot, beside a log",
     ),
-    (rb"\s*<(!DOCTYPE|html|svg|\?xml)", "a page or document in XML; give the log it tells of"),
+    (rb"\s*<(!DOCTYPE|html|svg|\?xml)", "a page or document in XML; give the log that it is about"),
     (rb"ULog\x01\x12\x35", "a PX4 ULog of a drone, which has no arm to estimate torques of"),
     (rb"PK\x03\x04", "a zip archive; unpack it and give the log inside"),
     (rb"(7z\xbc\xaf|Rar!|BZh|\xfd7zXZ)", "an archive; unpack it and give the log inside"),
@@ -294,7 +294,7 @@ KINDS = (
 #: File inside a zip archive → what the archive is.
 OFFICE = {
     b"xl/workbook": "an Excel workbook; save the sheet as CSV and give that",
-    b"word/document": "a Word document; give the log it tells of",
+    b"word/document": "a Word document; give the log that it is about",
     b"META-INF/manifest": "an OpenDocument; save the sheet as CSV and give that",
 }
 

@@ -87,8 +87,8 @@ def _found(table: Table) -> Picks:
     if len(groups) > 1 or not (groups or wrench):
         there = " and ".join(groups) or f"no column ends in {TORQUE} among {listed(table.names)}"
         raise LogError(
-            f"{table.path}: the reference torques cannot be told: {there}. Name them with "
-            "--reference-columns, as in t=time,tau_ext=true_tau_{i}."
+            f"{table.path}: which columns are the reference torques is unclear: {there}. "
+            "Name them with --reference-columns, as in t=time,tau_ext=true_tau_{i}."
         )
     picks = [Pick(TORQUE, columns.cells(name)) for name in groups]
     picks += [] if wrench is None else [wrench]

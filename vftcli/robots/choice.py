@@ -101,7 +101,7 @@ def declared_payload(recording: "Recording") -> "Payload":
     mass, com = recording.payload_mass, recording.payload_com
     if mass is None:
         raise RobotError(
-            f"{recording.name}: the log does not say which payload the controller was told of; "
+            f"{recording.name}: the log does not say which payload was set at the controller; "
             "describe it in a [payload.NAME] section of the robot file and give --payload NAME"
         )
     centre = np.zeros(3) if com is None else np.asarray(com, float)

@@ -220,7 +220,9 @@ def points(section: Section) -> dict[str, tuple[float, ...]]:
     if len(torques) != len(speeds):
         section.refuse(f"there are {len(torques)} torques for {len(speeds)} speeds", "torques")
     if any(fast <= slow for slow, fast in itertools.pairwise(speeds)):
-        section.refuse(f"speeds is {shown(list(speeds))}; each lies above the one before", "speeds")
+        section.refuse(
+            f"speeds is {shown(list(speeds))}; each must be above the one before", "speeds"
+        )
     return {"speeds": speeds, "torques": torques}
 
 

@@ -105,7 +105,7 @@ class Bound(NamedTuple):
             if not self.low <= value <= self.high:
                 unit = f" {self.unit}" if self.unit else ""
                 return (
-                    f"{key} is {value:g}{unit}; on a robot it lies within "
+                    f"{key} is {value:g}{unit}; on a robot it is within "
                     f"{self.low:g} to {self.high:g}{unit}"
                 )
         return ""

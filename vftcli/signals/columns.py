@@ -31,10 +31,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
         "standard deviation of the external force and moment, outside of listed contacts of what "
         "would show",
     ),
-    "wrench_masked": (FORCE, "force and moment where the pose cannot tell them, by a prior"),
+    "wrench_masked": (FORCE, "force and moment by a prior, where the pose is near-singular"),
     "null_space": (TORQUE, "joint torque that no wrench at the flange explains"),
     "sigma_min": ("m", "smallest singular value of J, angular rows × 0.3 m"),
-    "contact": ("1", "number of the contact in the list that the sample lies in, null outside"),
+    "contact": ("1", "number of the contact in the list that the sample belongs to, null outside"),
 }
 ON_ROBOT = "on the robot"  #: Whose force it is: the environment's on the robot.
 

@@ -289,7 +289,7 @@ class Recording(TimeSeries):
         if not there or (len(there) > 1 and source is None):
             raise MissingSignalError(
                 f"{self.name}: the log has {' and '.join(there) or 'no effort'}, so none of it can "
-                f"be taken for {kind}; name the column with --columns"
+                f"be read as {kind}; name the column with --columns"
             )
         source = source or there[0]
         value: Array = getattr(self, source)

@@ -277,7 +277,7 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
     for name, size in vars(sizes).items():
         most = ABSOLUTE.get(name, LARGEST_SHARE)
         if not 0 <= size <= most:
-            raise ParameterError(f"mismatch.{name} is {size:g}; it lies within 0 to {most:g}")
+            raise ParameterError(f"mismatch.{name} is {size:g}; it is within 0 to {most:g}")
     nominal = chain = robot.loaded_chain
     mass = 1.0 + deviate(rng, sizes.mass, (n,))
     com = deviate(rng, sizes.com, (n, 3))

@@ -153,12 +153,12 @@ def zero_drift(wrench: Wrench, span: Span) -> Drift:
     where = f"zero interval {interval_text(*span)}"
     if not start < stop:
         raise ParameterError(
-            f"{where} lies outside the log, which runs from {wrench.t[0]:g} to {wrench.t[-1]:g} s"
+            f"{where} is outside the log, which runs from {wrench.t[0]:g} to {wrench.t[-1]:g} s"
         )
     inside = wrench.between(start, stop)
     if len(inside) < 2:
         raise ParameterError(
-            f"{where}: the pose cannot tell the wrench in any two of its samples (σ_min too "
+            f"{where}: no two of its samples have a known wrench (σ_min too "
             "small); choose a span in a regular pose"
         )
     return Drift(

@@ -301,8 +301,8 @@ def smooth_wrench(
     """
     if run.recording.joints < 6:
         raise RobotError(
-            f"an arm of {run.recording.joints} joints cannot tell the six components of a wrench; "
-            "leave --wrench and its options out: use the joint torques"
+            f"{run.recording.joints} joint torques cannot determine the six components of a "
+            "wrench; leave --wrench and its options out: use the joint torques"
         )
     if prior is None:
         prior = prior_of(run, free, gate)

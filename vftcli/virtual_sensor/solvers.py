@@ -52,7 +52,7 @@ def decompose(jacobian: Array) -> Decomposition:
     n = jacobian.shape[2]
     if n < 6:
         raise RobotError(
-            f"an arm of {n} joints cannot tell the six components of a wrench; "
+            f"{n} joint torques cannot determine the six components of a wrench; "
             "leave --wrench and its options out: use the joint torques"
         )
     scaled = SCALE[:, None] * jacobian

@@ -99,7 +99,7 @@ class LeRobotDataset:
                     )
                 values[place] = own[column.name]
         if done != rows:
-            raise LogError(f"{path}: has rows of episodes that the table of episodes does not tell")
+            raise LogError(f"{path}: has rows of episodes that the table of episodes lacks")
         added = [pa.field(PREFIX + c.name, kind_of(c.width)) for c in columns]
         told = with_features(source.schema_arrow.metadata or {}, columns)
         schema = pa.schema([*source.schema_arrow, *added], metadata=told)

@@ -117,7 +117,7 @@ class MessageLayout:
     def _take(self, size: int, what: str) -> int:
         start, self._position = self._position, self._position + size
         if self._position > len(self._message):
-            raise LayoutError(f"{what} lies outside the message")
+            raise LayoutError(f"{what} is outside the message")
         return start
 
     def _take_fixed(self, size: int, what: str) -> Bytes:
@@ -139,7 +139,7 @@ class MessageLayout:
             self._align(size)
         start = self._take(count * size, path)
         if len(self.leaves) > MAX_LEAVES:
-            raise LayoutError(f"{path} lies outside the message")
+            raise LayoutError(f"{path} is outside the message")
         self.leaves[path] = Leaf(start, self._order + code, count)
 
     def _count(self) -> int:
