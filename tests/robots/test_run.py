@@ -148,7 +148,9 @@ def test_every_joint_signal_follows_and_what_goes_is_said() -> None:
 
 
 def test_names_that_do_not_cover_the_arm_are_refused_with_both_lists() -> None:
-    with pytest.raises(RobotError, match=r"wrist_c.*are not named as.*shoulder_pan.*\[\[joints\]\]"):
+    with pytest.raises(
+        RobotError, match=r"wrist_c.*are not named as.*shoulder_pan.*\[\[joints\]\]"
+    ):
         paired(log_of(NAMES), UR)
 
 

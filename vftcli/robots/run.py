@@ -219,8 +219,8 @@ def paired(recording: Recording, robot: Robot) -> Recording:
         if order is None:
             raise RobotError(
                 f"{recording.name}: the joints of the log ({listed(named)}) are not named as "
-                f"those of robot {robot.name!r} ({listed(robot.chain.names)}). Choose the arm of this "
-                "log with --robot, or call the joints in the robot file as the log does (name in "
+                f"those of robot {robot.name!r} ({listed(robot.chain.names)}). Choose this log's "
+                "arm with --robot, or call the joints in the robot file as the log does (name in "
                 "[[joints]])"
             )
         if order != tuple(range(recording.joints)):
