@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots import Robot
-from vftcli.robots.chain import Chain
+from vftcli.robots.chain import Chain, link_poses
 from vftcli.robots.kernels import load_regressor, momentum_terms
 from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_mean_squares
 from vftcli.signals.least_squares import inverse_of
@@ -206,8 +206,12 @@ def gravity_by_up(chain: Chain, q: Array) -> Array:
 
     It is linear in "up", the third axis of which is the chain's own, −gravity.
     """
-    turned = [replace(chain, gravity=-axis) for axis in up_axes(chain.gravity).T]
-    return np.stack([momentum_terms(one, q, np.zeros_like(q)).gravity for one in turned], axis=2)
+    R, origins = (each[:, :-1] for each in link_poses(chain, q))
+    mass = chain.mass[:, None]
+    moments = mass * (origins + np.einsum("tjab,jb->tja", R, chain.com))
+    # A joint carries every link from its own to the last.
+    carried, masses = (np.flip(np.flip(x, -2).cumsum(axis=-2), -2) for x in (moments, mass))
+    return np.cross(R[..., 2], carried - masses * origins) @ up_axes(chain.gravity)
 
 
 def up_axes(gravity: Array) -> Array:
