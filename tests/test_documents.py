@@ -8,15 +8,22 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
-from vftcli.cli import COMMANDS, app
+from vftcli.cli import COMMANDS, app, make_app
+from vftcli.observers.table import OBSERVERS
+from vftcli.signals.option import settings_by_name
 from vftcli.signals.version import VERSION
 
 ROOT = Path(__file__).parent.parent
+AXES = {"admittance", "position", "rotation", "x", "y", "z", "rx", "ry", "rz"}
+"""Groups of an admittance parameter."""
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 
 
@@ -79,8 +86,8 @@ def test_all_documents_run_one_after_another_in_one_folder() -> None:
 
 
 def test_citation_and_changelog_state_the_version() -> None:
-    citation = (ROOT / "docs" / "citation.md").read_text("utf-8")
-    assert re.findall(r"^ *version\W+([\d.]+)", citation, re.MULTILINE) == [VERSION, VERSION]
+    citation = (ROOT / "docs" / "paper.md").read_text("utf-8")
+    assert re.findall(r"^ *version\W+([\d.]+)", citation, re.MULTILINE) == [VERSION]
     changelog = (ROOT / "docs" / "changelog.md").read_text("utf-8")
     newest = re.search(r"^## (.*)$", changelog, re.MULTILINE)
     assert newest is not None
@@ -124,6 +131,33 @@ def test_the_notebook_runs_and_shows_every_result() -> None:
     assert shown >= 10
 
 
+def as_typed(path: Path) -> list[str]:
+    """Every vftcli command of a document: of its blocks, and within its sentences."""
+    text = path.read_text("utf-8").replace("\\\n", " ").replace("\\|", "|")
+    fenced = re.findall(r"^```(?:sh|bash|text|console)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    lines = re.findall(r"(?:^|&& (?:\S*/)?)(?:\$ )?(vftcli .*)$", "\n".join(fenced), re.MULTILINE)
+    return [*lines, *re.findall(r"`(vftcli [^`]+)`", text)]
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)
+def test_every_command_as_typed_is_one_of_the_program(path: Path) -> None:
+    """Name, options and settings; the changelog also names those that are gone."""
+    if path.name == "changelog.md":
+        return
+    group: Any = typer.main.get_command(make_app())
+    for line in as_typed(path):
+        words = shlex.split(line.partition(" # ")[0])[1:]
+        name = next((word for word in words if word in COMMANDS), "contacts")
+        given = [word.partition("=")[0] for word in words if word.startswith("-")]
+        there = {opt for param in group.commands[name].params for opt in param.opts}
+        assert set(given) <= there | {"--version", "--install-completion", "-h", "--help"}, line
+        kinds = vars(group.commands[name].callback)["choices"]
+        groups = {n.partition(".")[0] for n in settings_by_name(kinds)} | {*OBSERVERS, "kfo"}
+        for word, value in pairwise(words):
+            if word == "--set" and name != "simulate":
+                assert value.partition(".")[0] in groups | AXES, line
+
+
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)
 def test_links_lead_somewhere(path: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", path.read_text("utf-8")):
@@ -148,7 +182,6 @@ def test_the_summaries_of_help_are_the_commands_own() -> None:
 
 
 def test_every_observer_and_robot_is_documented() -> None:
-    from vftcli.observers.table import OBSERVERS
     from vftcli.robots import PROFILES
 
     observers = (ROOT / "docs" / "observers.md").read_text("utf-8")
@@ -160,7 +193,7 @@ def test_every_observer_and_robot_is_documented() -> None:
 def test_every_finding_is_documented() -> None:
     import tomllib
 
-    text = (ROOT / "docs" / "trust.md").read_text("utf-8")
+    text = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
     for path in (ROOT / "vftcli" / "signals" / "words").glob("doctor*.toml"):
         for code, entry in tomllib.loads(path.read_text("utf-8")).items():
             assert f"`{entry.get('name', code)}`" in text, code

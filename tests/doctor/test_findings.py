@@ -129,8 +129,8 @@ def test_a_finding_holds_its_numbers_for_machines() -> None:
 
 
 def test_variants_of_a_finding_share_its_name() -> None:
-    """Told to a machine by name, as docs/trust.md lists them."""
-    text = (Path(__file__).parents[2] / "docs" / "trust.md").read_text(encoding="utf-8")
+    """Told to a machine by name, as docs/troubleshooting.md lists them."""
+    text = (Path(__file__).parents[2] / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
     entries = {
         code: entry
         for path in WORDS.glob("doctor*.toml")

@@ -182,7 +182,7 @@ def test_hold_is_van_loans_matrix_exponential(decay: float, step: float) -> None
 
 
 def test_the_printed_44_is_unsymmetric_indefinite_and_a_quarter_sample_faster() -> None:
-    """docs/errata.md: lower-right block −A_c, run all the same. 1e-6 s: the iteration's rest."""
+    """docs/paper.md: lower-right block −A_c, run all the same. 1e-6 s: the iteration's rest."""
     A_c, Q_c = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.01, 5000.0])
     A = np.eye(2) + STEP * A_c
     delay = []

@@ -1,4 +1,4 @@
-"""What the terminal shows of five logs: docs/screens.md is made, and tested, by running them.
+"""What the terminal shows of five logs: screens.md is made, and tested, by running them.
 
 Example: VFT_LOGS=logs python tests/outputs/screens.py
 """
@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from vftcli.cli import app
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "screens.md"
+PAGE = Path(__file__).parent / "screens.md"
 COLUMNS = "88"
 """Width of the terminal."""
 

@@ -1,11 +1,15 @@
-"""docs/screens.md shows what the terminal shows."""
+"""screens.md and docs/story.md show what the terminal shows."""
 
 import re
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from screens import ROOT, SCREENS, printed, shown
+from typer.testing import CliRunner
+
+from vftcli.cli import app
 
 NUMBER = re.compile(r"[−-]?\d+(?:\.\d+)?")
 
@@ -25,9 +29,45 @@ def test_a_screen_is_what_the_command_prints(
     logs: Path = request.getfixturevalue("logs") if screen.real else ROOT / "fixtures"
     ours = list(words(shown(screen, logs, tmp_path)))
     theirs = list(words(printed()[screen.command]))
-    # Another platform's last digit may turn a rounded number by one; nothing else differs.
+    agree(ours, theirs)
+
+
+def agree(ours: list[str], theirs: list[str]) -> None:
+    """Equal words; another platform's last digit may turn a rounded number by one."""
     assert [NUMBER.sub("0", word) for word in ours] == [NUMBER.sub("0", word) for word in theirs]
     for mine, said in zip(ours, theirs, strict=True):
         pairs = zip(NUMBER.findall(mine), NUMBER.findall(said), strict=True)
         for a, b in ((float(x.replace("−", "-")), float(y.replace("−", "-"))) for x, y in pairs):
             assert abs(a - b) <= max(1.0, 0.05 * abs(b)), (mine, said)
+
+
+STORY = ROOT / "docs" / "story.md"
+LOGS = {
+    "ur10_exciting.db3": "salerno_ur10/ur10_exciting.db3",
+    "traj_raw.csv": "panda_ati/traj_raw.csv",
+}
+"""Name of a log in the story → where it is among the real logs."""
+
+
+@pytest.mark.slow
+def test_the_story_quotes_what_its_commands_print(
+    logs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every command runs in one folder; what is quoted of it stands there, pieces in order."""
+    for name, place in LOGS.items():
+        (tmp_path / name).symlink_to(logs / place)
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"(?ms)^```console\n(.*?)^```$", STORY.read_text("utf-8"))
+    assert len(blocks) >= 6
+    for command, quoted in re.findall(r"(?ms)^\$ vftcli (.*?)\n(.*?)(?=^\$ |\Z)", "".join(blocks)):
+        result = CliRunner(env={"COLUMNS": "80"}).invoke(app, shlex.split(command))
+        assert result.exit_code == 0, result.output
+        rest = list(words(result.stdout))
+        for piece in (list(words(part)) for part in quoted.split("…\n")):
+            plain = [NUMBER.sub("0", word) for word in rest]
+            sought = [NUMBER.sub("0", word) for word in piece]
+            starts = range(len(rest) - len(piece) + 1)
+            at = next((n for n in starts if plain[n : n + len(piece)] == sought), None)
+            assert at is not None, (command, piece)
+            agree(rest[at : at + len(piece)], piece)
+            rest = rest[at + len(piece) :]

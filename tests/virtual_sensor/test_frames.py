@@ -44,7 +44,7 @@ def test_adjoint_is_pinocchios_action_on_forces(pose: Pose, wrench: np.ndarray) 
 
 
 def test_the_printed_56_turns_the_rotation_round_in_its_lower_left_block() -> None:
-    """docs/errata.md: 20 mm off, turned by .5 rad, 20 N across: 20·.02·2 sin .5 = .38 N·m."""
+    """docs/paper.md: 20 mm off, turned by .5 rad, 20 N across: 20·.02·2 sin .5 = .38 N·m."""
     c, s = np.cos(0.5), np.sin(0.5)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     right = adjoint(Pose(turn, np.array([0.0, 0.0, 0.02])))
