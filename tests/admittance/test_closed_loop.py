@@ -1,7 +1,7 @@
 """The closed loop: the online filter is the batch one; latencies; aliasing; the bearing.
 
-The quick tests run the first drag of one seed; all five seeds and the Panda's assembly are marked
-statistical.
+The quick tests push for a moment, the slow ones run the first drag of one seed; all five seeds and
+the Panda's assembly are marked statistical.
 """
 
 from dataclasses import replace
@@ -19,6 +19,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
+from vftcli.simulation.scenario import ProfileSpec
 
 WINDOWS = {"literal": (0.45, 0.85), "density": (0.2, 0.45), "discrete": (0.1, 0.3)}
 """The issue's windows for 20 N to 5 mm of motion. [s]"""
@@ -79,26 +80,41 @@ def test_latency_of_the_first_drag(convention: str) -> None:
     assert entry.detection < entry.motion
 
 
-@pytest.mark.slow
-def test_instantaneous_torque_aliases() -> None:
+def pushed(
+    torque: str, duration: float = 0.4, zero: tuple[float, float] | None = (0.05, 0.1)
+) -> ClosedLoop:
+    """Four tenths of a second in which 40 N along −y come on from .15 to .25 s."""
+    push = ProfileSpec(name="push", spans=((0.15, 0.9),), force=(0.0, -40.0, 0.0), rise=0.1)
+    scenario = replace(load_scenario("ur5-drag", ()), contacts=(push,), duration=duration)
+    robot = load_robot("ur5")
+    p = from_table(robot.admittance, robot.name, parse_settings(["threshold_mode=soft"]))
+    return run_closed_loop(
+        scenario,
+        variable(p),
+        observer("ur5", "discrete"),
+        seed=1,
+        torque=torque,
+        zero=zero,
+    )
+
+
+@pytest.fixture(scope="module")
+def loop() -> ClosedLoop:
+    return pushed("average")
+
+
+def test_instantaneous_torque_aliases(loop: ClosedLoop) -> None:
     """The servo's answer to each command is over in milliseconds: one sample of it is no mean."""
     mean, last = (
-        run("ur5-drag", "density", duration=9.5, torque=t) for t in ("average", "instant")
+        np.abs(each.estimate - each.truth)[each.t > 0.3] for each in (loop, pushed("instant"))
     )
-    assert mean.stable
-    error = np.nanmax(np.abs(mean.estimate - mean.truth)[mean.t > 3.0, :3])
-    size = np.nanmax(np.abs(last.estimate)[:, :3])
-    if last.stable:
-        size = np.nanmax(np.abs(last.estimate - last.truth)[last.t > 3.0, :3])
     # science of the issue: about 100 N of false force; the mean stays within lag and model error
-    assert size > 100.0
-    assert error < 50.0
+    assert np.max(last[:, :3]) > 100.0
+    assert np.max(mean[:, :3]) < 10.0
 
 
-@pytest.mark.slow
-def test_the_loop_s_record_replays_the_loop() -> None:
+def test_the_loop_s_record_replays_the_loop(loop: ClosedLoop) -> None:
     """The controller that was in the loop, run on the force it acted on, moves as it did."""
-    loop = run("ur5-drag", "discrete", "threshold_mode=soft", duration=9.5)
     assert np.all(loop.reached)  # at a wall the loop waits, and the replay does not
     robot = load_robot("ur5")
     p = loop.controller.parameters
@@ -110,14 +126,24 @@ def test_the_loop_s_record_replays_the_loop() -> None:
     assert "α = 1.6" not in lost
 
 
-@pytest.mark.slow
-def test_the_controller_rests_while_the_zero_is_taken() -> None:
-    loop = run("ur5-drag", "density", duration=4.0)
-    np.testing.assert_array_equal(loop.commanded[loop.t <= 3.0], 0.0)
-    assert np.all(np.isnan(loop.estimate[loop.t < 0.5]))
-    rest = loop.estimate[(loop.t > 1.5) & (loop.t < 3.0)]
-    # noise of 0.06 A · 12.6 N·m/A through a 10 rad/s filter and 1/0.2 m of lever
-    assert np.max(np.abs(np.mean(rest, axis=0))[:3]) < 0.5
+def test_the_zero_is_the_mean_of_its_span_and_goes_off_what_follows(loop: ClosedLoop) -> None:
+    """A loop without one has the same noise, and reads 1 to 3 N until the push."""
+    bare = pushed("average", 0.15, None)
+    t, read = bare.t, bare.estimate
+    np.testing.assert_allclose(loop.zero, read[(t >= 0.05) & (t <= 0.1)].mean(axis=0), rtol=1e-9)
+    later = t > 0.1
+    np.testing.assert_allclose(loop.estimate[: len(t)][later], read[later] - loop.zero, atol=1e-9)
+
+
+def test_the_arm_goes_where_it_is_pushed_once_the_zero_is_known(loop: ClosedLoop) -> None:
+    np.testing.assert_array_equal(loop.commanded[loop.t <= 0.1], 0.0)
+    np.testing.assert_array_equal(np.isnan(loop.estimate).all(axis=1), loop.t < 0.05)
+    np.testing.assert_allclose(loop.truth[loop.t > 0.26, 1], -40.0, rtol=1e-9)
+    away = loop.moved[-1, :3] - loop.commanded[-1, :3]
+    speed = np.diff(loop.commanded[-2:, :3], axis=0)[0] / 0.008
+    assert loop.commanded[-1, 1] < -0.03
+    # The servo lags behind by 3 ms, a push bends it by some .3 mm.
+    assert np.linalg.norm(away) < 4e-3 * np.linalg.norm(speed) + 1e-3
 
 
 def test_a_period_that_the_inner_step_does_not_divide_gets_one_that_does() -> None:

@@ -68,6 +68,18 @@ def test_groups_are_taken_only_as_workers_get_free() -> None:
     assert taken == [0]
 
 
+def pid_of(_task: int) -> int:
+    return os.getpid()
+
+
+def test_what_is_asked_to_run_here_runs_here_however_long_it_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("vftcli.batch.cluster.LITTLE", -1.0)
+    ended = list(run_tasks([(0,), (1,)], pid_of, HERE, silent))
+    assert [outcome.value for outcome in ended] == [os.getpid()] * 2
+
+
 @pytest.mark.slow
 def test_work_goes_to_workers_once_it_takes_longer_than_they_to_start(
     monkeypatch: pytest.MonkeyPatch,

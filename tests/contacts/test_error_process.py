@@ -1,16 +1,21 @@
 """The model error that a contact is told from."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
 from vftcli.virtual_sensor.model_error import (
+    LEAST_TIME,
     UNKNOWN,
     TorqueNoise,
     error_model,
     error_process,
+    infer_noise,
     innovations,
     learn_noise,
     spiked_white,
@@ -60,6 +65,32 @@ def test_what_was_drawn_is_learned() -> None:
     np.testing.assert_allclose(found.white, 0.01, rtol=0.15)
     np.testing.assert_allclose(found.time, 0.4, rtol=0.35)
     assert found.seen[0]
+
+
+def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
+    """A joint that moves: as wide as where it is quietest, and at least .2 of its friction."""
+    log = blocks(drawn(8000, np.random.default_rng(7)), np.full((8000, 1), 0.5))
+    dry = np.array([0.1])
+    alone = infer_noise(log, dry, None)
+    assert alone is not None
+    # Second differences of b are noise too, γ₀(6 − 8f + 2f²); robust, of 8000: 1.5 %.
+    f = np.exp(-B / 0.4)
+    np.testing.assert_allclose(alone.white, 0.01 + 0.25 * (1 - 4 * f / 3 + f * f / 3), rtol=0.05)
+    # b of .5 N·m and the white noise of .1: the quantile of 480 correlation times: 7 %.
+    np.testing.assert_allclose(alone.variance, 0.26, rtol=0.2)
+    assert alone.time[0] == LEAST_TIME
+    for variance, time, found in ((9.0, 0.1, 0.1), (1e-4, 0.1, LEAST_TIME), (1e-4, 2.0, 2.0)):
+        learned = replace(
+            noise(), white=np.array([4.0]), variance=np.array([variance]), time=np.array([time])
+        )
+        both = infer_noise(log, dry, learned)
+        assert both is not None
+        assert (both.white[0], both.time[0], both.free_seconds) == (4.0, found, 4.0)
+        assert both.variance[0] == max(variance, alone.variance[0])
+    strong = infer_noise(log, np.array([10.0]), noise())  # its friction says more than the quietest
+    assert strong is not None
+    assert strong.variance[0] == pytest.approx((0.2 * 10.0) ** 2)
+    assert infer_noise(blocks(np.zeros((2, 1)), np.zeros((2, 1))), dry, None) is None
 
 
 def test_an_offset_is_an_error_too() -> None:

@@ -99,6 +99,7 @@ def test_at_15_hz_the_pushes_are_still_told() -> None:
     # Blocks of 64 ms hide the tap of 23 N, .16 s long.
     assert len(scored.pairs) >= len(true) - 1
     assert not scored.false
+    assert [row.number for row in rows.contacts] == [*range(1, len(rows.contacts) + 1)]
 
 
 def test_numbers_that_are_not_finite_are_refused() -> None:
@@ -152,6 +153,7 @@ def test_a_payload_nobody_told_is_one_load(logs: Path) -> None:
     # 2.805 kg hang on the flange.
     error = np.abs(row.wrench[:3] - [0.0, 0.0, -27.52])
     assert np.all(error < 1.96 * row.wrench_sd[:3])
+    np.testing.assert_array_equal(row.mean_force, row.wrench[:3])
     assert np.all(1.96 * row.wrench_sd[:3] < 3.0)
 
 

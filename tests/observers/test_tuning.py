@@ -145,11 +145,12 @@ def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("offset", [0.0, 0.5, -0.5])
 def test_a_constant_error_brings_one_threshold_nearer(offset: float) -> None:
-    """2 Hz of 1 N·m rms about an offset m: 2·3600·(e^{−(h−m)²/2} + e^{−(h+m)²/2}) an hour."""
+    """2 Hz of σ = 1.5 N·m about an offset m: 7200·(e^{−(h−m)²/2σ²} + e^{−(h+m)²/2σ²}) an hour."""
     f = np.linspace(0.0, 10.0, 1001)
-    power = np.where(np.isclose(f, 2.0), 1.0, 0.0)[:, None]
+    power = np.where(np.isclose(f, 2.0), 2.25, 0.0)[:, None]
     power[0] = offset**2
-    expected = 7200.0 * (np.exp(-0.5 * (2.0 - offset) ** 2) + np.exp(-0.5 * (2.0 + offset) ** 2))
+    sides = np.array([2.0 - offset, 2.0 + offset])
+    expected = 7200.0 * np.exp(-(sides**2) / 4.5).sum()
     assert crossings(power, f, np.array([2.0]))[0] == pytest.approx(expected, rel=1e-12)
 
 

@@ -145,9 +145,12 @@ def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, last: str) -> None:
     assert "dropped the last row: it is cut off" in recording.source.repairs
 
 
-def test_a_last_row_without_line_end_is_kept_if_its_digits_are_all_there(tmp_path: Path) -> None:
-    recording = read(write(tmp_path / "x", table(rows()).rstrip("\n")))
-    assert recording.samples == 30
+@pytest.mark.parametrize("count", [2, 20, 30])
+def test_a_last_row_without_line_end_is_kept_if_its_digits_are_all_there(
+    tmp_path: Path, count: int
+) -> None:
+    recording = read(write(tmp_path / "x", table(rows(count)).rstrip("\n")))
+    assert recording.samples == count
     assert recording.source.repairs == ()
 
 

@@ -41,6 +41,19 @@ def test_derivatives_are_those_of_the_positions(spec: object) -> None:
     np.testing.assert_allclose((after.dq - before.dq) / (2 * h), here.ddq, atol=2e-6)
 
 
+def test_sweeps_go_out_across_and_back_one_joint_at_a_time() -> None:
+    """.4 rad at .4 rad/s: 1 s out, 2 s across, 1 s back, .3 s of rest, joint after joint."""
+    robot = load_robot("ur5")
+    motion = JointwiseSpec(speeds=(0.4,)).motion(robot)
+    assert motion.duration == pytest.approx(0.3 + 6 * 4.3)
+    start = motion.at(np.array([0.0])).q
+    for j in range(6):
+        t = 0.3 + 4.3 * j + np.array([-0.1, 1.0, 2.0, 3.0, 4.1])
+        away = np.zeros((5, 6))
+        away[:, j] = [0.0, 0.4, 0.0, -0.4, 0.0]
+        np.testing.assert_allclose(motion.at(t).q - start, away, atol=1e-9)
+
+
 def test_circle_is_a_horizontal_circle_of_fixed_orientation() -> None:
     robot = load_robot("ur5")
     spec = CircleSpec(towards=-1.5)

@@ -230,7 +230,7 @@ class TextTable(Table):
         if ended:
             return False
         above = [self.cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 : -1]]
-        ends = {cells[-1] for cells in above[bool(self.names) and len(rows) <= 2 :] if cells}
+        ends = {cells[-1] for cells in above if cells and cells[-1] not in self.names[-1:]}
         decimals = {len(end.partition(".")[2]) for end in ends}
         # Loggers print one number of decimals: fewer than above means digits are lost.
         if "." in last[-1] or "," in last[-1]:
