@@ -1,7 +1,7 @@
 """Pictures of what vftcli makes: docs/pictures is made by running commands.
 
 It needs the extras figures and browser, a Chromium, and xvfb-run and xdotool for the recording.
-Example: python tests/outputs/gallery.py
+Example: VFT_LOGS=logs python tests/outputs/gallery.py
 """
 
 import os
@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
+
+from screens import OF_STORY
 
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "docs" / "pictures"
@@ -73,6 +75,15 @@ EXHIBITS = (
     Exhibit(
         ("vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9 -o release",),
         (Picture("admit", "release/index.html", 1062),),
+    ),
+    Exhibit(
+        (
+            "vftcli identify ur10_exciting.db3 --columns tau=effort --robot ur10"
+            " --interval 0:13.7 -o my_ur10.toml",
+            "vftcli compare ur10_exciting.db3 --columns tau=effort --robot my_ur10.toml"
+            " --reference zero --interval 13.7:27.5 --figures png -o after",
+        ),
+        (Picture("story", "after/figures/errors-double.png"),),
     ),
 )
 """What is taken, in order."""
@@ -173,6 +184,8 @@ def main() -> None:
     with TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "fixtures").symlink_to(ROOT / "fixtures")
+        for log, place in OF_STORY.items():
+            (folder / log).symlink_to(Path(os.environ["VFT_LOGS"]) / place)
         for exhibit in EXHIBITS:
             for command in exhibit.commands:
                 run(command, folder)

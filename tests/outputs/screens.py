@@ -61,6 +61,11 @@ SCREENS = {
     ),
 }
 """Name of the log → what is run."""
+OF_STORY = {
+    "ur10_exciting.db3": "salerno_ur10/ur10_exciting.db3",
+    "traj_raw.csv": "panda_ati/traj_raw.csv",
+}
+"""Name of a log in docs/story.md → where it is among the real logs."""
 
 
 def shown(screen: Screen, logs: Path, folder: Path) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from screens import ROOT, SCREENS, printed, shown
+from screens import OF_STORY, ROOT, SCREENS, printed, shown
 from typer.testing import CliRunner
 
 from vftcli.cli import app
@@ -42,11 +42,6 @@ def agree(ours: list[str], theirs: list[str]) -> None:
 
 
 STORY = ROOT / "docs" / "story.md"
-LOGS = {
-    "ur10_exciting.db3": "salerno_ur10/ur10_exciting.db3",
-    "traj_raw.csv": "panda_ati/traj_raw.csv",
-}
-"""Name of a log in the story → where it is among the real logs."""
 
 
 @pytest.mark.slow
@@ -54,12 +49,13 @@ def test_the_story_quotes_what_its_commands_print(
     logs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every command runs in one folder; what is quoted of it stands there, pieces in order."""
-    for name, place in LOGS.items():
+    for name, place in OF_STORY.items():
         (tmp_path / name).symlink_to(logs / place)
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"(?ms)^```console\n(.*?)^```$", STORY.read_text("utf-8"))
     assert len(blocks) >= 6
-    for command, quoted in re.findall(r"(?ms)^\$ vftcli (.*?)\n(.*?)(?=^\$ |\Z)", "".join(blocks)):
+    text = re.sub(r" \\\n {4}", " ", "".join(blocks))
+    for command, quoted in re.findall(r"(?ms)^\$ vftcli (.*?)\n(.*?)(?=^\$ |\Z)", text):
         result = CliRunner(env={"COLUMNS": "80"}).invoke(app, shlex.split(command))
         assert result.exit_code == 0, result.output
         rest = list(words(result.stdout))
