@@ -1,5 +1,6 @@
 """Arms and forces in a Rerun recording, read back from the file."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,11 @@ from vftcli.outputs.rerun_arm import (
 from vftcli.outputs.rerun_file import Tab, rerun_file
 from vftcli.robots import PROFILES, load_robot
 from vftcli.robots.chain import link_poses
+from vftcli.robots.robot import Mesh
+from vftcli.signals.pose import Pose, rotation_about
 
-UR5 = load_robot("ur5").chain
+ROBOT = load_robot("ur5")
+UR5 = ROBOT.chain
 POSES = motion(UR5, np.linspace(0.0, 4.0, 201), np.zeros((201, 6)))
 TABS = [Tab("none", [])]
 
@@ -41,7 +45,7 @@ def test_an_unknown_force_has_no_arrow(tmp_path: Path) -> None:
 def test_capsules_point_where_they_should(tmp_path: Path) -> None:
     """Rerun's lie along z of their own axes; the upper arm is its link's longest shape."""
     with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
-        send_arm(stream, UR5, POSES, {})
+        send_arm(stream, ROBOT, POSES, {})
     (turns,) = rows_of(tmp_path / "r.rrd", "/robot/link_2", "Capsules3D:quaternions")
     for (x, y, z, w), shape in zip(turns, capsules(UR5)[2], strict=True):
         turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
@@ -59,7 +63,7 @@ def test_a_link_is_painted_while_it_is_touched(tmp_path: Path) -> None:
     """Its own colour, then that of the span, then its own again; other links keep theirs."""
     painted = {2: [(1.0, 2.0, "#dd6415")]}
     with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
-        send_arm(stream, UR5, POSES, painted)
+        send_arm(stream, ROBOT, POSES, painted)
 
     def colours(link: int) -> list[list[int]]:
         return rows_of(tmp_path / "r.rrd", f"/robot/link_{link}", "Capsules3D:colors")
@@ -72,6 +76,33 @@ def test_a_link_is_painted_while_it_is_touched(tmp_path: Path) -> None:
     assert rgba(LINK)[0] in found[0]
     (still,) = [row for row in colours(3) if row is not None]
     assert rgba("#dd6415")[0] not in still
+
+
+def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path) -> None:
+    """They are in the recording once, where they are on the link; else its capsules are too."""
+    file, pose = tmp_path / "a.stl", Pose(rotation_about("z", 0.5 * np.pi), np.array([0.1, 0, 0]))
+    file.write_bytes(b"\0" * 84)
+    whole = Mesh("a.stl", file, 2, pose, np.array([1.0, 2.0, 3.0]))
+    coloured = whole._replace(link=3, file=tmp_path / "b.dae")
+    (tmp_path / "b.dae").write_bytes(b"<COLLADA/>")
+    gone = whole._replace(link=4, file=tmp_path / "gone.stl")
+    meshes = (whole, coloured, gone, whole._replace(link=5), whole._replace(link=5, file=None))
+    path, painted = tmp_path / "r.rrd", {2: [(1.0, 2.0, "#dd6415")], 3: [(1.0, 2.0, "#dd6415")]}
+    with rerun_file(path, "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+        send_arm(stream, replace(ROBOT, meshes=meshes), POSES, painted)
+    capsules_of = [rows_of(path, f"/robot/link_{j}", "Capsules3D:lengths") for j in range(1, 7)]
+    assert list(map(bool, capsules_of)) == [True, False, False, True, True, True]
+    (blob,) = rows_of(path, "/robot/link_2/mesh_0", "Asset3D:blob")
+    assert bytes(blob[0]) == file.read_bytes()
+    assert rows_of(path, "/robot/link_5/mesh_0", "Asset3D:media_type") == [["model/stl"]]
+    ((matrix,),) = rows_of(path, "/robot/link_2/mesh_0", "Transform3D:mat3x3")
+    # Columns: the file's x goes to y, its y, of double size, to −x.
+    np.testing.assert_allclose(matrix, [0, 1, 0, -2, 0, 0, 0, 0, 3], atol=1e-7)  # float32
+    orange, own = [int(rgba("#dd6415")[0])], [int(rgba(LINK)[0])]
+    for name, unpainted in (("link_2", own), ("link_3", [])):  # a DAE has colours of its own
+        colours = rows_of(path, f"/robot/{name}/mesh_0", "Asset3D:albedo_factor")
+        assert [c for c in colours if c is not None] == [unpainted, orange, unpainted]
+    assert rows_of(path, "/robot/link_5/mesh_0", "Asset3D:albedo_factor") == [own]
 
 
 @pytest.mark.parametrize("name", PROFILES)

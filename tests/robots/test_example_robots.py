@@ -150,3 +150,19 @@ def test_every_arm_is_what_pinocchio_makes_of_the_file(name: str) -> None:
 def test_an_empty_robot_is_said_to_be_empty() -> None:
     with pytest.raises(RobotError, match="the <robot> is empty: it has no link and no joint"):
         load_robot(files()["ur_description/urdf/ur3"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("ur_description/urdf/ur5_robot", 7),
+        ("panda_description/urdf/panda", 11),  # with a hand and two fingers
+        ("xarm_description/urdf/xarm7", 8),
+    ],
+)
+def test_meshes_are_found_in_a_package_that_only_its_folder_names(name: str, count: int) -> None:
+    found = load_robot(files()[name])
+    assert len(found.meshes) == count
+    assert all(mesh.file for mesh in found.meshes)
+    assert "meshes-not-found" not in {remark.code for remark in found.remarks}

@@ -1,12 +1,12 @@
 """The arm and forces in a Rerun recording: shapes, poses and colours over time, arrows.
 
-The arm is made of capsules, from the chain's own geometry. A contact's arrow is there
-while it lasts, at its place, below `/contacts`, and the links that it touched have its
-colour.
+The arm is made of the meshes that its description names, and where they are not found of
+capsules, from the chain's own geometry. A contact's arrow is there while it lasts, at its
+place, below `/contacts`, and the links that it touched have its colour.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.outputs.charts import PLACES
 from vftcli.robots.chain import Chain, link_poses
+from vftcli.robots.meshes import COLOURED, FORMATS
+from vftcli.robots.robot import Mesh, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
@@ -99,13 +101,14 @@ def arrow_scale(hardest: float) -> float:
 
 
 def send_arm(
-    stream: Stream, chain: Chain, poses: ArmPoses, painted: Mapping[int, Sequence[Painted]]
+    stream: Stream, robot: Robot, poses: ArmPoses, painted: Mapping[int, Sequence[Painted]]
 ) -> None:
     """Send the arm's shape once, its poses over time, and when links have another colour."""
-    time = rr.TimeColumn("t", duration=poses.t)
-    for j, shapes in enumerate(capsules(chain)):
+    time, start = rr.TimeColumn("t", duration=poses.t), float(poses.t[0])
+    for j, shapes in enumerate(capsules(robot.chain)):
         link = f"{ROBOT}/link_{j}" if j else f"{ROBOT}/base"
-        if shapes:
+        meshes = [mesh for mesh in robot.meshes if mesh.link == j]
+        if not send_meshes(stream, link, meshes, start, painted.get(j, ())) and shapes:
             # Rerun's own capsules are along z from one end.
             turns = np.array([rotation_onto(shape.direction) for shape in shapes])
             batch = rr.Capsules3D(
@@ -117,7 +120,7 @@ def send_arm(
             )
             stream.log(link, batch, static=True)
             own = rgba(*(JOINT if shape.joint else LINK for shape in shapes))
-            send_colours(stream, link, own, float(poses.t[0]), painted.get(j, ()))
+            send_colours(stream, link, own, start, painted.get(j, ()))
         if j:
             columns = rr.Transform3D.columns(
                 translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
@@ -125,20 +128,50 @@ def send_arm(
             stream.send_columns(link, [time], columns)
 
 
+def send_meshes(
+    stream: Stream, link: str, meshes: Sequence[Mesh], start: float, painted: Sequence[Painted]
+) -> bool:
+    """Send the meshes of a link once; whether it has any and none is missing."""
+    found = [(mesh, mesh.file) for mesh in meshes if mesh.file is not None]
+    try:
+        contents = [file.read_bytes() for _, file in found]
+    except OSError:  # gone since the robot was loaded
+        return False
+    for k, (mesh, file) in enumerate(found):
+        path, ending = f"{link}/mesh_{k}", file.suffix.lower()
+        shape = mesh.pose.rotation * mesh.scale
+        place = rr.Transform3D(translation=mesh.pose.translation, mat3x3=shape)
+        asset = rr.Asset3D(contents=contents[k], media_type=FORMATS[ending])
+        stream.log(path, asset, place, static=True)
+        own = rgba(*() if ending in COLOURED else (LINK,))
+        send_colours(stream, path, own, start, painted, mesh=True)
+    return 0 < len(found) == len(meshes)
+
+
 def send_colours(
-    stream: Stream, link: str, own: Packed, start: float, painted: Sequence[Painted]
+    stream: Stream,
+    path: str,
+    own: Packed,
+    start: float,
+    painted: Sequence[Painted],
+    *,
+    mesh: bool = False,
 ) -> None:
-    """Send the colours of a link's shapes from the first pose on: its own, others in the spans."""
+    """Send the colours of shapes from the first pose on: their own, others in the spans."""
+    kind, field = (rr.Asset3D, "albedo_factor") if mesh else (rr.Capsules3D, "colors")
+    given: dict[str, Any] = {field: own}
     if not painted:
-        stream.log(link, rr.Capsules3D.from_fields(colors=own), static=True)
+        if len(own):  # else those in a mesh's file show
+            stream.log(path, kind.from_fields(**given), static=True)
         return
     changes: dict[float, Packed] = {start: own}
     for begin, stop, colour in painted:
-        changes[max(begin, start)] = rgba(*[colour] * len(own))
+        changes[max(begin, start)] = rgba(*[colour] * max(len(own), 1))
         changes[stop] = own
-    colours = np.concatenate([changes[t] for t in sorted(changes)])
-    columns = rr.Capsules3D.columns(colors=colours).partition([len(own)] * len(changes))
-    stream.send_columns(link, [rr.TimeColumn("t", duration=sorted(changes))], columns)
+    colours = [changes[t] for t in sorted(changes)]
+    given = {field: np.concatenate(colours)}
+    columns = kind.columns(**given).partition([*map(len, colours)])
+    stream.send_columns(path, [rr.TimeColumn("t", duration=sorted(changes))], columns)
 
 
 def painted_links(found: ContactList, joints: int) -> dict[int, list[Painted]]:

@@ -64,7 +64,7 @@ BAND = "#e98aa2"  #: The band of |F|: the colour of `best`, paler.
 
 def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     """Write the recording with its blueprint, so that it opens arranged."""
-    arm, errors, found = analysis.robot.chain, analysis.errors, analysis.contacts
+    robot, errors, found = analysis.robot, analysis.errors, analysis.contacts
     tabs = tabs_of(analysis, detail)
     words, marked, arrow = {"Summary": summary(analysis)}, None, None
     if errors is not None and (table := to_markdown(errors, [analysis])):
@@ -72,14 +72,14 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     if found is not None:
         tabs[0] = tabs[0]._replace(log=contact_log(found))
         marked = next(((c.start, c.stop) for c in found.contacts), None)
-    poses = motion(arm, analysis.t, analysis.recording.q)
+    poses = motion(robot.chain, analysis.t, analysis.recording.q)
     sampled = np.searchsorted(analysis.t, poses.t)
     if found is None or best_wrench(analysis) is not None:
         arrow = force_arrow(analysis, poses, sampled)
     scale, name = newton_per_metre(analysis), analysis.recording.name
     space = f"Arm (arrow: 1 m is {scale:g} N)"
     with rerun_file(path, name, tabs, words, poses, space, marked) as stream:
-        send_arm(stream, arm, poses, {} if found is None else painted_links(found, arm.joints))
+        send_arm(stream, robot, poses, {} if found is None else painted_links(found, robot.joints))
         if found is not None:
             force = None if arrow is None else arrow.force
             send_contacts(stream, found, poses, force, scale)
@@ -250,6 +250,8 @@ def summary(analysis: Analysis) -> str:
     """Log, robot, and meaning of numbers and arrow."""
     recording, robot = analysis.recording, analysis.robot
     source = recording.source
+    drawing = (remark for remark in robot.remarks if remark.code == "meshes-not-found")
+    notes = (*source.remarks, *all_remarks(analysis), *drawing)
     lines = [
         f"# {escape_markdown(recording.name)}",
         f"{escape_markdown(robot.title or robot.name)}, {recording.samples} samples in "
@@ -259,7 +261,7 @@ def summary(analysis: Analysis) -> str:
         *(f"- **{name}**: {escape_markdown(text)}" for name, text in CONVENTIONS.items()),
         f"- **arrow**: {arrow_words(analysis)}",
         *("", "## Notes"),
-        *(f"- {escape_markdown(str(n))}" for n in (*source.remarks, *all_remarks(analysis))),
+        *(f"- {escape_markdown(str(note))}" for note in notes),
         *("", f"Log sha256 {source.sha256 or 'unknown'}", ""),
     ]
     return "\n".join(lines)

@@ -14,7 +14,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ import numpy as np
 from vftcli.robots.arm import BASE, BodyTree, LumpedArm, shortened
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import LINK, TENSOR, momentum_terms, torque_regressor
+from vftcli.robots.meshes import meshes_of, packages_near
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.robot import JointFriction, Limits, Robot
 from vftcli.robots.robot_file import (
@@ -85,10 +85,10 @@ def load_described(path: Path, tip: str, arguments: Sequence[str]) -> Robot:
     if alone:
         said = caution("urdf-alone", file=beside.name)
         robot = replace(robot, name=tree.name, title=tree.name, remarks=(said,))
+    meshes = meshes_of(lumped, root) if root.tag == "robot" else ()
+    if lacking := [mesh.name for mesh in meshes if mesh.file is None]:
+        remarks += (fact("meshes-not-found", count=len(lacking), first=lacking[0]),)
     remarks = (*remarks, *arm_remarks(lumped, robot.chain), *inertia_remarks(lumped, robot.chain))
-    rotors = [joint.rotor_inertia for joint in lumped.joints]
-    if any(rotors):
-        remarks += (caution("armature-taken", armature_kg_m2=rotors),)
     damping = [joint.damping for joint in lumped.joints]
     dry = [joint.dry_friction for joint in lumped.joints]
     friction: tuple[JointFriction, ...] = ()
@@ -109,6 +109,7 @@ def load_described(path: Path, tip: str, arguments: Sequence[str]) -> Robot:
         path=path,
         endless=tuple(dict.fromkeys([*endless, *robot.endless])),
         simulated_friction=friction,
+        meshes=meshes,
         remarks=(*remarks, *robot.remarks),
     )
 
@@ -194,7 +195,7 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
 
 
 def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
-    """What is odd about the links' inertia."""
+    """What is odd about the links' inertia, and the rotors' where there is any."""
     if bare := tuple(j + 1 for j, mass in enumerate(chain.mass) if mass == 0.0):
         yield caution("links-without-mass", Where(joints=bare))
     # What the nearest tensors that a body can have differ by, zero where the tensor was
@@ -218,6 +219,9 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         values = np.linalg.eigvalsh(M + M.swapaxes(1, 2))
         if np.any(values[:, 0] <= 1e-12 * values[:, -1]):
             yield caution("mass-matrix-singular")
+    rotors = [joint.rotor_inertia for joint in lumped.joints]
+    if any(rotors):
+        yield caution("armature-taken", armature_kg_m2=rotors)
 
 
 #: Elements within one another: a URDF has four, an MJCF one more than its arm has links.
@@ -229,9 +233,6 @@ NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
 DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
 #: A use of an argument; one that is not declared has to be given.
 USED = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
-NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")  #: The name of a package in its manifest.
-
-ABOVE = 5  #: Folders above the file in which packages are looked for.
 #: Time of a processor in which a xacro must be expanded; large ones take below one. [s]
 SECONDS = 10
 WAITED = 6  #: How many times as long it may take where others keep the processors busy.
@@ -321,12 +322,3 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     if why:
         raise RobotError(f"{path}: the xacro cannot be expanded: {why}; {takes}")
     return str(made["text"])
-
-
-def packages_near(path: Path) -> Iterator[tuple[str, str]]:
-    """Name and folder of the packages above a file and beside these, the nearest last."""
-    for folder in reversed(path.resolve().parents[:ABOVE]):
-        for manifest in (*sorted(folder.glob("*/package.xml")), *folder.glob("package.xml")):
-            with suppress(RobotError):  # a neighbour's that is no text
-                if name := NAME.search(robot_text(manifest)):
-                    yield name[1], str(manifest.parent)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from vftcli.robots.chain import Chain, Payload
 from vftcli.signals.arrays import Array, seal
@@ -85,6 +85,16 @@ class SensorNoise(PerJoint):
     qd: Array  #: Velocity. (n,) [rad/s]
 
 
+class Mesh(NamedTuple):
+    """The shape of a part of the arm, in a file."""
+
+    name: str  #: The file as the description names it.
+    file: Path | None  #: The file, None where there is none that can be drawn.
+    link: int  #: The joint that moves it, from 1; 0 on the base.
+    pose: Pose  #: Its pose in the chain's frame of that joint.
+    scale: Array  #: Its size, as a factor along each of its axes. (3,)
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Robot(Shown):
     """One arm: chain, drives, friction, limits and the gains its observers start from."""
@@ -132,6 +142,7 @@ class Robot(Shown):
     document: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = ()  #: What a user of the numbers should know.
     path: Path | None = None  #: The file it was loaded from, None for one made in memory.
+    meshes: tuple[Mesh, ...] = ()  #: Shapes of its parts; none where only joints are known.
 
     def __post_init__(self) -> None:
         n = self.joints
