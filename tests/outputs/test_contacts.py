@@ -15,6 +15,7 @@ from vftcli.outputs.contacts import (
     answer,
     contact_grid,
     contacts_csv,
+    contacts_latex,
     contacts_record,
     direction,
     hardest_rows,
@@ -55,7 +56,7 @@ def test_an_arm_without_a_wrench_has_no_newtons() -> None:
                    impulse=None, anywhere=None)  # fmt: skip
     (row,) = jsonable(contacts_record(contact_list(bare)))["contacts"]
     assert row["force_N"] is None
-    assert contact_grid([bare]).columns[2].head == "joint torque [N·m]"
+    assert contact_grid([bare]).columns[2].heading == "joint torque [N·m]"
     assert answer(contact_list(bare, smallest_force=None)) == "1 contact."
 
 
@@ -66,6 +67,20 @@ def test_csv_has_a_row_a_contact_and_vectors_taken_apart() -> None:
     assert float(rows[0]["joint_torque_Nm_6"]) == 5.0
     assert float(rows[0]["anywhere_least_N"]) == 57.0
     assert contacts_csv([contact_list()]).startswith("recording,number")
+
+
+def test_the_table_for_a_paper_has_units_and_bands() -> None:
+    found = contact_list(contact(), contact(number=2, where="cannot tell", places=(3, 4)))
+    lines = contacts_latex(found).splitlines()
+    (heads,) = (k for k, line in enumerate(lines) if "$|F|$" in line)
+    assert [text.strip() for text in lines[heads + 1][:-2].split("&")] == [
+        "", "[s]", r"\multicolumn{1}{c}{[N]}", r"\multicolumn{1}{c}{[N]}", "", "", "",
+    ]  # fmt: skip
+    first = [text.strip() for text in lines[heads + 3][:-2].split("&")]
+    assert first[1:5] == ["4.60 --   4.78", r"65 $\pm$ 7", "57--78", "+y, down"]
+    assert r"link 3 \ldots{} link 4" in lines[heads + 4]
+    assert lines[heads + 5] == r"\bottomrule"
+    assert "force ON the robot" in lines[-2]
 
 
 def test_a_size_that_depends_on_the_place_is_a_range() -> None:

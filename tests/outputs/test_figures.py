@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ForceCourse
 from vftcli.evaluation.errors import POOLED
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.tuning import Tuned, parse_goal, tune_all, tuning_curves
@@ -77,11 +78,23 @@ def test_forces_stand_above_moments_or_beside_them(pushed: Analysis) -> None:
     assert heads["single"] == ["fx", "mx", "fy", "my", "fz", "mz"]
 
 
+def test_the_force_has_its_band_and_the_number_of_each_contact(touched: Analysis) -> None:
+    assert touched.contacts is not None
+    course = ForceCourse(np.array([1.0, 1.2, 1.5]), np.array([5.0, 65.0, 8.0]), np.full(3, 7.0))
+    first, *others = touched.contacts
+    found = replace(touched.contacts, contacts=(replace(first, course=course), *others))
+    (axes,) = drawn(log_figures(replace(touched, contacts=found))["force"]).axes
+    assert [text.get_text() for text in axes.texts] == ["1", "2"]
+    assert course.force.tolist() in [list(line.get_ydata()) for line in axes.lines]
+    corners = np.vstack([path.vertices for fill in axes.collections for path in fill.get_paths()])
+    assert {(1.2, 58.0), (1.2, 72.0)} <= set(map(tuple, corners.tolist()))
+    empty = replace(touched.contacts, contacts=())
+    assert "force" not in log_figures(replace(touched, contacts=empty))
+
+
 def test_a_log_without_wrench_and_errors_has_no_figures_of_them(
     without_reference: Analysis,
 ) -> None:
-    from dataclasses import replace
-
     bare = replace(without_reference, virtual_sensor=None)
     assert "errors" not in log_figures(bare)
     assert "wrench" not in log_figures(bare)

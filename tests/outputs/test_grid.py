@@ -147,6 +147,7 @@ def test_latex_takes_its_tables(grid: Grid, tmp_path: Path) -> None:
     tables = [
         latex(grid, grid),
         latex(replace(joints, rows=(row,) * 3, notes=("† rests", "*: at the floor"))),
+        latex(replace(grid, title="|F| of link 3 … link 4, 65 ± 7")),
         latex(replace(joints, title="α − ξ ≤ τ", rows=((*row[:-1], "1234567890123"),))),
     ]
     above = (

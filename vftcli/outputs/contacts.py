@@ -5,7 +5,7 @@ The words are the same on screen, page, index and batch.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from vftcli.contacts.contact_list import (
     Unexplained,
 )
 from vftcli.outputs.files import SEAL
-from vftcli.outputs.grid import Column, Grid, csv_rows, words
+from vftcli.outputs.grid import Column, Grid, csv_rows, latex, words
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, ranged
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -34,6 +34,8 @@ PART = 0.35  #: An axis that holds more than this share of a force is named in i
 AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")  #: An axis' two directions, base axes.
 MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 
+#: What the numbers of a table are.
+LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
 #: Field of a list → its key in the record, where both hold one thing.
@@ -277,11 +279,11 @@ def by_force(contact: Contact) -> tuple[bool, float, float]:
 def contact_grid(contacts: Sequence[Contact]) -> Grid:
     """The table of contacts; the joints' torques where no force is known."""
     known = any(contact.peak_force is not None for contact in contacts)
-    size = (Column("|F| [N]"), Column("range"), *words("direction"))
+    size = (Column("|F|", "N", symbol="$|F|$"), Column("range"), *words("direction"))
     columns = (
         Column("#"),
-        *words("from – to [s]"),
-        *(size if known else words("joint torque [N·m]")),
+        Column("from – to", "s", words=True),
+        *(size if known else (Column("joint torque", "N·m", words=True),)),
         *words("where", "trust"),
     )
     rows = []
@@ -295,6 +297,14 @@ def contact_grid(contacts: Sequence[Contact]) -> Grid:
             row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
         rows.append([*row, place_words(contact), contact.trust])
     return Grid(columns, rows)
+
+
+def contacts_latex(found: ContactList) -> str:
+    """A log's contacts as a table for a paper."""
+    grid = contact_grid(found.contacts)
+    columns = [c._replace(unit="N") if c.head == "range" else c for c in grid.columns]
+    title = f"Contacts in {found.recording}"
+    return latex(replace(grid, columns=columns, title=title, notes=(LEGEND,)))
 
 
 def stored_record(estimates: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The figures of one log: torque, errors, wrench, spectra, tuning, responses; gains with theirs."""
+"""The figures of one log, as force, torque, wrench, errors, spectra; gains with theirs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from vftcli.signals.arrays import Array
 
 #: Every figure that a log may have.
-LOG_FIGURES = ("torque", "errors", "wrench", "spectra", "tuning", "responses")
+LOG_FIGURES = ("force", "torque", "errors", "wrench", "spectra", "tuning", "responses")
 TUNED_FIGURES = ("spectra", "tuning")  #: Those beside gains that were found.
 ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
 MOST = 8  #: Most logs in one figure of errors; of more, only their summary.
@@ -64,7 +64,10 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
     name, numbers = analysis.recording.name, numbers_of(analysis.contacts)
     plots = plots_of(drawn_lines(analysis, torque_chart(analysis)))
     title = f"{name}: external torque on the robot about each joint's axis"
-    found = {"torque": Drawing(title, partial(line_figure, plots=plots, numbers=numbers))}
+    found = {}
+    if analysis.contacts is not None and analysis.contacts.hardest is not None:
+        found["force"] = force_drawing(analysis.contacts, analysis.t)
+    found["torque"] = Drawing(title, partial(line_figure, plots=plots, numbers=numbers))
     if analysis.errors is not None:
         found |= error_figures(analysis.errors)
     if (wrench := wrench_chart(analysis)) is not None:
@@ -111,7 +114,7 @@ def plot(
     for joint in joints or ():
         check_known(str(joint), every, f"no joint {joint!r}")
     if what == "contacts" and analysis.contacts is not None:
-        return contacts_figure(analysis.contacts, analysis.t)
+        return on_paper(force_drawing(analysis.contacts, analysis.t).draw)
     if what == "errors" and analysis.errors is not None:
         errors = analysis.errors
         rows = [
@@ -133,7 +136,12 @@ def on_paper(draw: "Callable[[float], Figure]") -> "Figure":
         return draw(WIDTHS["double"])
 
 
-def contacts_figure(found: ContactList, t: "Array | Sequence[float]" = ()) -> "Figure":
+def contacts_figure(found: ContactList) -> "Figure":
+    """A figure for a notebook: |F| of every contact of a list."""
+    return on_paper(force_drawing(found).draw)
+
+
+def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Drawing:
     """|F| of every contact with its 95 % band, under its number; over the log's clock. (T,) [s]"""
     courses = [c.course for c in found.contacts if c.course is not None]
     lines = [ChartLine("|F|", c.force[:, None], half=c.band[:, None], x=c.t) for c in courses]
@@ -146,7 +154,8 @@ def contacts_figure(found: ContactList, t: "Array | Sequence[float]" = ()) -> "F
         spans=spans,
         lowest=0.0,
     )
-    return on_paper(partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found)))
+    draw = partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found))
+    return Drawing(f"{found.recording}: size of the force on the robot, 95 % band", draw)
 
 
 def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> Chart:

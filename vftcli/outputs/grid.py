@@ -279,6 +279,7 @@ def escape_markdown(text: str) -> str:
 LATEX_LETTERS = str.maketrans({
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
     "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+    "…": r"\ldots{}", "±": r"$\pm$", "|": r"$|$",
     "–": "--", "†": r"$\dagger$", "−": "$-$", "×": r"$\times$", "<": r"$<$", "·": r"\,",
     "α": r"$\alpha$", "ξ": r"$\xi$", "µ": r"$\mu$", "τ": r"$\tau$", "σ": r"$\sigma$",
     "ω": r"$\omega$", "≤": r"$\leq$", "≥": r"$\geq$", "→": r"$\rightarrow$",

@@ -14,7 +14,7 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.wrenches import JacobianJudgement
 from vftcli.outputs import NONE, PLAIN, OutputChoice
 from vftcli.outputs import error_tables as tables
-from vftcli.outputs.contacts import contacts_csv, contacts_record
+from vftcli.outputs.contacts import contacts_csv, contacts_latex, contacts_record
 from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_table, put_text
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 #: Files of the errors table, in the order of `tables.FORMS`.
 ERROR_TABLES = ("errors.csv", "errors.json", "errors.md", "errors.tex")
 CONTACTS = ("contacts.json", "contacts.csv")  #: The list of contacts, where it is made.
+CONTACT_TABLE = "figures/contacts.tex"  #: The list for a paper, beside its figures.
 #: What a report of one log may hold; the error tables only where there is a reference.
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
 #: Head above the sub-folders of several logs.
@@ -57,6 +58,7 @@ def report_files(
     `several` is whether there is a sub-folder a log, None for where there is more than one.
     """
     own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
+    own += [CONTACT_TABLE] * (form is not None)
     if not (len(labels) > 1 if several is None else several):
         return own
     above = [*SUMMARY_FILES, *figure_files(form, ERROR_FIGURES)]
@@ -136,6 +138,8 @@ def fill(
     write_extras(folder, place, analysis, choice)
     if form is not None:
         write_figures(folder, log_figures(analysis), form, f"{place}figures/")
+        if analysis.contacts is not None and analysis.contacts.contacts:
+            folder.write(f"{place}{CONTACT_TABLE}", contacts_latex(analysis.contacts))
     return seal(folder, f"{place}{SEAL}", record)
 
 

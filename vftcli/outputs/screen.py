@@ -25,7 +25,7 @@ from vftcli.outputs.believability import (
     log_line,
     own_match,
 )
-from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, otherwise
+from vftcli.outputs.contacts import LEGEND, MOST_ROWS, answer, contact_grid, hardest_rows, otherwise
 from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
 from vftcli.outputs.grid import Column, Grid, GridCell, Rows, terminal
@@ -50,7 +50,6 @@ SUBJECT = 17  #: Columns of what a ground is about.
 #: Remarks that the other observers run on the paper's gains.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 
-LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
 NARROWEST, WIDEST = 72, 100  #: Columns that a screen uses at least, and at most.
 ROWS = 3  #: Lines of the bars.
 #: How full a letter is, from empty to full.
