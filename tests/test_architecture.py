@@ -61,7 +61,7 @@ FILES = (
     "readers/",
     "reproduction/paper.py",  # what a paper prints
     "robots/robot.py",
-    "robots/described.py",
+    "robots/meshes.py",  # the packages near a description
     "robots/robot_file.py",
     "signals/parsing.py",  # our own tables of TOML, each beside its module
     "signals/remarks.py",  # the catalogue of words
