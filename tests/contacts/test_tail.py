@@ -71,6 +71,10 @@ def test_what_happens_more_often_than_the_tail_is_read_off_the_maxima() -> None:
     assert value == 3500.0
     # 100 ± 1.96 √100 = 119.6 and 80.4 of them lie above the ends.
     assert (low, high) == (3480.0, 3520.0)
+    few = tail_of(np.array([1.0, 1.0, 2.0, 3.0, 5.0]))
+    assert few is not None
+    # Of 2 the ends are 2 + 1.96 √2 = 4.8, hence 5, and the largest at the most.
+    assert few.threshold(2.0 / few.hours) == (3.0, (1.0, 5.0))
 
 
 def test_a_rate_that_nearly_every_block_would_have_is_refused() -> None:

@@ -1,11 +1,14 @@
 """Bags: every container and compression, bulk against typed decoding, topics, salvage."""
 
+import bz2
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 from seed_logs import (
     ROWS,
     bag_messages,
@@ -18,6 +21,7 @@ from seed_logs import (
 )
 
 from vftcli.readers import read
+from vftcli.readers.bags.container import ReadBudget, unpacked
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
@@ -26,6 +30,16 @@ STORAGES = [
     ("mcap", "", ""), ("sqlite3", "", ""), ("mcap", "FILE", "ZSTD"), ("sqlite3", "FILE", "ZSTD"),
     ("sqlite3", "MESSAGE", "ZSTD"), ("mcap", "STORAGE", "ZSTD"),
 ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["lz4", "bz2", "zstd"])
+def test_a_chunk_unpacks_to_the_size_that_it_claims_or_not_at_all(name: str) -> None:
+    content, budget = bytes(range(100)), ReadBudget(Path("x"), 1000)
+    pack = {"lz4": lz4.frame.compress, "bz2": bz2.compress, "zstd": zstandard.compress}[name]
+    assert unpacked(budget, name, pack(content), 100) == content
+    for claimed in (99, 101):
+        with pytest.raises(LogError, match=f"does not unpack to {claimed} B"):
+            unpacked(budget, name, pack(content), claimed)
 
 
 def assert_is_the_motion(recording: Recording) -> None:
