@@ -28,11 +28,12 @@ myst_heading_anchors = 3
 autodoc_typehints = "none"  # the signature of a call is long enough without
 autodoc_member_order = "bysource"
 
-OF_NOTEBOOK = ("inspect", "contacts", "estimate", "report", "compare", "thresholds", "identify",
-               "simulate", "admit")  # fmt: skip
-CALLS = ("readers.read", "robots.load_robot", *(f"notebook.{name}" for name in OF_NOTEBOOK))
+CALLS = ("read", "load_robot", "inspect", "notebook.contacts", "estimate", "report", "compare",
+         "thresholds", "identify", "simulate", "admit")  # fmt: skip
 """What a notebook calls, in the order of the table above their reference."""
-HELD = ("analysis.Analysis", "contacts.contact_list.ContactList", "contacts.contact_list.Contact")
+HELD = ("Analysis", "contacts.contact_list.ContactList", "contacts.contact_list.Contact",
+        "ExternalTorque", "Recording", "FilteredDynamicsObserver", "MomentumObserver",
+        "KalmanObserver")  # fmt: skip
 """Classes of which the reference lists every field."""
 
 

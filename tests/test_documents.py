@@ -199,6 +199,22 @@ def test_every_finding_is_documented() -> None:
             assert f"`{entry.get('name', code)}`" in text, code
 
 
+def test_every_sentence_of_the_page_on_troubles_is_printed() -> None:
+    """Its pieces, between what differs from log to log, are in the code or its words."""
+    page = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
+    source = "".join(
+        path.read_text("utf-8")
+        for end in ("py", "toml")
+        for path in ROOT.glob(f"vftcli/**/*.{end}")
+    )
+    source = re.sub(r'"\s*\n\s*f?"', "", source)  # a sentence over several lines
+    rows = re.findall(r"^\| (`[^|]*)\|", page[: page.index("## Questions")], re.MULTILINE)
+    assert len(rows) > 20
+    for quoted in re.findall("`([^`]+)`", "".join(rows)):
+        for piece in quoted.split("…"):
+            assert piece.strip() in source, quoted
+
+
 def test_the_page_for_contributors_gives_a_reason_for_every_package() -> None:
     import tomllib
 
