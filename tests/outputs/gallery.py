@@ -57,7 +57,7 @@ EXHIBITS = (
             Picture("recording", "circle/recording.rrd"),
             *(
                 Picture(name, f"circle/figures/{name}-double.png")
-                for name in ("torque", "wrench", "errors", "spectra")
+                for name in ("torque", "force", "errors", "spectra")
             ),
         ),
     ),
