@@ -44,7 +44,7 @@ def test_refusals_are_one_line(
         (["-o", inside], "one inside the other"),
         (["-o", str(tmp_path / "c"), "--episode", "1"], "leave --interval and --episode out"),
         (["-o", str(tmp_path / "c"), "--add", "sd,force"], "--add force; there is wrench, sd,"),
-        (["-o", str(tmp_path / "c"), "--robot", "ur5"], "Choose the arm of this log with --robot"),
+        (["-o", str(tmp_path / "c"), "--robot", "ur5"], "Choose this log's arm with --robot"),
     ):
         monkeypatch.setattr("sys.argv", ["vftcli", "annotate", str(FIXTURE), *words])
         with pytest.raises(SystemExit) as stop:

@@ -83,7 +83,9 @@ def test_columns_are_filtered_and_made_once(prepared):
     assert log.column("logarithmic", 0, steeper) is not bent
     both = log.friction(0, Shape(("coulomb", "viscous"), 0.01))
     np.testing.assert_array_equal(both[:, 1], viscous)
-    np.testing.assert_array_equal(both[:, 0], log.filtered(np.tanh(dq[:, :1] / 0.01))[:, 0])
+    # tanh of a strided column rounds otherwise on some processors, by its last digit.
+    coulomb = log.filtered(np.tanh(dq[:, :1] / 0.01))[:, 0]
+    np.testing.assert_allclose(both[:, 0], coulomb, rtol=0, atol=1e-15)
     assert log.friction(0, Shape(())).shape == (len(t), 0)
 
 
