@@ -1,6 +1,5 @@
 """The documents are run: every command and snippet in them works on the repository's fixtures."""
 
-import ast
 import json
 import os
 import re
@@ -8,17 +7,15 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
+from run_notebook import NOTEBOOK, code_cells, run_cells
 from typer.testing import CliRunner
 
-from vftcli.cli import COMMANDS, app, make_app
+from vftcli.cli import COMMANDS, app
 from vftcli.observers.table import OBSERVERS
-from vftcli.signals.option import settings_by_name
 from vftcli.signals.version import VERSION
 
 ROOT = Path(__file__).parent.parent
@@ -112,50 +109,34 @@ def test_the_pages_build_as_a_site_without_a_warning(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("folder")
-def test_the_notebook_runs_and_shows_every_result() -> None:
-    notebook = json.loads((ROOT / "docs" / "notebook.ipynb").read_text("utf-8"))
-    names: dict[str, object] = {}
-    shown = 0
-    for cell in notebook["cells"]:
-        if cell["cell_type"] != "code":
-            continue
-        assert not cell["outputs"], "the notebook is kept without what it printed"
-        body = ast.parse("".join(cell["source"])).body
-        last = body.pop() if isinstance(body[-1], ast.Expr) else None
-        exec(compile(ast.Module(body, []), "notebook.ipynb", "exec"), names)
-        if last is not None:
-            value = eval(compile(ast.Expression(last.value), "notebook.ipynb", "eval"), names)
-            assert "<table" in value._repr_html_(), ast.unparse(last)
-            shown += 1
-    assert shown >= 10
+@pytest.mark.usefixtures("logs")
+def test_the_notebook_shows_what_is_kept_in_it() -> None:
+    """Its tables and words; a picture's bytes go with matplotlib's version."""
+    pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
+    found = run_cells(notebook := json.loads(NOTEBOOK.read_text("utf-8")))
+    texts = [text_of(outputs) for outputs in found]
+    assert texts == [text_of(cell["outputs"]) for cell in code_cells(notebook)]
+    assert sum("image/png" in output.get("data", ()) for cell in found for output in cell) == 2
 
 
-def as_typed(path: Path) -> list[str]:
-    """Every vftcli command of a document: of its blocks, and within its sentences."""
-    text = path.read_text("utf-8").replace("\\\n", " ").replace("\\|", "|")
-    fenced = re.findall(r"^```(?:sh|bash|text|console)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    lines = re.findall(r"(?:^|&& (?:\S*/)?)(?:\$ )?(vftcli .*)$", "\n".join(fenced), re.MULTILINE)
-    return [*lines, *re.findall(r"`(vftcli [^`]+)`", text)]
+def text_of(outputs: list[dict[str, Any]]) -> str:
+    return "".join(line for o in outputs for line in o.get("text") or o["data"]["text/plain"])
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)
-def test_every_command_as_typed_is_one_of_the_program(path: Path) -> None:
-    """Name, options and settings; the changelog also names those that are gone."""
-    if path.name == "changelog.md":
-        return
-    group: Any = typer.main.get_command(make_app())
-    for line in as_typed(path):
-        words = shlex.split(line.partition(" # ")[0])[1:]
-        name = next((word for word in words if word in COMMANDS), "contacts")
-        given = [word.partition("=")[0] for word in words if word.startswith("-")]
-        there = {opt for param in group.commands[name].params for opt in param.opts}
-        assert set(given) <= there | {"--version", "--install-completion", "-h", "--help"}, line
-        kinds = vars(group.commands[name].callback)["choices"]
-        groups = {n.partition(".")[0] for n in settings_by_name(kinds)} | {*OBSERVERS, "kfo"}
-        for word, value in pairwise(words):
-            if word == "--set" and name != "simulate":
-                assert value.partition(".")[0] in groups | AXES, line
+def test_the_notebook_is_small_and_its_words_quote_its_cells() -> None:
+    cells = json.loads(text := NOTEBOOK.read_text("utf-8"))["cells"]
+    prose = "".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    shown = json.dumps([cell.get("outputs") for cell in cells], ensure_ascii=False)
+    forces = re.findall(r"\d+ (?:±|to) \d+ N", prose)
+    assert forces == ["10 to 253 N", "75 ± 19 N"]
+    assert all(force in shown for force in forces)
+    assert len(text) < 100_000
+
+
+def test_the_notebook_says_that_it_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VFT_LOGS", raising=False)
+    with pytest.raises(SystemExit, match="VFT_LOGS names no folder of logs: this story is skipped"):
+        run_cells(json.loads(NOTEBOOK.read_text("utf-8")))
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)
