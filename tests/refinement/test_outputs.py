@@ -34,7 +34,7 @@ def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -
         assert f"sd/rts-auto/{j}" in table.columns
 
 
-def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -> None:
+def test_ribbons_curve_and_spectra_are_charts(worked_up: Analysis) -> None:
     halves = {s.name: s.half for s in torque_chart(worked_up).series if s.half is not None}
     assert set(halves) == {e.name for e in worked_up.estimates}
     band = worked_up.estimates[-1].error_sd
@@ -46,11 +46,7 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
     assert [s.name for s in curve.series] == ["kfo-auto", "rts-auto"]
     assert found.baselines.plain.spectra is not None
     assert len(spectra_chart(found.baselines.plain.spectra).series) == 2
-    page = render(worked_up)
-    assert page.count("<title>Spectrum of the disturbance") == 6
-    assert page.count("<title>Expected error against") == 6
-    assert "What the complete log tells" in page
-    assert "Error budget in N·m rms" in page
+    assert "Error budget in N·m rms" in render(worked_up)
 
 
 def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) -> None:

@@ -1,9 +1,8 @@
 """Charts: what page, recording and figures for papers draw, in which colours, at which samples.
 
-Every chart is drawn as SVG (`page/shell.py`), one small picture a joint or axis, for
-print and for readers without a script; with a script the plotting library draws the
-chosen one large beside them. Of a long log the lowest and the highest sample of every
-stretch stay.
+Every chart is drawn as SVG (`page/shell.py`), one picture a joint or axis, for print and
+for readers without a script; the page's script draws a living one in its place. Of a long
+log the lowest and the highest sample of every stretch stay.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -89,6 +88,7 @@ class Chart(NamedTuple):
     unit: str = "s"  #: Unit of the horizontal axis.
     log: bool = False  #: Whether the horizontal axis is logarithmic.
     lowest: float | None = None  #: Least end of the vertical axis, None for what the lines need.
+    highest: float | None = None  #: Upper end, None for what the lines need.
 
     @classmethod
     def of_one(cls, key: str, title: str, unit: str, x: Array, lines: Iterable[ChartLine]) -> Self:
@@ -110,7 +110,8 @@ class Chart(NamedTuple):
         # A line that does not change has no scale of its own.
         room = 0.05 * (high - low) if high > low else abs(high) or 1.0
         low, high = (low - room, high + room) if low <= high else (-1.0, 1.0)
-        return Span(low if self.lowest is None else max(low, self.lowest), high)
+        low = low if self.lowest is None else max(low, self.lowest)
+        return Span(low, high if self.highest is None else self.highest)
 
     def _drawn_values(self, panel: int) -> Iterator[Array]:
         """What is drawn at once in a panel, line by line: of a long log all have no room."""
@@ -137,6 +138,12 @@ def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
     """Colour and dash of every name: the first has a line without gaps."""
     colours = colours_of_names(names).items()
     return {name: (colour, DASHES[k % len(DASHES)]) for k, (name, colour) in enumerate(colours)}
+
+
+def paint(colour: str) -> str:
+    """A line's colour in the page: `best` is the force's, and two follow the scheme."""
+    own = {COLOURS["best"]: "force", INK: INK, REFERENCE: REFERENCE}
+    return f"var(--{own[colour]})" if colour in own else colour
 
 
 def families_of(limits: Array) -> tuple[int, ...]:

@@ -123,18 +123,19 @@ def fill(
     analysis = replace(analysis, run=record)
     # Without the package `left_out` says how to get it.
     recorded = choice.detail != NONE and installed("rerun")
-    for name in steps(["index.html", *["recording.rrd"] * recorded, "estimates.parquet"]):
+    for name in steps(["estimates.parquet", *["recording.rrd"] * recorded, "index.html"]):
         path = folder / f"{place}{name}"
-        if name == "index.html":
-            put_text(path, render(analysis))
+        if name == "estimates.parquet":
+            write_estimates(path, analysis)
+            put_errors(folder, place, analysis.errors, [analysis])
+            put_contacts(folder, place, [analysis], command)
         elif name == "recording.rrd":
             from vftcli.outputs.rerun_recording import write_rrd
 
             write_rrd(path, analysis, choice.detail)
         else:
-            write_estimates(path, analysis)
-    put_errors(folder, place, analysis.errors, [analysis])
-    put_contacts(folder, place, [analysis], command)
+            sizes = {file.name: file.stat().st_size for file in sorted(path.parent.iterdir())}
+            put_text(path, render(analysis, {**sizes, SEAL: None}))
     write_extras(folder, place, analysis, choice)
     if form is not None:
         write_figures(folder, log_figures(analysis), form, f"{place}figures/")

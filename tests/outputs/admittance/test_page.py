@@ -16,12 +16,12 @@ def test_the_page_shows_every_part(release: Replay) -> None:
     assert "<h2>Comparison</h2>" in page
     for heading in ("Deviation", "Parameters", "Stability before motion"):
         assert f"<summary>{heading}" in page
-    assert "Conventions and provenance" in page
+    assert "How this was made" in page
     assert "<release>" not in page
     assert "vftcli admit --release x=0.1" in page
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
     assert data is not None
-    assert json.loads(data.group(1))[0]["panels"] == ["x", "y", "z", "rx", "ry", "rz"]
+    assert json.loads(data.group(1))["charts"][0]["panels"] == ["x", "y", "z", "rx", "ry", "rz"]
 
 
 def test_rows_bear_the_name_that_the_legend_has(release: Replay) -> None:

@@ -1,130 +1,453 @@
-"""The pages in a real browser: drawn, printed, linked, by the keyboard, without a script."""
+"""The pages in a real browser: one moment everywhere, by pointer and keys, on paper, without JS."""
 
+import csv
+import io
 import re
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.page.pages import render, render_index
+from vftcli.robots.chain import link_poses
 
 FOCUSED = """() => { const x = document.activeElement; const style = getComputedStyle(x);
-  return { words: x.textContent.trim(), tag: x.tagName, seen: style.outlineStyle !== "none" } }"""
+  return { words: x.textContent.trim(), id: x.id, tag: x.tagName,
+           seen: style.outlineStyle !== "none" } }"""
+#: Contrast of every text with what is behind it, the least first. (WCAG 2.2, 1.4.3)
+CONTRASTS = """() => {
+  const parse = (text) => (text.match(/[\\d.]+/g) || []).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((v) => { v /= 255;
+    return v <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; })
+    .reduce((sum, v, k) => sum + v * [.2126, .7152, .0722][k], 0);
+  const behind = (x) => { for (; x; x = x.parentElement) {
+    const colour = parse(getComputedStyle(x).backgroundColor);
+    if (colour.length === 3 || colour[3] === 1) return colour; } return [255, 255, 255]; };
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
+  for (let at = walker.nextNode(); at; at = walker.nextNode()) {
+    const x = at.parentElement;
+    if (!at.data.trim() || !x.checkVisibility() || x.closest("svg, script, style")) continue;
+    const [a, b] = [light(parse(getComputedStyle(x).color)), light(behind(x))].sort();
+    found.push([(b + .05) / (a + .05), at.data.trim().slice(0, 40)]);
+  }
+  return found.sort(([a], [b]) => a - b).slice(0, 5);
+}"""
 
 
 @pytest.fixture(scope="module")
 def html(pushed: Analysis) -> str:
-    return render(pushed)
+    return render(pushed, {"estimates.parquet": 1000})
+
+
+def live(tab: Any) -> Any:
+    """The page when its script has unpacked the data."""
+    tab.page.wait_for_selector("html.js")
+    tab.page.wait_for_timeout(50)  # a frame or two
+    return tab.page
+
+
+def number(page: Any) -> str:
+    """The large number beside the arm."""
+    return " ".join(page.locator(".now b").inner_text().split())
+
+
+def settled(page: Any) -> None:
+    """Wait until nothing glides."""
+    page.wait_for_function("() => !vftcli.clock.way")
+    page.wait_for_timeout(50)
+
+
+def place_of(page: Any, chart: str, t: float, panel: int = 0) -> tuple[float, float]:
+    """Where a time is on a panel, in the window."""
+    figure = (
+        page.locator(chart).locator("figure").nth(panel)
+        if chart != "#force"
+        else page.locator(chart)
+    )
+    figure.scroll_into_view_if_needed()
+    box = figure.locator(".box").bounding_box()
+    low, high = page.evaluate("vftcli.clock.view")
+    # Numbers take 44 pixels on the left, 10 are free on the right.
+    x = box["x"] + 44 + (t - low) / (high - low) * (box["width"] - 54)
+    return x, box["y"] + box["height"] / 2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["pushed", "analysis", "with_wrench"])
-def test_every_chart_is_drawn_and_no_error_is_told(
+@pytest.mark.parametrize("name", ["pushed", "analysis", "with_wrench", "touched"])
+def test_nothing_is_asked_for_nor_told_and_everything_is_drawn(
     opened: Callable, request: pytest.FixtureRequest, name: str
 ) -> None:
-    tab = opened(render(request.getfixturevalue(name)))
+    text = render(request.getfixturevalue(name))
+    assert "NaN" not in text.partition('<script type="module">')[0]
+    assert "{{" not in text
+    tab = opened(text)
+    asked: list[str] = []
+    tab.page.on("request", lambda request: asked.append(request.url))
+    tab.page.reload()
+    page = live(tab)
     tab.unfold()
-    assert tab.page.locator(".large canvas").count() >= 1
+    page.wait_for_timeout(100)
     assert tab.blank_charts() == []
     assert tab.errors == []
+    assert [url for url in asked if not url.startswith("blob:")] == [page.url]
 
 
-def test_printed_everything_is_there(opened: Callable, html: str) -> None:
-    tab = opened(html)
-    tab.page.emulate_media(media="print")
-    # What is folded away on the screen is not on paper; large charts have their small ones.
-    assert tab.page.locator("details[open]").count() == 0
-    folded = tab.page.locator("details .multiples figure svg")
-    assert folded.count() >= 12
-    for k in range(folded.count()):
-        assert (folded.nth(k).bounding_box() or {"height": 0})["height"] > 20
-    assert not any(large.is_visible() for large in tab.page.locator(".large").all())
-    printed = tab.page.pdf(format="A4")
-    assert printed.startswith(b"%PDF")
-    assert 3 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 15
-    # A page of words and charts; a blank one is below 2 kB.
-    assert len(printed) > 100_000
+def test_it_opens_at_the_hardest_contact_and_says_one_number(
+    opened: Callable, html: str, pushed: Analysis
+) -> None:
+    page = live(opened(html))
+    assert number(page) == "95 ± 9 N"
+    assert number(page) in page.locator("h1").inner_text()
+    row = page.locator("tr[aria-current]")
+    assert row.count() == 1
+    assert "95 ± 9 N" in row.inner_text()
+    assert page.locator("#clock").inner_text() == f"{pushed.contacts.contacts[5].peak:.2f} s"
 
 
-def test_rows_and_chart_lead_to_one_another(opened: Callable, html: str, pushed: Analysis) -> None:
-    assert pushed.contacts is not None
-    tab = opened(html)
-    rows = tab.page.locator("table.contacts tbody tr")
-    assert rows.count() == len(pushed.contacts.contacts) == 12
-    rows.nth(6).locator("a").click()
-    assert tab.page.url.endswith("#mark-7")
-    assert tab.page.evaluate("document.querySelector(':target').matches('rect.contact')")
-    tab.page.locator(".hero .wide a", has_text="9").first.click()
-    assert tab.page.url.endswith("#contact-9")
-    ninth = pushed.contacts.contacts[8]
-    assert (
-        f"{ninth.peak_force:.0f} ± {ninth.peak_band:.0f} N"
-        in tab.page.locator("tr:target").inner_text()
+@pytest.mark.slow
+def test_a_row_goes_there_everywhere(opened: Callable, html: str, pushed: Analysis) -> None:
+    page = live(opened(html))
+    rows = page.locator(".contacts tbody tr")
+    assert rows.count() == len(pushed.contacts.contacts)
+    for k, contact in enumerate(pushed.contacts.contacts):
+        rows.nth(k).click()
+        settled(page)
+        assert number(page) == " ".join(rows.nth(k).locator(".force").inner_text().split())
+        assert page.evaluate("vftcli.clock.head") == pytest.approx(contact.peak, abs=0.0041)
+        assert rows.nth(k).get_attribute("aria-current") == "true"
+        assert page.locator("tr[aria-current]").count() == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["pushed", "recording_of_a_panda"])
+def test_the_arm_moves_as_the_kinematics_have_it(
+    opened: Callable, request: pytest.FixtureRequest, name: str
+) -> None:
+    """At 20 times, within 1 mm: positions are held to 2e-4 rad."""
+    analysis: Analysis = request.getfixturevalue(name)
+    page = live(opened(render(analysis)))
+    samples = np.linspace(0, len(analysis.t) - 1, 20).astype(int)
+    poses = link_poses(analysis.robot.chain, analysis.recording.q[samples])
+    found = page.evaluate(
+        "times => times.map((t) => vftcli.arm.poses(t))", analysis.t[samples].tolist()
     )
+    for k in range(len(samples)):
+        origins = np.array([origin for _, origin in found[k]])[1:]
+        np.testing.assert_allclose(origins, poses.translation[k], atol=1e-3)
+        rotations = np.array([turned for turned, _ in found[k]])[1:].reshape(-1, 3, 3)
+        # Seven joints, half a step of 2e-4 rad each.
+        np.testing.assert_allclose(rotations, poses.rotation[k], atol=7e-4)
 
 
-def test_the_keyboard_reaches_everything_in_the_order_of_the_page(
+@pytest.fixture(scope="session")
+def recording_of_a_panda() -> Analysis:
+    """Seven joints of the simulated Panda that lifts a bearing."""
+    from pathlib import Path
+
+    from vftcli.pipeline import AnalysisChoice, analyse_log
+    from vftcli.robots.choice import RobotChoice
+
+    log = Path(__file__).parents[3] / "fixtures" / "panda_bearing.csv"
+    return analyse_log(log, AnalysisChoice(robot=RobotChoice(name="panda"), contacts=False))
+
+
+def test_a_look_shows_one_moment_everywhere_and_comes_back(
+    opened: Callable, html: str, pushed: Analysis
+) -> None:
+    page = live(opened(html))
+    before = number(page), page.locator("#clock").inner_text()
+    t = 13.0
+    page.mouse.move(*place_of(page, "#torques", t, 2))
+    page.wait_for_timeout(60)
+    now = page.evaluate("vftcli.clock.now")
+    pixel = np.diff(page.evaluate("vftcli.clock.view"))[0] / 400.0
+    assert abs(now - t) < pixel
+    at = int(np.argmin(np.abs(pushed.t - now)))
+    best = next(e for e in pushed.estimates if e.name == "best")
+    heads = page.locator("#torques .head").all_inner_texts()
+    for joint, head in enumerate(heads):
+        shown = float(head.split()[0].replace("−", "-"))
+        # Two or three digits, half a step of 0.01 N·m below them.
+        assert shown == pytest.approx(best.tau[at, joint], abs=0.056)
+    assert page.locator("#clock").inner_text() == f"{now:.2f} s"
+    contact = pushed.contacts.contacts[6]
+    assert contact.start < now < contact.stop
+    assert "contact 7" in page.locator(".now span").inner_text()
+    force = np.interp(now, contact.course.t, contact.course.force)
+    assert float(number(page).split()[0]) == pytest.approx(force, abs=3.0)  # 8 ms of a push
+    page.mouse.move(5, 5)
+    page.wait_for_timeout(60)
+    assert (number(page), page.locator("#clock").inner_text()) == before
+
+
+@pytest.mark.slow
+def test_a_click_stays_a_drag_zooms_and_a_file_holds_what_is_seen(
+    opened: Callable, html: str, pushed: Analysis
+) -> None:
+    page = live(opened(html))
+    x, y = place_of(page, "#force", 6.3)
+    page.mouse.click(x, y)
+    page.mouse.move(5, 5)
+    page.wait_for_timeout(60)
+    assert page.evaluate("vftcli.clock.now") == pytest.approx(6.3, abs=0.02)
+    (left, y), (right, _) = (place_of(page, "#force", t) for t in (6.0, 8.0))
+    page.mouse.move(left, y)
+    page.mouse.down()
+    page.mouse.move(0.5 * (left + right), y)
+    assert page.locator("#force .chosen").is_visible()
+    page.mouse.move(right, y)
+    page.mouse.up()
+    assert page.evaluate("vftcli.clock.view") == pytest.approx([6.0, 8.0], abs=0.02)
+    low, high = page.evaluate("vftcli.clock.view")
+    page.locator("#torques .chip", has_text="gmo").click()
+    with page.expect_download() as waited:
+        page.locator("#torques .csv").click()
+    comment, _, table = waited.value.path().read_text("utf-8").partition("\n")
+    assert comment.startswith("# ur5_circle.csv · sha256 ")
+    head, *lines = csv.reader(io.StringIO(table))
+    assert head[0] == "t [s]"
+    assert "J3 gmo [N·m]" in head
+    assert "J3 best ± [N·m]" in head
+    inside = (pushed.t >= low) & (pushed.t <= high)
+    values = np.array([[float(x or "nan") for x in line] for line in lines])
+    np.testing.assert_allclose(values[:, 0], pushed.t[inside], atol=1e-4)
+    gmo = next(e for e in pushed.estimates if e.name == "gmo")
+    found = values[:, head.index("J3 gmo [N·m]")]
+    np.testing.assert_allclose(found, gmo.tau[inside, 2], atol=0.0051)
+    with page.expect_download() as waited:
+        page.locator("#torques .png").click()
+    image = waited.value.path().read_bytes()
+    assert image.startswith(b"\x89PNG")
+    assert len(image) > 20_000  # a blank sheet of this size has 5 kB
+    assert page.locator("#torques .whole").is_visible()
+    page.keyboard.press("Escape")
+    assert page.evaluate("vftcli.clock.view") == [0.0, pytest.approx(20.0)]
+    assert not page.locator("#torques .whole").is_visible()
+
+
+def test_the_plain_wheel_scrolls_and_with_ctrl_it_zooms(opened: Callable, html: str) -> None:
+    page = live(opened(html))
+    x, y = place_of(page, "#force", 10.0)
+    page.mouse.move(x, y)
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -100)
+    page.keyboard.up("Control")
+    page.wait_for_timeout(60)
+    low, high = page.evaluate("vftcli.clock.view")
+    assert high - low == pytest.approx(20.0 / 1.2, rel=1e-3)
+    assert (10.0 - low) / (high - low) == pytest.approx(0.5, abs=0.01)
+    page.mouse.wheel(0, 300)
+    page.wait_for_timeout(300)
+    assert page.evaluate("scrollY") > 0
+    assert page.evaluate("vftcli.clock.view") == [low, high]
+
+
+@pytest.mark.slow
+def test_the_keyboard_reaches_and_does_everything(opened: Callable, html: str) -> None:
+    page = live(opened(html, reduced_motion="reduce"))
+    order = []
+    for _ in range(9 + 12):
+        page.keyboard.press("Tab")
+        order.append(page.evaluate(FOCUSED))
+    assert all(each["seen"] for each in order)
+    ids = [each["id"] or each["words"] for each in order]
+    assert ids[1:6] == ["reset", "play", "speed", "previous", "next"]
+    assert ids[6:9] == ["CSV", "PNG", "slider"]
+    assert ids[9:] == [str(k) for k in range(1, 13)]
+
+
+@pytest.mark.slow
+def test_keys_go_play_zoom_and_turn(opened: Callable, html: str) -> None:
+    page = live(opened(html, reduced_motion="reduce"))
+    page.locator(".contacts a").nth(4).focus()
+    page.keyboard.press("Enter")
+    page.wait_for_timeout(60)
+    assert "contact 5" in page.locator(".now span").inner_text()
+    page.keyboard.press("n")
+    page.wait_for_timeout(60)
+    assert "contact 6" in page.locator(".now span").inner_text()
+    page.keyboard.press("p")
+    page.wait_for_timeout(60)
+    assert "contact 5" in page.locator(".now span").inner_text()
+    page.keyboard.press("+")
+    low, high = page.evaluate("vftcli.clock.view")
+    assert high - low == pytest.approx(0.67 * 20.0, rel=1e-6)
+    page.keyboard.press("Escape")
+    assert page.evaluate("vftcli.clock.view") == [0.0, pytest.approx(20.0)]
+    page.locator("#arm canvas").focus()
+    yaw = page.evaluate("vftcli.arm.yaw")
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate("vftcli.arm.yaw") == pytest.approx(yaw + 0.12)
+    page.keyboard.press("0")
+    assert page.evaluate("vftcli.arm.yaw") == yaw
+    before = page.evaluate("vftcli.clock.head")
+    page.keyboard.press(" ")
+    page.wait_for_timeout(200)
+    assert page.evaluate("vftcli.clock.running")
+    assert page.evaluate("vftcli.clock.head") > before
+
+
+def test_the_slider_goes_by_samples_and_seconds_and_says_what_it_reads(
     opened: Callable, html: str
 ) -> None:
-    tab = opened(html)
-    seen = []
-    for _ in range(12 + 12 + 3):
-        tab.page.keyboard.press("Tab")
-        seen.append(tab.page.evaluate(FOCUSED))
-    numbers = [str(k) for k in range(1, 13)]
-    assert [x["words"] for x in seen[:24]] == [*numbers, *numbers]  # the chart's, then the rows'
-    assert [x["tag"] for x in seen[24:]] == ["SUMMARY"] * 3
-    assert all(x["seen"] for x in seen)
-    tab.page.keyboard.press("Shift+Tab")
-    tab.page.keyboard.press("Shift+Tab")
-    tab.page.keyboard.press("Enter")
-    assert tab.page.locator("#torques[open]").count() == 1
+    page = live(opened(html))
+    page.locator("#slider").focus()
+    before = page.evaluate("vftcli.clock.head")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("vftcli.clock.head") == pytest.approx(before + 0.008)
+    page.keyboard.press("PageUp")
+    assert page.evaluate("vftcli.clock.head") == pytest.approx(before + 1.008)
+    page.wait_for_timeout(60)
+    assert re.match(r"12\.33 s, < 4 N\s+no contact", page.evaluate("slider.ariaValueText"))
 
 
-def test_observers_come_on_demand(opened: Callable, html: str) -> None:
-    tab = opened(html)
-    tab.unfold()
-    large = tab.page.locator("#torques .large")
-    gmo = large.get_by_role("button", name="gmo")
-    assert gmo.get_attribute("aria-pressed") == "false"
-    before = large.locator("canvas").screenshot()
-    gmo.click()
-    assert gmo.get_attribute("aria-pressed") == "true"
-    assert large.locator("canvas").screenshot() != before
-    large.get_by_role("button", name="J3", exact=True).click()
-    assert large.locator(".plot").get_attribute("aria-label").endswith("J3 in N·m")
-    large.locator(".plot").focus()
-    tab.page.keyboard.press("+")
-    assert tab.errors == []
+def test_nothing_glides_where_motion_is_unwanted(opened: Callable, html: str) -> None:
+    page = live(opened(html, reduced_motion="reduce"))
+    page.locator("#contact-1").click()
+    assert page.evaluate("[vftcli.clock.way, vftcli.clock.head]") == [None, pytest.approx(5.12)]
+    page = live(opened(html))
+    page.locator("#contact-1").click()
+    assert page.evaluate("vftcli.clock.way !== null")
+
+
+def test_a_finger_goes_to_the_time_it_touches(opened: Callable, html: str) -> None:
+    page = live(opened(html, 400, has_touch=True))
+    page.touchscreen.tap(*place_of(page, "#force", 7.3))
+    page.wait_for_timeout(60)
+    assert page.evaluate("vftcli.clock.head") == pytest.approx(7.3, abs=0.06)  # a pixel
+    assert "contact 3" in page.locator(".now span").inner_text()
+
+
+def test_the_arm_docks_follows_and_stays_shut(opened: Callable, html: str) -> None:
+    page = live(opened(html))
+    dock = page.locator("#dock")
+    assert not dock.is_visible()
+    page.mouse.move(*place_of(page, "#torques", 5.12, 4))
+    page.wait_for_timeout(150)
+    assert dock.is_visible()
+    assert "contact 1" in dock.inner_text()
+    box = dock.bounding_box()
+    assert (round(box["width"]), round(box["height"])) == (300, 230)
+    page.locator("#undock").click()
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(100)
+    page.evaluate("scrollTo(0, 5000)")
+    page.wait_for_timeout(100)
+    assert not dock.is_visible()
+    assert page.locator("#arm canvas").count() == 1
+
+
+def test_printed_everything_is_there(opened: Callable, html: str, pushed: Analysis) -> None:
+    page = live(opened(html))
+    printed = page.pdf(format="A4")
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 4
+    assert len(printed) > 100_000  # a page of words and charts; a blank one is below 2 kB
+    page.emulate_media(media="print", color_scheme="dark")
+    assert page.locator("details:not([open])").count() == 0 or all(
+        (svg.bounding_box() or {"height": 0})["height"] > 20
+        for svg in page.locator("details figure svg").all()
+    )
+    # The drawings are there, what a pointer moves is not.
+    for still in page.locator("figure > svg, .view > svg").all():
+        assert still.evaluate("x => getComputedStyle(x).visibility") == "visible"
+    assert not any(x.is_visible() for x in page.locator(".live").all())
+    words = " ".join(page.locator("body").inner_text().split())
+    for contact in pushed.contacts.contacts:
+        assert f"{contact.peak:.1f} s" in words
+    assert page.evaluate("getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
 
 
 def test_without_a_script_the_page_answers(opened: Callable, html: str) -> None:
-    tab = opened(html, java_script_enabled=False)
-    assert "12 contacts" in tab.page.locator("h1").inner_text()
-    for place in (".hero svg.wide", "#contacts", "#believed"):
-        assert tab.page.locator(place).is_visible()
-    tab.page.locator("#torques summary").click()
-    small = tab.page.locator("#torques .multiples svg")
-    assert small.count() == 6
-    assert all(each.is_visible() for each in small.all())
+    page = opened(html, java_script_enabled=False).page
+    assert "12 contacts" in page.locator("h1").inner_text()
+    for place in ("#force svg", "#arm svg", "#contacts", "#believed"):
+        assert page.locator(place).is_visible()
+    torques = page.locator("#torques figure svg")
+    assert torques.count() == 6
+    assert all(each.is_visible() for each in torques.all())
+    assert not any(each.is_visible() for each in page.locator(".live").all())
+    page.locator(".contacts a").nth(6).click()
+    assert page.url.endswith("#mark-7")
+    page.locator("#force a", has_text="9").first.click()
+    assert page.url.endswith("#contact-9")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [400, 1280])
-def test_nothing_sticks_out(opened: Callable, html: str, width: int, scheme: str) -> None:
+def test_nothing_sticks_out_and_every_word_can_be_read(
+    opened: Callable, html: str, width: int, scheme: str
+) -> None:
     tab = opened(html, width, color_scheme=scheme)
+    live(tab)
     assert tab.overflow <= 0
     tab.unfold()
     assert tab.overflow <= 0
+    least = tab.page.evaluate(CONTRASTS)
+    assert least[0][0] >= 4.5, least
     paper = tab.page.evaluate("getComputedStyle(document.body).backgroundColor")
     bright = sum(map(int, re.findall(r"\d+", paper)[:3])) > 380
     assert bright == (scheme == "light")
 
 
-def test_the_index_needs_no_script(
+@pytest.mark.slow
+def test_a_change_of_scheme_redraws(opened: Callable, html: str) -> None:
+    page = live(opened(html))
+    before = page.locator("#force canvas").screenshot()
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_timeout(100)
+    assert page.locator("#force canvas").screenshot() != before
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(15, 19, 23)"
+
+
+@pytest.mark.slow
+def test_hostile_names_stay_words(opened: Callable, analysis: Analysis) -> None:
+    name = "</script><b id=evil>x</b>"
+    best, first, *others = analysis.estimates
+    log = replace(analysis.motion.log, robot=replace(analysis.robot, title=name))
+    made = replace(
+        analysis,
+        motion=replace(analysis.motion, log=log),
+        estimates=(best, replace(first, name=name), *others),
+    )
+    tab = opened(render(made))
+    page = live(tab)
+    assert page.locator("#evil").count() == 0
+    assert name in page.locator(".eyebrow").inner_text()
+    page.locator("#torques .chip", has_text="</script>").click()
+    page.wait_for_timeout(60)
+    assert tab.errors == []
+
+
+@pytest.mark.slow
+def test_a_frame_of_play_is_quick(opened: Callable, html: str) -> None:
+    """The median of 120 frames, drawn one after the other."""
+    page = live(opened(html))
+    took = page.evaluate(
+        """() => Array.from({ length: 120 }, (_, k) => {
+          vftcli.clock.head = 4 + k / 10;
+          const start = performance.now();
+          for (const plot of vftcli.clock.plots) plot.draw(1);
+          vftcli.clock.moved();
+          return performance.now() - start;
+        }).sort((a, b) => a - b)[60]"""
+    )
+    assert took <= 8.0
+
+
+def test_the_index_sorts_by_its_heads(
     opened: Callable, pushed: Analysis, without_reference: Analysis
 ) -> None:
     tab = opened(render_index([("a", pushed), ("b", without_reference)]), 400)
     assert tab.errors == []
     assert tab.overflow <= 0
-    assert tab.page.locator("tbody a").count() >= 2
+    head = tab.page.locator(".sorts thead th").nth(2)  # the span: 20.0 and 5.2 s
+    rows = tab.page.locator(".sorts tbody tr")
+    head.click()
+    assert "5.2 s" in rows.nth(0).inner_text()
+    head.focus()
+    tab.page.keyboard.press("Enter")
+    assert "20.0 s" in rows.nth(0).inner_text()
+    assert head.get_attribute("aria-sort") == "descending"

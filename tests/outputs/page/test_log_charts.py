@@ -8,6 +8,8 @@ from vftcli.outputs.charts import REFERENCE
 from vftcli.outputs.page.log_charts import (
     LOWEST,
     condition_charts,
+    force_chart,
+    highest,
     response_charts,
     torque_chart,
     wrench_chart,
@@ -48,7 +50,6 @@ def test_scales_are_said(analysis: Analysis) -> None:
         "One scale in J1–J2; the others have their own."
     )
     assert scale_words(chart._replace(families=())) == "Every joint has its own scale."
-    assert "best; 4 more on demand" in render(analysis)
 
 
 def test_a_first_order_response_is_3_db_down_at_its_cutoff(analysis: Analysis) -> None:
@@ -94,8 +95,40 @@ def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
     np.testing.assert_array_equal(leading.values, known)
     assert [line.shown for line in chart.series if not line.leads] == [False] * 4
     html = render(with_wrench)
-    assert html.count('data-panel="0"') >= 2  # fx, and what the pose can tell
+    assert html.count('data-panel="5"') == 2  # J6 and mz
     assert "ON the robot in base axes" in html
+
+
+def test_the_force_is_that_of_the_contacts_and_has_their_peaks(pushed: Analysis) -> None:
+    found = pushed.contacts
+    assert found is not None
+    chart = force_chart(pushed, found)
+    (line,) = chart.series
+    force, t = line.values[:, 0], pushed.t
+    inside = np.zeros(len(t), dtype=bool)
+    for c in found.contacts:
+        assert c.course is not None
+        own = (t >= c.course.t[0]) & (t <= c.course.t[-1])
+        inside |= own
+        assert force[np.argmin(np.abs(t - c.peak))] == c.peak_force
+        # The line between two blocks never leaves them.
+        assert np.nanmax(force[own]) <= c.peak_force * (1 + 1e-12)
+    assert np.isfinite(force[inside]).all()
+    assert np.isnan(force[~inside]).all()
+    assert chart.spans == tuple((c.start, c.stop) for c in found.contacts)
+
+
+def test_the_axis_of_the_force_holds_every_peak_with_its_band(pushed: Analysis) -> None:
+    found = pushed.contacts
+    assert found is not None
+    tops = [(c.peak_force or 0.0) + (c.peak_band or 0.0) for c in found.contacts]
+    assert highest(found) > max(tops)
+    assert highest(replace(found, contacts=())) == 2.5 * (found.detectable_force or 0.0)
+    assert highest(replace(found, contacts=(), smallest_force=None)) == 1.0
+    # A band wider than its force stretches no axis.
+    wide = replace(found.contacts[0], peak_force=88.0, peak_band=900.0)
+    assert highest(replace(found, contacts=(wide,))) < 250.0
+    assert force_chart(pushed, found).ends(0) == (0.0, highest(found))
 
 
 def test_the_band_is_grey_where_no_contact_is_listed(pushed: Analysis) -> None:

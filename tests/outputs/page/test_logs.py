@@ -103,7 +103,7 @@ def test_one_line_a_log_the_worst_first_and_what_failed() -> None:
     assert "2 logs, 1 of 2 touched." in page
     assert "1 log could not be analysed." in page
     assert "LogError" in page
-    assert "aria-sort" in page
+    assert "ariaSort" in page
 
 
 def test_a_batch_of_failures_alone_has_a_page() -> None:

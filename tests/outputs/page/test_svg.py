@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from vftcli.outputs.page.shell import (
     label,
     part,
     path_of,
+    polyline,
     ribbon,
     stripes,
     ticks,
@@ -59,7 +62,16 @@ def test_a_line_breaks_where_nothing_is_known() -> None:
 
 
 def test_what_is_far_outside_stays_near() -> None:
-    assert path_of(SCALES, np.array([0.0, 1.0]), np.array([0.0, 1e9])) == "M0.0 100.0 10.0 -100.0"
+    assert path_of(SCALES, np.array([0.0, 1.0]), np.array([0.0, 1e9])) == "M0 100l10-200"
+
+
+def test_a_path_is_drawn_to_a_tenth_without_its_errors_adding_up() -> None:
+    """Moves of 0.04 are nothing, ten of them 0.4."""
+    assert polyline([[0.0, 0.0], [0.5, -1.1], [0.6, 9.0]]) == "M0 0l.5-1.1 .1 10.1"
+    points = np.column_stack([0.04 * np.arange(11), np.zeros(11)])
+    moves = re.findall(r"-?[\d.]+", polyline(points).partition("l")[2])[::2]
+    assert sum(map(float, moves)) == pytest.approx(0.4)
+    assert polyline([[3.0, 4.0]]) == "M3 4h.01"
 
 
 def test_a_stripe_stays_in_the_plot() -> None:

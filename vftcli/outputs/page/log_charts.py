@@ -10,6 +10,7 @@ from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import Curve
 from vftcli.outputs.charts import (
+    COLOURS,
     REFERENCE,
     Chart,
     ChartLine,
@@ -182,6 +183,38 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
     )
 
 
+def force_chart(analysis: Analysis, found: ContactList) -> Chart:
+    """|F| of every listed contact with its band, the reference's below it."""
+    t, sensed = analysis.t, analysis.virtual_sensor
+    force, half = np.full((2, len(t), 1), np.nan)
+    for contact in found.contacts:
+        if (course := contact.course) is not None:
+            inside = (t >= course.t[0]) & (t <= course.t[-1])
+            force[inside, 0] = np.interp(t[inside], course.t, course.force)
+            half[inside, 0] = np.interp(t[inside], course.t, course.band)
+            # The peak may be between two samples: the nearest one has its size.
+            force[np.argmin(np.abs(t - contact.peak))] = contact.peak_force
+    lines = [ChartLine("best", force, COLOURS[BEST], half=half, leads=True)]
+    if sensed is not None and sensed.reference is not None:
+        size = sensed.reference.size[:, None]
+        lines.insert(0, ChartLine(reference_name(analysis), size, REFERENCE))
+    chart = Chart.of_one("force", "Force on the robot", "N", t, lines)
+    spans = contact_spans(found)
+    return chart._replace(spans=spans, lowest=0.0, highest=highest(found, lines[:-1]))
+
+
+def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
+    """Upper end of the axis: peaks with bands, the least visible force, other lines. [N]"""
+    top = max(2.5 * (found.detectable_force or 0.0), 0.0)
+    top = max([top, *(1.05 * float(np.nanmax(line.values, initial=0.0)) for line in others)])
+    for contact in found.contacts:
+        if contact.peak_force is not None and contact.peak_band is not None:
+            # A band wider than its force leaves the chart.
+            peak = contact.peak_force + min(contact.peak_band, contact.peak_force)
+            top = max(top, 1.12 * peak)
+    return top or 1.0
+
+
 def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     """σ_min with the masked zone, what the solver says there, and the null-space channel."""
     sensed = analysis.virtual_sensor
@@ -216,16 +249,6 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         yield Chart.of_one("null_space", title, "N·m", t, lines)._replace(
             band=None if limit is None else np.array([limit]), band_label="free part"
         )
-
-
-def refined_charts(analysis: Analysis) -> list[Chart]:
-    """Spectra and tuning of a complete log, as far as there are any."""
-    found, charts = analysis.refinement, list[Chart]()
-    if found is not None and (spectra := found.baselines.plain.spectra) is not None:
-        charts.append(spectra_chart(spectra))
-    if found is not None and found.curves:
-        charts.append(tuning_chart(found.curves, observer_styles(analysis)))
-    return charts
 
 
 def spectra_chart(found: Spectra) -> Chart:

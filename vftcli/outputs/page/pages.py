@@ -1,6 +1,8 @@
 """The pages of one log, of several logs and of a batch: what each of them is filled with."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from types import MappingProxyType
@@ -14,7 +16,6 @@ from vftcli.outputs.contacts import by_force, hardest_words, otherwise
 from vftcli.outputs.error_tables import (
     axis_grids,
     blocks,
-    detail_grids,
     marks_on_page,
     nothing_to_compare,
     rmse_grid,
@@ -23,7 +24,8 @@ from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import Grid, GridCell, words
 from vftcli.outputs.grids import contact_grids, drift_grid
 from vftcli.outputs.page import details, log_charts
-from vftcli.outputs.page.shell import page, part
+from vftcli.outputs.page.shell import Box, page, part, scales_of
+from vftcli.outputs.page.stage import free_spans, stage_data, still_arm, view_of
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
 from vftcli.outputs.run_record import run_record
 from vftcli.signals.remarks import sentence
@@ -32,25 +34,38 @@ from vftcli.virtual_sensor.frames import FRAMES
 if TYPE_CHECKING:
     import polars as pl
 
+FORCE_BOX = Box(width=1120, height=250, left=44, bottom=22, top=34, right=10)  #: That of |F|.
+#: File beside the page → what it is.
+FILES = {
+    "recording.rrd": "3-D recording for Rerun",
+    "estimates.parquet": "every sample",
+    "contacts.csv": "this list",
+    "errors.csv": "errors by joint",
+    "run.json": "settings, versions, remarks",
+}
 #: Heads of the overview.
 HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean RMSE", "Health")
 
 
-def render(analysis: Analysis) -> str:
-    """The report of one log: self-contained, nothing is loaded from anywhere."""
+def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyType({})) -> str:
+    """The report of one log: self-contained, nothing is loaded from anywhere.
+
+    `sizes` are the bytes of the files beside it, None for one that is not written yet.
+    """
     found, record = analysis.contacts, analysis.run or run_record(analysis, "")
     torque, wrench = log_charts.torque_chart(analysis), log_charts.wrench_chart(analysis)
-    unlisted = [r for r in analysis.remarks if r.code == "contacts-not-told"]
-    sentences = [f"What touched the arm is unknown: {sentence(r)}." for r in unlisted]
-    view: dict[str, Any] = {"grounds": grounds(analysis), "record": record}
+    camera = view_of(analysis)
+    charts = [torque] if wrench is None else [torque, wrench]
+    view: dict[str, Any] = {"grounds": grounds(analysis), "record": record, "force": None}
     if found is not None:
-        sentences = [otherwise(found)]
+        force = log_charts.force_chart(analysis, found)
+        charts.insert(0, force)
         ranges = [contact.anywhere[1] for contact in found.contacts if contact.anywhere is not None]
         view |= {
+            "force": force,
+            "scales": next(scales_of(force, FORCE_BOX)),
             "most": max(ranges, default=1.0),
-            "drawings": [(each, details.arm_drawing(analysis, each)) for each in found.contacts],
-            "free": details.free_spans(analysis),
-            "timelines": details.timelines(analysis, found),
+            "free": free_spans(analysis),
             "contact_grids": details.contact_details(found),
             "model": details.model_pairs(found),
         }
@@ -58,48 +73,61 @@ def render(analysis: Analysis) -> str:
         grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
         grids += contact_grids(analysis.errors) if analysis.errors is not None else ()
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
-        view["condition"] = log_charts.condition_charts(analysis)
-    if (refined := analysis.refinement) is not None:
-        view["budget"] = details.budget_grid(refined.budgets) if refined.budgets else None
-        view["refined"] = log_charts.refined_charts(analysis)
+    if (refined := analysis.refinement) is not None and refined.budgets:
+        view["budget"] = details.budget_grid(refined.budgets[:1])
     if analysis.published is not None:
         view["printed"] = details.beside_print(analysis.published)
     answer = headline(analysis)
     return page(
         "report.html",
         f"{answer} – {analysis.recording.name}",
-        [chart for chart in (torque, wrench) if chart is not None],
+        charts,
         log_charts.observer_styles(analysis),
+        partial(stage_data, analysis, camera),
+        f"{analysis.recording.name} · sha256 {analysis.recording.source.sha256 or 'unknown'} · "
+        "torques and forces ON the robot · ± is the half width of the 95 % band",
         analysis=analysis,
         found=found,
         headline=answer,
         eyebrow=eyebrow(analysis),
-        sentences=sentences,
+        sentences=lead_sentences(analysis),
+        arm=still_arm(analysis, camera, found.hardest if found is not None else None),
         torque=torque,
         wrench=wrench,
         scale_words=scale_words(torque),
         errors=errors_view(analysis),
         observers=details.observers_view(analysis),
-        responses=log_charts.response_charts(analysis),
         guide=details.selection_guide(analysis),
+        files=[(name, FILES[name], size) for name, size in sizes.items() if name in FILES],
         remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["remarks"]],
         **view,
     )
 
 
-def eyebrow(analysis: Analysis) -> tuple[str, ...]:
-    """The log, the robot, the span at its rate, and what measured the force."""
-    recording, robot, reference = analysis.recording, analysis.robot, analysis.reference
-    measured = "nothing else measured the force"
-    if reference is not None:
-        measured = f"compared with {reference.name}"
-    elif recording.wrench is not None:
-        measured = "beside a sensor's own wrench"
-    elif recording.tau_ext is not None:
-        measured = "beside the controller's own estimate"
+def eyebrow(analysis: Analysis) -> tuple[str, str, str]:
+    """The log, the robot, and the span at its rate."""
+    recording, robot = analysis.recording, analysis.robot
     rate = rate_of(recording)
     span = f"{recording.duration:.1f} s" + (f" at {rate:.0f} Hz" if rate else "")
-    return recording.name, robot.title or robot.name, span, measured
+    return recording.name, robot.title or robot.name, span
+
+
+def lead_sentences(analysis: Analysis) -> list[str]:
+    """Where it was touched, which rows are uncertain, and what would not show."""
+    found = analysis.contacts
+    if found is None:
+        unlisted = [r for r in analysis.remarks if r.code == "contacts-not-told"]
+        return [f"What touched the arm is unknown: {sentence(r)}." for r in unlisted]
+    said, rows = list[str](), [c for c in found.contacts if not c.is_load]
+    places = Counter("an unknown place" if c.where == "cannot tell" else c.where for c in rows)
+    if len(rows) > 1:
+        each = (f"{n} at {x}" if x[:3] == "an " else f"{n} on the {x}" for x, n in places.items())
+        said.append(f"{', '.join(each)}." if len(places) > 1 else f"All on the {rows[0].where}.")
+    if weak := [str(contact.number) for contact in rows if contact.trust == "weak"]:
+        are = "s of {} are" if len(weak) > 1 else " of {} is"
+        numbers = " and ".join([", ".join(weak[:-1]), weak[-1]] if len(weak) > 1 else weak)
+        said.append(f"The size{are.format(numbers)} uncertain.")
+    return [*said, otherwise(found)]
 
 
 def scale_words(chart: Chart) -> str:
@@ -128,8 +156,6 @@ def errors_view(analysis: Analysis) -> dict[str, Any]:
         "marks": marks_on_page(found),
         "axes": axis_grids(table, [analysis]),
         "missing": nothing_to_compare(table),
-        "details": detail_grids(table),
-        "bias": details.bias_grid(table),
     }
 
 
@@ -149,7 +175,6 @@ def render_index(
     return page(
         "logs.html",
         title,
-        scripts=["sort.js"],
         eyebrow=(f"{len(analyses) + len(failed)} logs", ", ".join(robots)),
         words=lead,
         examinations=[one for _, analysis in analyses for one in analysis.examinations],
@@ -218,7 +243,6 @@ def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
     return page(
         "logs.html",
         f"{len(lines)} logs" + (f", {touched} of {listed} touched." if listed else "."),
-        scripts=["sort.js"],
         eyebrow=(f"{len(lines) + count} logs", ", ".join(sorted({line.robot for line in lines}))),
         words=f"{counted(count, 'log')} could not be analysed." if count else "",
         failures=Grid(words("Log", "Stage", "Error", "Why"), rows),

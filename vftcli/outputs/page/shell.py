@@ -3,10 +3,9 @@
 Charts without a script are SVG: here is where values are drawn, with ticks and the text of paths.
 """
 
-import base64
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -15,9 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor import in_words
-from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line
+from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line, paint
 from vftcli.outputs.contacts import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
+from vftcli.outputs.page.packing import PageClock, page_data
 from vftcli.outputs.quantity import at_least_shown, counted, minus, ranged
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
@@ -31,16 +31,6 @@ HERE = Path(__file__).parent
 LEVELS = ("warning", "caution", "fact")  #: Levels of a remark, the most serious first.
 TICKS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
 TICK_ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
-#: Bytes that the large charts of a page may take; a long log's may take more, up to this
-#: factor.
-ROOM, LONG = 350_000, 4.0
-#: Stretches a long log is cut into, two samples each, however many lines there are.
-FEWEST, MOST = 250, 2000
-#: Bytes of a stretch of a line: two samples of a float32 and an int16 as base64.
-POINT = 2 * (4 + 2) * 4 / 3
-#: Steps between a line's lowest and highest value, finer than any screen; the number for
-#: NaN.
-STEPS, UNKNOWN = 65534, -32768
 
 
 @cache
@@ -70,12 +60,12 @@ def templates() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    drawing = (ticks, decades, label, scales_of, stripes, strokes, polyline)
+    drawing = (ticks, decades, label, scales_of, stripes, strokes, paint)
     words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
-    functions = (*drawing, *words, at_least_shown, asset)
+    functions = (*drawing, *words, at_least_shown, asset, Box)
     made.globals |= {each.__name__: each for each in functions}
     made.globals |= {"is_plain": re.compile(r"[\w.,=× -]+").fullmatch, "QUIET": QUIET}
-    made.filters |= {each.__name__: each for each in (counted, polyline, warnings_of, worst_first)}
+    made.filters |= {each.__name__: each for each in (counted, warnings_of, worst_first)}
     made.filters |= {
         "f1": "{:.1f}".format,
         "known": np.isfinite,
@@ -96,12 +86,17 @@ def page(
     title: str,
     charts: Sequence[Chart] = (),
     styles: Mapping[str, LineStyle] | None = None,
-    scripts: Sequence[str] = (),
+    stage: Callable[[PageClock], dict[str, Any]] | None = None,
+    about: str = "",
     **view: object,
 ) -> str:
-    """A whole HTML page with its style: self-contained, nothing is loaded from anywhere."""
-    data = script_json(packed_charts(charts)) if charts else ""
-    frame = {"title": title, "styles": styles or {}, "scripts": scripts, "data": data}
+    """A whole HTML page with its style: self-contained, nothing is loaded from anywhere.
+
+    `stage` makes what the script needs beside the charts, by the clock of the first;
+    `about` is the first line of a CSV that the page makes.
+    """
+    data = script_json({"about": about} | page_data(charts, stage)) if charts else ""
+    frame = {"title": title, "styles": styles or {}, "data": data}
     return templates().get_template(template).render(**frame, drawn=charts, **view) + "\n"
 
 
@@ -113,77 +108,11 @@ def script_json(data: object) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 
 
-def packed_charts(charts: Sequence[Chart]) -> list[dict[str, Any]]:
-    """Charts over time as the script takes them, all together within the page's room."""
-    lines = sum(
-        len(c.panels) * (1 + (s.half is not None) + (s.quiet is not None))
-        for c in charts
-        for s in c.series
-    )
-    duration = max((float(c.x[-1] - c.x[0]) for c in charts), default=0.0)
-    room = ROOM * float(np.clip(duration / 60.0, 1.0, LONG))
-    stretches = int(np.clip(room / (POINT * max(lines, 1)), FEWEST, MOST))
-    return [packed(chart, stretches) for chart in charts]
-
-
-def packed(chart: Chart, stretches: int) -> dict[str, Any]:
-    """A chart over time as JSON can hold it."""
-    band = None
-    # JSON has no NaN; a band of unknowns only is no band.
-    if chart.band is not None and np.isfinite(chart.band).any():
-        band = [float(value) if np.isfinite(value) else None for value in chart.band]
-    return {
-        "key": chart.key,
-        "title": chart.title,
-        "units": chart.units,
-        "panels": chart.panels,
-        "unit": chart.unit,
-        "band": band,
-        "bandLabel": chart.band_label,
-        "spans": chart.spans,
-        "series": [
-            {
-                "name": line.name,
-                "colour": line.colour,
-                "dash": [float(part) for part in line.dash.split()],
-                "leads": line.leads,
-                "shown": line.shown,
-                "lines": [packed_line(chart, line, j, stretches) for j in range(len(chart.panels))],
-            }
-            for line in chart.series
-        ],
-    }
-
-
-def packed_line(chart: Chart, line: ChartLine, panel: int, stretches: int) -> dict[str, Any]:
-    """A line's points in a panel: of every stretch its lowest and its highest sample."""
-    t, y, halves = drawn_line(chart, line, panel, stretches)
-    names = ("half",) if line.quiet is None else ("half", "quiet")
-    ribbons = {name: quantised(half) for name, half in zip(names, halves, strict=False)}
-    return {"x": base64_of(t, "<f4"), "y": quantised(y), **ribbons}
-
-
-def quantised(values: Array) -> dict[str, Any]:
-    """Values in `STEPS` steps between the lowest and the highest, as base64 int16."""
-    finite = values[np.isfinite(values)]
-    low = float(finite.min()) if finite.size else 0.0
-    step = (float(finite.max()) - low) / STEPS if finite.size else 0.0
-    # A constant line has no steps; any will do.
-    step = step or 1.0
-    numbers = np.where(np.isfinite(values), np.round((values - low) / step) - STEPS // 2, UNKNOWN)
-    return {"low": low, "step": step, "points": base64_of(numbers, "<i2")}
-
-
-def base64_of(values: Array, kind: str) -> str:
-    """Numbers of a kind as base64: as text they would be three times as long."""
-    return base64.b64encode(np.asarray(values).astype(kind).tobytes()).decode("ascii")
-
-
 class Box(NamedTuple):
     """A chart's size and the room around its plot, in the units of the drawing."""
 
-    width: float = 300.0  #: Whole width.
-    height: float = 130.0  #: Whole height.
+    width: float = 460.0  #: Whole width.
+    height: float = 132.0  #: Whole height.
     left: float = 38.0  #: Room for the numbers beside the vertical axis.
     bottom: float = 18.0  #: Room for the numbers below.
     top: float = 8.0  #: Room above.
@@ -256,12 +185,12 @@ def label(value: float) -> str:
     return minus(f"{value + 0.0:.6g}")
 
 
-def scales_of(chart: Chart) -> Iterator[Scales]:
-    """The scales of every panel's small picture."""
+def scales_of(chart: Chart, box: Box) -> Iterator[Scales]:
+    """The scales of every panel's picture."""
     families = chart.families or (0,) * len(chart.panels)
     ends = {family: chart.ends(families.index(family)) for family in set(families)}
     x = Span(float(chart.x[0]), float(chart.x[-1]))
-    return (Scales(Box(), x, ends[family], chart.log) for family in families)
+    return (Scales(box, x, ends[family], chart.log) for family in families)
 
 
 def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:
@@ -278,10 +207,20 @@ def path_of(scales: Scales, t: Array, y: Array) -> str:
     return "".join(polyline(points[start:stop]) for start, stop in runs)
 
 
-def polyline(points: Array) -> str:
-    """Points as the text of an SVG path; a single one is a dot. (K, 2)"""
-    text = "M" + " ".join(f"{x:.1f} {y:.1f}" for x, y in points)
-    return text + ("h.01" if len(points) == 1 else "")
+def polyline(points: Array | Sequence[Array]) -> str:
+    """Points as the text of an SVG path, to a tenth; a single one is a dot. (K, 2)"""
+    tenths = np.rint(10.0 * np.asarray(points)).astype(int)
+    first, *moves = np.vstack([tenths[:1], np.diff(tenths, axis=0)]).tolist()
+    # From point to point: "l.5-1.1.6.2" is shorter than two places.
+    text = "".join(f"{tenth(x)}{tenth(y)}" for x, y in moves)
+    return f"M{first[0] / 10:g} {first[1] / 10:g}" + (f"l{text.lstrip()}" if moves else "h.01")
+
+
+def tenth(number: int) -> str:
+    """A number of tenths as a path's text: its sign or point, else a space, parts it."""
+    whole, rest = divmod(abs(number), 10)
+    text = f"{whole or ''}.{rest}" if rest else f"{whole}"
+    return f"-{text}" if number < 0 else f" {text}"
 
 
 def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:

@@ -1,0 +1,184 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.page.packing import Blob, PageClock
+from vftcli.outputs.page.shell import part
+from vftcli.outputs.page.stage import (
+    HEIGHT,
+    SHARES,
+    WIDTH,
+    arrow_of,
+    axes_of,
+    cone_of,
+    free_spans,
+    shapes_of,
+    stage_data,
+    still_arm,
+    view_of,
+)
+from vftcli.robots import load_robot
+from vftcli.robots.chain import link_poses
+
+
+def listed(analysis: Analysis) -> ContactList:
+    assert analysis.contacts is not None
+    return analysis.contacts
+
+
+def numbers(path: str) -> np.ndarray:
+    """Points of a path that has moves after its first."""
+    import re
+
+    points = np.array(re.findall(r"-?\d*\.?\d+", path), dtype=float).reshape(-1, 2)
+    return np.cumsum(points, axis=0)
+
+
+def test_the_camera_looks_level_along_y_or_down_on_the_floor() -> None:
+    right, up, ahead = axes_of(0.0, 0.0)
+    np.testing.assert_allclose([right, up, ahead], [[1, 0, 0], [0, 0, 1], [0, 1, 0]])
+    right, up, ahead = axes_of(0.0, 0.5 * np.pi)
+    np.testing.assert_allclose([right, up, ahead], [[1, 0, 0], [0, 1, 0], [0, 0, -1]], atol=1e-15)
+    turned = axes_of(0.7, 0.3)
+    np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_capsules_join_the_frames(name: str) -> None:
+    """A link's capsule ends where the next frame begins, at any pose."""
+    chain = load_robot(name).chain
+    poses = link_poses(chain, np.full((1, chain.joints), 0.4))
+    rotation = np.concatenate([np.eye(3)[None], poses.rotation[0]])
+    origin = np.concatenate([np.zeros((1, 3)), poses.translation[0]])
+    links = [shape for shape in shapes_of(chain) if not shape.joint]
+    assert links
+    for shape in links:
+        np.testing.assert_allclose(shape.start, 0.0)
+        end = rotation[shape.frame] @ shape.end + origin[shape.frame]
+        np.testing.assert_allclose(end, origin[shape.frame + 1], atol=1e-12)
+    joints = [shape for shape in shapes_of(chain) if shape.joint]
+    assert [shape.frame for shape in joints] == list(range(1, chain.joints + 1))
+
+
+def test_the_whole_log_is_in_view_and_the_arm_reaches_to_the_right(pushed: Analysis) -> None:
+    view = view_of(pushed)
+    poses = link_poses(pushed.robot.chain, pushed.recording.q)
+    seen = view.seen(poses.translation.reshape(-1, 3))
+    assert seen[:, :2].min() > 0.0
+    assert (seen[:, 0] < WIDTH).all()
+    assert (seen[:, 1] < HEIGHT).all()
+    flange, base = view.seen(poses.translation[:, -1]), view.seen(np.zeros((1, 3)))
+    assert flange[:, 0].mean() > base[0, 0]
+
+
+def test_an_arm_that_stands_upright_or_knows_no_pose_has_a_view(pushed: Analysis, as_if) -> None:
+    for q in (np.zeros(6), np.full(6, np.nan)):
+        log = replace(pushed.recording, q=np.tile(q, (len(pushed.t), 1)))
+        view = view_of(replace(as_if(pushed, log), contacts=None))
+        assert np.isfinite([*view.centre, *view.span, view.yaw]).all()
+        assert min(view.span) > 0.0
+
+
+def test_an_arrow_ends_where_the_force_acts(pushed: Analysis) -> None:
+    view, hardest = view_of(pushed), listed(pushed).hardest
+    assert hardest is not None
+    tail, tip = arrow_of(pushed, hardest, view.reach)
+    at = int(np.argmin(np.abs(pushed.t - hardest.peak)))
+    poses = link_poses(pushed.robot.chain, pushed.recording.q[at : at + 1]).translation[0]
+    np.testing.assert_allclose(tip, poses[-1], atol=2e-3)  # the peak is between two samples
+    assert hardest.wrench is not None
+    along = hardest.wrench[:3] / np.linalg.norm(hardest.wrench[:3])
+    np.testing.assert_allclose(tip - tail, sum(SHARES) * view.reach * along, rtol=1e-9)
+    link = replace(hardest, places=(2, 3))
+    _, tip = arrow_of(pushed, link, view.reach)
+    np.testing.assert_allclose(tip, 0.5 * (poses[2] + poses[3]), atol=2e-3)
+
+
+def test_the_cone_is_that_of_a_force_known_evenly(pushed: Analysis) -> None:
+    """Every axis known to ±s: across the force 1.96 s in each of two directions."""
+    hardest = listed(pushed).contacts[0]
+    wrench = np.array([30.0, -40.0, 0.0, 0.0, 0.0, 0.0])
+    even = replace(hardest, wrench=wrench, peak_force=50.0, wrench_sd=np.full(6, 5.0))
+    assert cone_of(even) == pytest.approx(np.arctan(1.96 * 5.0 / 50.0))
+    # What is known badly along the force alone opens no cone.
+    along = replace(
+        even, wrench=np.array([50.0, *[0.0] * 5]), wrench_sd=np.array([9.0, *[0.0] * 5])
+    )
+    assert cone_of(along) == 0.0
+    assert cone_of(replace(even, wrench=None, wrench_sd=None)) == 0.0
+
+
+@pytest.mark.parametrize(("places", "hit"), [((0,), {6}), ((2, 3), {2, 3}), ((), set())])
+def test_the_touched_links_are_marked(
+    pushed: Analysis, places: tuple[int, ...], hit: set[int]
+) -> None:
+    contact = replace(listed(pushed).contacts[0], places=places)
+    drawn = still_arm(pushed, view_of(pushed), contact)
+    parts = sum(shape.frame in hit for shape in shapes_of(pushed.robot.chain))
+    assert [kind for _, _, kind in drawn.parts].count("hit") == parts
+    assert part("svg/still", drawn, "The arm", "9 N").count('class="shaft"') == 1
+
+
+def test_the_drawing_holds_the_arm_and_its_arrow(pushed: Analysis) -> None:
+    view = view_of(pushed)
+    for contact in listed(pushed).contacts:
+        drawn = still_arm(pushed, view, contact)
+        shaft, head = map(numbers, drawn.arrow)
+        places = np.vstack(
+            [shaft, head, [drawn.label], *(numbers(path) for path, *_ in drawn.parts)]
+        )
+        assert places.min() > 0.0
+        assert (places.max(axis=0) < (WIDTH, HEIGHT)).all()
+    bare = replace(listed(pushed).contacts[0], wrench=None)
+    assert still_arm(pushed, view, bare).arrow == []
+    assert 'class="shaft"' not in part("svg/still", still_arm(pushed, view, None), "x", "")
+
+
+def test_the_free_part_is_the_first_round(pushed: Analysis) -> None:
+    ((start, stop),) = free_spans(pushed)
+    np.testing.assert_allclose((start, stop), (0.0, 4.0), atol=0.02)  # a round of 4 s
+    # What is only guessed is not called free.
+    assert free_spans(replace(pushed, contacts=replace(listed(pushed), basis="friction"))) == []
+    assert free_spans(replace(pushed, contacts=None)) == []
+
+
+def staged(analysis: Analysis) -> dict:
+    return stage_data(analysis, view_of(analysis), PageClock(Blob(), analysis.t))
+
+
+def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None:
+    data = staged(pushed)
+    for row, contact in zip(data["contacts"], listed(pushed).contacts, strict=True):
+        assert abs(pushed.t[row["i"]] - contact.peak) <= 0.004 + 1e-9  # half a sample
+        shown = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N"
+        low, high = contact.anywhere or (0.0, 0.0)
+        unknown = f"{low:.0f}–{high:.0f} N"
+        assert f"{row['force']} {row['band']}" == (unknown if contact.place_unknown else shown)
+        assert row["weak"] == (contact.trust == "weak")
+    assert data["first"] == data["contacts"][5]["i"]
+    assert (data["least"], data["none"]) == ("4 N", "no contact")
+    assert data["wrench"] == {"flange": True}
+
+
+def test_a_log_without_a_list_claims_nothing(pushed: Analysis) -> None:
+    data = staged(replace(pushed, contacts=None))
+    assert (data["contacts"], data["least"], data["none"]) == ([], None, "")
+    guessed = staged(replace(pushed, contacts=replace(listed(pushed), basis="friction")))
+    assert (guessed["least"], guessed["none"]) == (None, "no contact listed")
+
+
+def few(contact: Contact) -> Contact:
+    return replace(
+        contact, peak_force=None, peak_band=None, wrench=None, wrench_sd=None, anywhere=None
+    )
+
+
+def test_few_joints_have_contacts_without_a_force(pushed: Analysis) -> None:
+    bare = replace(listed(pushed), contacts=tuple(map(few, listed(pushed).contacts)))
+    data = staged(replace(pushed, contacts=bare))
+    assert {(row["size"], row["force"], row["sized"]) for row in data["contacts"]} == {
+        (None, "", False)
+    }

@@ -1,0 +1,170 @@
+"""Series of a page as one text: steps of int16, their differences, deflated, in base64.
+
+A clock is the samples that every line of a log shares on the page, so that one index is one
+moment in all of them. A short log has every sample; of a long one each line keeps the lowest
+and the highest value of every stretch, and half of the stretches are where contacts are.
+"""
+
+import base64
+import zlib
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from vftcli.outputs.charts import GAP_STEPS, REFERENCE, Chart, ChartLine, Index, paint
+from vftcli.signals.arrays import Array
+from vftcli.signals.series import gaps_of
+
+#: Samples of a log that is kept whole; of a longer one so many stretches, with two values
+#: each.
+WHOLE, STRETCHES = 8192, 4096
+COARSE = 4  #: Stretches in one value of a line that is not drawn at once.
+AROUND = 0.5  #: Time before and after a contact where the stretches are short. [s]
+#: Unit → largest step of a value: below every band, and 2e-4 rad on 1.3 m are 0.3 mm.
+LARGEST = {"N·m": 0.01, "N": 0.1, "rad": 2e-4}
+FEWEST = 1000  #: Steps at least between zero and the largest value, where units allow less.
+MOST, UNKNOWN = 32767, -32768  #: Largest number of steps, and the number for NaN.
+TICK, WIDE = 1e-4, 32768  #: Step of times [s]; steps of it in one of the upper row.
+
+
+class Blob:
+    """Rows of numbers for the page's script."""
+
+    def __init__(self) -> None:
+        self.steps: list[float] = []  #: Step of each row, in its unit.
+        self.rows: list[np.ndarray[Any, np.dtype[np.int16]]] = []  #: The rows in steps.
+
+    def add(self, values: Array, step: float) -> int:
+        """Number of a new row; its step grows where the values would not fit."""
+        most = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+        step = max(step, most / MOST) or 1.0
+        steps = np.where(np.isfinite(values), np.rint(values / step), UNKNOWN)
+        self.rows.append(steps.astype(np.int16))
+        self.steps.append(step)
+        return len(self.rows) - 1
+
+    def data(self) -> dict[str, Any]:
+        """What the script unpacks: high bytes of all differences, then the low ones."""
+        changes = [np.diff(row, prepend=np.int16(0)) for row in self.rows]
+        joined = np.concatenate(changes or [np.empty(0, np.int16)])
+        # Zigzag: small changes of either sign are small numbers.
+        words = ((joined << 1) ^ (joined >> 15)).astype("<i2")
+        planes = words.view(np.uint8).reshape(-1, 2).T[::-1].tobytes()
+        packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+        packed = packer.compress(planes) + packer.flush()
+        sizes = [len(row) for row in self.rows]
+        return {"blob": base64.b64encode(packed).decode(), "steps": self.steps, "sizes": sizes}
+
+
+class PageClock:
+    """The samples or stretches of a log that its lines share."""
+
+    def __init__(self, blob: Blob, t: Array, spans: Sequence[tuple[float, float]] = ()) -> None:
+        gaps = gaps_of(t, GAP_STEPS) + 1
+        self.blob = blob
+        #: First sample of each stretch, None where every sample is kept. (N,)
+        self.starts = None if len(t) <= WHOLE else stretch_starts(t, spans, gaps)
+        first = np.arange(len(t)) if self.starts is None else self.starts
+        middle = first + np.diff(first, append=len(t)) // 2
+        self.samples = first if self.starts is None else middle  #: A sample of each. (N,)
+        ticks = np.diff(np.rint(t[self.samples] / TICK).astype(np.int64), prepend=0)
+        # Two rows hold a difference of 29 bits: a log may have a gap of an hour.
+        low, high = ticks % WIDE, ticks // WIDE
+        self.rows = [blob.add(low * TICK, TICK), blob.add(high * (WIDE * TICK), WIDE * TICK)]
+        self.gaps = np.searchsorted(first, gaps).tolist()
+
+    def index(self, sample: int) -> int:
+        """Place of a sample of the log on this clock."""
+        if self.starts is None:
+            return sample
+        return int(np.searchsorted(self.starts, sample, side="right")) - 1
+
+    def pose(self, values: Array) -> int:
+        """Row of one value a stretch: a joint's position. (T,) [rad]"""
+        return self.blob.add(values[self.samples], LARGEST["rad"])
+
+    def ends(self, values: Array, unit: str, every: int = 1) -> tuple[int, int | None]:
+        """Rows of the lowest value of each stretch, and of the highest above it. (T,)"""
+        step, add = step_of(values, unit), self.blob.add
+        if self.starts is None:
+            return add(values, step), None
+        low, high = (f.reduceat(values, self.starts[::every]) for f in (np.fmin, np.fmax))
+        return add(low, step), add(high - low, step)
+
+    def most(self, values: Array, unit: str) -> int:
+        """Row of the largest value of each stretch: half the width of a band. (T,)"""
+        kept = values if self.starts is None else np.fmax.reduceat(values, self.starts)
+        return self.blob.add(kept, step_of(values, unit))
+
+    def line(self, chart: Chart, line: ChartLine) -> dict[str, Any]:
+        """A line of a chart, panel by panel."""
+        every = 1 if line.shown or self.starts is None else COARSE
+        columns = list(zip(line.values.T, chart.units, strict=True))
+        lows, spreads = zip(*(self.ends(x, unit, every) for x, unit in columns), strict=True)
+        data: dict[str, Any] = {
+            "name": line.name,
+            "colour": paint(line.colour),
+            "broad": line.colour == REFERENCE,
+            "dash": [float(part) for part in line.dash.split()],
+            "leads": line.leads,
+            "shown": line.shown,
+            "quiet": line.quiet is not None,
+            "every": every,
+            "low": lows,
+        }
+        if self.starts is not None:
+            data["spread"] = spreads
+        if line.half is not None and line.shown:
+            halves = zip(line.half.T, chart.units, strict=True)
+            data["half"] = [self.most(half, unit) for half, unit in halves]
+        return data
+
+
+def step_of(values: Array, unit: str) -> float:
+    """Step of a series: that of its unit, a smaller one for small values, 0 without a unit's."""
+    most = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+    return min(LARGEST.get(unit, 0.0), most / FEWEST)
+
+
+def stretch_starts(t: Array, spans: Sequence[tuple[float, float]], gaps: Index) -> Index:
+    """First sample of each stretch, half of them near the spans; none reaches over a gap."""
+    near = np.zeros(len(t), dtype=bool)
+    for start, stop in spans:
+        near |= (t >= start - AROUND) & (t <= stop + AROUND)
+    share = near.mean()
+    weight = np.where(near, 0.5 / share, 0.5 / (1.0 - share)) if 0 < share < 1 else np.ones(len(t))
+    ends = np.cumsum(weight)
+    starts = np.searchsorted(ends, np.arange(STRETCHES) * (ends[-1] / STRETCHES), side="right")
+    return np.unique(np.concatenate([[0], starts, gaps]))
+
+
+def page_data(
+    charts: Sequence[Chart], stage: Callable[[PageClock], dict[str, Any]] | None = None
+) -> dict[str, Any]:
+    """All that the script draws: charts over time, each on the clock of its own samples."""
+    blob, clocks, drawn = Blob(), dict[int, PageClock](), []
+    for chart in charts:
+        # Charts of one log share its array of times.
+        if id(chart.x) not in clocks:
+            clocks[id(chart.x)] = PageClock(blob, chart.x, chart.spans)
+        clock, band = clocks[id(chart.x)], chart.band
+        drawn.append(
+            {
+                "key": chart.key,
+                "title": chart.title,
+                "clock": list(clocks).index(id(chart.x)),
+                "panels": chart.panels,
+                "units": chart.units,
+                "ends": [tuple(chart.ends(j)) for j in range(len(chart.panels))],
+                # JSON has no NaN.
+                "band": band if band is None else np.nan_to_num(band).tolist(),
+                "spans": chart.spans,
+                "lines": [clock.line(chart, line) for line in chart.series],
+            }
+        )
+    data: dict[str, Any] = {"charts": drawn}
+    if stage is not None:
+        data["stage"] = stage(next(iter(clocks.values())))
+    data["clocks"] = [{"t": clock.rows, "gaps": clock.gaps} for clock in clocks.values()]
+    return {**data, **blob.data()}

@@ -1,0 +1,261 @@
+"""The stage of the page: the arm in three dimensions, its view, and the contacts beside it.
+
+The arm is capsules from the chain's own geometry. It is seen in weak perspective, from the side
+to which it reaches in this log, a little turned; the page's script has the same projection.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
+from vftcli.outputs.page.packing import PageClock
+from vftcli.outputs.page.shell import polyline
+from vftcli.outputs.quantity import at_least_shown
+from vftcli.robots.chain import Chain, LinkPoses, link_poses
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import VftError
+from vftcli.signals.external_torque import COVERS
+from vftcli.signals.series import resample_columns, runs_of
+
+#: Radius of the first and of the last link, as a share of the stretched arm's length, and
+#: of the shortest link that is drawn.
+THICKNESS, SHORTEST = (0.048, 0.030), 0.02
+ASIDE, PITCH = 0.45, 0.3  #: Turn of the view from the arm's side, and downwards. [rad]
+AWAY = 4.2  #: Distance of the camera, in reaches.
+POSES = 600  #: Poses of the log that the view is fitted to.
+SHARES = 0.14, 0.6  #: Length of an arrow of no force, and what the largest adds, in reaches.
+WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.8  #: Size of the still drawing, and the part it fills.
+
+
+class LinkShape(NamedTuple):
+    """A capsule that moves with a frame of the chain, 0 the base."""
+
+    frame: int  #: The frame, from 1 for the first link.
+    start: Array  #: Centre of one end in its axes. (3,) [m]
+    end: Array  #: Centre of the other. (3,) [m]
+    radius: float  #: Radius. [m]
+    joint: bool  #: Whether it is a joint, not a link.
+
+
+class View(NamedTuple):
+    """The camera."""
+
+    yaw: float  #: Direction to the right, from x towards y. [rad]
+    pitch: float  #: How far it looks down. [rad]
+    centre: Array  #: Point in the middle. (3,) [m]
+    span: Array  #: Width and height that must be seen. (2,) [m]
+    reach: float  #: Largest distance of the flange from the base. [m]
+
+    def seen(self, points: Array) -> Array:
+        """Points of the still drawing, downwards, depth, and units of 1 m there. (K, 4)"""
+        across, up, ahead = axes_of(self.yaw, self.pitch)
+        moved = points - self.centre
+        depth, scale = moved @ ahead, FILLED * min(WIDTH / self.span[0], HEIGHT / self.span[1])
+        near = scale * AWAY * self.reach / (AWAY * self.reach + depth)
+        x, y = WIDTH / 2 + near * (moved @ across), 0.53 * HEIGHT - near * (moved @ up)
+        return np.column_stack([x, y, depth, near])
+
+
+class StillArm(NamedTuple):
+    """The arm at one moment, as paths of a drawing."""
+
+    parts: list[tuple[str, float, str]]  #: Path, width, kind; the farthest first.
+    arrow: list[str]  #: Shaft and head of the force, none without one.
+    label: tuple[float, float]  #: Place of its size.
+
+
+def axes_of(yaw: float, pitch: float) -> Array:
+    """Directions to the right, upwards and ahead of a camera. (3, 3)"""
+    (cy, cp), (sy, sp) = np.cos([yaw, pitch]), np.sin([yaw, pitch])
+    return np.array([[cy, sy, 0.0], [-sy * sp, cy * sp, cp], [-sy * cp, cy * cp, -sp]])
+
+
+def shapes_of(chain: Chain) -> list[LinkShape]:
+    """Capsules of base, links and joints."""
+    offsets = np.vstack([chain.translation, chain.flange_translation])
+    lengths = np.linalg.norm(offsets, axis=1)
+    length, shapes = float(lengths.sum()), list[LinkShape]()
+    for j, radius in enumerate(length * np.linspace(*THICKNESS, len(offsets))):
+        if j > 0:
+            # A joint is short and thick, about its axis, z of the link that it moves.
+            half = np.array([0.0, 0.0, 1.1 * radius])
+            shapes.append(LinkShape(j, -half, half, 1.18 * radius, joint=True))
+        if lengths[j] > SHORTEST * length:
+            shapes.append(LinkShape(j, np.zeros(3), offsets[j], radius, joint=False))
+    return shapes
+
+
+def view_of(analysis: Analysis) -> View:
+    """The view that holds the arm in all its poses, and the arrows at their peaks."""
+    q = analysis.recording.q
+    known = q[np.isfinite(q).all(axis=1)]
+    every = known[:: max(len(known) // POSES, 1)] if len(known) else np.zeros((1, q.shape[1]))
+    swept = link_poses(analysis.robot.chain, np.ascontiguousarray(every)).translation
+    flange, points = swept[:, -1], [np.zeros((1, 3)), swept.reshape(-1, 3)]
+    reach = float(np.linalg.norm(flange, axis=1).max()) or 1.0
+    listed = analysis.contacts.contacts if analysis.contacts is not None else ()
+    sized = (contact for contact in listed if contact.wrench is not None and contact.size_known)
+    points += (arrow_of(analysis, contact, reach)[:1] for contact in sized)
+    mean = flange.mean(axis=0)
+    yaw = float(np.arctan2(mean[1], mean[0])) - ASIDE if np.hypot(*mean[:2]) > 0.05 else -ASIDE
+    axes, margin = axes_of(yaw, PITCH), 0.09 * reach
+    places = np.vstack(points) @ axes.T
+    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
+    return View(yaw, PITCH, 0.5 * (low + high) @ axes, (high - low)[:2], reach)
+
+
+def pose_at(analysis: Analysis, t: float) -> LinkPoses:
+    """Poses of links and flange at a time. (1, n + 1, …)"""
+    q = resample_columns(np.array([t]), analysis.t, analysis.recording.q)
+    return link_poses(analysis.robot.chain, q)
+
+
+def arrow_of(analysis: Analysis, contact: Contact, reach: float) -> Array:
+    """Tail and tip of a contact's force at its peak; the tip is where it acts. (2, 3) [m]"""
+    points = pose_at(analysis, contact.peak).translation[0]
+    first, last = spot_of(contact, analysis.robot.joints)
+    tip = 0.5 * (points[first - 1] + points[last - 1])
+    share = (contact.peak_force or 0.0) / most_force(analysis.contacts)
+    length = reach * (SHARES[0] + SHARES[1] * min(share, 1.0))
+    return np.vstack([tip - length * along(contact), tip])
+
+
+def spot_of(contact: Contact, joints: int) -> tuple[int, int]:
+    """Frames between which a force acts: the flange's twice, or both ends of a link."""
+    if 0 in contact.places or not contact.places:
+        return joints + 1, joints + 1
+    return contact.places[-1], contact.places[-1] + 1
+
+
+def along(contact: Contact) -> Array:
+    """Direction of a contact's force at its peak. (3,)"""
+    force = np.zeros(3) if contact.wrench is None else contact.wrench[:3]
+    return np.asarray(force / max(float(np.linalg.norm(force)), 1e-12))
+
+
+def most_force(found: ContactList | None) -> float:
+    """The largest force of a list, at least 1. [N]"""
+    sizes = [c.peak_force for c in found.contacts if c.size_known] if found is not None else []
+    return max([size for size in sizes if size is not None], default=1.0)
+
+
+def cone_of(contact: Contact) -> float:
+    """Half the angle of the 95 % cone about a force's direction. [rad]"""
+    if contact.wrench_sd is None or not contact.peak_force:
+        return 0.0
+    # Two directions are across the force: the mean of their variances.
+    across = np.sum(contact.wrench_sd[:3] ** 2 * (1.0 - along(contact) ** 2)) / 2.0
+    return float(np.arctan(COVERS * np.sqrt(across) / contact.peak_force))
+
+
+def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillArm:
+    """The arm at a contact's peak, else at the log's start."""
+    pose = pose_at(analysis, float(analysis.t[0]) if contact is None else contact.peak)
+    rotation = np.concatenate([np.eye(3)[None], pose.rotation[0]])
+    origin = np.concatenate([np.zeros((1, 3)), pose.translation[0]])
+    last = analysis.robot.joints
+    touched = {place or last for place in contact.places} if contact is not None else set()
+    parts = []
+    for shape in shapes_of(analysis.robot.chain):
+        ends = np.vstack([shape.start, shape.end]) @ rotation[shape.frame].T + origin[shape.frame]
+        drawn = view.seen(ends)
+        kind = "hit" if shape.frame in touched else "joint" if shape.joint else "link"
+        path = polyline(drawn[:, :2])
+        parts.append((float(drawn[:, 2].sum()), path, 2.0 * shape.radius * drawn[0, 3], kind))
+    parts.sort(key=lambda part: -part[0])
+    arrow, label = list[str](), (0.0, 0.0)
+    if contact is not None and contact.wrench is not None and contact.peak_force is not None:
+        tail, tip = view.seen(arrow_of(analysis, contact, view.reach))[:, :2]
+        ahead = (tip - tail) / max(float(np.linalg.norm(tip - tail)), 1e-9)
+        beside, neck = 5.5 * np.array([-ahead[1], ahead[0]]), tip - 13.0 * ahead
+        arrow = [polyline(np.vstack([tail, neck])), polyline([neck + beside, tip, neck - beside])]
+        x, y = tail - np.array([24.0, 18.0]) * ahead
+        label = float(np.clip(x, 40.0, WIDTH - 40.0)), float(np.clip(y, 14.0, HEIGHT - 8.0))
+    return StillArm([part[1:] for part in parts], arrow, label)
+
+
+def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
+    """Stretches of the log that are known to be without contact. [s]"""
+    found = analysis.contacts
+    if found is None or found.basis != "free motion":
+        return []
+    try:
+        own = analysis.motion.known.own
+    except VftError:
+        # Only other runs are known to be free.
+        return []
+    t = analysis.t
+    return [(float(t[start]), float(t[stop - 1])) for start, stop in runs_of(own)]
+
+
+def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, Any]:
+    """What the script needs of arm and contacts, beside the charts."""
+    found, chain = analysis.contacts, analysis.robot.chain
+    contacts = found.contacts if found is not None else ()
+    least = found.detectable_force if found is not None else None
+    hardest = found.hardest if found is not None else None
+    sure = found is not None and found.tells_untouched
+    sensed = analysis.virtual_sensor
+    # Axes that the script knows; in others the direction is that of the peak.
+    turns = sensed is not None and sensed.sensor.frame in {"base", "flange"}
+    keys = ("rotation", "flange_rotation", "translation", "flange_translation")
+    matrices = {key: np.round(getattr(chain, key), 9) for key in keys}
+    matrices["rotation"] = matrices["rotation"].reshape(-1, 9)
+    matrices["flange_rotation"] = matrices["flange_rotation"].ravel()
+    return {
+        "chain": {key: matrix.tolist() for key, matrix in matrices.items()},
+        "q": [clock.pose(column) for column in analysis.recording.q.T],
+        "shapes": [
+            (s.frame, *(np.round(end, 4).tolist() for end in (s.start, s.end)), s.radius, s.joint)
+            for s in shapes_of(chain)
+        ],
+        "wrench": {"flange": sensed.sensor.frame == "flange"} if turns and sensed else None,
+        "view": view._replace(centre=view.centre.tolist(), span=view.span.tolist())._asdict(),
+        "contacts": [contact_data(c, chain.joints, analysis.t, clock) for c in contacts],
+        "first": 0 if hardest is None else peak_index(hardest, analysis.t, clock),
+        "most": most_force(found),
+        "floor": least,
+        "least": None if least is None or not sure else at_least_shown(least),
+        "none": "no contact" if sure else "no contact listed" if found is not None else "",
+        "free": free_spans(analysis),
+        "stops": () if found is None else found.stops,
+        "weak": [c.trust == "weak" for c in contacts if not c.is_load],
+    }
+
+
+def peak_index(contact: Contact, t: Array, clock: PageClock) -> int:
+    """Place of a contact's peak on the page's clock."""
+    return clock.index(int(np.argmin(np.abs(t - contact.peak))))
+
+
+def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> dict[str, Any]:
+    """A contact for the script: its moment, its words, its place."""
+    sized = contact.peak_force is not None and not contact.place_unknown
+    size, _, band = force_size(contact).partition(" ") if contact.wrench is not None else ("",) * 3
+    towards = [] if contact.wrench is None else [direction(contact.wrench[:3])]
+    return {
+        "number": contact.number,
+        "name": contact_name(contact),
+        "start": contact.start,
+        "stop": contact.stop,
+        "peak": contact.peak,
+        "i": peak_index(contact, t, clock),
+        "size": contact.peak_force,
+        "half": contact.peak_band,
+        "sized": sized,
+        "force": size,
+        "band": band,
+        "words": " · ".join([contact_name(contact), place_words(contact), *towards]),
+        "weak": contact.trust == "weak",
+        "load": contact.is_load,
+        "sure": contact.where != "cannot tell",
+        # The frames whose links are touched, and the two between which the force acts.
+        "frames": [place or joints for place in contact.places],
+        "flange": not contact.places or 0 in contact.places,
+        "spot": spot_of(contact, joints),
+        "along": along(contact).tolist(),
+        "cone": cone_of(contact),
+    }
