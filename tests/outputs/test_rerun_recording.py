@@ -57,6 +57,14 @@ def test_the_file_verifies(path: Path) -> None:
     assert "1 file verified without error" in done.stdout + done.stderr
 
 
+@pytest.mark.slow
+def test_the_blueprint_is_in_use_when_the_file_is_opened(path: Path) -> None:
+    """One that is a default alone comes too late for a viewer in a browser."""
+    command = [sys.executable, "-m", "rerun", "rrd", "print", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "make_active: true, make_default: true" in done.stdout
+
+
 def test_a_blueprint_is_in_the_file(path: Path) -> None:
     reader = rerun.chunk.RrdReader(str(path))
     assert len(reader.blueprints()) == 1

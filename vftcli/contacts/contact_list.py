@@ -300,8 +300,8 @@ class ContactList(Shown):
 
     def plot(self) -> "Figure":
         """A matplotlib figure of |F| of every contact with its band, neither shown nor saved."""
-        draw = import_module("vftcli.outputs.figures").contacts_figure
-        figure: Figure = draw(self)
+        figures = import_module("vftcli.outputs.figures")
+        figure: Figure = figures.on_paper(figures.force_drawing(self).draw)
         return figure
 
     def weighed(self, load: tuple[float, float] | None, doubted: bool) -> "ContactList":

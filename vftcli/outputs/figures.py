@@ -136,11 +136,6 @@ def on_paper(draw: "Callable[[float], Figure]") -> "Figure":
         return draw(WIDTHS["double"])
 
 
-def contacts_figure(found: ContactList) -> "Figure":
-    """A figure for a notebook: |F| of every contact of a list."""
-    return on_paper(force_drawing(found).draw)
-
-
 def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Drawing:
     """|F| of every contact with its 95 % band, under its number; over the log's clock. (T,) [s]"""
     courses = [c.course for c in found.contacts if c.course is not None]

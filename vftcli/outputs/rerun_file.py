@@ -93,8 +93,8 @@ def rerun_file(
     # Into memory: Rerun writes a file in a thread, which on a full disk stops and is
     # waited for.
     made = stream.memory_recording()
-    shown = blueprint(tabs, words, poses, space, marked)
-    stream.send_blueprint(shown, make_active=False, make_default=True)
+    # Active: a viewer in a browser arranges by itself what is a default alone.
+    stream.send_blueprint(blueprint(tabs, words, poses, space, marked))
     stream.send_recording_name(drawable(title))
     for tab in tabs:
         for plot in tab.plots:
