@@ -1,8 +1,16 @@
 """Contact and ContactList."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from contact_rows import contact, contact_list
 
+from vftcli.contacts.contact_list import CarriedLoad
+from vftcli.free_motion.free_motion import FreeLoad
+from vftcli.robots import Payload, load_robot
+from vftcli.robots.run import Run
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
 
 
@@ -66,3 +74,57 @@ def test_a_pose_that_is_blind_along_an_axis_tells_no_least_force(
 ) -> None:
     assert contact_list(smallest_force=least).detectable_force == told
     assert contact_list(smallest_force=float("nan")).detectable_force is None
+
+
+def test_a_row_of_a_table_has_a_column_for_each_number() -> None:
+    remark = caution("free-part-rests", least_N=12.0)
+    row = contact(remarks=(remark,)).row()
+    assert [row[f"force_N_{axis}"] for axis in "xyz"] == [0.4, 51.9, -38.8]
+    assert [row[f"moment_sd_Nm_{axis}"] for axis in "xyz"] == [0.5, 0.5, 0.5]
+    assert [row[f"joint_torque_Nm_{j}"] for j in range(1, 7)] == [0, 1, 2, 3, 4, 5]
+    assert (row["anywhere_least_N"], row["anywhere_most_N"]) == (57.0, 78.0)
+    assert (row["kind"], row["places"]) == ("contact", "flange 5 6")
+    assert row["remarks"] == str(remark)
+
+
+def test_a_list_is_a_sequence_of_its_rows_and_a_table() -> None:
+    rows = contact(), contact(number=2, is_load=True, peak_force=80.0)
+    found = contact_list(*rows)
+    assert (len(found), found[1], list(found)) == (2, rows[1], list(rows))
+    assert found.to_polars()["peak_force_N"].to_list() == [64.8, 80.0]
+    assert repr(found).startswith("<ContactList of log.csv: 2 contacts in 20 s, the hardest 80 ± 7")
+    assert repr(rows[0]) == "<Contact 1, a contact: 4.60 to 4.78 s, 65 ± 7 N, wrist (good)>"
+    assert repr(rows[1]).startswith("<Contact 2, a load: ")
+    assert bool(contact_list())
+    assert repr(contact_list()) == "<ContactList of log.csv: 0 contacts in 20 s>"
+    assert contact_list().to_polars().is_empty()
+    assert (found.tells_untouched, contact_list(rows[0]).tells_untouched) == (False, True)
+
+
+def test_a_size_is_a_range_where_the_place_is_unknown_and_torques_where_no_force_is() -> None:
+    by_place = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
+    assert "57 to 78 N" in repr(contact(remarks=(by_place,)))
+    bare = contact_list(contact(), candidates=(contact(number=2),)).without_forces()
+    assert "0 1 2 3 4 5 N·m" in repr(bare[0])
+    assert (bare[0].wrench, bare.candidates[0].peak_force, bare.smallest_force) == (None,) * 3
+    assert bare.remarks[-1].code == "no-wrench-of-few-joints"
+    assert bare[0].row()["anywhere_least_N"] is None
+
+
+@pytest.mark.parametrize(
+    ("mass", "sd", "name"),
+    [(2.8, 0.1, "gripper"), (2.5, 0.2, "gripper"), (2.5, 0.1, None), (1.2, 0.02, "camera")],
+)
+def test_a_load_is_the_payload_that_weighs_as_much(mass: float, sd: float, name: str) -> None:
+    """2.8 kg or 1.1 kg, within a tenth of the load or two of its standard deviations."""
+    payloads = {
+        key: Payload(mass=m, com=np.zeros(3), inertia=np.zeros((3, 3)))
+        for key, m in (("gripper", 2.8), ("camera", 1.1))
+    }
+    robot, t = replace(load_robot("ur5"), payloads=payloads), 0.1 * np.arange(100)
+    dq = np.where((t > 2.0) & (t < 7.0), 0.3, 0.0)[:, None] * np.ones(6)
+    run = Run(recording=Recording(t=t, q=0.0 * dq, dq=dq), robot=robot)
+    load = FreeLoad(mass=mass, moment=np.zeros(3), sd=sd, moment_sd=np.zeros(3), share=0.5)
+    carried = CarriedLoad.of(load, run)
+    assert (carried.mass, carried.sd, carried.payload) == (mass, sd, name)
+    assert carried.span == pytest.approx((2.1, 6.9))

@@ -16,6 +16,7 @@ from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers import read
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
@@ -140,6 +141,29 @@ def test_four_hands_on_a_held_pose(logs: Path) -> None:
     assert second.where == "wrist"
     # They load J1 and J2 only.
     assert "wrist" not in (third.where, fourth.where)
+
+
+def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
+    """The free circle of 4 s four times over, with 2.8 kg from 4.1 s on, at 31 Hz."""
+    whole, robot = read(FIXTURES / "ur5_circle.csv"), load_robot("ur5")
+    rows = np.tile(np.arange(0, 500, 4), 4)
+    signals = {name: whole.require(name)[rows] for name in ("q", "dq", "current")}
+    t = 0.032 * np.arange(len(rows))
+    weight = load_regressor(robot.chain, signals["q"]) @ np.array([2.8, 0.0, 0.0, 0.1])
+    signals["current"] = signals["current"] - (t > 4.1)[:, None] * weight / robot.torque_constant
+    found = list_contacts(motion(Recording(t=t, **signals), "ur5", "0.3:4"))
+    (row,) = found.contacts
+    assert found.remarks[-1].code == "contact-is-load"
+    assert (row.is_load, row.number, row.where) == (True, 1, "wrist")
+    assert (row.start, row.stop) == (pytest.approx(4.1, abs=0.05), pytest.approx(t[-1], abs=0.1))
+    error, sd = row.wrench[:3] - [0.0, 0.0, -2.8 * 9.81], row.wrench_sd[:3]
+    assert error[2] < 1.96 * sd[2] < 2.0  # 3 % of 27 N that drive constants are known to
+    assert np.linalg.norm(error) < 2.0
+    np.testing.assert_array_equal(row.mean_force, row.wrench[:3])
+    np.testing.assert_allclose(row.impulse, row.mean_force * (row.stop - row.start))
+    assert row.peak_force == pytest.approx(np.linalg.norm(row.mean_force), rel=0.01)
+    assert row.anywhere == (row.peak_force - row.peak_band, row.peak_force + row.peak_band)
+    assert abs(np.median(row.course.force) - 27.5) < 2.0
 
 
 @pytest.mark.slow
