@@ -116,11 +116,14 @@ def test_the_odds_are_those_of_the_textbook_filter() -> None:
     d[60:75, 1] -= np.linspace(0.0, 3.0, 15)
     log = blocks(d, np.full_like(d, 0.5))
     size = np.column_stack([np.linspace(10.0, 20.0, 150), np.linspace(8.0, 4.0, 150)])
-    course = error_process(noise(2), log)
-    found = two_state_odds(log, (course, error_process(noise(2), turned_round(log))), size)
-    for (forward, _), (time, lasts) in zip(found, SEARCHES, strict=True):
+    ahead, back = error_process(noise(2), log), error_process(noise(2), turned_round(log))
+    found = two_state_odds(log, (ahead, back), size)
+    for (forward, backward), (time, lasts) in zip(found, SEARCHES, strict=True):
+        there = textbook_odds(d, ahead, size, time, lasts)
+        again = textbook_odds(d[::-1], back, size[::-1], time, lasts)
         # The odds reach hundreds of nats, of sums of 300 terms.
-        np.testing.assert_allclose(forward, textbook_odds(d, course, size, time, lasts), atol=1e-8)
+        np.testing.assert_allclose(forward, there, atol=1e-8)
+        np.testing.assert_allclose(backward, again[::-1], atol=1e-8)
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
-from vftcli.robots.run import Run
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
@@ -89,12 +89,19 @@ def test_cycles_that_do_not_exist_are_refused() -> None:
 
 
 def test_the_level_is_that_of_the_free_samples_that_move() -> None:
-    part = free_part(motion(LOG, "ur5", "0.3:4"))
-    assert part is not None
-    level = torque_level(part.pieces)
-    assert level.shape == (6,)
-    # The simulated arm's model errs by tenths of a newton metre to a few.
-    assert np.all((level > 0.01) & (level < 5.0))
+    """2 N·m while J1 moves, 9 at rest, 20 in the first .1 s, in which the observer settles.
+
+    Its gain of 30 1/s leaves 18 e^(−30 · .2) N·m of that after .3 s, .05.
+    """
+    t = 0.005 * np.arange(600)
+    moves = (t < 2.0)[:, None] * (np.arange(6) == 0)
+    torque = np.where(t[:, None] < 0.1, 20.0, np.where(moves, 2.0, 9.0))
+    log = Recording(t=t, q=np.zeros((600, 6)), dq=0.5 * moves, torque=0.0 * torque)
+    p = np.cumsum(0.005 * torque, axis=0)
+    run = Run(recording=log, robot=load_robot("ur5"))
+    run = run.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
+    level = torque_level([RunSamples(run, t < 2.8)])
+    np.testing.assert_allclose(level, np.array([2.0, 9.0, 9.0, 9.0, 9.0, 9.0]) / 1.96, rtol=0.02)
 
 
 def test_resting_joints_are_given_their_stiction() -> None:

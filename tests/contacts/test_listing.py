@@ -150,7 +150,8 @@ def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
     signals = {name: whole.require(name)[rows] for name in ("q", "dq", "current")}
     t = 0.032 * np.arange(len(rows))
     weight = load_regressor(robot.chain, signals["q"]) @ np.array([2.8, 0.0, 0.0, 0.1])
-    signals["current"] = signals["current"] - (t > 4.1)[:, None] * weight / robot.torque_constant
+    signals["tau_ext"] = (t > 4.1)[:, None] * weight
+    signals["current"] = signals["current"] - signals["tau_ext"] / robot.torque_constant
     found = list_contacts(motion(Recording(t=t, **signals), "ur5", "0.3:4"))
     (row,) = found.contacts
     assert found.remarks[-1].code == "contact-is-load"
@@ -164,6 +165,7 @@ def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
     assert row.peak_force == pytest.approx(np.linalg.norm(row.mean_force), rel=0.01)
     assert row.anywhere == (row.peak_force - row.peak_band, row.peak_force + row.peak_band)
     assert abs(np.median(row.course.force) - 27.5) < 2.0
+    assert row.vendor_force == pytest.approx(2.8 * 9.81)
 
 
 @pytest.mark.slow

@@ -297,5 +297,5 @@ def test_a_gap_and_what_is_left_out_are_blocks_of_which_nothing_is_known() -> No
 def test_one_sample_is_a_block_of_which_nothing_is_known(inside: np.ndarray | None) -> None:
     one = DynamicsTerms(t=np.zeros(1), p=np.ones((1, 2)), mu=np.ones((1, 2)))
     found = disturbance_blocks(one, np.ones((1, 2)), 0.1, inside)
-    assert (len(found.t), found.known.tolist()) == (1, [False])
+    assert (len(found.t), found.length.tolist(), found.known.tolist()) == (1, [0.0], [False])
     np.testing.assert_array_equal(found.q, [[1.0, 1.0]])
