@@ -4,6 +4,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from shutil import copytree
 
 from sphinx.application import Sphinx
 
@@ -92,15 +93,33 @@ MADE: dict[str, Callable[[], str]] = {
 """Mark in a page → what the site has in its place, made of the code."""
 
 
+def linked(text: str) -> str:
+    """A text with what lies outside of docs/ named, not linked, and the example where it is put."""
+    text = re.sub(r"\[([^]]*)\]\((?:docs/)?(example/[^)]*)\)", r'<a href="\2">\1</a>', text)
+    return re.sub(r"\[([^]]*)\]\(\.\./[^)]*\)", r"\1", text)
+
+
 def read(app: Sphinx, page: str, source: list[str]) -> None:
-    """Take a page's text before it is parsed: what lies outside of docs/ is named, not linked."""
+    """Take a page's text before it is parsed: links, and what is made of the code."""
     del app
-    source[0] = re.sub(r"\[([^]]*)\]\(\.\./[^)]*\)", r"\1", source[0])
+    source[0] = linked(source[0])
     for mark, made in MADE.items():
         if mark in source[0]:
             source[0] = source[0].replace(mark, made())
     if page == "index":
         source[0] = navigation(source[0])
+
+
+def include(app: Sphinx, path: Path, page: str, source: list[str]) -> None:
+    """Take the README's text before it is parsed."""
+    del app, path, page
+    source[0] = linked(source[0])
+
+
+def put_example(app: Sphinx, error: Exception | None) -> None:
+    """Copy the example page with its recording beside the site's pages."""
+    if error is None:
+        copytree(DOCS / "example", Path(app.outdir) / "example", dirs_exist_ok=True)
 
 
 def plain(
@@ -114,4 +133,6 @@ def plain(
 def setup(app: Sphinx) -> None:
     """Register what is done to the text of pages and of docstrings."""
     app.connect("source-read", read)
+    app.connect("include-read", include)
+    app.connect("build-finished", put_example)
     app.connect("autodoc-process-docstring", plain)

@@ -1,4 +1,4 @@
-"""Pictures of what vftcli makes: docs/pictures is made by running commands.
+"""What vftcli makes: docs/pictures and docs/example are made by running commands.
 
 It needs the extras figures and browser, a Chromium, and xvfb-run and xdotool for the recording.
 Example: VFT_LOGS=logs python tests/outputs/gallery.py
@@ -53,7 +53,7 @@ EXHIBITS = (
             " --figures png -o circle",
         ),
         (
-            Picture("report", "circle/index.html", 1162),
+            Picture("report", "circle/index.html", 1040),
             Picture("recording", "circle/recording.rrd"),
             *(
                 Picture(name, f"circle/figures/{name}-double.png")
@@ -63,7 +63,7 @@ EXHIBITS = (
     ),
     Exhibit(
         ("vftcli report fixtures/ur5_circle.csv fixtures/ur5_table1.csv --robot ur5 -o logs",),
-        (Picture("index", "logs/index.html", 360),),
+        (Picture("index", "logs/index.html", 290),),
     ),
     Exhibit(
         (
@@ -87,6 +87,11 @@ EXHIBITS = (
     ),
 )
 """What is taken, in order."""
+EXAMPLE = (
+    "vftcli report fixtures/ur5_circle.csv --robot ur5 --free 3:4 --interval 3:6.6"
+    " --observer best --force -o docs/example"
+)
+"""Makes the example page, from the folder above docs: of 3.6 s, so that the recording is small."""
 
 
 def launch_touched() -> None:
@@ -160,7 +165,7 @@ def shrink(path: Path) -> None:
     if picture.width > WINDOW[0]:
         picture = picture.resize((WINDOW[0], picture.height * WINDOW[0] // picture.width))
     for colours in (256, 128, 64, 32, 16):
-        few = picture.quantize(colours, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few = picture.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
         few.save(path, optimize=True)
         if path.stat().st_size <= LARGEST:
             return
@@ -179,7 +184,8 @@ def take(picture: Picture, folder: Path) -> None:
 
 
 def main() -> None:
-    """Take every picture anew."""
+    """Take every picture anew, and make the example."""
+    run(EXAMPLE, ROOT)
     PICTURES.mkdir(exist_ok=True)
     with TemporaryDirectory() as name:
         folder = Path(name)
