@@ -13,10 +13,10 @@ from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import (
     LogLine,
     Tab,
+    blueprint,
     drawable,
     recording_id,
     rerun_file,
-    time_panel,
     title_of,
 )
 
@@ -99,9 +99,10 @@ def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:
 
 
 def test_the_time_panel_marks_a_span_in_nanoseconds() -> None:
-    span = time_panel((1.25, 2.0)).time_selection
+    tabs, words = [Tab("none", [])], {"Summary": ""}
+    span = blueprint(tabs, words, POSES, "Arm", (1.25, 2.0)).time_panel.time_selection
     assert (span.min.value, span.max.value) == (1_250_000_000, 2_000_000_000)
-    assert time_panel(None).time_selection is None
+    assert blueprint(tabs, words, POSES, "Arm", None).time_panel.time_selection is None
 
 
 FULL = """

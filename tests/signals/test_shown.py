@@ -9,6 +9,7 @@ import polars as pl
 import pyarrow.parquet as pq
 import pytest
 
+from vftcli.robots import load_robot
 from vftcli.signals.columns import StatedFrame, column_facts, described_schema
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
@@ -85,6 +86,19 @@ def test_frames_have_the_columns_of_the_files_and_null_for_what_is_not_known() -
     assert frame.columns[-1] == "band/gmo/6"
     assert frame["tau_ext/gmo/6"].null_count() == np.count_nonzero(Q[:, 5] > 5.5)
     assert wrench.to_polars()["wrench/best/fx"].null_count() == np.count_nonzero(T > 0.5)
+
+
+def test_a_robot_is_a_frame_of_its_joints() -> None:
+    """The profile's numbers; an arm without drive constants has the same columns."""
+    robot = load_robot("ur5")
+    frame = robot.to_polars()
+    assert frame["joint"].to_list()[:2] == ["J1 shoulder_pan", "J2 shoulder_lift"]
+    assert frame["mass_kg"].to_list() == robot.chain.mass.tolist()
+    assert frame["torque_constant_Nm_A"].to_list() == [12.625] * 3 + [9.3122] * 3
+    bare = replace(robot, torque_constant=None, friction=()).to_polars()
+    assert bare.schema == frame.schema
+    assert bare["torque_constant_Nm_A"].null_count() == 6
+    assert set(bare["friction"]) == {"none"}
 
 
 def test_a_joint_that_is_never_known_is_shown_without_a_warning() -> None:

@@ -10,7 +10,7 @@ import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from uuid import UUID
 
 import numpy as np
@@ -163,24 +163,16 @@ def blueprint(
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
     said = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
     left = rrb.Vertical(arm, said, row_shares=[3, 2])
+    ends = [round(1e9 * end) for end in marked or ()]
+    span = rrb.components.AbsoluteTimeRange(*ends) if ends else None
     return rrb.Blueprint(
         rrb.Horizontal(left, rrb.Tabs(*map(grid_of, tabs), active_tab=0), column_shares=[2, 5]),
-        time_panel(marked),
+        rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", time_selection=span),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         auto_views=False,
         auto_layout=False,
     )
-
-
-def time_panel(marked: tuple[float, float] | None) -> rrb.TimePanel:
-    """The time panel, paused on the log's own clock, with a span selected in it."""
-    span: dict[str, Any] = {}
-    # An unstable part of the viewer's: a version without it opens the recording too.
-    if marked is not None and hasattr(rrb.components, "AbsoluteTimeRange"):
-        first, last = (round(1e9 * end) for end in marked)
-        span = {"time_selection": rrb.components.AbsoluteTimeRange(min=first, max=last)}
-    return rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", **span)
 
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
@@ -200,13 +192,11 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
     if not tab.log:
         return plots
-    columns: dict[str, Any] = {}
-    # The path says nothing that the words do not; versions without the choice show it.
-    if hasattr(rrb, "TextLogColumns"):
-        shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
-        columns = {"columns": rrb.TextLogColumns(text_log_columns=shown)}
+    # The path says nothing that the words do not.
+    shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
+    columns = rrb.TextLogColumns(text_log_columns=shown)
     paths = list(dict.fromkeys(line.path for line in tab.log))
-    log = rrb.TextLogView(origin="/", contents=paths, name="Log", **columns)
+    log = rrb.TextLogView(origin="/", contents=paths, name="Log", columns=columns)
     return rrb.Vertical(plots, log, row_shares=[2, 1], name=tab.name)
 
 

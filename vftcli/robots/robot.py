@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.robots.chain import Chain, Payload
 from vftcli.signals.arrays import Array, seal
@@ -13,6 +13,9 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose
 from vftcli.signals.remarks import Remark
 from vftcli.signals.shown import Shown
+
+if TYPE_CHECKING:
+    import polars as pl
 
 #: Joint temperature that friction is taken for where nobody says one: a warm arm's. [°C]
 REFERENCE = 35.0
@@ -168,6 +171,16 @@ class Robot(Shown):
             model = self.friction[j].model if self.friction else "none"
             mass, speed = float(self.chain.mass[j]), float(self.limits.qd_max[j])
             yield f"J{j + 1} {name}", mass, constant, model, speed
+
+    def to_polars(self) -> "pl.DataFrame":
+        """One row a joint, units in the columns' names."""
+        import polars as pl
+
+        names = ("joint", "mass_kg", "torque_constant_Nm_A", "friction", "speed_limit_rad_s")
+        words = {"joint", "friction"}
+        kinds = {name: pl.String if name in words else pl.Float64 for name in names}
+        _, *rows = self._rows()
+        return pl.DataFrame(rows, kinds, orient="row").fill_nan(None)
 
     @property
     def joints(self) -> int:
