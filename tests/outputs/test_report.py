@@ -8,6 +8,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs import NONE, OutputChoice, report
+from vftcli.outputs.contacts import contacts_latex
 from vftcli.outputs.estimates import write_estimate_folder
 from vftcli.outputs.files import digests
 from vftcli.outputs.report import ERROR_TABLES, FILES, SUMMARY_FILES, write_report
@@ -45,6 +46,19 @@ def test_the_list_of_contacts_is_written_as_it_is_printed(
     assert rows["start_s"].to_list() == [1.0, 2.2]
     write_report(tmp_path / "none", [replace(touched, contacts=None)], command="")
     assert not (tmp_path / "none/contacts.json").exists()
+
+
+@pytest.mark.slow
+def test_the_table_of_contacts_is_beside_the_figures(touched: Analysis, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
+    assert touched.contacts is not None
+    empty = replace(touched, contacts=replace(touched.contacts, contacts=()))
+    for name, analysis in (("some", touched), ("none", empty)):
+        write_report(tmp_path / name, [analysis], command="", form="svg")
+    table = tmp_path / "some/figures/contacts.tex"
+    assert table.read_text("utf-8") == contacts_latex(touched.contacts)
+    assert "figures/contacts.tex" in digests(tmp_path / "some")
+    assert {path.suffix for path in (tmp_path / "none/figures").iterdir()} == {".svg"}
 
 
 def test_a_report_writes_an_mcap_on_request(touched: Analysis, tmp_path: Path) -> None:

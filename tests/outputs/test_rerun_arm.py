@@ -96,6 +96,9 @@ def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path) -> Non
     assert bytes(blob[0]) == file.read_bytes()
     assert rows_of(path, "/robot/link_5/mesh_0", "Asset3D:media_type") == [["model/stl"]]
     ((matrix,),) = rows_of(path, "/robot/link_2/mesh_0", "Transform3D:mat3x3")
+    assert rows_of(path, "/robot/link_2/mesh_0", "Transform3D:translation") == [
+        [[pytest.approx(0.1), 0.0, 0.0]]
+    ]
     # Columns: the file's x goes to y, its y, of double size, to −x.
     np.testing.assert_allclose(matrix, [0, 1, 0, -2, 0, 0, 0, 0, 3], atol=1e-7)  # float32
     orange, own = [int(rgba("#dd6415")[0])], [int(rgba(LINK)[0])]
