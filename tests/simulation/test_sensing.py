@@ -1,5 +1,7 @@
 """What the log sees: each imperfection alone, and none at all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.simulation.sensing import check_sensing
 
-SHORT = ["duration=2.0", "contacts.hand.begin=0.0"]
+SHORT = ["duration=0.4", "contacts.hand.begin=0.0"]
 CLEAN = ["sensing.noise=0", "sensing.position_step=0"]
 
 
@@ -15,7 +17,6 @@ def circle(*settings: str) -> Simulation:
     return simulate(load_scenario("ur5-circle", [*SHORT, *settings]), 1)
 
 
-@pytest.mark.slow
 def test_everything_off_is_the_true_state() -> None:
     run = circle(*CLEAN, "sensing.torque=instant", "mismatch.torque_constant=0")
     np.testing.assert_allclose(run.recording.q, run.samples.q, atol=1e-15)
@@ -26,7 +27,6 @@ def test_everything_off_is_the_true_state() -> None:
     np.testing.assert_allclose(np.diff(run.recording.t), 0.008, atol=1e-12)
 
 
-@pytest.mark.slow
 def test_average_torque_is_the_mean_over_the_interval() -> None:
     fine = circle(*CLEAN, "sensing.rate=1000", "sensing.torque=instant")
     mean = circle(*CLEAN, "sensing.torque=average")
@@ -46,7 +46,6 @@ def test_noise_has_the_profile_size() -> None:
     np.testing.assert_allclose(np.std(currents, axis=0), noise.current, rtol=0.07)
 
 
-@pytest.mark.slow
 def test_positions_are_quantised() -> None:
     steps = circle("sensing.position_step=0.001").recording.q / 0.001
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
@@ -62,6 +61,16 @@ def test_clock_drift_stretches_the_period_on_the_log_clock() -> None:
     assert run.samples.stamp[-1] == pytest.approx(8.08, abs=0.008)
 
 
+@pytest.mark.parametrize(("count", "code"), [(1, "repeat-dropped"), (2, "repeats-dropped")])
+def test_rows_that_are_logged_twice_are_dropped_and_counted(count: int, code: str) -> None:
+    run = circle("duration=0.1")
+    rows = tuple(sorted([*run.measured.rows, *run.measured.rows[:count]]))
+    log = replace(run, measured=run.measured._replace(rows=rows)).recording
+    np.testing.assert_array_equal(log.q, run.recording.q)
+    assert (log.source.rows, log.source.duplicates) == (len(rows), count)
+    assert [remark.code for remark in log.source.remarks] == [code]
+
+
 @pytest.mark.slow
 def test_dropped_samples_leave_gaps_and_repeated_rows_are_counted() -> None:
     run = circle("duration=8.0", "sensing.dropped=0.05", "sensing.repeated=0.05")
@@ -72,7 +81,6 @@ def test_dropped_samples_leave_gaps_and_repeated_rows_are_counted() -> None:
     assert np.max(np.diff(run.recording.t)) > 0.0159
 
 
-@pytest.mark.slow
 def test_jittering_stamps_still_increase() -> None:
     steps = np.diff(circle("sensing.jitter=0.003").recording.t)
     assert np.all(steps > 0)
@@ -105,7 +113,6 @@ def test_force_sensor_reads_the_handle_in_its_own_axes() -> None:
     assert np.max(there) > 20.0
 
 
-@pytest.mark.slow
 def test_force_sensor_at_rest_weighs_its_tool() -> None:
     run = simulate(load_scenario("ur5-sensor", ["duration=2", "force_sensor.tool_mass=0.5"]), 1)
     assert "wrench" in run.measured.signals
