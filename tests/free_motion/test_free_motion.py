@@ -78,6 +78,13 @@ def test_spans_and_cycles_add_up(circle: Run) -> None:
     assert not np.any((own > 4.1) & (own < 7.9))
 
 
+def test_spans_that_carry_nothing_are_free_where_nothing_else_is_given(circle: Run) -> None:
+    motion, given = (motion_of(circle, choice=FreeChoice(cycles=c)) for c in ((), (2,)))
+    assert motion.unloaded(((0.0, 4.0),)).choice.spans == ((0.0, 4.0),)
+    assert motion.unloaded(()) is motion
+    assert given.unloaded(((0.0, 4.0),)) is given
+
+
 @pytest.mark.parametrize("spans", [((40.0, 50.0),), ((-1.0, 30.0),)])
 def test_a_span_that_is_no_part_of_the_log_is_refused(
     circle: Run, spans: tuple[tuple[float, float], ...]
