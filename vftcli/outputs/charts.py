@@ -42,7 +42,7 @@ PLACES = {
 DASHES = ("", "7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
 QUIET = "95 % band, no contact listed"  #: What a grey ribbon is called.
 GAP_STEPS = 10.0  #: A step this many times the median is drawn as a break in the line.
-STRETCHES = 250  #: Stretches of a line in a small chart: two samples a stretch, about one a pixel.
+STRETCHES = 150  #: Stretches of a line in a still drawing, two samples each.
 
 LineStyle = tuple[str, str]  #: Colour and dash of a line.
 Index = NDArray[np.intp]

@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.charts import Chart, ChartLine
+from vftcli.outputs.page import shell
 from vftcli.outputs.page.pages import render, render_index
+from vftcli.outputs.page.shell import HERE, part
 from vftcli.robots.chain import link_poses
 
 FOCUSED = """() => { const x = document.activeElement; const style = getComputedStyle(x);
@@ -75,8 +78,14 @@ def place_of(page: Any, chart: str, t: float, panel: int = 0) -> tuple[float, fl
     return x, box["y"] + box["height"] / 2
 
 
+@pytest.fixture
+def unlisted(without_reference: Analysis) -> Analysis:
+    """A log without a list of contacts and without a reference."""
+    return replace(without_reference, contacts=None, virtual_sensor=None)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["pushed", "analysis", "with_wrench", "touched"])
+@pytest.mark.parametrize("name", ["pushed", "analysis", "with_wrench", "touched", "unlisted"])
 def test_nothing_is_asked_for_nor_told_and_everything_is_drawn(
     opened: Callable, request: pytest.FixtureRequest, name: str
 ) -> None:
@@ -95,12 +104,19 @@ def test_nothing_is_asked_for_nor_told_and_everything_is_drawn(
     assert [url for url in asked if not url.startswith("blob:")] == [page.url]
 
 
+def test_the_page_is_small(html: str) -> None:
+    """20 s of five observers and a reference; script and style as they are written."""
+    assert len(html.encode()) <= 400_000
+    assert (HERE / "page.js").stat().st_size <= 32_000
+    assert (HERE / "page.css").stat().st_size <= 13_000
+
+
 def test_it_opens_at_the_hardest_contact_and_says_one_number(
     opened: Callable, html: str, pushed: Analysis
 ) -> None:
     page = live(opened(html))
     assert number(page) == "95 ± 9 N"
-    assert number(page) in page.locator("h1").inner_text()
+    assert number(page) in " ".join(page.locator("h1").inner_text().split())
     row = page.locator("tr[aria-current]")
     assert row.count() == 1
     assert "95 ± 9 N" in row.inner_text()
@@ -435,6 +451,36 @@ def test_a_frame_of_play_is_quick(opened: Callable, html: str) -> None:
         }).sort((a, b) => a - b)[60]"""
     )
     assert took <= 8.0
+
+
+@pytest.mark.slow
+def test_a_long_log_reads_and_keeps_its_extremes(opened: Callable) -> None:
+    """200 s at 1 kHz with one sample of 77: its stretch says so, on the head and in the file."""
+    t = 1e-3 * np.arange(200_000)
+    y = np.sin(t)[:, None]
+    y[123_456] = 77.0
+    long = Chart("long", "Long", ("N",), ("fx",), t, (ChartLine("best", y, leads=True),))
+    html = shell.page("page.html", "A – long", [long])
+    page = live(opened(html.replace("<body>", f"<body>{part('svg/multiples', long)}")))
+    box = page.locator(".box").bounding_box()
+    # Numbers take 44 pixels on the left, 10 are free on the right.
+    width, middle = box["width"] - 54, box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 44 + 0.6 * width, middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 44 + 0.65 * width, middle, steps=3)
+    page.mouse.up()
+    # The view is 120 to 130 s now; a stretch has 49 samples.
+    page.mouse.move(box["x"] + 44 + 0.3456 * width, middle)
+    page.wait_for_timeout(60)
+    low, high = page.locator(".head").inner_text().removesuffix(" N").split("…")
+    assert float(high) == pytest.approx(77.0, abs=0.1)
+    assert float(low.replace("−", "-")) == pytest.approx(np.sin(123.456), abs=0.1)
+    with page.expect_download() as waited:
+        page.locator(".csv").click()
+    _, head, *rows = waited.value.path().read_text("utf-8").splitlines()
+    assert head == "t [s],fx best min [N],fx best max [N]"
+    assert len(rows) == pytest.approx(4096 / 20, abs=3)
+    assert max(float(row.split(",")[2]) for row in rows) == pytest.approx(77.0, abs=0.1)
 
 
 def test_the_index_sorts_by_its_heads(

@@ -11,6 +11,7 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.published import Comparison, advice, facts
 from vftcli.observers.table import OBSERVERS
+from vftcli.outputs.contacts import hardest_rows
 from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, words
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.quantity import DASH, banded, significant, vector
@@ -18,6 +19,7 @@ from vftcli.outputs.run_record import observer_record
 from vftcli.refinement.refine import Budget
 from vftcli.signals.arrays import Array
 
+MOST = 40  #: Contacts in numbers at most.
 #: Headings of the tables of contacts: vectors, and what follows them.
 VECTORS = (
     "force [N]",
@@ -45,12 +47,13 @@ COMPUTED = (
 
 
 def contact_details(found: ContactList) -> tuple[Grid, ...]:
-    """Moments, impulses, evidence and joint torques of every contact."""
+    """Moments, impulses, evidence and joint torques of the contacts, `MOST` at most."""
     if not found.contacts:
         return ()
+    contacts = hardest_rows(found.contacts, MOST)
     wrenches: Rows = []
     torques: Rows = []
-    for c in found.contacts:
+    for c in contacts:
         vectors: list[Array | None] = [None] * 4
         if c.wrench is not None and c.wrench_sd is not None:
             vectors = [c.wrench[:3], c.wrench_sd[:3], c.wrench[3:], c.wrench_sd[3:]]
@@ -65,7 +68,12 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
         Grid(
             (number, *words(*VECTORS), *map(Column, EVIDENCE)),
             wrenches,
-            "Wrench at the peak, base axes, the moment about the flange point",
+            "Wrench at the peak, base axes, the moment about the flange point"
+            + (
+                f"; the {MOST} hardest, contacts.csv has all"
+                if len(contacts) < len(found.contacts)
+                else ""
+            ),
         ),
         Grid(
             (number, *joints, Column("at rest")),

@@ -184,7 +184,7 @@ class Plot {
 		const [low, high] = this.clock.view;
 		if (!begin(this)) return;
 		Object.assign(this, { wide: this.width - LEFT - 10, tall: this.height - this.top - 20 });
-		this.pace = this.wide / (high - low || 1); // pixels a second
+		this.pace = this.wide / (high - low || 1);
 		if (what & LINES) this.lines();
 		const x = this.x(this.clock.now);
 		this.cursor.style.transform = `translateX(${x}px)`;
@@ -194,8 +194,7 @@ class Plot {
 	look() { if (this.head) this.head.textContent = this.reading(); }
 	under() {}
 	over() {}
-		// All that moves with zoom and size alone.
-	lines() {
+		lines() {
 		const { top, wide, tall, chart: { spans, weak, band, lines, ends }, panel } = this, room = [LEFT, top, wide, tall];
 		c.clearRect(0, 0, this.width, this.height);
 		within(room, () => {
@@ -344,8 +343,8 @@ class Arm {
 	zoom = 1;
 	constructor(clock) {
 		Object.assign(this, { clock, ...stage.view, canvas: $("#arm canvas") });
-		const from = clock.first, step = (clock.last - from) / 600;
-		this.swept = Array.from({ length: 601 }, (_, k) => [from + k * step, this.poses(from + k * step).at(-1)[1]]);
+		this.every = Math.ceil(clock.t.length / 3000);
+		this.swept = [...clock.t].filter((_, i) => i % this.every === 0).map((t) => this.poses(t).at(-1)[1]);
 		this.listen();
 		watch(this, this.canvas);
 	}
@@ -359,12 +358,12 @@ class Arm {
 	seen(point) {
 		const [x, y, z] = add(point, this.centre, -1), [cy, sy, cp, sp] = [cos(this.yaw), sin(this.yaw), cos(this.pitch), sin(this.pitch)];
 		const ahead = cy * y - sy * x, depth = cp * ahead - sp * z, near = this.scale * this.zoom / (1 + depth / (4.2 * this.reach));
-		return [this.width / 2 + near * (cy * x + sy * y), this.height * .53 - near * (sp * ahead + cp * z), depth, near];
+		return [this.width / 2 + near * (cy * x + sy * y), this.height / 2 - near * (sp * ahead + cp * z), depth, near];
 	}
 	draw() {
 		if (!begin(this)) return;
 		const { width, height } = this, t = this.clock.now, contact = contactAt(t), frames = this.poses(t);
-		this.scale = .8 * min(width / this.span[0], height / this.span[1]);
+		this.scale = .92 * min(width / this.span[0], height / this.span[1]);
 		c.clearRect(0, 0, width, height);
 		const parts = stage.shapes.map(([frame, a, b, radius, joint]) => {
 			const [R, p] = frames[frame], ends = [a, b].map((end) => add(p, turn(R, end)));
@@ -383,14 +382,13 @@ class Arm {
 			path([[k / 4, -end, 0], [k / 4, end, 0], null, [-end, k / 4, 0], [end, k / 4, 0]].map((p) => p && this.seen(p)), css.line);
 		}
 		c.globalAlpha = 1;
-		// One path: shadows of parts would add up.
-		const flat = parts.flatMap(({ ends }) => [null, ...ends.map(([x, y]) => this.seen([x, y, 0]))]);
+			const flat = parts.flatMap(({ ends }) => [null, ...ends.map(([x, y]) => this.seen([x, y, 0]))]);
 		path(flat, css.unseen, 1.6 * parts[0].radius * this.seen([0, 0, 0])[3]);
 	}
 	// The flange's way: amber in contacts, blue where it was a moment ago.
 	trace(t) {
-		const part = (from, to) => this.swept.filter(([time]) => time >= from && time <= to).map(([, point]) => this.seen(point));
-		path(part(0, Infinity), css.zero);
+		const seen = this.swept.map((point) => this.seen(point)), part = (...ends) => seen.slice(...ends.map((at, k) => k + floor(this.clock.index(at) / this.every)));
+		path(seen, css.zero);
 		for (const { start, stop } of stage.contacts) path(part(start, stop), css.touch, 2);
 		path(part(t - 1.2, t), css.force, 2);
 	}

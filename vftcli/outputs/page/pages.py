@@ -34,6 +34,7 @@ from vftcli.virtual_sensor.frames import FRAMES
 if TYPE_CHECKING:
     import polars as pl
 
+MOST_NAMED = 6  #: Uncertain contacts whose numbers the lead names; of more it says how many.
 FORCE_BOX = Box(width=1120, height=250, left=44, bottom=22, top=34, right=10)  #: That of |F|.
 #: File beside the page → what it is.
 FILES = {
@@ -119,14 +120,17 @@ def lead_sentences(analysis: Analysis) -> list[str]:
         unlisted = [r for r in analysis.remarks if r.code == "contacts-not-told"]
         return [f"What touched the arm is unknown: {sentence(r)}." for r in unlisted]
     said, rows = list[str](), [c for c in found.contacts if not c.is_load]
-    places = Counter("an unknown place" if c.where == "cannot tell" else c.where for c in rows)
-    if len(rows) > 1:
-        each = (f"{n} at {x}" if x[:3] == "an " else f"{n} on the {x}" for x, n in places.items())
-        said.append(f"{', '.join(each)}." if len(places) > 1 else f"All on the {rows[0].where}.")
+    places = Counter(
+        "at an unknown place" if c.where == "cannot tell" else f"on the {c.where}" for c in rows
+    )
+    if len(places) == 1 and len(rows) > 1:
+        said.append(f"All {next(iter(places))}.")
+    elif len(places) > 1:
+        said.append(f"{', '.join(f'{count} {place}' for place, count in places.items())}.")
     if weak := [str(contact.number) for contact in rows if contact.trust == "weak"]:
-        are = "s of {} are" if len(weak) > 1 else " of {} is"
         numbers = " and ".join([", ".join(weak[:-1]), weak[-1]] if len(weak) > 1 else weak)
-        said.append(f"The size{are.format(numbers)} uncertain.")
+        numbers = numbers if len(weak) <= MOST_NAMED else f"{len(weak)} contacts"
+        said.append(f"The size{'s' * (len(weak) > 1)} of {numbers} {'are' if len(weak) > 1 else 'is'} uncertain.")
     return [*said, otherwise(found)]
 
 

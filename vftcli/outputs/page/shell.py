@@ -6,7 +6,7 @@ Charts without a script are SVG: here is where values are drawn, with ticks and 
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -68,6 +68,8 @@ def templates() -> "Environment":
     made.filters |= {each.__name__: each for each in (counted, warnings_of, worst_first)}
     made.filters |= {
         "f1": "{:.1f}".format,
+        # A number stays on one line with its band and its unit.
+        "unbroken": partial(re.sub, r"(?<=[\d±]) (?=[\d±]|k?[Ngs]\b)", "\u00a0"),
         "known": np.isfinite,
         "said": lambda line: sentence(line, "long") if isinstance(line, Remark) else line,
     }

@@ -27,7 +27,7 @@ ASIDE, PITCH = 0.45, 0.3  #: Turn of the view from the arm's side, and downwards
 AWAY = 4.2  #: Distance of the camera, in reaches.
 POSES = 600  #: Poses of the log that the view is fitted to.
 SHARES = 0.14, 0.6  #: Length of an arrow of no force, and what the largest adds, in reaches.
-WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.8  #: Size of the still drawing, and the part it fills.
+WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92  #: Size of the still drawing, and the part it fills.
 
 
 class LinkShape(NamedTuple):
@@ -52,11 +52,16 @@ class View(NamedTuple):
     def seen(self, points: Array) -> Array:
         """Points of the still drawing, downwards, depth, and units of 1 m there. (K, 4)"""
         across, up, ahead = axes_of(self.yaw, self.pitch)
-        moved = points - self.centre
-        depth, scale = moved @ ahead, FILLED * min(WIDTH / self.span[0], HEIGHT / self.span[1])
-        near = scale * AWAY * self.reach / (AWAY * self.reach + depth)
-        x, y = WIDTH / 2 + near * (moved @ across), 0.53 * HEIGHT - near * (moved @ up)
-        return np.column_stack([x, y, depth, near])
+        moved, scale = points - self.centre, min(WIDTH / self.span[0], HEIGHT / self.span[1])
+        near = FILLED * scale * self.nearness(points)
+        x, y = WIDTH / 2 + near * (moved @ across), HEIGHT / 2 - near * (moved @ up)
+        return np.column_stack([x, y, moved @ ahead, near])
+
+    def nearness(self, points: Array) -> Array:
+        """Size of things at points, by that in the middle. (K,)"""
+        away = AWAY * self.reach
+        depth = (points - self.centre) @ axes_of(self.yaw, self.pitch)[2]
+        return np.asarray(away / (away + depth))
 
 
 class StillArm(NamedTuple):
@@ -101,10 +106,14 @@ def view_of(analysis: Analysis) -> View:
     points += (arrow_of(analysis, contact, reach)[:1] for contact in sized)
     mean = flange.mean(axis=0)
     yaw = float(np.arctan2(mean[1], mean[0])) - ASIDE if np.hypot(*mean[:2]) > 0.05 else -ASIDE
-    axes, margin = axes_of(yaw, PITCH), 0.09 * reach
-    places = np.vstack(points) @ axes.T
-    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
-    return View(yaw, PITCH, 0.5 * (low + high) @ axes, (high - low)[:2], reach)
+    axes, places, view = axes_of(yaw, PITCH), np.vstack(points), View(yaw, PITCH, mean, mean, reach)
+    for _ in range(3):
+        # What is near looks larger: the middle of what is seen is not the places' own.
+        x, y = ((places - view.centre) @ axes[:2].T * view.nearness(places)[:, None]).T
+        middle = 0.5 * np.array([x.min() + x.max(), y.min() + y.max()])
+        view = view._replace(centre=view.centre + middle @ axes[:2])
+    thick = 4.0 * max(shape.radius for shape in shapes_of(analysis.robot.chain))
+    return view._replace(span=np.array([np.ptp(x), np.ptp(y)]) + thick)
 
 
 def pose_at(analysis: Analysis, t: float) -> LinkPoses:
@@ -239,12 +248,10 @@ def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> d
     return {
         "number": contact.number,
         "name": contact_name(contact),
-        "start": contact.start,
-        "stop": contact.stop,
-        "peak": contact.peak,
+        **{key: round(getattr(contact, key), 4) for key in ("start", "stop", "peak")},
         "i": peak_index(contact, t, clock),
-        "size": contact.peak_force,
-        "half": contact.peak_band,
+        "size": contact.peak_force and round(contact.peak_force, 2),
+        "half": contact.peak_band and round(contact.peak_band, 2),
         "sized": sized,
         "force": size,
         "band": band,
@@ -256,6 +263,6 @@ def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> d
         "frames": [place or joints for place in contact.places],
         "flange": not contact.places or 0 in contact.places,
         "spot": spot_of(contact, joints),
-        "along": along(contact).tolist(),
-        "cone": cone_of(contact),
+        "along": np.round(along(contact), 3).tolist(),
+        "cone": round(cone_of(contact), 3),
     }
