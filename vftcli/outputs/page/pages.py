@@ -127,10 +127,13 @@ def lead_sentences(analysis: Analysis) -> list[str]:
         said.append(f"All {next(iter(places))}.")
     elif len(places) > 1:
         said.append(f"{', '.join(f'{count} {place}' for place, count in places.items())}.")
-    if weak := [str(contact.number) for contact in rows if contact.trust == "weak"]:
-        numbers = " and ".join([", ".join(weak[:-1]), weak[-1]] if len(weak) > 1 else weak)
-        numbers = numbers if len(weak) <= MOST_NAMED else f"{len(weak)} contacts"
-        said.append(f"The size{'s' * (len(weak) > 1)} of {numbers} {'are' if len(weak) > 1 else 'is'} uncertain.")
+    weak = [str(contact.number) for contact in rows if contact.trust == "weak"]
+    if len(weak) == 1:
+        said.append(f"The size of {weak[0]} is uncertain.")
+    elif weak:
+        several = f"{', '.join(weak[:-1])} and {weak[-1]}"
+        named = several if len(weak) <= MOST_NAMED else f"{len(weak)} contacts"
+        said.append(f"The sizes of {named} are uncertain.")
     return [*said, otherwise(found)]
 
 
