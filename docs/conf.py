@@ -9,6 +9,7 @@ from shutil import copytree
 from sphinx.application import Sphinx
 
 from vftcli.cli import help as topics
+from vftcli.doctor.examination import REFUSING
 from vftcli.readers import FORMATS
 from vftcli.signals.version import VERSION
 
@@ -60,7 +61,8 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def findings() -> str:
     """What the tool says of each finding, from the catalogue of its words."""
     rows = [
-        (f"`{entry.get('name', code)}`", re.sub(r"{[^}]*}", "…", entry["short"]),
+        (("✗ " if code in REFUSING else "") + f"`{entry.get('name', code)}`",
+         re.sub(r"{[^}]*}", "…", entry["short"]),
          entry.get("consequence", ""), entry.get("remedy", ""))
         for path in sorted(WORDS.glob("doctor*.toml"))
         for code, entry in tomllib.loads(path.read_text(encoding="utf-8")).items()
@@ -69,9 +71,12 @@ def findings() -> str:
 
 
 def formats() -> str:
-    """What is read of each format, and its pitfalls."""
-    rows = [(f"`{name}`", each.takes, each.pitfalls) for name, each in FORMATS.items()]
-    return table(["format", "what is read", "pitfalls"], rows)
+    """How to record each format, what is read of it, and its pitfalls."""
+    rows = [
+        (f"`{name}`: {each.title}", each.recording, each.takes, each.pitfalls)
+        for name, each in FORMATS.items()
+    ]
+    return table(["format", "how to record it", "what is read", "pitfalls"], rows)
 
 
 def settings() -> str:

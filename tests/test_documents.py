@@ -3,19 +3,25 @@
 import json
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 from run_notebook import NOTEBOOK, code_cells, run_cells
 from typer.testing import CliRunner
 
-from vftcli.cli import COMMANDS, app
+from vftcli.cli import COMMANDS, app, make_app
+from vftcli.doctor.examination import REFUSING
 from vftcli.observers.table import OBSERVERS
+from vftcli.signals.option import settings_by_name
 from vftcli.signals.version import VERSION
 
 ROOT = Path(__file__).parent.parent
@@ -139,6 +145,33 @@ def test_the_notebook_says_that_it_is_skipped(monkeypatch: pytest.MonkeyPatch) -
         run_cells(json.loads(NOTEBOOK.read_text("utf-8")))
 
 
+def as_typed(path: Path) -> list[str]:
+    """Every vftcli command of a document: of its blocks, and within its sentences."""
+    text = path.read_text("utf-8").replace("\\\n", " ").replace("\\|", "|")
+    fenced = re.findall(r"^```(?:sh|bash|text|console)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    lines = re.findall(r"(?:^|&& (?:\S*/)?)(?:\$ )?(vftcli .*)$", "\n".join(fenced), re.MULTILINE)
+    return [*lines, *re.findall(r"`(vftcli [^`]+)`", text)]
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)
+def test_every_command_as_typed_is_one_of_the_program(path: Path) -> None:
+    """Name, options and settings; the changelog also names those that are gone."""
+    if path.name == "changelog.md":
+        return
+    group: Any = typer.main.get_command(make_app())
+    for line in as_typed(path):
+        words = shlex.split(line.partition(" # ")[0])[1:]
+        name = next((word for word in words if word in COMMANDS), "contacts")
+        given = [word.partition("=")[0] for word in words if word.startswith("-")]
+        there = {opt for param in group.commands[name].params for opt in param.opts}
+        assert set(given) <= there | {"--version", "--install-completion", "-h", "--help"}, line
+        kinds = vars(group.commands[name].callback)["choices"]
+        groups = {n.partition(".")[0] for n in settings_by_name(kinds)} | {*OBSERVERS, "kfo"}
+        for word, value in pairwise(words):
+            if word == "--set" and name != "simulate":
+                assert value.partition(".")[0] in groups | AXES, line
+
+
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)
 def test_links_lead_somewhere(path: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", path.read_text("utf-8")):
@@ -171,13 +204,23 @@ def test_every_observer_and_robot_is_documented() -> None:
     assert not [name for name in PROFILES if f"`{name}`" not in robots]
 
 
-def test_every_finding_is_documented() -> None:
-    import tomllib
+def test_the_site_has_a_row_of_every_finding_and_format() -> None:
+    """Its tables are made of the catalogues; docs/formats.md names every format."""
+    pytest.importorskip("sphinx", reason="no site is built: the extra docs is not installed")
+    from vftcli.readers import FORMATS
 
-    text = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
+    site = runpy.run_path(str(ROOT / "docs" / "conf.py"))
+    findings, formats = site["findings"](), site["formats"]()
     for path in (ROOT / "vftcli" / "signals" / "words").glob("doctor*.toml"):
         for code, entry in tomllib.loads(path.read_text("utf-8")).items():
-            assert f"`{entry.get('name', code)}`" in text, code
+            mark = "✗ " if code in REFUSING else ""
+            assert f"| {mark}`{entry.get('name', code)}` |" in findings, code
+            assert entry.get("remedy", "").replace("|", "\\|") in findings, code
+    text = (ROOT / "docs" / "formats.md").read_text("utf-8")
+    for name, each in FORMATS.items():
+        assert f"`{name}`" in text, name
+        cells = (f"`{name}`: {each.title}", each.recording, each.takes, each.pitfalls)
+        assert " | ".join(cell.replace("|", "\\|") for cell in cells) in formats, name
 
 
 def test_every_sentence_of_the_page_on_troubles_is_printed() -> None:
@@ -197,8 +240,6 @@ def test_every_sentence_of_the_page_on_troubles_is_printed() -> None:
 
 
 def test_the_page_for_contributors_gives_a_reason_for_every_package() -> None:
-    import tomllib
-
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     page = (ROOT / "docs" / "contributing.md").read_text("utf-8")
     needed = [*project["dependencies"], *project["optional-dependencies"]["test"]]

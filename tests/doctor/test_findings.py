@@ -1,7 +1,6 @@
 """The log doctor on logs made to be ill, and on real ones."""
 
 import json
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from vftcli.robots import Payload, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import WORDS
 
 
 def moving(robot: str, *, load: float = 0.0, seconds: float = 10.0, seed: int = 0) -> Recording:
@@ -126,19 +124,6 @@ def test_a_finding_holds_its_numbers_for_machines() -> None:
     assert record["values"]["at_s"] == pytest.approx(4.0)
     assert (record["level"], record["severity"], record["name"]) == ("warning", "warning", "gaps")
     assert json.loads(json.dumps(record)) == record
-
-
-def test_variants_of_a_finding_share_its_name() -> None:
-    """Told to a machine by name, as docs/troubleshooting.md lists them."""
-    text = (Path(__file__).parents[2] / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
-    entries = {
-        code: entry
-        for path in WORDS.glob("doctor*.toml")
-        for code, entry in tomllib.loads(path.read_text(encoding="utf-8")).items()
-    }
-    for code, entry in entries.items():
-        name = entry.get("name", code)
-        assert f"`{name}`" in text or name.startswith("zero-"), name
 
 
 def test_signals_that_are_not_there() -> None:
