@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 
@@ -50,8 +51,6 @@ def test_a_log_and_a_robot_may_be_files_or_objects() -> None:
 
 @pytest.mark.slow
 def test_a_list_without_contacts_is_a_list_nevertheless(analysis: vft.Analysis) -> None:
-    from dataclasses import replace
-
     assert analysis.contacts is not None
     empty: ContactList = replace(analysis.contacts, contacts=())
     assert empty
@@ -148,9 +147,17 @@ def test_an_analysis_is_plotted_and_saved(analysis: vft.Analysis, tmp_path: Path
     assert analysis.contacts is not None
     (axes,) = analysis.contacts.plot().axes
     assert len(axes.lines) >= len(analysis.contacts)
-    for wrong in ({"what": "forces"}, {"joints": [7]}, {"observers": ["fdo"]}):
+    assert len(analysis.plot("torques", joints=2, observers="gmo").axes) == 1
+    for wrong in (
+        {"what": "forces"}, {"what": None}, {"joints": [7]}, {"joints": "2"}, {"joints": 0},
+        {"joints": 1.5}, {"observers": ["fdo"]}, {"observers": "fdo"}, {"observers": 3},
+    ):  # fmt: skip
         with pytest.raises(vft.VftError, match="there is"):
             analysis.plot(**wrong)  # type: ignore[arg-type]
+    assert analysis.errors is not None
+    other = replace(analysis, errors=analysis.errors.clear())
+    with pytest.raises(vft.VftError, match="the analysis holds no errors to plot"):
+        other.plot("errors")
     analysis.save(tmp_path / "out")
     assert (tmp_path / "out" / "index.html").exists()
 

@@ -118,8 +118,8 @@ class Analysis(Shown):
     def plot(
         self,
         what: str = "contacts",
-        joints: Sequence[int] | None = None,
-        observers: Sequence[str] | None = None,
+        joints: int | Sequence[int] | None = None,
+        observers: str | Sequence[str] | None = None,
     ) -> "Figure":
         """A matplotlib figure of the contacts, torques, wrench or errors, neither shown nor saved.
 
@@ -133,7 +133,7 @@ class Analysis(Shown):
         """
         # What draws and writes is several floors up; an analysis knows nothing of it.
         draw = import_module("vftcli.outputs.figures").plot
-        figure: Figure = draw(self, what, joints, observers or ())
+        figure: Figure = draw(self, what, joints, observers)
         return figure
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:

@@ -104,29 +104,38 @@ PLOTS = {"contacts": None, "torques": torque_chart, "wrench": wrench_chart, "err
 
 
 def plot(
-    analysis: Analysis, what: str, joints: Sequence[int] | None, observers: Sequence[str]
+    analysis: Analysis,
+    what: str,
+    joints: int | Sequence[int] | None,
+    observers: str | Sequence[str] | None,
 ) -> "Figure":
     """A figure for a notebook: `what` is one of `PLOTS`, joints count from 1, None for all."""
-    check_known(what, PLOTS, f"no plot {what!r}")
-    for name in observers:
-        check_known(name, [e.name for e in analysis.estimates], f"no estimate of {name!r}")
-    every = [str(j) for j in range(1, analysis.recording.joints + 1)]
-    for joint in joints or ():
-        check_known(str(joint), every, f"no joint {joint!r}")
+    check_known(str(what), PLOTS, f"no plot {what!r}")
+    asked = (joints, observers)
+    numbers, names = ([] if x is None else np.atleast_1d(x).tolist() for x in asked)
+    for name in names:
+        check_known(str(name), [e.name for e in analysis.estimates], f"no estimate of {name!r}")
+    for joint in numbers:
+        if joint not in range(1, analysis.recording.joints + 1):
+            raise ParameterError(f"no joint {joint!r}; there is 1 to {analysis.recording.joints}")
+    drawing = None
     if what == "contacts" and analysis.contacts is not None:
-        return on_paper(force_drawing(analysis.contacts, analysis.t).draw)
-    if what == "errors" and analysis.errors is not None:
+        drawing = force_drawing(analysis.contacts, analysis.t)
+    elif what == "errors" and analysis.errors is not None:
         errors = analysis.errors
         rows = [
-            observer in (observers or [observer]) and joint in (joints or [joint])
+            observer in (names or [observer]) and joint in (numbers or [joint])
             for observer, joint in errors.select("observer", "joint").iter_rows()
         ]
-        return on_paper(error_figures(errors.filter(rows))["errors"].draw)
-    if (draw := PLOTS[what]) is None or (chart := draw(analysis)) is None:
+        drawing = error_figures(errors.filter(rows)).get("errors")
+    elif (draw := PLOTS[what]) is not None and (chart := draw(analysis)) is not None:
+        only = [int(j) - 1 for j in numbers] if numbers and what == "torques" else None
+        plots = plots_of(drawn_lines(analysis, chart, names), only=only)
+        spans = numbers_of(analysis.contacts)
+        drawing = Drawing(chart.title, partial(line_figure, plots=plots, numbers=spans))
+    if drawing is None:
         raise ParameterError(f"the analysis holds no {what} to plot")
-    only = [j - 1 for j in joints] if joints and what == "torques" else None
-    plots = plots_of(drawn_lines(analysis, chart, observers), only=only)
-    return on_paper(partial(line_figure, plots=plots, numbers=numbers_of(analysis.contacts)))
+    return on_paper(drawing.draw)
 
 
 def on_paper(draw: "Callable[[float], Figure]") -> "Figure":

@@ -38,8 +38,7 @@ def meshes_of(arm: LumpedArm, root: ET.Element) -> tuple[Mesh, ...]:
     Of a link those for show, or where not all of them are found those for collisions.
     `root` is the first element of the URDF.
     """
-    names = [mesh.get("filename", "") for mesh in root.iter("mesh")]
-    asked = any(name.startswith("package://") for name in names)
+    asked = any("package://" in mesh.get("filename", "") for mesh in root.iter("mesh"))
     above = reversed(arm.tree.path.resolve().parents[:ABOVE])
     packages = {folder.name: str(folder) for folder in above}
     packages |= packages_near(arm.tree.path) if asked else ()

@@ -177,8 +177,7 @@ class Robot(Shown):
         import polars as pl
 
         names = ("joint", "mass_kg", "torque_constant_Nm_A", "friction", "speed_limit_rad_s")
-        words = {"joint", "friction"}
-        kinds = {name: pl.String if name in words else pl.Float64 for name in names}
+        kinds = dict.fromkeys(names, pl.Float64) | {"joint": pl.String, "friction": pl.String}
         _, *rows = self._rows()
         return pl.DataFrame(rows, kinds, orient="row").fill_nan(None)
 
