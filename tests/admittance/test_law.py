@@ -183,6 +183,11 @@ def test_at_small_speed_the_energy_is_that_of_a_mass(scale: float) -> None:
     found = energy(controller, np.zeros(6), v)
     expected = 0.5 * np.asarray(p.mass) * v**2 / np.asarray(p.alpha) ** 2
     np.testing.assert_allclose(found, expected, rtol=1e-5)
+    # The printed one has the variable mass M_d/α there, and at rest the stiffness α K_d.
+    alpha, slow = np.asarray(p.alpha), printed_energy(controller, np.zeros(6), v)
+    np.testing.assert_allclose(slow, alpha * expected, rtol=1e-5)
+    bent = printed_energy(controller, np.full(6, 0.1), np.zeros(6))
+    np.testing.assert_allclose(bent, 0.5 * alpha * np.asarray(p.stiffness) * 0.01, rtol=1e-12)
 
 
 def test_kinetic_shape_is_smooth_and_bounded() -> None:
