@@ -93,6 +93,7 @@ def test_a_size_is_as_sure_as_its_place() -> None:
     apart = ContactLocation([fit(5, 40.0, 1.0), fit(3, 60.0, 1.0)], 6)
     assert apart.spread(40.0) == pytest.approx(20.0 / np.sqrt(2.0))
     assert apart.links == (3, 5)
+    assert (apart.sizes(40.0, 5.0), apart.sizes(0.5, 5.0)) == ((35.0, 61.0), (0.0, 61.0))
     tip = ContactLocation([fit(6, 40.0, 1.0, share=1.0), fit(3, 40.0, 1.0, 1.0)], 6)
     assert tip.links == (0, 3)  # the last link's end is the flange, and that of no other
     # Four in the score are e⁻² in likelihood.

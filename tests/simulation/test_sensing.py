@@ -61,6 +61,13 @@ def test_clock_drift_stretches_the_period_on_the_log_clock() -> None:
     assert run.samples.stamp[-1] == pytest.approx(8.08, abs=0.008)
 
 
+def test_a_seed_is_zero_or_positive() -> None:
+    scenario = load_scenario("ur5-circle", ["duration=0.1"])
+    assert simulate(scenario, 0).seed == 0
+    with pytest.raises(ParameterError, match=r"the seed is -1; it must be zero or positive"):
+        simulate(scenario, -1)
+
+
 @pytest.mark.parametrize(("count", "code"), [(1, "repeat-dropped"), (2, "repeats-dropped")])
 def test_rows_that_are_logged_twice_are_dropped_and_counted(count: int, code: str) -> None:
     run = circle("duration=0.1")
