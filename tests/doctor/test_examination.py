@@ -7,6 +7,7 @@ import pytest
 from moving_arms import FRICTION, gravity, moving
 
 from vftcli.doctor import examine
+from vftcli.doctor.signals import signal_findings
 from vftcli.robots import load_robot
 from vftcli.signals.recording import Recording
 
@@ -139,6 +140,16 @@ def sampled_every(log: Recording, step: int) -> Recording:
         for name in log.signals
     }
     return replace(log, **between)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_straight_lines_are_seen_in_what_only_rises_or_only_falls(sign: float) -> None:
+    t = 0.008 * np.arange(1500)
+    course = sign * (0.2 * t + 0.05 * np.sin(3.0 * t))[:, None] * np.ones(6)
+    log = Recording(t=t, q=course, dq=np.gradient(course, t, axis=0), current=course)
+    found = {finding.code: finding for finding in signal_findings(sampled_every(log, 10))}
+    assert found["interpolated"].values["rate_Hz"] == pytest.approx(12.5)
+    assert "interpolated" not in {finding.code for finding in signal_findings(log)}
 
 
 @pytest.mark.parametrize("step", [10, 25])
