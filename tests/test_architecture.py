@@ -60,6 +60,7 @@ FILES = (
     "outputs/",
     "readers/",
     "reproduction/paper.py",  # what a paper prints
+    "reproduction/manifest.py",  # a user's manifest
     "robots/robot.py",
     "robots/meshes.py",  # the packages near a description
     "robots/robot_file.py",

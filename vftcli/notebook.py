@@ -58,7 +58,12 @@ C = TypeVar("C", bound=Choice)
 #: The rooms' choices of which calls take the options.
 OF_LOG: tuple[type[Choice], ...] = (ReadChoice, RobotChoice)
 OF_CONTACTS = (*OF_LOG, FreeChoice)
-OF_ESTIMATE = (*OF_CONTACTS, ObserverChoice, RefinementChoice, WrenchChoice)
+OF_ESTIMATE: tuple[type[Choice], ...] = (
+    *OF_CONTACTS,
+    ObserverChoice,
+    RefinementChoice,
+    WrenchChoice,
+)
 OF_REPORT = (*OF_ESTIMATE, ReferenceChoice)
 
 

@@ -40,7 +40,8 @@ RESULTS: dict[tuple[object, ...], str] = {
     ("admit", "--release", "x=0.3", "--robot", "ur5"): "rows",
     ("simulate", "ur5-circle", "--set", "duration=1", "-o", "out.csv"): "scenario seed files",
     (
-        "bench",
+        "benchmark",
+        "speed",
         "--set",
         "bench.samples=2000",
         "--set",

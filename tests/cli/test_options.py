@@ -30,6 +30,7 @@ OWN = {("simulate", "--set"), ("identify", "--gains"), ("simulate", "--output"),
        ("admit", "--output"), ("identify", "--output"), ("convert", "--output"),
        ("inspect", "--output"), ("compare", "--output"),
        ("annotate", "--output"), ("batch", "--output"), ("reproduce", "--output"),
+       ("benchmark", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, the goal of --method gains, what is
 written where, and --csv, which the contract makes a file of `estimate` and a table of the others.

@@ -166,7 +166,7 @@ COMMANDS = (
     ("simulate", "list"),
     ("simulate", "ur5-circle", "--set", "duration=1", "-o", "out.csv"),
     ("reproduce", "huang2025", "--only", "table1", "--fast"),
-    ("bench", "--set", "bench.samples=2000", "--set", "bench.rounds=1"),
+    ("benchmark", "speed", "--set", "bench.samples=2000", "--set", "bench.rounds=1"),
     ("help",),
     ("help", "settings"),
     ("help", "robots", "ur5"),

@@ -70,7 +70,7 @@ def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> No
         ("compare", FIXTURE, "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
         ("identify", FIXTURE, "--robot", "ur5", "--method", "gains", "-o", "gains.toml"),
         ("identify", FIXTURE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
-        ("bench", "--set", "bench.rounds=1", "--set", "bench.samples=1200"),
+        ("benchmark", "speed", "--set", "bench.rounds=1", "--set", "bench.samples=1200"),
     ],
 )
 def test_what_needs_none_of_them_works(words: tuple[str, ...], folder: Path) -> None:

@@ -84,11 +84,11 @@ def test_twists_exceed_the_threshold() -> None:
     [
         (["servo.stifness=soft"], "Did you mean stiffness"),
         (["servo.stiffness=hard"], "there is stiff, soft"),
-        (["sensor.rate=3"], "no scenario key 'sensor'"),
+        (["sensor.rate=3"], "no key 'sensor'"),
         (["contacts.hnd.style=taps"], "Did you mean hand"),
         (["contacts.hand.kind=push"], "Did you mean pushes"),
         (["trajectory.kind=cirlce"], "Did you mean circle"),
-        (["trajectory={kind='excitation'}"], "lacks trajectory.mean"),
+        (["trajectory={kind='excitation'}"], "trajectory.mean is missing"),
         (["step=two"], "must be a finite number"),
         (["duration=inf"], "finite"),
         (["pair=1"], "true or false"),
@@ -118,7 +118,7 @@ RUNAWAY = ["duration=1", "servo.damping=200", "servo.torque_limits=false", "fric
         (["step=0.01", "duration=1"], "at most 0.001"),
         (["robot=ur55"], "no robot 'ur55'"),
         (["servo.stiffness=4000", "duration=1"], "at most 400"),
-        (["contacts.hand.kind=hand"], "no scenario key"),
+        (["contacts.hand.kind=hand"], "no key"),
         (RUNAWAY, "runs away"),
         (["contacts.hand.link=9"], "0 .flange. to 6"),
     ],
@@ -138,7 +138,7 @@ def test_unknown_scenario_lists_them() -> None:
     [
         ("name = 'x'\n[servo]\nstiffness = ", "not valid TOML"),
         ("[trajectory]\nradius = 0.2\n", "trajectory.kind ''"),
-        ("[[contacts]]\nkind = 'load'\nname = 'l'\n", "lacks contacts.0..weight"),
+        ("[[contacts]]\nkind = 'load'\nname = 'l'\n", "contacts.0..weight is missing"),
     ],
 )
 def test_broken_files_are_refused(text: str, words: str, tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ JOURNEYS = {
         "admit": "admit:admit",
         "simulate": "convert:simulate_log",
         "reproduce": "reproduce:reproduce",
-        "bench": "reproduce:bench",
+        "benchmark": "benchmark:benchmark",
     },
     "Look up": {
         "help": "help:show_help",

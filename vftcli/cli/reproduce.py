@@ -1,15 +1,13 @@
-"""`vftcli reproduce` and `vftcli bench`: a paper's experiments and times, beside its numbers."""
+"""`vftcli reproduce`: a paper's experiments beside its numbers."""
 
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import command_line, echo, echo_data, say, say_json, show, stages
-from vftcli.robots.choice import RobotChoice
-from vftcli.signals.option import Choice, Option, setting
+from vftcli.cli.console import command_line, say, show, stages
+from vftcli.signals.option import Option
 
 
 @opt.command
@@ -65,46 +63,3 @@ def reproduce(
     say(f"wrote {output}: open {output / 'index.html'}")
     if any(shown.failures for shown in found.values()):
         raise typer.Exit(1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class BenchChoice(Choice):
-    """How much is timed."""
-
-    samples: Annotated[int, setting("bench.samples", "N", "Log length.", least=100)] = 30_060
-    rounds: Annotated[int, setting("bench.rounds", "N", "Interleaved runs.", least=1)] = 7
-
-
-@opt.command
-def bench(
-    *,
-    robot: Annotated[str, RobotChoice.option("robot")] = "ur5",
-    length: opt.Typed[BenchChoice],
-    latex: Annotated[bool, opt.LATEX],
-    json: opt.Json,
-) -> None:
-    """Time the observers on this machine.
-
-    Example: vftcli bench --set bench.rounds=3
-    """
-    from vftcli.outputs import grid
-    from vftcli.outputs.grids import bench_grid
-    from vftcli.reproduction.timing import benchmark
-
-    asked = length.choice()
-    result = benchmark(robot, asked.samples, asked.rounds)
-    if json:
-        say_json([], **result)
-        return
-    title = (
-        f"{result['robot']}, {asked.samples} samples, median of {asked.rounds} rounds, "
-        f"NumPy with {result['simd']}"
-    )
-    if latex:
-        echo_data(grid.latex(replace(bench_grid(result), title=f"Computing time: {title}")))
-        return
-    echo(title)
-    echo(grid.terminal(bench_grid(result)))
-    if ratios := [f"{ratio:.2f}" for ratio in result["ratios"].values()]:
-        echo(f"Dynamics with four observers take {ratios[0]} of the time of a loop of pin.rnea,")
-        echo(f"{ratios[1]} on a clock that jitters by 5 %.")

@@ -15,7 +15,7 @@ from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.free_motion.two_cycle import two_cycle_reference
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
-from vftcli.readers.references import read_reference
+from vftcli.readers.references import ReferenceTable, read_reference
 from vftcli.refinement.refine import EXPECTED, MEASURED, gap_remark
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import Robot
@@ -190,8 +190,15 @@ def file_reference(
     """
     table = read_reference(path, columns)
     # The recording counts from its first sample, a reference file from the log's zero.
-    t = table.t - recording.source.t0
-    name = f"file:{path.name}"
+    table = table._replace(t=table.t - recording.source.t0)
+    return table_reference(table, path, recording, robot, mounting)
+
+
+def table_reference(
+    table: ReferenceTable, path: Path, recording: Recording, robot: Robot, mounting: Mounting
+) -> ReferenceLoad:
+    """What a file's table gives at the log's times, its own counted from the first sample."""
+    t, name = table.t, f"file:{path.name}"
     wrench = None
     if table.wrench is not None:
         values = on_the_logs_clock(t, table.wrench, recording, path)
@@ -213,6 +220,19 @@ def file_reference(
     remark = caution("reference-file", file=path.name, covered=covered, samples=recording.samples)
     torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=(remark,))
     return ReferenceLoad(torque=torque, wrench=wrench)
+
+
+def since_start(t: Array, recording: Recording) -> Array:
+    """Times of a file [s] from the log's first sample, whether they count from there or not.
+
+    They are on the log's own clock where more of the log's stamps are among them so, or
+    where they overlap it and none of its stamps is among them either way.
+    """
+    zero = recording.source.t0
+    stamps = np.round(recording.t, 6)
+    own, counted = (np.count_nonzero(np.isin(np.round(x, 6), stamps)) for x in (t - zero, t))
+    overlaps = bool(t[0] <= zero + recording.t[-1] and t[-1] >= zero)
+    return t - zero if own > counted or (own == counted and overlaps) else t
 
 
 def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:

@@ -4,7 +4,7 @@ With e = τ̂ − τ, a missing τ̂ counting as 0, and weights w by the clock, 
 Σ w x / Σ w. Sums of cells of 2 s are kept: a block bootstrap draws whole cells.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Self
@@ -100,6 +100,19 @@ class Score:
             covered=sums(has & (size <= np.where(has, band, 0.0))),
             penalties=sums(np.where(has, penalty, 0.0)),
         )
+
+    def by_joint(self) -> Iterator[dict[str, list[float]]]:
+        """Of each joint the sums of all cells, by name."""
+        columns = {f.name: np.atleast_2d(getattr(self, f.name).T) for f in fields(self)}
+        for j in range(self.squares.shape[1]):
+            yield {name: rows[j % len(rows)].tolist() for name, rows in columns.items()}
+
+    @classmethod
+    def joined(cls, joints: Sequence[Mapping[str, Sequence[float]]]) -> Self:
+        """The score of what `by_joint` gives."""
+        names = [f.name for f in fields(cls)]
+        sums = {name: np.array([joint[name] for joint in joints], float).T for name in names}
+        return cls(**{**sums, "seconds": sums["seconds"][:, 0]})
 
     def __add__(self, other: Self) -> Self:
         """Both logs' cells, one after the other's."""

@@ -36,10 +36,10 @@ PIECE = 500  #: Logs with rows in memory at a time.
 
 
 class BatchFolder:
-    """The folder of a batch."""
+    """The folder of a batch; its gathered table has a name of its own where one is given."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = Path(path)
+    def __init__(self, path: Path, table: str = TABLE) -> None:
+        self.path, self.table = Path(path), table
         self.rows = self.path / "rows"
 
     def row_file(self, key: str) -> Path:
@@ -50,6 +50,12 @@ class BatchFolder:
     def place(key: str) -> str:
         """Place of a log's result, relative to the folder."""
         return f"logs/{key[:2]}/{key}"
+
+    def made(self, name: str) -> Path:
+        """A folder of its own for what is made before the work."""
+        place = self.path / "made" / name
+        place.mkdir(parents=True, exist_ok=True)
+        return place
 
     @contextmanager
     def opened(self, options: str, record: Mapping[str, Any], *, force: bool) -> Iterator[None]:
@@ -125,7 +131,7 @@ class BatchFolder:
         from pyarrow.parquet import ParquetWriter
 
         (self.path / SEAL).unlink(missing_ok=True)
-        for name, pieces in ((TABLE, tables), (FAILURES, (failures,))):
+        for name, pieces in ((self.table, tables), (FAILURES, (failures,))):
             with atomic(self.path / name, force=True) as temporary, ExitStack() as stack:
                 writer = None
                 for piece in pieces:
@@ -137,5 +143,5 @@ class BatchFolder:
                         stack.enter_context(writer)
                     writer.write_table(table)
         write_text(self.path / PAGE, page(), force=True)
-        files = {name: digest(self.path / name) for name in (TABLE, FAILURES, PAGE)}
+        files = {name: digest(self.path / name) for name in (self.table, FAILURES, PAGE)}
         write_text(self.path / SEAL, to_json({**record, "files": files}), force=True)

@@ -103,7 +103,7 @@ def jittering(motion: Recording) -> Recording:
 
 def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401 - Pinocchio is untyped
     """One bare `pin.rnea` call a sample, one term, nothing else."""
-    pin = needed("pinocchio", "the ratios of vftcli bench")
+    pin = needed("pinocchio", "the ratios of vftcli benchmark speed")
     data, zero = model.createData(), np.zeros(model.nv)
     for k in range(len(q)):
         pin.rnea(model, data, q[k], dq[k], zero)

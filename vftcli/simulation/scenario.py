@@ -325,12 +325,11 @@ def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Se
     keys = [f for f in fields(cls) if f.init]  # type: ignore[arg-type]
     paths = {key.name: f"{where}.{key.name}".lstrip(".") for key in keys}
     for name in table:
-        check_known(name, paths, f"no scenario key {f'{where}.{name}'.lstrip('.')!r}")
+        check_known(name, paths, f"no key {f'{where}.{name}'.lstrip('.')!r}")
     for key in keys:
         if key.name not in table and key.default is key.default_factory is MISSING:
             raise ParameterError(
-                f"the scenario lacks {paths[key.name]}; [{where or 'scenario'}] takes "
-                f"{', '.join(paths)}"
+                f"{paths[key.name]} is missing; [{where or 'scenario'}] takes {', '.join(paths)}"
             )
     hints = get_type_hints(cls)
     return cls(**{name: convert(value, hints[name], paths[name]) for name, value in table.items()})

@@ -1,0 +1,196 @@
+"""`vftcli benchmark` as a user sees it: rivals as rows, resume, tables, what is refused."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.batch.keys import digest_of
+from vftcli.evaluation.references import since_start
+from vftcli.readers.library import Library
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+CIRCLE = FIXTURES / "ur5_circle.csv"
+MANIFEST = """
+[[log]]
+name = "circle"
+arm = "UR5"
+file = "ur5_circle.csv"
+robot = "ur5"
+truth = "torque"
+truth_file = "ur5_circle.csv.truth.parquet"
+truth_error = { tau_Nm = 0.05, note = "a simulation's" }
+[[log]]
+name = "gone"
+arm = "UR5"
+file = "nowhere.csv"
+source = "a page that has it"
+truth = "free"
+"""
+
+
+@pytest.fixture(autouse=True)
+def _unread() -> None:
+    digest_of.cache_clear()
+
+
+@pytest.fixture
+def manifest(tmp_path: Path) -> Path:
+    """A manifest of one log that is there and one that is not."""
+    path = tmp_path / "my.toml"
+    path.write_text(MANIFEST)
+    return path
+
+
+def asked(manifest: Path, *words: object) -> tuple[object, ...]:
+    out = manifest.with_name("out")
+    return ("benchmark", manifest, "--data", FIXTURES, "--jobs", "0", "-o", out, *words)
+
+
+def record(manifest: Path) -> dict[str, object]:
+    return json.loads((manifest.with_name("out") / "run.json").read_text())
+
+
+@pytest.mark.slow
+def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: Path) -> None:
+    """A copy of gmo, the truth, nothing, and the truth 50 ms late."""
+    truth = pl.read_parquet(FIXTURES / "ur5_circle.csv.truth.parquet")
+    t = since_start(truth["t"].to_numpy(), Library().open(CIRCLE))
+    tau = truth.select(pl.col("^tau_ext/[0-9]+$"))
+    assert run("estimate", CIRCLE, "--robot", "ur5", "-o", tmp_path / "e", "-q")[0] == 0
+    estimates = pl.read_parquet(tmp_path / "e" / "estimates.parquet")
+    gmo = estimates.select(
+        "t", pl.col("^tau_ext/gmo/.*$").name.map(lambda n: n.replace("/gmo", ""))
+    )
+    late = pl.DataFrame({x.name: np.interp(t - 0.05, t, x.to_numpy()) for x in tau})
+    files = {
+        "copy": gmo,
+        "true": tau.with_columns(t=pl.Series(t)),
+        "silent": gmo.select("t", pl.exclude("t") * None),
+        "late": late.with_columns(t=pl.Series(t)),
+    }
+    words: list[object] = []
+    for name, table in files.items():
+        (tmp_path / name).mkdir()
+        table.write_csv(tmp_path / name / "circle.csv")
+        words += ["--outside", f"{name}={tmp_path / name}"]
+    code, out, err = run(*asked(manifest, *words, "--json"))
+    assert code == 0, err
+    rows = {(r["method"].split()[0], r["part"]): r for r in json.loads(out)["rows"]}
+    keys = ("rmse_Nm", "l1_Nm", "skill", "rmse_low_Nm", "rmse_high_Nm")
+    for part in ("contact", "all"):
+        # CSV keeps every digit of a double.
+        assert [rows["copy", part][k] for k in keys] == [rows["gmo", part][k] for k in keys]
+        assert [rows["silent", part][k] for k in keys] == [rows["zero", part][k] for k in keys]
+        assert rows["silent", part]["missing"] == 1.0
+        assert rows["true", part]["skill"] == pytest.approx(1.0, abs=1e-9)
+        assert rows["true", part]["l1_Nm"] == pytest.approx(0.0, abs=1e-9)
+    assert rows["late", "all"]["lag_s"] == pytest.approx(0.05)
+    assert rows["copy", "free"]["skill"] is None
+
+
+@pytest.mark.slow
+def test_a_second_run_does_what_is_left_and_the_same_bytes(run, manifest: Path) -> None:
+    code, out, err = run(*asked(manifest))
+    assert code == 0, err
+    assert f"gone: no {FIXTURES / 'nowhere.csv'}; source: a page that has it" in err
+    assert max(map(len, out.splitlines())) <= 80
+    folder = manifest.with_name("out")
+    names = ("scores.parquet", "index.html")
+    before = {name: (folder / name).read_bytes() for name in names}
+    (row,) = folder.glob("rows/*/*.parquet")
+    row.unlink()  # as a run that was killed leaves it
+    (folder / "scores.parquet").unlink()
+    assert run(*asked(manifest))[:2] == (0, out)
+    assert {name: (folder / name).read_bytes() for name in names} == before
+    assert [task["task"] for task in record(manifest)["tasks"]] == ["circle, alone"]
+    assert run(*asked(manifest))[:2] == (0, out)
+    assert record(manifest)["tasks"] == []
+
+
+@pytest.mark.slow
+def test_the_table_is_that_of_ten_lines(run, manifest: Path) -> None:
+    code, out, err = run(*asked(manifest, "--csv"))
+    assert code == 0, err
+    sums = pl.col("seconds", "squares", "sizes", "truth").list.sum()
+    table = pl.read_parquet(manifest.with_name("out") / "scores.parquet").drop_nulls("joint")
+    each = ("method", "part", "joint")
+    joints = (
+        table.with_columns(sums).group_by(each).agg(pl.col("seconds", "squares", "truth").sum())
+    )
+    root = (pl.col("squares", "truth") / pl.col("seconds")).sqrt()
+    means = joints.with_columns(root).group_by("method", "part").mean()
+    mine = {(r["method"], r["part"]): r for r in means.to_dicts()}
+    for row in pl.read_csv(out.encode()).to_dicts():
+        own = mine[row["method"].split()[0], row["part"]]
+        assert row["rmse_Nm"] == pytest.approx(own["squares"])
+        if row["part"] != "free":
+            assert row["skill"] == pytest.approx(1.0 - own["squares"] / own["truth"])
+
+
+@pytest.mark.slow
+def test_planted_pushes_are_found_in_drive_torque_and_truth(run, tmp_path: Path) -> None:
+    """What is taken out of a current is Jᵀ F/K: beside the tool's own reading of it."""
+    shutil.copy(CIRCLE, tmp_path / "log.csv")
+    (tmp_path / "my.toml").write_text(
+        '[[log]]\nname = "a"\narm = "UR5"\nfile = "log.csv"\nrobot = "ur5"\ntruth = "free"\n'
+        "pushes = [[10, 2, [0, 30, -20]]]\nscore = [[1, 15]]\n"
+    )
+    words = ("benchmark", tmp_path / "my.toml", "--jobs", "0", "-o", tmp_path / "out")
+    assert run(*words, "--observer", "gmo")[0] == 2  # methods are the tool's own
+    code, _, err = run(*words)
+    assert code == 0, err
+    (pushed,) = tmp_path.glob("out/made/*/a-pushed.parquet")
+    truth = pl.read_parquet(f"{pushed}.truth.parquet")
+    fy = truth["wrench/fy"].to_numpy()
+    assert fy.max() == pytest.approx(30.0, rel=1e-3)
+    assert not fy[(truth["t"] < 10) | (truth["t"] > 12)].any()
+    before, after = (Library().open(p) for p in (tmp_path / "log.csv", pushed))
+    # K of the UR5 profile's two sizes of joints, N·m/A.
+    constant = np.repeat([12.625, 9.3122], 3)
+    tau = truth.select(pl.col("^tau_ext/.*$")).to_numpy()
+    taken = (before.require("current") - after.require("current")) * constant
+    assert taken == pytest.approx(tau, abs=1e-9)
+    assert abs(tau[:, 1]).max() > 5.0
+
+
+def test_what_is_unfair_or_another_file_ends_with_one_line(run, manifest: Path) -> None:
+    manifest.write_text(MANIFEST.replace('file = "ur5', f'sha256 = "{"1" * 64}"\nfile = "ur5', 1))
+    code, out, err = run(*asked(manifest))
+    assert (code, out) == (1, "")
+    assert len(err.splitlines()) == 1
+    assert "circle: " in err
+    assert "sha256" in err
+    assert not manifest.with_name("out").exists()
+
+
+@pytest.mark.slow
+def test_anyway_marks_the_rows(run, manifest: Path) -> None:
+    manifest.write_text(MANIFEST.replace('file = "ur5', f'sha256 = "{"1" * 64}"\nfile = "ur5', 1))
+    code, out, err = run(*asked(manifest, "--anyway"))
+    assert code == 0, err
+    assert "gmo !" in out
+    assert "!: scored in spite of a complaint (--anyway)" in out
+
+
+@pytest.mark.slow
+def test_a_log_that_fails_leaves_the_others(run, manifest: Path) -> None:
+    broken = manifest.with_name("broken.csv")
+    broken.write_text("t,q1\n0,nothing\n")
+    entry = f'[[log]]\nname = "b"\narm = "UR5"\nfile = "{broken}"\nrobot = "ur5"\ntruth = "free"\n'
+    manifest.write_text(MANIFEST + entry)
+    code, out, err = run(*asked(manifest))
+    assert code == 3
+    assert "best" in out
+    assert "b, alone failed: " in err
+
+
+def test_bench_is_a_former_word(run) -> None:
+    words = ("--set", "bench.samples=1200", "--set", "bench.rounds=1")
+    code, out, err = run("bench", *words)
+    assert code == 0, err
+    assert "note: bench is now benchmark speed" in err
+    assert "dynamics" in out

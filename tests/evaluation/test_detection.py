@@ -1,0 +1,49 @@
+"""Lists of contacts against the true ones, and the intervals of what is counted."""
+
+import pytest
+
+from vftcli.evaluation.detection import ListedRow, rate_interval, score_list, share_interval
+
+NAN = float("nan")
+
+
+def test_found_split_false_onset_and_peak() -> None:
+    true = [(2.0, 3.0, 20.0), (5.0, 6.0, NAN), (8.0, 9.0, 10.0)]
+    rows = [
+        ListedRow(2.1, 2.4, 15.0, 6.0),  # finds the first, its band holds the peak
+        ListedRow(2.6, 3.05, 18.0, 1.0),  # a second row on it
+        ListedRow(6.08, 6.5, 5.0, 1.0, is_load=True),  # within the slack of the second
+        ListedRow(6.9, 7.1, 30.0, 1.0),  # nothing there
+        ListedRow(12.0, 13.0, 90.0, 1.0),  # where nobody vouches
+    ]
+    found = score_list(rows, true, [(0.0, 11.0)], duration=20.0)
+    assert (found.true_contacts, found.found, found.found_as_load) == (3, 2, 1)
+    assert (found.split, found.false, found.hardest_false_N) == (1, 1, 30.0)
+    assert found.free_h == pytest.approx((11.0 - 3.0) / 3600.0)
+    assert found.onset_s == pytest.approx([0.1, 1.08])
+    # Of the rows on a contact the hardest counts: 18 N of 20, whose band is 1 N.
+    assert found.peak_error_N == pytest.approx([-2.0])
+    assert found.peaks_held == 0
+
+
+def test_a_vouched_span_ends_with_the_log() -> None:
+    assert score_list([], [], [(0.0, 1e9)], duration=36.0).free_h == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("count", "low", "high"),
+    # Exact 95 % limits of a Poisson mean: Garwood (1936), table as in any handbook.
+    [(0, 0.0, 3.6889), (1, 0.02532, 5.5716), (3, 0.6187, 8.7673), (10, 4.7954, 18.3904)],
+)
+def test_a_rate_has_its_exact_poisson_interval(count: int, low: float, high: float) -> None:
+    assert rate_interval(count, 1.0) == pytest.approx((low, high), abs=1e-4)
+    assert rate_interval(count, 2.0) == pytest.approx((low / 2, high / 2), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("part", "whole", "low", "high"),
+    # Roots of (p̂ − p)² = z² p (1 − p)/n, solved by hand: 7/14 is symmetric about a half.
+    [(7, 14, 0.26799, 0.73201), (0, 6, 0.0, 0.39033), (6, 6, 0.60967, 1.0)],
+)
+def test_a_share_has_its_wilson_interval(part: int, whole: int, low: float, high: float) -> None:
+    assert share_interval(part, whole) == pytest.approx((low, high), abs=1e-5)

@@ -1,0 +1,93 @@
+"""What other programs write: their estimates, their lists of contacts, a log in several files."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import count, takewhile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.readers.delimited import TextTable
+from vftcli.readers.opening import open_log
+from vftcli.readers.parquet import ParquetTable
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.references import TORQUE
+from vftcli.readers.table import Cell, Pick, Picks, Table, listed
+from vftcli.readers.tables import load_signals
+from vftcli.signals.arrays import Array, check_clock
+from vftcli.signals.errors import LogError
+from vftcli.signals.external_torque import COVERS
+from vftcli.signals.wrench import AXES
+
+
+class OutsideTable(NamedTuple):
+    """Estimates that another program made of a log; NaN where it has no answer."""
+
+    t: Array  #: Its stamps. (T,) [s]
+    tau: Array  #: External torque on the robot. (T, n) [N·m]
+    sd: Array | None  #: Standard deviation of its error, or None. (T, n) [N·m]
+    wrench: Array | None  #: Force and moment on the robot, base axes, or None. (T, 6)
+
+
+def read_outside(path: Path, name: str) -> OutsideTable:
+    """Estimates t, tau_ext/1…, sd/1… or band/1… (half a 95 % band), wrench/fx… of a file.
+
+    One of `vftcli estimate` has them as tau_ext/NAME/1…, its band/NAME/1… one deviation.
+    """
+    file = open_log(path)
+    table: Table = ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)
+    ours = f"{TORQUE}/{name}/1" in table.names
+    inner = f"/{name}/" if ours else "/"
+    columns = {column: Cell(k) for k, column in enumerate(table.names)}
+
+    def cells(kind: str, ends: Iterable[object]) -> tuple[Cell, ...]:
+        wanted = (f"{kind}{inner}{end}" for end in ends)
+        return tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
+
+    found = {kind: cells(kind, count(1)) for kind in (TORQUE, "band", "sd")}
+    found["wrench"] = cells("wrench", AXES)
+    if "t" not in columns or not found[TORQUE]:
+        raise LogError(
+            f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
+            f"{listed(table.names)}"
+        )
+    picks = [Pick(kind, each) for kind, each in found.items() if each]
+    raw = load_signals(table, Picks(tuple(picks), Pick("t", (columns["t"],))), ReadChoice())
+    sd, band = raw.signals.get("sd"), raw.signals.get("band")
+    if band is not None:
+        sd = band if ours else band / COVERS
+    wrench = raw.signals.get("wrench") if len(found["wrench"]) == len(AXES) else None
+    t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
+    check_clock(t, str(path))
+    return OutsideTable(t, raw.signals[TORQUE], sd, wrench)
+
+
+def read_list(path: Path) -> list[dict[str, Any]]:
+    """Rows of a list of contacts, by the columns of `vftcli contacts --csv`."""
+    import polars as pl
+
+    try:
+        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
+        for row in rows:
+            row["start_s"], row["stop_s"] = float(row["start_s"]), float(row["stop_s"])
+    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
+        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
+    return rows
+
+
+def read_parts(files: Mapping[str, Path], order: Sequence[str]) -> dict[str, Array]:
+    """Columns t, q1… of a log in a text file a signal, all its numbers row after row."""
+    columns: dict[str, Array] = {}
+    samples = 0
+    for signal in order:
+        try:
+            values = np.loadtxt(files[signal], ndmin=1).ravel()
+            rows = values.reshape(samples or len(values), -1)
+        except (OSError, UnicodeDecodeError, ValueError):
+            raise LogError(
+                f"{files[signal]}: not numbers, as many for each of {samples or 'its'} samples"
+            ) from None
+        samples = len(rows)
+        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
+        columns |= dict(zip(names, rows.T, strict=True))
+    return columns

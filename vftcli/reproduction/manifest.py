@@ -1,0 +1,358 @@
+"""A benchmark's manifest: logs with truth, how each is scored, and what may have been seen.
+
+One entry is one log. What an entry does not name is an option of `vftcli estimate`, in the
+same words. No log comes with the package and none is downloaded.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple, cast
+
+from vftcli.batch.keys import content_digest, digest_of, with_files
+from vftcli.doctor.examination import Examiner
+from vftcli.notebook import OF_ESTIMATE, Asked
+from vftcli.pipeline import AnalysisChoice
+from vftcli.readers.library import Library, absolute
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import interval
+from vftcli.signals.parsing import check_known, toml_tables
+from vftcli.simulation.scenario import Vector, section_from
+
+BUILT_IN = ("sim", "field")  #: Manifests that come with the package.
+TRUTHS = ("free", "sensor", "torque", "weight", "contacts", "simulated")
+PROTOCOLS = ("alone", "free", "identified")
+PUSHED = "-pushed"  #: Ending of the name of a log with pushes planted.
+APART = 1.0  #: Least time between what is trained on and what is scored of one log. [s]
+SETTLED = 1.0  #: Scored from here on where nothing is said: causal filters settle. [s]
+#: Options that an entry may have: those of `vftcli estimate`, in its words. What it says of
+#: the arm and of free motion it says itself.
+OPTIONS = {
+    word: option
+    for kind in OF_ESTIMATE
+    for word, (*_, option) in kind.options().items()
+    if not option.is_setting and word not in {"arm", "free"}
+}
+Spans = tuple[tuple[float, float], ...]
+ALWAYS: Spans = ((0.0, 1e9),)  #: All of a log. [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthError:
+    """How far the truth itself may be off."""
+
+    tau_Nm: float = 0.0  # noqa: N815 - a key of the manifest, with its unit
+    wrench_N: float = 0.0  # noqa: N815
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchmarkLog:
+    """One log with truth: an entry ``[[log]]``."""
+
+    name: str  #: What it is called, by outside estimates too.
+    arm: str  #: What is pooled.
+    truth: str  #: One of `TRUTHS`.
+    day: str = ""  #: What may not be trained on to score this log.
+    file: str = ""  #: Below the folder of the data.
+    parts: tuple[str, ...] = ()  #: Files of numbers that are one log, as ``q=positions.txt``.
+    scenario: str = ""  #: What is simulated instead.
+    seed: int = 1  #: Its seed.
+    changes: tuple[str, ...] = ()  #: Keys of the scenario, as ``duration=12``.
+    sha256: str = ""  #: Of the file.
+    source: str = ""  #: Where it is had.
+    licence: str = ""
+    truth_file: str = ""  #: Where the truth is, "" for the log's own file.
+    truth_columns: str = ""  #: Its columns, as of ``--reference-columns``.
+    vendor: str = ""  #: Columns of the controller's own estimate, "" for none.
+    score: Spans = ()  #: What is scored, from the first sample; () for all but the start. [s]
+    vouched: Spans | None = None  #: Where a row is false if nothing touched; None: as `score`. [s]
+    #: True contacts, where the truth does not show them: start, end [s], peak [N] if known.
+    contacts: tuple[tuple[float, ...], ...] = ()
+    contact_N: float = 1.0  # noqa: N815  #: Force from which the truth is a contact. [N]
+    #: Planted: start [s], length [s], peak force on the flange in base axes [N].
+    pushes: tuple[tuple[float, float, Vector], ...] = ()
+    weight_N: float = 0.0  # noqa: N815  #: What is carried over `score`. [N]
+    #: The protocols that it is scored by, none of what is only trained on; None: all it can be.
+    protocols: tuple[str, ...] | None = None
+    free: tuple[str, ...] = ()  #: Motion that nobody touched: names of logs, or A:B.
+    identified: str = ""  #: Name of the ``[[robot]]`` of protocol 3.
+    truth_error: TruthError = field(default_factory=TruthError)
+    exact_model: bool = False  #: Simulated, or torque made from the model: in no headline.
+    options: tuple[tuple[str, Any], ...] = ()  #: Options of `vftcli estimate`, as typed.
+
+    def __post_init__(self) -> None:
+        check_known(self.truth, TRUTHS, f"log {self.name}: truth {self.truth!r}")
+        if not re.fullmatch(r"[\w.+-]+", self.name):
+            raise ParameterError(f"log {self.name!r}: a name has letters, digits, . + - and _")
+        if bool(self.file) + bool(self.parts) + bool(self.scenario) != 1:
+            raise ParameterError(f"log {self.name}: give one of file, parts, scenario")
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The protocols that it is scored by."""
+        if self.protocols is not None:
+            return self.protocols
+        return tuple(p for p in PROTOCOLS if p == "alone" or getattr(self, p))
+
+    @property
+    def trusted(self) -> Spans:
+        """Where the truth says that nothing else touched. [s]"""
+        return self.vouched if self.vouched is not None else self.score or ALWAYS
+
+    @property
+    def spans(self) -> Spans:
+        """What is scored. [s]"""
+        return self.score or ((SETTLED, 1e9),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainedRobot:
+    """A robot file of `vftcli identify` from other logs: an entry ``[[robot]]``."""
+
+    name: str
+    train: tuple[str, ...]  #: Names of logs.
+    interval: str = ""  #: What of them is used, as A:B; "" for all. [s]
+    method: str = ""  #: Of `vftcli identify`, "" for its default.
+    robot: str = ""  #: The arm to begin with.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Declaration:
+    """What the maker of outside estimates declares of them: ``rival.toml``."""
+
+    protocol: str = "alone"
+    training: tuple[str, ...] = ()  #: sha256 of every file that was trained on.
+    causal: bool = False  #: Whether it could run online.
+    inputs: str = ""  #: What it reads of a log.
+
+
+class Rival(NamedTuple):
+    """Outside estimates: a row of their own."""
+
+    name: str
+    folder: Path
+    declared: Declaration
+
+    def file(self, log: BenchmarkLog) -> Path | None:
+        """Its estimates of a log, None where it has none."""
+        return self._first(f"{log.name}.parquet", f"{log.name}.csv")
+
+    def list(self, log: BenchmarkLog) -> Path | None:
+        """Its list of a log's contacts, None where it has none."""
+        return self._first(f"{log.name}.contacts.csv")
+
+    def _first(self, *names: str) -> Path | None:
+        tries = (self.folder / name for name in names)
+        return next((path for path in tries if path.is_file()), None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest:
+    """Logs, trained robots, and the folder that the logs lie in."""
+
+    name: str
+    path: Path
+    data: Path
+    logs: tuple[BenchmarkLog, ...]
+    robots: tuple[TrainedRobot, ...]
+
+    @cached_property
+    def by_name(self) -> dict[str, BenchmarkLog]:
+        """Name → log."""
+        return {log.name: log for log in self.logs}
+
+    def paths(self, log: BenchmarkLog) -> list[Path]:
+        """The files of a log that are looked for; a simulated one has none."""
+        names = [part.partition("=")[2] for part in log.parts] if log.parts else [log.file]
+        return [self.data / name for name in names if name]
+
+    def robot(self, log: BenchmarkLog) -> str | None:
+        """Its arm: a profile, or a file below the folder of the data; None if none is named."""
+        name: str | None = dict(log.options).get("robot")
+        return str(self.data / name) if name and Path(name).suffix else name
+
+    def missing(self, log: BenchmarkLog) -> list[Path]:
+        """The files of its entry that are not there."""
+        robot = self.robot(log) or ""
+        also = [self.data / log.truth_file] * bool(log.truth_file) + [Path(robot)] * ("." in robot)
+        return [path for path in (*self.paths(log), *also) if not path.exists()]
+
+    def choice(
+        self,
+        log: BenchmarkLog,
+        protocol: str,
+        file: Path,
+        robot: Path | None = None,
+        logs: Mapping[str, Path] = MappingProxyType({}),
+    ) -> AnalysisChoice:
+        """What is asked of a log by a protocol.
+
+        Args:
+            log: The log.
+            protocol: One of `PROTOCOLS`.
+            file: Where it is.
+            robot: The robot file of protocol 3.
+            logs: Name → where each log is, for free motion.
+        """
+        words = {w: OPTIONS[w].keyword(v) for w, v in log.options if w != "robot"}
+        if file not in self.paths(log):
+            words.pop("columns", None)  # those of a file that this one is made of
+        if protocol == "free":
+            words["free"] = [str(logs.get(word, word)) for word in log.free]
+        arm = str(robot) if robot is not None else self.robot(log)
+        made = Asked("", arm, {"frame": "base", **words}, {}).analysis([file], wrench=True)
+        made = replace(made, library=Library(), examiner=Examiner())
+        return cast("AnalysisChoice", with_files(made, absolute))
+
+    def trains_on(self, log: BenchmarkLog, protocol: str) -> Iterator[tuple[BenchmarkLog, Spans]]:
+        """What a protocol may have seen: logs, and the spans of each that are used."""
+        if protocol == "free":
+            for word in log.free:
+                is_log = word in self.by_name
+                yield self.by_name.get(word, log), (ALWAYS if is_log else (interval(word),))
+        if protocol == "identified":
+            robot = next(r for r in self.robots if r.name == log.identified)
+            spans = (interval(robot.interval),) if robot.interval else ALWAYS
+            yield from ((self.by_name[name], spans) for name in robot.train)
+
+    def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
+        """Why a log's rows of a protocol are unfair: a line for each training log that is."""
+        own = list(map(digest_of, self.paths(log)))
+        for other, spans in self.trains_on(log, protocol):
+            what = f"{log.name}, {protocol}: {other.name}"
+            if other.name.removesuffix(PUSHED) == log.name.removesuffix(PUSHED):
+                near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.spans)
+                if any(near):
+                    yield f"{what} is known less than {APART:g} s from what is scored of it"
+            elif self.missing(other):
+                continue
+            elif own and own == list(map(digest_of, self.paths(other))):
+                yield f"{what} is the scored file under another name"
+            elif protocol == "identified" and other.day and other.day == log.day:
+                yield f"{what} is of the same day, {log.day}"
+
+    def complaints(self, rivals: Sequence[Rival]) -> dict[str, list[str]]:
+        """Name of a log → a line on each thing that makes its rows unfair or another file's."""
+        found: dict[str, list[str]] = {}
+        for log in self.logs:
+            if self.missing(log):
+                continue
+            paths = self.paths(log)
+            sha = content_digest(paths) if paths else ""
+            lines = [line for protocol in log.asked for line in self.leaks(log, protocol)]
+            if log.sha256 and sha != log.sha256 and not log.pushes:
+                lines.append(
+                    f"{log.name}: {paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
+                )
+            lines += [
+                f"{log.name}: {rival.name} was trained on it (sha256 {sha[:9]}…)"
+                for rival in rivals
+                if sha in rival.declared.training and rival.file(log)
+            ]
+            if lines:
+                found[log.name.removesuffix(PUSHED)] = lines
+        return found
+
+    def absent(self) -> list[str]:
+        """A line on each log that is not there: where it is had."""
+        return [
+            f"{log.name}: no {lacking[0]}" + (f"; source: {log.source}" if log.source else "")
+            for log in self.logs
+            if not log.pushes and (lacking := self.missing(log))
+        ]
+
+
+def load_manifest(name: str, data: Path | None) -> Manifest:
+    """A built-in manifest, or a user's file, whose logs lie beside it unless `data` is given.
+
+    Raises:
+        ParameterError: If there is none, or an entry is wrong.
+    """
+    path = Path(name)
+    if name in BUILT_IN:
+        path = Path(str(files("vftcli.reproduction") / f"{name}.toml"))
+    elif path.suffix != ".toml":
+        check_known(name, (*BUILT_IN, "speed"), f"no FILE.toml and no benchmark {name!r}")
+    tables = tables_of(path)
+    for key in tables:
+        check_known(key, ("log", "robot"), f"{path}: no table {key!r}")
+    logs = tuple(each for table in tables.get("log", ()) for each in logs_of(table))
+    robots = [section_from(TrainedRobot, table, "robot") for table in tables.get("robot", ())]
+    default = Path() if name in BUILT_IN else path.parent
+    found = Manifest(
+        name=path.stem, path=path, data=data or default, logs=logs, robots=tuple(robots)
+    )
+    check_names(found)
+    return found
+
+
+def check_names(manifest: Manifest) -> None:
+    """Raise unless every log is named once and every name that is used is one's."""
+    names = [log.name for log in manifest.logs]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ParameterError(f"{manifest.path}: two logs are called {twice[0]}")
+    if not names:
+        raise ParameterError(f"{manifest.path}: no [[log]]; docs/benchmark.md shows an entry")
+    for robot in manifest.robots:
+        for name in robot.train:
+            check_known(name, names, f"robot {robot.name}: no log {name!r} to train on")
+    for log in manifest.logs:
+        if log.identified:
+            there = [robot.name for robot in manifest.robots]
+            check_known(log.identified, there, f"log {log.name}: no [[robot]] {log.identified!r}")
+        for word in log.free:
+            if ":" not in word:
+                check_known(word, names, f"log {log.name}: no free log {word!r}")
+
+
+def tables_of(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file; a ParameterError names it where it cannot be read."""
+    try:
+        return toml_tables(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text"
+        raise ParameterError(f"{path}: cannot be read as a manifest ({reason})") from None
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+
+
+def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
+    """The log of an entry; one that nobody touches, with pushes, is a second log with these."""
+    words = {key: value for key, value in table.items() if key in OPTIONS}
+    rest = {key: value for key, value in table.items() if key not in OPTIONS}
+    for word, value in words.items():
+        OPTIONS[word].keyword(value)  # refused now rather than in a worker
+    log = section_from(BenchmarkLog, rest, f"log {table.get('name', '')}".strip())
+    log = replace(log, options=tuple(words.items()))
+    if not log.pushes:
+        yield log
+        return
+    if log.truth != "free":
+        raise ParameterError(f"log {log.name}: pushes are planted where truth is free")
+    yield replace(log, pushes=())
+    yield replace(log, name=f"{log.name}{PUSHED}", arm=f"{log.arm} (planted)")
+
+
+def rival_of(text: str, ours: Sequence[str]) -> Rival:
+    """The outside estimates of ``NAME=DIR``.
+
+    Raises:
+        ParameterError: If the name is one of `ours`, or the folder or its declaration is wrong.
+    """
+    name, _, place = text.partition("=")
+    if not re.fullmatch(r"[\w.+-]+", name) or not place:
+        raise ParameterError(f"--outside {text!r} is not NAME=DIR")
+    if name in ours:
+        raise ParameterError(f"--outside {text}: {name} is one of our rows; give another name")
+    folder = Path(place)
+    if not folder.is_dir():
+        raise ParameterError(f"--outside {text}: there is no folder {folder}")
+    file = folder / "rival.toml"
+    declared = section_from(Declaration, tables_of(file) if file.is_file() else {}, "rival.toml")
+    check_known(declared.protocol, PROTOCOLS, f"{file}: protocol {declared.protocol!r}")
+    return Rival(name, folder, declared)
