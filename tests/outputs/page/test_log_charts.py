@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import OF_FORCES
 from vftcli.outputs.charts import REFERENCE
 from vftcli.outputs.page.log_charts import (
     LOWEST,
@@ -14,7 +15,7 @@ from vftcli.outputs.page.log_charts import (
     torque_chart,
     wrench_chart,
 )
-from vftcli.outputs.page.pages import render, scale_words
+from vftcli.outputs.page.pages import render
 
 
 def test_the_best_is_drawn_at_once_the_others_on_demand(analysis: Analysis) -> None:
@@ -42,14 +43,10 @@ def test_a_reference_at_rest_is_another_line(analysis: Analysis) -> None:
     assert np.isnan(resting.values[150, 1])
 
 
-def test_scales_are_said(analysis: Analysis) -> None:
+def test_joints_of_one_drive_size_share_a_scale(analysis: Analysis) -> None:
     chart = torque_chart(analysis)
     assert chart.families == (1, 1, 1, 2, 2, 2)  # 150 and 28 N·m
-    assert scale_words(chart) == "One scale in J1–J3 and in J4–J6."
-    assert scale_words(chart._replace(families=(1, 1, 2, 3, 4, 5))) == (
-        "One scale in J1–J2; the others have their own."
-    )
-    assert scale_words(chart._replace(families=())) == "Every joint has its own scale."
+    assert chart.ends(0) == chart.ends(2) != chart.ends(3)
 
 
 def test_a_first_order_response_is_3_db_down_at_its_cutoff(analysis: Analysis) -> None:
@@ -103,6 +100,7 @@ def test_the_force_is_that_of_the_contacts_and_has_their_peaks(pushed: Analysis)
     found = pushed.contacts
     assert found is not None
     chart = force_chart(pushed, found)
+    assert chart is not None
     (line,) = chart.series
     force, t = line.values[:, 0], pushed.t
     inside = np.zeros(len(t), dtype=bool)
@@ -128,7 +126,19 @@ def test_the_axis_of_the_force_holds_every_peak_with_its_band(pushed: Analysis) 
     # A band wider than its force stretches no axis.
     wide = replace(found.contacts[0], peak_force=88.0, peak_band=900.0)
     assert highest(replace(found, contacts=(wide,))) < 250.0
-    assert force_chart(pushed, found).ends(0) == (0.0, highest(found))
+    chart = force_chart(pushed, found)
+    assert chart is not None
+    assert chart.ends(0) == (0.0, highest(found))
+
+
+def test_without_a_force_there_is_no_chart_of_it(pushed: Analysis) -> None:
+    assert pushed.contacts is not None
+    unfelt = [replace(c, **dict.fromkeys(OF_FORCES)) for c in pushed.contacts.contacts]
+    bare = replace(pushed.contacts, contacts=tuple(unfelt), smallest_force=None)
+    assert force_chart(pushed, bare) is None
+    html = render(replace(pushed, contacts=bare))
+    assert 'id="force"' not in html
+    assert 'id="contact-12"' in html
 
 
 def test_the_band_is_grey_where_no_contact_is_listed(pushed: Analysis) -> None:

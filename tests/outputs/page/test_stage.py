@@ -170,6 +170,13 @@ def test_a_log_without_a_list_claims_nothing(pushed: Analysis) -> None:
     assert (guessed["least"], guessed["none"]) == (None, "no contact listed")
 
 
+def test_what_touches_a_loaded_arm_comes_before_its_load(pushed: Analysis) -> None:
+    first, second, *rest = listed(pushed).contacts
+    load = replace(first, is_load=True, start=0.0, stop=20.0)
+    data = staged(replace(pushed, contacts=replace(listed(pushed), contacts=(load, second, *rest))))
+    assert [row["number"] for row in data["contacts"]] == [*range(2, 13), 1]
+
+
 def few(contact: Contact) -> Contact:
     return replace(
         contact, peak_force=None, peak_band=None, wrench=None, wrench_sd=None, anywhere=None

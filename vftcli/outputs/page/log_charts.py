@@ -183,8 +183,10 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
     )
 
 
-def force_chart(analysis: Analysis, found: ContactList) -> Chart:
-    """|F| of every listed contact with its band, the reference's below it."""
+def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
+    """|F| of every listed contact with its band, the reference's below it; None without any."""
+    if found.hardest is None and found.detectable_force is None:
+        return None
     t, sensed = analysis.t, analysis.virtual_sensor
     force, half = np.full((2, len(t), 1), np.nan)
     for contact in found.contacts:

@@ -47,9 +47,10 @@ on(window, "afterprint", () => { for (const each of folded) each.open = false; }
 // ---- Numbers, colours, and what every drawing is made of.
 const seconds = (t) => `${t.toFixed(2)} s`;
 const minus = (text) => text.replace("-", "−");
-const number = (x, size = abs(x)) => {
-	const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
-	return minus((+x.toFixed(digits) + 0).toFixed(digits)); // no negative nought
+// Three digits of the largest, as far as the steps of the data go, and no negative nought.
+const number = (x, size, step) => {
+	const digits = clamp(2 - floor(Math.log10(max(size, step))), 0, max(0, Math.ceil(-Math.log10(step) - .1)));
+	return minus((+x.toFixed(digits) + 0).toFixed(digits));
 };
 const ticks = (low, high, count) => {
 	const width = (high - low) / count, power = 10 ** floor(Math.log10(width)), found = [];
@@ -245,7 +246,8 @@ class Plot {
 		const shown = this.chart.lines.filter((line) => line.shown && !isNaN(this.value(line).low)).sort((a, b) => b.leads - a.leads);
 		const texts = shown.map((line) => {
 			const { low, high, half } = this.value(line), size = max(abs(low), abs(high), half || 0), name = line.leads || !shown[1] ? "" : `${line.name.replace(/ \(.*/, "")} `;
-			return name + number(low, size) + (high - low > .005 * size ? `…${number(high, size)}` : "") + (isNaN(half) ? "" : ` ± ${number(half, size)}`);
+			const text = (x) => number(x, size, data.steps[line.low[this.panel]]);
+			return name + text(low) + (high - low > .005 * size ? `…${text(high)}` : "") + (isNaN(half) ? "" : ` ± ${text(half)}`);
 		});
 		return texts[0] ? `${texts.join(" · ")} ${this.chart.units[this.panel]}` : "";
 	}
@@ -257,7 +259,6 @@ class Plot {
 			if (e.button) return;
 			from = place(e);
 			box.setPointerCapture(e.pointerId);
-			if (!isMouse(e)) clock.go(this.time(from));
 		});
 		on(box, "pointermove", (e) => {
 			const x = place(e);
@@ -271,10 +272,10 @@ class Plot {
 			const x = place(e), start = from, dragged = !chosen.hidden;
 			from = null;
 			chosen.hidden = true;
-			if (start === null || !isMouse(e)) return;
+			if (start === null) return;
 			if (dragged) clock.zoom(this.time(min(x, start)), this.time(max(x, start)));
 			else clock.go(this.time(x));
-			clock.look = dragged ? null : this.time(x);
+			clock.look = dragged || !isMouse(e) ? null : this.time(x);
 		});
 		on(box, "pointercancel pointerleave", () => { from = clock.look = null; chosen.hidden = true; ask(LOOKS); });
 		on(box, "dblclick", () => clock.zoom());
@@ -310,7 +311,6 @@ const pngOf = (plots) => {
 	});
 	return new Promise((done) => { sheet.toBlob(done); });
 };
-// Its tools: a switch a line, the whole log again, what is seen as a file.
 const openTools = (chart, plots, tools) => {
 	const whole = $(".whole", tools), log = document.title.split(" – ").at(-1).replace(/[^\w-]+/g, "_");
 	chart.clock.buttons.push(whole);
@@ -409,7 +409,7 @@ class Arm {
 		const along = strong > 1e-9 ? (wrench.flange ? turn(R, force) : force).map((x) => x / strong) : contact.along, tip = add(a, add(b, a, -1), .5);
 		const reach = (newtons) => this.reach * (.14 + .6 * clamp(newtons / most, 0, 1)), end = (newtons) => this.seen(add(tip, along, -reach(newtons)));
 		const [x, y, ahead] = this.seen(tip), [u, v, behind, near] = end(size), long = hypot(x - u, y - v) || 1, dx = (x - u) / long, dy = (y - v) / long;
-		// The cone: a triangle, and the ellipse of its open end.
+		// The cone: a triangle and an ellipse.
 		const wide = Math.tan(contact.cone) * reach(size) * near;
 		area([[x, y], [u - wide * dy, v + wide * dx], [u + wide * dy, v - wide * dx]], css.band);
 		c.beginPath();
@@ -452,7 +452,7 @@ class Arm {
 // ---- The stage: one moment in the arm, the list, the force and the number.
 let stage = null, forceLine = null;
 const contactAt = (t) => stage.contacts.find((c) => t >= c.start - 1e-9 && t <= c.stop + 1e-9);
-// At the peak it is the contact's own number, elsewhere the line's.
+// At the peak it is the contact's number, elsewhere the line's.
 const forceAt = ({ i, size, half }, t) => {
 	const at = clocks[0].index(t), line = at !== i && forceLine?.plot.value(forceLine, at);
 	return line ? { size: line.high, half: line.half } : { size: size ?? NaN, half: half ?? NaN };
@@ -558,12 +558,12 @@ const openStage = () => {
 	new IntersectionObserver(([{ isIntersecting: there }]) => settle(!there)).observe(home);
 	on($("#undock"), "click", () => { shut = true; settle(true); });
 	clock.go(clock.t[stage.first]);
-	self.vftcli = { clock, arm, rows, data }; // for whoever checks the page
+	self.vftcli = { clock, arm, rows, data }; // for tests
 };
 
 // ---- The data: int16 as zigzag differences, all high bytes first, deflated.
 const unpack = async ({ blob, steps, sizes }) => {
-	const packed = Uint8Array.from(atob(blob), (letter) => letter.charCodeAt(0));
+	const packed = Uint8Array.from(atob(blob), (x) => x.charCodeAt(0));
 	const stream = new Response(packed).body.pipeThrough(new DecompressionStream("deflate-raw"));
 	const planes = new Uint8Array(await new Response(stream).arrayBuffer()), words = planes.length / 2;
 	let place = 0;

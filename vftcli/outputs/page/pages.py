@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import groupby
 from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import JointMeans
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
-from vftcli.outputs.charts import Chart
 from vftcli.outputs.contacts import by_force, hardest_words, otherwise
 from vftcli.outputs.error_tables import (
     axis_grids,
@@ -59,12 +57,11 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
     charts = [torque] if wrench is None else [torque, wrench]
     view: dict[str, Any] = {"grounds": grounds(analysis), "record": record, "force": None}
     if found is not None:
-        force = log_charts.force_chart(analysis, found)
-        charts.insert(0, force)
+        if (force := log_charts.force_chart(analysis, found)) is not None:
+            charts.insert(0, force)
+            view |= {"force": force, "scales": next(scales_of(force, FORCE_BOX))}
         ranges = [contact.anywhere[1] for contact in found.contacts if contact.anywhere is not None]
         view |= {
-            "force": force,
-            "scales": next(scales_of(force, FORCE_BOX)),
             "most": max(ranges, default=1.0),
             "free": free_spans(analysis),
             "contact_grids": details.contact_details(found),
@@ -95,7 +92,6 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         arm=still_arm(analysis, camera, found.hardest if found is not None else None),
         torque=torque,
         wrench=wrench,
-        scale_words=scale_words(torque),
         errors=errors_view(analysis),
         observers=details.observers_view(analysis),
         guide=details.selection_guide(analysis),
@@ -135,17 +131,6 @@ def lead_sentences(analysis: Analysis) -> list[str]:
         named = several if len(weak) <= MOST_NAMED else f"{len(weak)} contacts"
         said.append(f"The sizes of {named} are uncertain.")
     return [*said, otherwise(found)]
-
-
-def scale_words(chart: Chart) -> str:
-    """Pictures with a common scale, in words."""
-    numbered = groupby(zip(chart.families, chart.panels, strict=False), key=itemgetter(0))
-    families = [[name for _, name in members] for _, members in numbered]
-    shared = [f"{names[0]}–{names[-1]}" for names in families if len(names) > 1]
-    if not shared:
-        return "Every joint has its own scale."
-    rest = "; the others have their own" if any(len(names) == 1 for names in families) else ""
-    return f"One scale in {' and in '.join(shared)}{rest}."
 
 
 def errors_view(analysis: Analysis) -> dict[str, Any]:

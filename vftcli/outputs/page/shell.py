@@ -60,7 +60,7 @@ def templates() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    drawing = (ticks, decades, label, scales_of, stripes, strokes, paint)
+    drawing = (ticks, label, scales_of, stripes, strokes, paint)
     words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
     functions = (*drawing, *words, at_least_shown, asset, Box)
     made.globals |= {each.__name__: each for each in functions}
@@ -127,12 +127,10 @@ class Scales(NamedTuple):
     box: Box  #: The chart.
     x: Span  #: Ends of the horizontal axis.
     y: Span  #: Ends of the vertical axis.
-    log: bool = False  #: Whether the horizontal axis is logarithmic.
 
     def across(self, x: Array | float) -> Array:
         """Horizontal places."""
-        low, high = np.log(self.x) if self.log else self.x
-        share = ((np.log(x) if self.log else np.asarray(x)) - low) / ((high - low) or 1.0)
+        share = (np.asarray(x) - self.x.low) / ((self.x.high - self.x.low) or 1.0)
         places: Array = self.box.left + share * (self.side - self.box.left)
         return places
 
@@ -176,12 +174,6 @@ def ticks(span: Span, count: int) -> list[float]:
     return found if len(found) >= min(count, 3) else ticks(span, count + 2)
 
 
-def decades(span: Span) -> list[float]:
-    """Powers of ten along a logarithmic axis."""
-    first, last = np.ceil(np.log10(span.low) - 1e-9), np.floor(np.log10(span.high) + 1e-9)
-    return [float(10.0**k) for k in np.arange(first, last + 1)]
-
-
 def label(value: float) -> str:
     """A tick's number without an exponent where one can do without."""
     return minus(f"{value + 0.0:.6g}")
@@ -192,7 +184,7 @@ def scales_of(chart: Chart, box: Box) -> Iterator[Scales]:
     families = chart.families or (0,) * len(chart.panels)
     ends = {family: chart.ends(families.index(family)) for family in set(families)}
     x = Span(float(chart.x[0]), float(chart.x[-1]))
-    return (Scales(box, x, ends[family], chart.log) for family in families)
+    return (Scales(box, x, ends[family]) for family in families)
 
 
 def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:

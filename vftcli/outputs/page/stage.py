@@ -210,6 +210,8 @@ def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, An
     sensed = analysis.virtual_sensor
     # Axes that the script knows; in others the direction is that of the peak.
     turns = sensed is not None and sensed.sensor.frame in {"base", "flange"}
+    # A load lasts: what touches the arm meanwhile comes before it.
+    ordered = sorted(contacts, key=lambda contact: contact.is_load)
     keys = ("rotation", "flange_rotation", "translation", "flange_translation")
     matrices = {key: np.round(getattr(chain, key), 9) for key in keys}
     matrices["rotation"] = matrices["rotation"].reshape(-1, 9)
@@ -223,7 +225,7 @@ def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, An
         ],
         "wrench": {"flange": sensed.sensor.frame == "flange"} if turns and sensed else None,
         "view": view._replace(centre=view.centre.tolist(), span=view.span.tolist())._asdict(),
-        "contacts": [contact_data(c, chain.joints, analysis.t, clock) for c in contacts],
+        "contacts": [contact_data(c, chain.joints, analysis.t, clock) for c in ordered],
         "first": 0 if hardest is None else peak_index(hardest, analysis.t, clock),
         "most": most_force(found),
         "floor": least,
