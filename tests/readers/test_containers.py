@@ -1,6 +1,7 @@
 """Arrow, JSON, MATLAB and HDF5 files: what is read of each, and what is refused by name."""
 
 import json
+import pickle
 import sys
 import zipfile
 from collections.abc import Callable
@@ -66,6 +67,15 @@ def test_a_square_log_is_not_turned(tmp_path: Path) -> None:
     with (tmp_path / "x").open("wb") as file:
         savemat(file, {"t": np.arange(6.0), "q": q})
     np.testing.assert_array_equal(read(tmp_path / "x").q, q)
+
+
+def test_a_pickled_clock_of_numpy_scalars_is_a_clock(tmp_path: Path) -> None:
+    t = 0.01 * np.arange(30)
+    q = np.outer(np.sin(t), np.ones(7))
+    (tmp_path / "x").write_bytes(pickle.dumps({"time": [*t], "q": [*q]}))
+    recording = read(tmp_path / "x")
+    np.testing.assert_array_equal(recording.t, t)
+    np.testing.assert_array_equal(recording.q, q)
 
 
 def test_an_unpacked_matlab_file_is_read_as_a_packed_one(tmp_path: Path) -> None:
