@@ -13,6 +13,7 @@ from vftcli.outputs.rerun_arm import (
     MOST_POSES,
     arrow_scale,
     capsules,
+    collada,
     motion,
     rgba,
     send_arm,
@@ -84,7 +85,7 @@ def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path) -> Non
     file.write_bytes(b"\0" * 84)
     whole = Mesh("a.stl", file, 2, pose, np.array([1.0, 2.0, 3.0]))
     coloured = whole._replace(link=3, file=tmp_path / "b.dae")
-    (tmp_path / "b.dae").write_bytes(b"<COLLADA/>")
+    (tmp_path / "b.dae").write_bytes(b'<COLLADA><unit meter="0.5"/></COLLADA>')
     gone = whole._replace(link=4, file=tmp_path / "gone.stl")
     meshes = (whole, coloured, gone, whole._replace(link=5), whole._replace(link=5, file=None))
     path, painted = tmp_path / "r.rrd", {2: [(1.0, 2.0, "#dd6415")], 3: [(1.0, 2.0, "#dd6415")]}
@@ -101,11 +102,35 @@ def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path) -> Non
     ]
     # Columns: the file's x goes to y, its y, of double size, to −x.
     np.testing.assert_allclose(matrix, [0, 1, 0, -2, 0, 0, 0, 0, 3], atol=1e-7)  # float32
+    ((half,),) = rows_of(path, "/robot/link_3/mesh_0", "Transform3D:mat3x3")
+    np.testing.assert_allclose(half, np.array(matrix) / 2, atol=1e-7)
     orange, own = [int(rgba("#dd6415")[0])], [int(rgba(LINK)[0])]
     for name, unpainted in (("link_2", own), ("link_3", [])):  # a DAE has colours of its own
         colours = rows_of(path, f"/robot/{name}/mesh_0", "Asset3D:albedo_factor")
         assert [c for c in colours if c is not None] == [unpainted, orange, unpainted]
     assert rows_of(path, "/robot/link_5/mesh_0", "Asset3D:albedo_factor") == [own]
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [
+        ('<unit name="mm" meter="0.001"/><up_axis>Y_UP</up_axis>', 0.001),
+        ("<unit meter = '0.0254' name='inch'></unit><up_axis> X_UP</up_axis>", 0.0254),
+        ("<up_axis>Z_UP</up_axis>", 1.0),
+        ('<unit meter="x"/>', 1.0),
+        ('<unit meter="nan"/>', 1.0),
+        ('<unit meter="0"/>', 1.0),
+    ],
+)  # fmt: skip
+def test_a_dae_is_in_metres_with_z_up(head: str, unit: float) -> None:
+    """As ROS has it: RViz leaves a file's up axis out and takes its unit."""
+    found, metres = collada(f"<asset>{head}</asset><p>Y_UP</p>".encode())
+    assert metres == unit
+    assert b"<p>Y_UP</p>" in found
+    assert b"Y_UP</up" not in found
+    assert b"X_UP" not in found
+    assert (b"meter" in found) == ("meter" in head)
+    assert collada(found) == (found, 1.0)
 
 
 @pytest.mark.parametrize("name", PROFILES)

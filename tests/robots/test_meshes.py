@@ -26,7 +26,7 @@ def shaped(text: str, name: str, shapes: str) -> str:
 
 def put(file: Path) -> Path:
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(b"solid")
+    file.write_bytes(b"<triangles/>")
     return file
 
 
@@ -59,7 +59,7 @@ def test_a_mesh_is_found_by_its_name(tmp_path: Path, name: str, place: str | Non
         assert mesh.file is not None
         assert mesh.file.resolve() == (tmp_path / place).resolve()
     said = [str(remark) for remark in found.remarks if remark.code == "meshes-not-found"]
-    one = f"mesh files not found: 1, the first {named}; those links are drawn as simple shapes"
+    one = f"mesh files not found or not readable: 1, first {named}; simple shapes are drawn"
     assert said == ([one] if place is None else [])
 
 
@@ -90,6 +90,16 @@ def test_a_mesh_is_where_pinocchio_has_its_link(tmp_path: Path) -> None:
         expected = data.oMf[model.getFrameId(name, pin.FrameType.BODY)] * own
         np.testing.assert_allclose(placed.homogeneous, expected.homogeneous, atol=1e-12)
         assert mesh.scale.tolist() == [0.001, 0.002, -0.003]
+
+
+def test_a_dae_without_triangles_cannot_be_shown(tmp_path: Path) -> None:
+    """Rerun reads nothing else of it; the collision shape is there instead."""
+    (tmp_path / "a.dae").write_bytes(b"<COLLADA><polylist/></COLLADA>")
+    put(tmp_path / "b.stl")
+    shapes = shape("a.dae") + shape("b.stl", kind="collision")
+    text = shaped(robot(link("base"), arm(6)), "link2", shapes)
+    (mesh,) = load_robot(written(tmp_path, text)).meshes
+    assert mesh.name == "b.stl"
 
 
 def test_collision_shapes_replace_those_for_show_that_are_not_all_found(tmp_path: Path) -> None:

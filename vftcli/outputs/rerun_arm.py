@@ -5,7 +5,9 @@ capsules, from the chain's own geometry. A contact's arrow is there while it las
 place, below `/contacts`, and the links that it touched have its colour.
 """
 
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +39,9 @@ LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
 SCALES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
 SHAFT = 0.012  #: Radius of a force arrow. [m]
 LONGEST = 0.5  #: The hardest force's arrow is as long at most. [m]
+#: The unit of a DAE, and the axis that it calls up.
+UNIT = re.compile(rb"(<unit\b[^>]*?\bmeter\s*=\s*[\"'])([^\"']*)")
+UP = re.compile(rb"(<up_axis>\s*)[XY]_UP")
 
 
 class Capsule(NamedTuple):
@@ -134,18 +139,30 @@ def send_meshes(
     """Send the meshes of a link once; whether it has any and none is missing."""
     found = [(mesh, mesh.file) for mesh in meshes if mesh.file is not None]
     try:
-        contents = [file.read_bytes() for _, file in found]
+        contents = [collada(file.read_bytes()) for _, file in found]
     except OSError:  # gone since the robot was loaded
         return False
     for k, (mesh, file) in enumerate(found):
         path, ending = f"{link}/mesh_{k}", file.suffix.lower()
-        shape = mesh.pose.rotation * mesh.scale
+        asset = rr.Asset3D(contents=contents[k][0], media_type=FORMATS[ending])
+        shape = mesh.pose.rotation * mesh.scale * contents[k][1]
         place = rr.Transform3D(translation=mesh.pose.translation, mat3x3=shape)
-        asset = rr.Asset3D(contents=contents[k], media_type=FORMATS[ending])
         stream.log(path, asset, place, static=True)
         own = rgba(*() if ending in COLOURED else (LINK,))
         send_colours(stream, path, own, start, painted, mesh=True)
     return 0 < len(found) == len(meshes)
+
+
+def collada(contents: bytes) -> tuple[bytes, float]:
+    """A mesh with z up, in metres where it is a DAE, and the unit that its numbers are in. [m]
+
+    Robot descriptions ignore a DAE's axis and Rerun its unit; other files state neither.
+    """
+    found, unit = UNIT.search(contents), 1.0
+    with suppress(ValueError):
+        unit = float(found[2]) if found else 1.0
+    metric = UP.sub(rb"\1Z_UP", UNIT.sub(rb"\g<1>1", contents, count=1))
+    return metric, unit if 1e-6 < unit < 1e3 else 1.0
 
 
 def send_colours(

@@ -73,14 +73,17 @@ def named(link: UrdfPart, tag: str, packages: Mapping[str, str]) -> Iterator[Mes
 
 
 def file_of(name: str, path: Path, packages: Mapping[str, str]) -> Path | None:
-    """The mesh file of a name in a URDF, None where there is none that can be drawn."""
+    """The mesh file of a name in a URDF, None where there is none that can be shown."""
     scheme, _, rest = name.rpartition("://")
     package, _, inner = rest.partition("/")
     file = path.parent / rest if scheme != "package" else Path(packages.get(package, "")) / inner
     known = scheme in {"", "file"} or (scheme == "package" and package in packages)
     with suppress(OSError):  # a name that is too long, a folder that is closed
         if known and file.suffix.lower() in FORMATS and file.is_file():
-            return file
+            # Of a DAE a viewer reads triangles, no other polygons.
+            small = file.stat().st_size <= LARGEST
+            if small and (file.suffix.lower() != ".dae" or b"<triangles" in file.read_bytes()):
+                return file
     return None
 
 
