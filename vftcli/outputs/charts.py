@@ -30,6 +30,7 @@ COLOURS = {
 SPARE = ("#2f86d0", "#dd6415", "#0c9f76", "#c95fa4", "#b98900", "#7a6fd6", "#a0522d", "#5b8c00")
 #: Colours that follow the page: its text's, and the reference's.
 INK, REFERENCE = "ink", "reference"
+OLIVE = "#77801f"  #: What the page has for a blue that is no force's.
 GREY = "#8a929a"  #: Both on an unknown background.
 #: The part of the arm that was touched, in words → its colour.
 PLACES = {
@@ -141,9 +142,9 @@ def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
 
 
 def paint(colour: str) -> str:
-    """A line's colour in the page: `best` is the force's, and two follow the scheme."""
-    own = {COLOURS["best"]: "force", INK: INK, REFERENCE: REFERENCE}
-    return f"var(--{own[colour]})" if colour in own else colour
+    """A line's colour in the page, where blue is the force's and `best`'s alone."""
+    own = {COLOURS["best"]: "var(--force)", INK: "var(--ink)", REFERENCE: "var(--reference)"}
+    return {**own, COLOURS["fdo"]: OLIVE}.get(colour, colour)
 
 
 def families_of(limits: Array) -> tuple[int, ...]:

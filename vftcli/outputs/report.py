@@ -134,7 +134,7 @@ def fill(
 
             write_rrd(path, analysis, choice.detail)
         else:
-            sizes = {file.name: file.stat().st_size for file in sorted(path.parent.iterdir())}
+            sizes = {file.name: file.stat().st_size for file in path.parent.iterdir()}
             put_text(path, render(analysis, {**sizes, SEAL: None}))
     write_extras(folder, place, analysis, choice)
     if form is not None:

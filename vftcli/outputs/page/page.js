@@ -2,7 +2,7 @@
 const $ = (query, at = document) => at.querySelector(query);
 const $$ = (query, at = document) => [...at.querySelectorAll(query)];
 const on = (target, names, act, how) => names.split(" ").forEach((name) => target.addEventListener(name, act, how));
-const { abs, cos, floor, hypot, max, min, round, sin } = Math;
+const { abs, ceil, cos, floor, hypot, log10, max, min, round, sin } = Math;
 const clamp = (x, low, high) => min(max(x, low), high);
 // A button's space is its own.
 const onKeys = (place, acts) => on(place, "keydown", (e) => {
@@ -49,14 +49,14 @@ const seconds = (t) => `${t.toFixed(2)} s`;
 const minus = (text) => text.replace("-", "−");
 // Three digits of the largest, as far as the steps of the data go, and no negative nought.
 const number = (x, size, step) => {
-	const digits = clamp(2 - floor(Math.log10(max(size, step))), 0, max(0, Math.ceil(-Math.log10(step) - .1)));
+	const digits = clamp(2 - floor(log10(max(size, step))), 0, max(0, ceil(-log10(step) - .1)));
 	return minus((+x.toFixed(digits) + 0).toFixed(digits));
 };
 const ticks = (low, high, count) => {
-	const width = (high - low) / count, power = 10 ** floor(Math.log10(width)), found = [];
+	const width = (high - low) / count, power = 10 ** floor(log10(width)), found = [];
 	const step = [1, 2, 5, 10].find((s) => width <= 1.4 * s * power) * power;
-	for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-	return { found, digits: max(0, -floor(Math.log10(step) + 1e-9)) };
+	for (let k = ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+	return { found, digits: max(0, -floor(log10(step) + 1e-9)) };
 };
 const css = {};
 let c = null; // what is drawn on
@@ -294,18 +294,23 @@ const csvOf = (plots) => {
 		}
 	}
 	const lines = [...clock.t.keys()].filter((i) => clock.t[i] >= low - 1e-9 && clock.t[i] <= high + 1e-9).map((i) => [clock.t[i].toFixed(4), ...columns.map((of) => (isNaN(of(i)) ? "" : +of(i).toPrecision(6)))]);
-	return new Blob([[`# ${data.about.replace(/\n/g, " ")}`, heads, ...lines, ""].join("\n")], { type: "text/csv" });
+	return new Blob([[`# ${data.about}`, heads, ...lines, ""].join("\n")], { type: "text/csv" });
 };
 const pngOf = (plots) => {
 	const ratio = devicePixelRatio, { width, height } = plots[0], sheet = document.createElement("canvas"), wide = plots[1] ? 2 : 1;
 	sheet.width = ratio * wide * width;
-	sheet.height = ratio * (32 + Math.ceil(plots.length / wide) * (height + 26));
+	sheet.height = ratio * (54 + ceil(plots.length / wide) * (height + 26));
 	c = sheet.getContext("2d");
 	c.scale(ratio, ratio);
 	fill(css.paper, 0, 0, sheet.width, sheet.height);
-	write(document.title, 12, 18, css.ink, 14, "left");
+	let at = 12;
+	write(document.title, at, 16, css.ink, 14, "left");
+	for (const { name, shown, colour } of plots[0].chart.lines) if (shown) {
+		write(name, at, 38, paint(colour), 12, "left");
+		at += c.measureText(name).width + 16;
+	}
 	plots.forEach(({ chart, panel, sheet: drawn }, k) => {
-		const x = k % wide * width, y = 32 + floor(k / wide) * (height + 26);
+		const x = k % wide * width, y = 54 + floor(k / wide) * (height + 26);
 		write(`${chart.panels[panel]} [${chart.units[panel]}]`, x + 12, y + 12, css.ink, 12, "left");
 		c.drawImage(drawn, x, y + 24, width, height);
 	});
@@ -343,7 +348,7 @@ class Arm {
 	zoom = 1;
 	constructor(clock) {
 		Object.assign(this, { clock, ...stage.view, canvas: $("#arm canvas") });
-		this.every = Math.ceil(clock.t.length / 3000);
+		this.every = ceil(clock.t.length / 3000);
 		this.swept = [...clock.t].filter((_, i) => i % this.every === 0).map((t) => this.poses(t).at(-1)[1]);
 		this.listen();
 		watch(this, this.canvas);
@@ -376,14 +381,13 @@ class Arm {
 		if (contact?.force) this.arrow(contact, frames, t);
 	}
 	ground(parts) {
-		const far = Math.ceil(5.2 * this.reach), end = far / 4;
+		const far = ceil(5.2 * this.reach), end = far / 4;
 		for (let k = -far; k <= far; k++) {
 			c.globalAlpha = 1 - abs(k) / (far + 1);
 			path([[k / 4, -end, 0], [k / 4, end, 0], null, [-end, k / 4, 0], [end, k / 4, 0]].map((p) => p && this.seen(p)), css.line);
 		}
 		c.globalAlpha = 1;
-			const flat = parts.flatMap(({ ends }) => [null, ...ends.map(([x, y]) => this.seen([x, y, 0]))]);
-		path(flat, css.unseen, 1.6 * parts[0].radius * this.seen([0, 0, 0])[3]);
+		path(parts.flatMap(({ ends }) => [null, ...ends.map(([x, y]) => this.seen([x, y, 0]))]), css.unseen, 1.6 * parts[0].radius * this.seen([0, 0, 0])[3]);
 	}
 	// The flange's way: amber in contacts, blue where it was a moment ago.
 	trace(t) {
@@ -393,18 +397,18 @@ class Arm {
 		path(part(t - 1.2, t), css.force, 2);
 	}
 	link({ ends, radius, joint, hit }, several) {
-		const [[ax, ay, , near], [bx, by]] = ends.map((end) => this.seen(end)), width = 2 * radius * near, length = hypot(bx - ax, by - ay);
-		let [nx, ny] = length > 1 ? [(ay - by) / length * radius * near, (bx - ax) / length * radius * near] : [-width / 2, 0];
-		if (nx + 2 * ny > 0) [nx, ny] = [-nx, -ny]; // light from the upper left
+		const [[ax, ay, , near], [bx, by]] = ends.map((end) => this.seen(end)), r = radius * near, length = hypot(bx - ax, by - ay);
+		let [nx, ny] = length > 1 ? [(ay - by) / length * r, (bx - ax) / length * r] : [-r, 0];
+		if (nx + 2 * ny > 0) [nx, ny] = [-nx, -ny]; // lit from upper left
 		const light = c.createLinearGradient(ax + nx, ay + ny, ax - nx, ay - ny);
 		const colours = hit ? several ? ["#ffd9bd", "#f2a673", "#c47a45"] : ["#ff9d5c", "#e0610f", "#9c3c05"] : joint ? ["#8da3b8", "#5f7990", "#334a5e"] : ["#fdfefe", "#d5dbe1", "#8d98a4"];
 		colours.forEach((colour, k) => light.addColorStop(k / 2, colour));
-		for (const [colour, wide] of [[css.card, width + 2.4], [light, width]]) path([[ax, ay], [bx + .01, by]], colour, wide);
+		for (const [colour, wide] of [[css.card, 2 * r + 2.4], [light, 2 * r]]) path([[ax, ay], [bx + .01, by]], colour, wide);
 	}
 	// On the flange the force has its direction of the moment, elsewhere that of the peak.
 	arrow(contact, frames, t) {
 		const { size, half } = forceAt(contact, t), { wrench, most } = stage, at = this.clock.index(t), [R] = frames.at(-1), [a, b] = contact.spot.map((k) => frames[k][1]);
-		if (isNaN(size)) return;
+		if (!size) return;
 		const force = wrench && contact.flange && at !== contact.i ? wrench.rows.map((row) => rows[row][at]) : [], strong = hypot(...force);
 		const along = strong > 1e-9 ? (wrench.flange ? turn(R, force) : force).map((x) => x / strong) : contact.along, tip = add(a, add(b, a, -1), .5);
 		const reach = (newtons) => this.reach * (.14 + .6 * clamp(newtons / most, 0, 1)), end = (newtons) => this.seen(add(tip, along, -reach(newtons)));
@@ -453,15 +457,15 @@ class Arm {
 let stage = null, forceLine = null;
 const contactAt = (t) => stage.contacts.find((c) => t >= c.start - 1e-9 && t <= c.stop + 1e-9);
 // At the peak it is the contact's number, elsewhere the line's.
-const forceAt = ({ i, size, half }, t) => {
-	const at = clocks[0].index(t), line = at !== i && forceLine?.plot.value(forceLine, at);
-	return line ? { size: line.high, half: line.half } : { size: size ?? NaN, half: half ?? NaN };
+const forceAt = (contact, t) => {
+	const i = clocks[0].index(t), line = i !== contact.i && forceLine?.plot.value(forceLine, i);
+	return line ? { size: line.high, half: line.half } : contact;
 };
 const wordsAt = (t) => {
 	const contact = contactAt(t);
 	if (!contact) return [stage.least ? `< ${stage.least}` : "–", "", stage.none];
 	const { size, half } = forceAt(contact, t);
-	if (clocks[0].index(t) === contact.i || !contact.sized || isNaN(size)) return [contact.force || "unknown", contact.band, contact.words];
+	if (clocks[0].index(t) === contact.i || !contact.sized || !size) return [contact.force || "unknown", contact.band, contact.words];
 	return [`${round(size)}`, `± ${round(half)} N`, contact.words];
 };
 class ForcePlot extends Plot {
@@ -485,8 +489,8 @@ class ForcePlot extends Plot {
 			write(name, x, 9, weak ? css.mute : css.ink, 12);
 		}
 		for (const { peak, size, half: band, sized, force, band: words, weak, load } of inside.sort((a, b) => b.sized - a.sized || b.size - a.size)) {
-			if (size === null || load) continue;
-			const x = this.x(peak), y = this.y(size), text = `${force} ${words}`.replace(" N", ""), half = 3.6 * text.length + 4, middle = clamp(x, LEFT + half, LEFT + this.wide - half);
+			if (!size || load) continue;
+			const x = this.x(peak), y = this.y(size), text = `${force} ${words}`.replace(" N", ""), half = 3.4 * text.length + 2, middle = clamp(x, LEFT + half, LEFT + this.wide - half);
 			path([[x, y], [x + .01, y]], weak ? css.mute : css.force, 8);
 			path([[x, y], [x + .01, y]], css.card, 4.4);
 			if (placed.some(([at, room]) => abs(at - middle) <= half + room)) continue;

@@ -26,6 +26,7 @@ from vftcli.outputs.page.shell import Box, page, part, scales_of
 from vftcli.outputs.page.stage import free_spans, stage_data, still_arm, view_of
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
 from vftcli.outputs.run_record import run_record
+from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 from vftcli.virtual_sensor.frames import FRAMES
 
@@ -52,8 +53,8 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
     `sizes` are the bytes of the files beside it, None for one that is not written yet.
     """
     found, record = analysis.contacts, analysis.run or run_record(analysis, "")
+    log, camera = analysis.recording, view_of(analysis)
     torque, wrench = log_charts.torque_chart(analysis), log_charts.wrench_chart(analysis)
-    camera = view_of(analysis)
     charts = [torque] if wrench is None else [torque, wrench]
     view: dict[str, Any] = {"grounds": grounds(analysis), "record": record, "force": None}
     if found is not None:
@@ -78,12 +79,12 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
     answer = headline(analysis)
     return page(
         "report.html",
-        f"{answer} – {analysis.recording.name}",
+        f"{answer} – {log.name}",
         charts,
         log_charts.observer_styles(analysis),
         partial(stage_data, analysis, camera),
-        f"{analysis.recording.name} · sha256 {analysis.recording.source.sha256 or 'unknown'} · "
-        "torques and forces ON the robot · ± is the half width of the 95 % band",
+        f"{printable(log.name)} · sha256 {log.source.sha256 or 'unknown'} · torques and forces ON "
+        "the robot · ± is the half width of the 95 % band",
         analysis=analysis,
         found=found,
         headline=answer,
@@ -95,7 +96,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         errors=errors_view(analysis),
         observers=details.observers_view(analysis),
         guide=details.selection_guide(analysis),
-        files=[(name, FILES[name], size) for name, size in sizes.items() if name in FILES],
+        files=[(name, what, sizes[name]) for name, what in FILES.items() if name in sizes],
         remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["remarks"]],
         **view,
     )
