@@ -281,6 +281,8 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
     assert arm.friction[1].parameters == {"coulomb": 0.3, "viscous": 20.0}
     with pytest.raises(RobotError, match=r"model\.friction=model is what an MJCF gives its joints"):
         RobotChoice(name="ur5", friction="model").load(log)
+    damped = load_robot(str(written(tmp_path, mjcf('damping="20"'), "damped.xml")))
+    assert "simulator-friction-left" in {remark.code for remark in damped.remarks}
 
 
 @pytest.mark.parametrize(
