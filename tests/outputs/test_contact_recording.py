@@ -9,6 +9,7 @@ from contact_rows import contact, contact_list
 from rerun_rows import rows_of, times_of
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import Unexplained
 from vftcli.outputs.charts import PLACES
 from vftcli.outputs.rerun_arm import painted_links, touched_point
 from vftcli.outputs.rerun_recording import (
@@ -66,7 +67,9 @@ def test_the_log_says_when_how_hard_and_where() -> None:
     assert first.text in {words, words.replace("weak", "good")}
     assert (remark.path, remark.t, remark.level) == ("/remarks", 17.9, "WARN")
     (nothing,) = contact_log(contact_list(remarks=()))
-    assert "nothing touched the arm" in nothing.text
+    assert nothing.text == "Nothing touched the arm, as far as this log shows."
+    unknown = contact_list(remarks=(), unexplained=Unexplained(13.0, 4, 17.0))
+    assert "Largest unexplained torque: 13 N·m on J4" in contact_log(unknown)[0].text
 
 
 def test_the_touched_links_are_painted(touched: Analysis) -> None:

@@ -19,7 +19,7 @@ from vftcli.contacts.contact_list import ContactList
 from vftcli.observers.table import BEST
 from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import COLOURS, GREY, PLACES, REFERENCE, SPARE, Chart, ChartLine
-from vftcli.outputs.contacts import beginning
+from vftcli.outputs.contacts import answer, beginning
 from vftcli.outputs.error_tables import DAGGER, to_markdown
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.page.log_charts import (
@@ -226,7 +226,7 @@ def contact_log(found: ContactList) -> list[LogLine]:
         begins = remark.where.span[0] if remark.where.span is not None else 0.0
         lines.append(LogLine("/remarks", begins, sentence(remark), GREY, "WARN"))
     if not found.contacts:
-        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as known", GREY))
+        lines.append(LogLine("/remarks", 0.0, answer(found), GREY))
     return lines
 
 
