@@ -17,7 +17,7 @@ INPUTS = 20
 
 @pytest.mark.slow
 def test_a_short_run_finds_nothing() -> None:
-    """The long ones are documented in docs/contributing.md."""
+    """The long ones are documented in tests/README.md."""
     words = [sys.executable, fuzz.__file__, "--seed", "7", "--inputs", str(INPUTS)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
