@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -129,6 +130,23 @@ def test_the_axis_of_the_force_holds_every_peak_with_its_band(pushed: Analysis) 
     chart = force_chart(pushed, found)
     assert chart is not None
     assert chart.ends(0) == (0.0, highest(found))
+
+
+def test_the_force_stands_before_the_logs_own_wrench(pushed: Analysis, as_if: Callable) -> None:
+    wrench = np.zeros((len(pushed.t), 6))
+    wrench[:, 1:3] = 30.0, -40.0
+    assert pushed.contacts is not None
+    silent, felt = (
+        as_if(pushed, replace(pushed.recording, wrench=w)) for w in (0 * wrench, wrench)
+    )
+    chart, bare = force_chart(felt, pushed.contacts), force_chart(silent, pushed.contacts)
+    assert chart is not None
+    assert bare is not None
+    own, best = chart.series
+    assert (own.colour, best.name) == (REFERENCE, "best")
+    np.testing.assert_allclose(own.values, 50.0)
+    assert [line.name for line in bare.series] == ["best"]
+    assert "the log&#x27;s own wrench" in render(felt)
 
 
 def test_without_a_force_there_is_no_chart_of_it(pushed: Analysis) -> None:

@@ -184,10 +184,10 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
 
 
 def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
-    """|F| of every listed contact with its band, the reference's below it; None without any."""
+    """|F| of every contact with its band, the log's own wrench below it; None without any."""
     if found.hardest is None and found.detectable_force is None:
         return None
-    t, sensed = analysis.t, analysis.virtual_sensor
+    t = analysis.t
     force, half = np.full((2, len(t), 1), np.nan)
     for contact in found.contacts:
         if (course := contact.course) is not None:
@@ -197,9 +197,9 @@ def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
             # The peak may be between two samples: the nearest one has its size.
             force[np.argmin(np.abs(t - contact.peak))] = contact.peak_force
     lines = [ChartLine("best", force, COLOURS[BEST], half=half, leads=True)]
-    if sensed is not None and sensed.reference is not None:
-        size = sensed.reference.size[:, None]
-        lines.insert(0, ChartLine(reference_name(analysis), size, REFERENCE))
+    if (own := analysis.recording.wrench) is not None and own.any():
+        size = np.linalg.norm(own[:, :3], axis=1)[:, None]
+        lines.insert(0, ChartLine("the log's own wrench", size, REFERENCE))
     chart = Chart.of_one("force", "Force on the robot", "N", t, lines)
     spans = contact_spans(found)
     return chart._replace(spans=spans, lowest=0.0, highest=highest(found, lines[:-1]))
