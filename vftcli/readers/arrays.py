@@ -3,7 +3,6 @@
 MATLAB's files are read by SciPy (version 5) or h5py (7.3): variables, or one level of structs.
 """
 
-import tokenize
 import warnings
 import zipfile
 import zlib
@@ -13,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, Literal
 
 import numpy as np
@@ -29,15 +29,6 @@ from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import fact
 
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
-#: What NumPy raises for a header or content that is no array.
-NOT_AN_ARRAY = (
-    ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
-    RecursionError, tokenize.TokenError,
-)  # fmt: skip
-#: What is raised for a bundle of arrays that is damaged.
-NOT_A_BUNDLE = (
-    zipfile.BadZipFile, RuntimeError, EOFError, OSError, ValueError,
-)  # fmt: skip
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
@@ -157,7 +148,7 @@ def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> Columns:
 
 def _npz_arrays(file: LogFile) -> Columns:
     arrays = {}
-    with naming_damage(file.path, "a damaged .npz file", NOT_A_BUNDLE):
+    with naming_damage(file.path, "a damaged .npz file", zipfile.BadZipFile):
         bundle = zipfile.ZipFile(BytesIO(file.content))
         total = sum(member.file_size for member in bundle.infolist())
         check_unpacked(file.path, total, len(file.content))
@@ -176,7 +167,7 @@ def _npy_array(path: Path, head: bytes, content: bytes | memoryview) -> Column:
     What the header claims is compared with the file's size before it is believed.
     """
     stream = BytesIO(head)
-    with naming_damage(path, "not a readable .npy file", NOT_AN_ARRAY):
+    with naming_damage(path, "not a readable .npy file", TokenError):
         version = np.lib.format.read_magic(stream)
         header = {
             (1, 0): np.lib.format.read_array_header_1_0,
@@ -189,7 +180,7 @@ def _npy_array(path: Path, head: bytes, content: bytes | memoryview) -> Column:
             f"{path}: the header claims {claimed} bytes of numbers, the file holds "
             f"{len(content) - stream.tell()}; it is cut, damaged, or holds more than one array."
         )
-    with naming_damage(path, "not a readable array", NOT_AN_ARRAY, ". Save it with np.save."):
+    with naming_damage(path, "not a readable array", remedy=". Save it with np.save."):
         return np.asarray(np.lib.format.read_array(BytesIO(content), allow_pickle=False))
 
 
@@ -233,11 +224,6 @@ MATLAB_NUMBERS = {
     "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64",
     "logical", "struct",
 }  # fmt: skip
-#: What SciPy raises for a file that is none.
-NOT_MATLAB = (
-    ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OSError, zlib.error,
-    MemoryError, OverflowError, RecursionError, NotImplementedError, SystemError,
-)  # fmt: skip
 
 
 def _read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
@@ -287,7 +273,7 @@ def _matlab_5(file: LogFile) -> Columns:
     from scipy.io import loadmat, whosmat
 
     stream: Any = BytesIO(file.content)
-    with naming_damage(file.path, "a damaged MATLAB file", NOT_MATLAB), warnings.catch_warnings():
+    with naming_damage(file.path, "a damaged MATLAB file", zlib.error), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what is left out
         there = [(name, shape) for name, shape, kind in whosmat(stream) if kind in MATLAB_NUMBERS]
         claimed = sum(8 * int(np.prod(shape, dtype=object)) for _, shape in there)

@@ -84,12 +84,8 @@ MOST_OBJECTS, DEEPEST = 100_000, 32
 def opened(file: LogFile) -> Iterator[Any]:
     """The file as h5py opens it, its errors turned into one that names the file."""
     h5py = needed("h5py", f"{file.path}: an HDF5 file", error=LogError)
-    errors = (
-        OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError,
-        AttributeError, SystemError,
-    )  # fmt: skip
     with (
-        naming_damage(file.path, "a damaged HDF5 file", errors),
+        naming_damage(file.path, "a damaged HDF5 file"),
         h5py.File(file.direct or BytesIO(file.content), "r") as content,
     ):
         yield content

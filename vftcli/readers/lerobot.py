@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.readers.aliases import ALIASES, kinematic_order
+from vftcli.readers.aliases import ALIASES, AXES, kinematic_order
 from vftcli.readers.columns import SIGNALS
 from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
@@ -30,24 +30,13 @@ FRAME = "frame_index"
 
 #: How far the stamps, 32-bit floats, may lie from frame / fps for that to be taken. [s]
 CLOCK_SLACK = 1e-3
-#: What an element's name says it measures.
-STEMS = {
-    "pos": "q", "position": "q", "positions": "q", "vel": "dq", "velocity": "dq",
-    "velocities": "dq", "effort": "torque", "efforts": "torque", "torque": "torque",
-    "torques": "torque", "current": "current", "currents": "current",
-}  # fmt: skip
-NAMED = re.compile(rf"(?P<joint>.+)[._/](?P<stem>{'|'.join(STEMS)})")  #: joint_1.pos
-#: joint_positions.1
-COUNTED = re.compile(
-    rf"(?P<joint>.*?joint)[_.](?P<stem>{'|'.join(STEMS)})[_.](?P<number>\d{{1,4}})"
-)
+#: What an element's name says it measures, in words of `ALIASES`.
+WORDS = "pos|positions?|vel|velocity|velocities|efforts?|torques?|currents?"
+NAMED = re.compile(rf"(.+)[._/]({WORDS})")  #: joint_1.pos
+COUNTED = re.compile(rf"(joint)[_.]({WORDS})[_.](\d{{1,4}})$")  #: joint_positions.1
 
 SIDE = re.compile(rf"(?:^|[._/ ])({'|'.join(ARMS)})(?:$|[._/ ])")
 NO_JOINT = re.compile(r"(?i)grip|finger")
-#: Names of elements that are a pose's.
-CARTESIAN = {
-    "x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw",
-}  # fmt: skip
 MEASURED = ("q", "dq", "torque", "current", "tau_ext")  #: Signals that are looked for.
 #: Values of robot_type that are a profile's name.
 ROBOTS = ("panda", "fr3", "ur5", "ur5e", "ur10e")
@@ -163,24 +152,24 @@ def _elements_of(name: str, table: ParquetTable, labels: Json) -> Iterable[Eleme
     if not name.startswith("observation."):
         return
     width = table.lists.get(table.names.index(name))
-    last = [part for part in name.lower().split(".") if part not in {"observation", *ARMS}]
-    of_feature = next(
-        (s for s in MEASURED if last and last[-1] in (*ALIASES[s], *(["state"] * (s == "q")))), ""
-    )
+    *_, last = ["", *(part for part in name.lower().split(".")[1:] if part not in ARMS)]
+    of_feature = "q" if last == "state" else signal_of(last)
     if isinstance(labels, dict):
         labels = next(iter(labels.values()), None)
     good = isinstance(labels, list) and len(labels) == (width or 1)
     for k in range(width or 1):
-        label = str(labels[k]) if good else ""
-        signal, joint = of_feature, label
-        if match := COUNTED.fullmatch(label):
-            signal, joint = STEMS[match["stem"]], f"{match['joint']}_{match['number']}"
-        elif match := NAMED.fullmatch(label):
-            signal, joint = STEMS[match["stem"]], match["joint"]
-        pose = joint.lower().rpartition("_")[2].rpartition(".")[2] in CARTESIAN
+        label = COUNTED.sub(r"\1_\3.\2", str(labels[k])) if good else ""
+        match = NAMED.fullmatch(label)
+        joint, signal = (match[1], signal_of(match[2])) if match else (label, of_feature)
+        pose = AXES.fullmatch(re.split("[_.]", joint)[-1])
         if signal and not pose and not NO_JOINT.search(joint):
             side = SIDE.search(label.replace("_", ".")) or SIDE.search(name)
             yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
+
+
+def signal_of(word: str) -> str:
+    """The signal that a word names, "" where it names none that is looked for."""
+    return next((signal for signal in MEASURED if word in ALIASES[signal]), "")
 
 
 def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:

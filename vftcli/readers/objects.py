@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.opening import LogFile, reason_of
+from vftcli.readers.opening import DAMAGE, LogFile, reason_of
 from vftcli.readers.table import Columns, Notes
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import printable
@@ -188,17 +188,13 @@ class PickledArray:
         self.array = NOTHING
 
     def __setstate__(self, state: Data) -> None:
-        """Take up shape, type, order and bytes, as NumPy pickles them."""
+        """Lay the array over bytes, of a shape, type and order, as NumPy pickles them."""
         shape, kind, fortran, content = state[-4:]
-        self.fill(content, kind, shape, "F" if fortran else "C")
-
-    def fill(self, content: Data, kind: Data, shape: Data, order: str) -> None:
-        """Lay the array over some bytes."""
         if not isinstance(kind, PickledType) or not isinstance(content, bytes | bytearray):
             raise Refused("an array of objects")
         if kind.dtype is not None:
             numbers = np.frombuffer(content, dtype=kind.dtype)
-            self.array = numbers.reshape(shape, order="F" if order == "F" else "C")
+            self.array = numbers.reshape(shape, order="F" if fortran else "C")
 
 
 Built = tuple[Any, int]  #: What was built of a part of a pickle, and how many numbers it holds.
@@ -207,7 +203,7 @@ NOTHING = np.empty(0, dtype="V1")  #: What stands for an array that holds no num
 
 def _from_buffer(buffer: Data, kind: Data, shape: Data, order: Data = "C") -> PickledArray:
     array = PickledArray()
-    array.fill(buffer, kind, shape, order)
+    array.__setstate__((shape, kind, order == "F", buffer))
     return array
 
 
@@ -217,20 +213,13 @@ def _scalar(kind: Data, content: Data = None) -> Data:
     return np.frombuffer(content, dtype=kind.dtype, count=1)[0].item()
 
 
-#: All that a pickle may call, by the names NumPy has pickled it under, each replaced by
-#: ours.
+#: All that a pickle may call, by the names of NumPy before 2, each replaced by ours.
 ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
     ("numpy", "ndarray"): Marker,
     ("numpy", "dtype"): PickledType,
-    **{
-        (f"numpy.{package}.{module}", name): function
-        for package in ("core", "_core")
-        for module, name, function in (
-            ("multiarray", "_reconstruct", PickledArray),
-            ("multiarray", "scalar", _scalar),
-            ("numeric", "_frombuffer", _from_buffer),
-        )
-    },
+    ("numpy.core.multiarray", "_reconstruct"): PickledArray,
+    ("numpy.core.multiarray", "scalar"): _scalar,
+    ("numpy.core.numeric", "_frombuffer"): _from_buffer,
 }
 
 
@@ -252,7 +241,7 @@ class ArrayUnpickler(pickle.Unpickler):
         if (module, name) == ("collections", "OrderedDict"):
             return self._ordered
         try:
-            return ALLOWED[module, name]
+            return ALLOWED[module.replace("._core.", ".core."), name]
         except KeyError:
             raise Refused(f"{module}.{name}"[:80]) from None
 
@@ -327,10 +316,7 @@ def load_arrays_only(file: LogFile) -> Data:
         raise LogError(f"{file.path}: refused, the pickle asks for {refusal}. {remedy}") from None
     except RecursionError:
         raise LogError(f"{file.path}: the pickle is nested too deeply. {remedy}") from None
-    except (
-        pickle.UnpicklingError, EOFError, ValueError, TypeError, KeyError, IndexError,
-        AttributeError, OverflowError, MemoryError, SyntaxError,
-    ) as error:  # fmt: skip
+    except (pickle.UnpicklingError, *DAMAGE) as error:
         raise LogError(
             f"{file.path}: a damaged pickle ({reason_of(error)[:80]}). {remedy}"
         ) from None

@@ -49,14 +49,21 @@ def check_unpacked(what: object, claimed: int, size: int) -> None:
         )
 
 
+#: What libraries raise on a damaged file, whatever it holds.
+DAMAGE = (
+    ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError,
+    SyntaxError, SystemError, TypeError, ValueError,
+)  # fmt: skip
+
+
 @contextmanager
 def naming_damage(
-    path: Path, what: str, errors: tuple[type[Exception], ...], remedy: str = ""
+    path: Path, what: str, *own: type[Exception], remedy: str = ""
 ) -> Iterator[None]:
-    """Turn errors of a library into a LogError that names the file."""
+    """Turn errors of a library, some of its own kinds too, into one that names the file."""
     try:
         yield
-    except errors as error:
+    except (*DAMAGE, *own) as error:
         raise LogError(f"{path}: {what} ({reason_of(error)}){remedy}") from None
 
 

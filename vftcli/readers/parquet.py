@@ -44,8 +44,7 @@ MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 
 def guarded(path: Path) -> Iterator[None]:
     """Turn the errors of pyarrow, beside Python's own, into a LogError that names the file."""
     arrow = needed("pyarrow", f"{path}: a Parquet or Arrow file", error=LogError).ArrowException
-    errors = OSError, ValueError, KeyError, MemoryError, OverflowError, arrow
-    with naming_damage(path, "a damaged Parquet or Arrow file", errors):
+    with naming_damage(path, "a damaged Parquet or Arrow file", arrow):
         yield
 
 

@@ -211,10 +211,9 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
         same = frame.placement == pin.SE3.Identity()
         if frame.type == pin.FrameType.BODY and same and k and names[k] == model.names[k]:
             names[k] = str(frame.name)
-    each = [MjcfJoint(path, pin, model, k) for k in range(1, model.njoints)]
-    bodies = {names[0]: NO_BODY}
-    bodies |= {names[one.number]: one.body() for one in each}
-    joints = [one.joint(names) for one in each]
+    moved = range(1, model.njoints)
+    bodies = {names[0]: NO_BODY, **{names[k]: mjcf_body(path, model, k) for k in moved}}
+    joints = [mjcf_joint(path, model, k, names) for k in moved]
     for frame in model.frames:
         # Bodies without a joint, and sites, are frames of the joint that moves them.
         if frame.name not in bodies and frame.type != pin.FrameType.JOINT:
@@ -242,70 +241,52 @@ def pose_of(placement: Any) -> Pose:  # noqa: ANN401
     return Pose(np.array(placement.rotation), np.array(placement.translation))
 
 
-class MjcfJoint(NamedTuple):
-    """A joint of a model that Pinocchio read, and what it moves."""
+def mjcf_body(path: Path, model: Any, k: int) -> Body:  # noqa: ANN401
+    """What joint k of Pinocchio's model moves, what is fixed to that included."""
+    found, place = model.inertias[k], model.jointPlacements[k]
+    body = Body(float(found.mass), np.array(found.lever), np.array(found.inertia))
+    each = {**body._asdict(), "xyz": place.translation}
+    broken = (BOUNDS[key].broken(key, np.ravel(values).tolist()) for key, values in each.items())
+    turns = np.allclose(place.rotation @ place.rotation.T, np.eye(3), atol=1e-6)
+    if why := next(filter(None, broken), "") if turns else "its orientation is no rotation":
+        raise RobotError(f"{path}: joint {model.names[k]!r}: {why}")
+    return body
 
-    path: Path  #: The MJCF.
-    pin: Any  #: Pinocchio.
-    model: Any  #: Its model.
-    number: int  #: Number of the joint, the world's is 0.
 
-    def refuse(self, message: str) -> NoReturn:
-        """Raise a RobotError that names the file and the joint."""
-        raise RobotError(f"{self.path}: joint {self.model.names[self.number]!r}: {message}")
-
-    def body(self) -> Body:
-        """What it moves, what is fixed to that included."""
-        found, place = self.model.inertias[self.number], self.model.jointPlacements[self.number]
-        if not np.allclose(place.rotation @ place.rotation.T, np.eye(3), atol=1e-6):
-            self.refuse("its orientation is no rotation")
-        body = Body(float(found.mass), np.array(found.lever), np.array(found.inertia))
-        each = {**body._asdict(), "xyz": place.translation}
-        for key, values in each.items():
-            if why := BOUNDS[key].broken(key, np.ravel(values).tolist()):
-                self.refuse(why)
-        return body
-
-    def joint(self, names: list[str]) -> TreeJoint:
-        """The joint in a tree of links with these names."""
-        model, k = self.model, self.number
-        joint, form = model.joints[k], model.joints[k].shortname()
-        kind = next(
-            (kind for name, kind in PINOCCHIO_KINDS.items() if re.fullmatch(name, form)), ""
-        )
-        plain = TreeJoint(
-            name=str(model.names[k]),
-            kind=kind or form,
-            parent=names[model.parents[k]],
-            child=names[k],
-            placement=pose_of(model.jointPlacements[k]),
-        )
-        if not kind:
-            return plain
-        v, q = joint.idx_v, joint.idx_q
-        limits = {"qd_max": model.velocityLimit[v], "tau_max": model.effortLimit[v]}
-        limits = {key: value for key, value in limits.items() if 0 < value < 1e300}
-        if kind != "continuous":
-            limits |= {"q_min": model.lowerPositionLimit[q], "q_max": model.upperPositionLimit[q]}
-        # The unit axis in its own frame; the Jacobian of a single joint comes without
-        # second axis.
-        data = model.createData()
-        self.pin.computeJointJacobians(model, data, self.pin.neutral(model))
-        local = self.pin.getJointJacobian(model, data, k, self.pin.ReferenceFrame.LOCAL)
-        column, rotor = np.array(local).reshape(6, model.nv)[:, v], float(model.armature[v])
-        axis = column[3:] if column[3:].any() else column[:3]
-        if not np.isclose(np.linalg.norm(axis), 1.0):
-            self.refuse("its axis points nowhere")
-        if why := BOUNDS["rotor_inertia"].broken("armature", [rotor]):
-            self.refuse(why)
-        return replace(
-            plain,
-            axis=axis,
-            limits={key: float(value) for key, value in limits.items() if math.isfinite(value)},
-            rotor_inertia=rotor,
-            damping=float(model.damping[v]),
-            dry_friction=float(model.upperDryFrictionLimit[v]),
-        )
+def mjcf_joint(path: Path, model: Any, k: int, names: list[str]) -> TreeJoint:  # noqa: ANN401
+    """Joint k of Pinocchio's model in a tree of links with these names."""
+    joint, form = model.joints[k], model.joints[k].shortname()
+    kind = next((kind for name, kind in PINOCCHIO_KINDS.items() if re.fullmatch(name, form)), "")
+    plain = TreeJoint(
+        name=str(model.names[k]),
+        kind=kind or form,
+        parent=names[model.parents[k]],
+        child=names[k],
+        placement=pose_of(model.jointPlacements[k]),
+    )
+    if not kind:
+        return plain
+    v, q = joint.idx_v, joint.idx_q
+    limits = {"qd_max": model.velocityLimit[v], "tau_max": model.effortLimit[v]}
+    limits = {key: value for key, value in limits.items() if 0 < value < 1e300}
+    if kind != "continuous":
+        limits |= {"q_min": model.lowerPositionLimit[q], "q_max": model.upperPositionLimit[q]}
+    # Unit twist in its own frame, velocity first: the axis.
+    twist, rotor = np.array(joint.createData().S).ravel(), float(model.armature[v])
+    axis = twist[3:] if twist[3:].any() else twist[:3]
+    why = BOUNDS["rotor_inertia"].broken("armature", [rotor])
+    if not np.isclose(np.linalg.norm(axis), 1.0):
+        why = "its axis points nowhere"
+    if why:
+        raise RobotError(f"{path}: joint {plain.name!r}: {why}")
+    return replace(
+        plain,
+        axis=axis,
+        limits={key: float(value) for key, value in limits.items() if math.isfinite(value)},
+        rotor_inertia=rotor,
+        damping=float(model.damping[v]),
+        dry_friction=float(model.upperDryFrictionLimit[v]),
+    )
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """Containers of messages: their files on disk, and the channels and batches that each yields."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -46,7 +46,7 @@ BATCH_BYTES = 16 * 1024 * 1024
 MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
-def batched(messages: Messages, budget: "ReadBudget") -> Iterator[Batch]:
+def batched(messages: Iterable[Message], budget: "ReadBudget") -> Iterator[Batch]:
     """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
     found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0
@@ -159,10 +159,10 @@ def storage_files(file: LogFile) -> list[str]:
     return sorted(plain, key=natural)
 
 
-#: How a file of a container begins → the function of `records` that reads it.
+#: How a file of a container begins → what of `records` reads it.
 CONTAINERS = {
-    b"#ROSBAG V2.0\n": "bag_messages",
-    b"\x89MCAP0\r\n": "mcap_messages",
+    b"#ROSBAG V2.0\n": "BagMessages",
+    b"\x89MCAP0\r\n": "McapMessages",
     b"SQLite format 3\0": "db3_messages",
 }
 

@@ -45,11 +45,6 @@ BYTES_PER_FIELD = 8
 Header = dict[bytes, bytes]  #: Name of a field → its bytes.
 
 
-def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
-    """Messages of a bag, chunk by chunk, up to the last whole chunk."""
-    return _Bag(budget).messages(file.content.obj)
-
-
 def _fields(head: bytes) -> Header:
     fields, place = {}, 0
     while place < len(head):
@@ -61,8 +56,8 @@ def _fields(head: bytes) -> Header:
     return fields
 
 
-class _Bag:
-    """What is known of a bag while its records come in.
+class BagMessages:
+    """Messages of a bag, chunk by chunk, and what is known of it while its records come in.
 
     Attributes:
         counts: What its header and index count, and what was found.
@@ -71,7 +66,8 @@ class _Bag:
         listed, counted: Chunks that the index at the end lists; messages that it counts.
     """
 
-    def __init__(self, budget: ReadBudget) -> None:
+    def __init__(self, file: LogFile, budget: ReadBudget) -> None:
+        self.content: Content = file.content.obj
         self.budget = budget
         self.counts = MessageCount()
         self.channels: dict[bytes, Channel] = {}
@@ -79,18 +75,17 @@ class _Bag:
         self.indexed: list[int] = []
         self.listed = self.counted = 0
 
-    def messages(self, content: Content) -> Messages:
-        """The messages of the content, up to the last whole chunk."""
+    def __iter__(self) -> Messages:
         end = BAG_MAGIC
         while True:
             try:
-                header, data, place = self._record(content, end)
+                header, data, place = self._record(self.content, end)
             except CutError:
                 break
             yield from self._take(header, data)
             end = place
         self._check_index()
-        self.counts.report(self.budget, len(content) - end, "its index")
+        self.counts.report(self.budget, len(self.content) - end, "its index")
 
     def _record(self, content: Content, place: int) -> tuple[Header, bytes, int]:
         head, place = sized(content, place)
@@ -165,19 +160,15 @@ DATA_END_BYTES = 13  #: Length of the record that ends the data, its head includ
 ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
 
 
-def mcap_messages(file: LogFile, budget: ReadBudget) -> Messages:
-    """Messages of an MCAP file, up to the last whole chunk."""
-    return _Mcap(budget).messages(file.content.obj)
-
-
 def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""
 
 
-class _Mcap:
-    """Schemas and channels met so far, what the summary says, and what was found."""
+class McapMessages:
+    """Messages of an MCAP file, chunk by chunk, those outside chunks one by one."""
 
-    def __init__(self, budget: ReadBudget) -> None:
+    def __init__(self, file: LogFile, budget: ReadBudget) -> None:
+        self.content: Content = file.content.obj
         self.budget = budget
         self.counts = MessageCount()
         #: Number of a schema → its name, encoding and data.
@@ -185,9 +176,8 @@ class _Mcap:
         self.channels: dict[int, Channel] = {}
         self.indexed = 0
 
-    def messages(self, content: Content) -> Messages:
-        """The messages of the file, chunk by chunk, those outside chunks one by one."""
-        counts, end = self.counts, MAGIC_SIZE
+    def __iter__(self) -> Messages:
+        content, counts, end = self.content, self.counts, MAGIC_SIZE
         with suppress(CutError, struct.error):
             for op, body, place in self._records(content, MAGIC_SIZE):
                 end = place
