@@ -19,9 +19,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.robots.chain import Chain, LinkPoses, link_poses
+from vftcli.robots.chain import Chain, link_poses
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.linear_model import SPIKE, LinearModel, log_likelihood, smoothed
+from vftcli.signals.pose import Pose
 from vftcli.signals.series import covered
 from vftcli.virtual_sensor.model_error import UNKNOWN, ErrorProcess, error_model, innovations
 from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan, Lane, WrenchPrior, assembled
@@ -60,13 +61,13 @@ def places(chain: Chain, q: Array) -> list[ContactPlace]:
     return found
 
 
-def points_on(poses: LinkPoses, link: Indices | int, share: Array | float) -> Array:
+def points_on(poses: Pose, link: Indices | int, share: Array | float) -> Array:
     """Points along links, from their joints (0) to the next (1), in base axes. (K, …, 3) [m]"""
     start, end = poses.translation[:, link - 1], poses.translation[:, link]
     return start + share * (end - start)
 
 
-def link_jacobian(poses: LinkPoses, link: int, share: float) -> Array:
+def link_jacobian(poses: Pose, link: int, share: float) -> Array:
     """Jacobian of a point along a link, in base axes. (K, 6, n)"""
     axes = poses.rotation[:, :-1, :, 2]
     arms = points_on(poses, link, share)[:, None, :] - poses.translation[:, :-1]

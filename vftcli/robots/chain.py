@@ -61,24 +61,21 @@ class Chain(Shown):
 
     def __post_init__(self) -> None:
         n = self.joints
-        shapes = {
-            "rotation": (n, 3, 3),
-            "translation": (n, 3),
-            "mass": (n,),
-            "com": (n, 3),
-            "inertia": (n, 3, 3),
-            "rotor_inertia": (n,),
-            "gravity": (3,),
-            "flange_rotation": (3, 3),
-            "flange_translation": (3,),
-        }
-        for name, shape in shapes.items():
-            seal(self, name, shape=shape, called="the chain")
+        seal(self, "rotation", "inertia", shape=(n, 3, 3), called="the chain")
+        seal(self, "translation", "com", shape=(n, 3), called="the chain")
+        seal(self, "mass", "rotor_inertia", shape=(n,), called="the chain")
+        seal(self, "gravity", "flange_translation", shape=(3,), called="the chain")
+        seal(self, "flange_rotation", shape=(3, 3), called="the chain")
 
     @property
     def joints(self) -> int:
         """Number of joints n."""
         return len(self.names)
+
+    @property
+    def bodies(self) -> list["Body"]:
+        """The links, base to tip, each in the axes of its frame."""
+        return list(map(Body, self.mass.tolist(), self.com, self.inertia))
 
     def with_payload(self, payload: Payload | None) -> "Chain":
         """Return the chain with a load fixed to its flange, merged into the last link."""
@@ -86,8 +83,7 @@ class Chain(Shown):
             return self
         flange = Pose(self.flange_rotation, self.flange_translation)
         load = Body(payload.mass, payload.com, payload.inertia).moved(flange)
-        last = Body(float(self.mass[-1]), self.com[-1], self.inertia[-1])
-        mass, com, inertia = merge_bodies([last, load])
+        mass, com, inertia = merge_bodies([self.bodies[-1], load])
         return replace(
             self,
             mass=np.append(self.mass[:-1], mass),
@@ -102,13 +98,11 @@ class Chain(Shown):
         model = pin.Model()
         model.name = name
         parent = 0
-        for j, joint in enumerate(self.names):
+        for j, (mass, com, inertia) in enumerate(self.bodies):
             placement = pin.SE3(np.array(self.rotation[j]), np.array(self.translation[j]))
-            parent = model.addJoint(parent, pin.JointModelRZ(), placement, joint)
-            inertia = pin.Inertia(
-                float(self.mass[j]), np.array(self.com[j]), np.array(self.inertia[j])
-            )
-            model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+            parent = model.addJoint(parent, pin.JointModelRZ(), placement, self.names[j])
+            body = pin.Inertia(mass, np.array(com), np.array(inertia))
+            model.appendBodyToJoint(parent, body, pin.SE3.Identity())
         flange = pin.SE3(np.array(self.flange_rotation), np.array(self.flange_translation))
         model.addFrame(pin.Frame("flange", parent, flange, pin.FrameType.OP_FRAME))
         model.armature = np.array(self.rotor_inertia)
@@ -240,13 +234,6 @@ def kinematics(
     return placements, inertial_frames, tip
 
 
-class LinkPoses(NamedTuple):
-    """Poses of the chain's frames in the base frame, the flange last."""
-
-    rotation: Array  #: Orientations. (T, n+1, 3, 3)
-    translation: Array  #: Origins. (T, n+1, 3) [m]
-
-
 def along(R: Array, vector: Array) -> Array:
     """R v for R (3, 3, T) and v (3,), rounded alike whatever T is. (3, T)
 
@@ -256,8 +243,8 @@ def along(R: Array, vector: Array) -> Array:
     return np.asarray(x * R[:, 0] + y * R[:, 1] + z * R[:, 2])
 
 
-def link_poses(chain: Chain, q: Array) -> LinkPoses:
-    """Poses of joints and flange in the base frame for q (T, n). [rad]"""
+def link_poses(chain: Chain, q: Array) -> Pose:
+    """Poses of joints, then flange, in the base frame for q (T, n) [rad]. (T, n+1)"""
     check_kind(chain, Chain, "the chain", "robot.chain")
     check_shape(q, ("T", chain.joints), "q", "the poses")
     samples, n = np.shape(q)
@@ -272,7 +259,7 @@ def link_poses(chain: Chain, q: Array) -> LinkPoses:
         rotation[j], translation[j] = R, o
     translation[n] = o + along(R, chain.flange_translation)
     rotation[n] = np.stack([along(R, column) for column in chain.flange_rotation.T], axis=1)
-    return LinkPoses(rotation.transpose(3, 0, 1, 2), translation.transpose(2, 0, 1))
+    return Pose(rotation.transpose(3, 0, 1, 2), translation.transpose(2, 0, 1))
 
 
 def flange_jacobian(chain: Chain, q: Array) -> Array:

@@ -43,7 +43,7 @@ from vftcli.signals.pose import cross, skew
 #: Samples worked on at a time: so many that calling an operation costs little beside it;
 #: more than some 6000 gain nothing. Blocks of a long log hold whole chunks.
 CHUNK = 8192
-KEPT = 4  #: Programs that are kept, some 4 MB each: those of the arm in hand.
+KEPT = 4  #: Programs that are kept, some 5 MB each: those of the arm in hand.
 #: An entry of a rotation, or of an inertia relative to its largest, that is zero but for
 #: this.
 ROUNDING = 1e-15
@@ -290,12 +290,11 @@ def load_regressor(chain: Chain, q: Array) -> Array:
 
 def chain_parameters(chain: Chain) -> Array:
     """The inertial parameters φ of a chain. (10n,)"""
-    phi = np.empty((chain.joints, LINK))
-    for j in range(chain.joints):
-        m, c = chain.mass[j], chain.com[j]
-        about_origin = chain.inertia[j] + m * point_tensor(c)
-        phi[j] = [m, *(m * c), *(about_origin[r, s] for r, s in TENSOR)]
-    return phi.ravel()
+    phi = list[float]()
+    for m, c, tensor in chain.bodies:
+        about_origin = tensor + m * point_tensor(c)
+        phi += [m, *(m * c), *(about_origin[r, s] for r, s in TENSOR)]
+    return np.array(phi)
 
 
 def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:

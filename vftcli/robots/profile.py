@@ -303,10 +303,10 @@ def robot_document(robot: Robot) -> Table:
         old = xyz_rpy_document(robot)
     tables = [dict(table) for table in old["joints"]]
     chain, (_, frames, _) = robot.chain, kinematics(old["convention"], tables, old)
-    for j, (table, frame) in enumerate(zip(tables, frames, strict=True)):
-        body = Body(float(chain.mass[j]), chain.com[j], chain.inertia[j]).moved(inverse(frame))
-        values = {"com": body.com, "inertia": body.inertia[np.triu_indices(3)]}
-        for key, value in {"mass": np.array(body.mass), **values}.items():
+    for j, (table, frame, link) in enumerate(zip(tables, frames, chain.bodies, strict=True)):
+        mass, com, inertia = link.moved(inverse(frame))
+        values = {"mass": np.array(mass), "com": com, "inertia": inertia[np.triu_indices(3)]}
+        for key, value in values.items():
             scale, before = float(abs(value).max(initial=1e-12)), table.get(key)
             if before is None or not np.allclose(before, value, rtol=0, atol=AGREES * scale):
                 table[key] = value.tolist()

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.readers.aliases import UR_NAMES, UR_WORDS, kinematic_order
+from vftcli.readers.table import listed
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import check_joints, drive_torque, dynamics_terms
@@ -16,7 +17,6 @@ from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
-from vftcli.signals.parsing import printable
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import Where, fact
 from vftcli.signals.repairs import without_isolated
@@ -269,11 +269,6 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     return recording.changed(said, **changed)
 
 
-def listed(names: Sequence[str]) -> str:
-    """Names for a message."""
-    return ", ".join(printable(name[:40]) for name in names[:24]) or "none"
-
-
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
     """Places of a robot's joints among a log's, None where names do not tell.
 
@@ -290,21 +285,18 @@ def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
 
     None without one, and where several prefixes fit: two arms.
     """
-    there, wanted = [plain(name) for name in logged], [plain(name) for name in joints]
+    there, wanted = list(map(plain, logged)), list(map(plain, joints))
     # What all of the robot's names share up to a separator says nothing of a joint.
-    first = wanted[0].split("_")
-    heads = ("".join(f"{part}_" for part in first[:k]) for k in range(len(first) - 1, 0, -1))
-    own = next((head for head in heads if all(name.startswith(head) for name in wanted)), "")
-    bare = [name.removeprefix(own) for name in wanted]
-    if all(name.isdigit() for name in bare):
-        return None
+    heads = (wanted[0][: k + 1] for k, letter in enumerate(wanted[0]) if letter == "_")
+    own = [head for head in heads if all(name.startswith(head) for name in wanted)]
+    bare = [name.removeprefix(max(own, default="")) for name in wanted]
     prefixes = {name.removesuffix(bare[0]) for name in there if name.endswith(bare[0])}
     fits = [
         prefix
-        for prefix in sorted(prefixes)
+        for prefix in prefixes
         if prefix[-1:] in {"", "_"} and all(there.count(prefix + name) == 1 for name in bare)
     ]
-    if len(fits) != 1:
+    if len(fits) != 1 or all(name.isdigit() for name in bare):
         return None
     return tuple(there.index(fits[0] + name) for name in bare)
 
@@ -315,14 +307,12 @@ def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
     if found := by_number(logged, count):
         return found
     known = kinematic_order(logged)
-    names = [plain(logged[k]) for k in known]
+    names, ur = [plain(logged[k]) for k in known], list(map(plain, UR_NAMES))
     is_known = len(known) == count and (
-        names == [plain(word) for word in UR_WORDS]
-        or all(name.endswith(plain(ur)) for name, ur in zip(names, UR_NAMES, strict=False))
+        names == list(map(plain, UR_WORDS)) or all(map(str.endswith, names, ur))
     )
     generic = by_number(joints, count) == tuple(range(count))
-    maker = [plain(name) for name in joints] == [plain(name) for name in UR_NAMES]
-    return known if is_known and (generic or maker) else None
+    return known if is_known and (generic or list(map(plain, joints)) == ur) else None
 
 
 def by_number(names: Sequence[str], count: int) -> tuple[int, ...] | None:

@@ -207,25 +207,18 @@ def in_few_rows(
 ) -> tuple[list[Operation], int]:
     """Operations on rows that are used anew once nothing needs them, and how many rows these are.
 
-    The outputs stand first, in their order, then the inputs.
+    The outputs come first, in their order, then the inputs.
     """
     last = {row: k for k, op in enumerate(operations) for row in op.reads}
-    place = {row: row for row in range(inputs)}
-    free: list[int] = []
-    rows = inputs
+    place = {row: k for k, row in enumerate([*outputs, *range(inputs)])}
+    planned, free, rows = [], list[int](), len(outputs) + inputs
     for k, operation in enumerate(operations):
-        # An operation may write where it reads; an output not where an input stands.
+        work, a, b, out = operation
+        # An operation may write where it reads.
         free += [place[row] for row in operation.reads if last[row] == k and row not in outputs]
-        kept = [row for row in free if row >= inputs or operation.out not in outputs]
-        if kept:
-            free.remove(kept[-1])
-        place[operation.out] = kept[-1] if kept else rows
-        rows = max(rows, place[operation.out] + 1)
-    first = [rows + k if row is None else place[row] for k, row in enumerate(outputs)]
-    rest = set(range(rows)).difference(first, range(inputs))
-    moved = {row: k for k, row in enumerate([*first, *range(inputs), *rest])}
-    place = {row: moved[at] for row, at in place.items()}
-    return [
-        Operation(work, place[a], place[b] if isinstance(b, int) else b, place[out])
-        for work, a, b, out in operations
-    ], len(moved)
+        if out not in place:
+            place[out] = free.pop() if free else rows
+            rows = max(rows, place[out] + 1)
+        second = place[b] if isinstance(b, int) else b
+        planned.append(Operation(work, place[a], second, place[out]))
+    return planned, rows

@@ -253,18 +253,11 @@ def disturbance_blocks(
         whole &= inside[1:] & inside[:-1]
     # The unbroken runs of intervals give the edges; between two runs one block reaches
     # across.
-    edges: list[int] = [0]
-    known: list[bool] = []
+    places = {0, len(t) - 1}
     for start, stop in runs_of(whole):
-        if start > edges[-1]:
-            edges.append(start)
-            known.append(False)
         count = max(round((stop - start) / size), 1)
-        edges += [*range(start + size, start + size * count, size), stop]
-        known += [True] * count
-    if edges[-1] < len(t) - 1:
-        edges.append(len(t) - 1)
-        known.append(False)
+        places |= {*range(start, start + size * count, size), stop}
+    edges = sorted(places)
     at = t[edges]
     middle, length = 0.5 * (at[1:] + at[:-1]), np.diff(at)
     return Blocks(
@@ -273,7 +266,7 @@ def disturbance_blocks(
         d=np.diff(disturbance_impulse(terms)[edges], axis=0) / length[:, None],
         q=resample_columns(middle, t, q),
         velocity=np.diff(q[edges], axis=0) / length[:, None],
-        known=np.array(known),
+        known=whole[edges[:-1]],
     )
 
 

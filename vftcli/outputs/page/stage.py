@@ -14,10 +14,11 @@ from vftcli.outputs.contacts import contact_name, direction, force_size, place_w
 from vftcli.outputs.page.packing import PageClock
 from vftcli.outputs.page.shell import polyline
 from vftcli.outputs.quantity import at_least_shown
-from vftcli.robots.chain import Chain, LinkPoses, link_poses
+from vftcli.robots.chain import Chain, link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import VftError
 from vftcli.signals.external_torque import COVERS
+from vftcli.signals.pose import Pose
 from vftcli.signals.series import resample_columns, runs_of
 
 #: Radius of the first and of the last link, as a share of the stretched arm's length, and
@@ -116,7 +117,7 @@ def view_of(analysis: Analysis) -> View:
     return view._replace(span=np.array([np.ptp(x), np.ptp(y)]) + thick)
 
 
-def pose_at(analysis: Analysis, t: float) -> LinkPoses:
+def pose_at(analysis: Analysis, t: float) -> Pose:
     """Poses of links and flange at a time. (1, n + 1, …)"""
     q = resample_columns(np.array([t]), analysis.t, analysis.recording.q)
     return link_poses(analysis.robot.chain, q)

@@ -44,14 +44,12 @@ class MessageLayout:
         leaves: Dotted path → numbers.
         texts: Dotted path → strings, one or several.
         fixed: Ranges of bytes that have to be equal for a message to have this layout.
-        uses: Number of batches it was used for.
     """
 
     def __init__(self, types: Types, message: Bytes, kind: str, *, cdr: bool) -> None:
         self.leaves: dict[str, Leaf] = {}
         self.texts: dict[str, Names] = {}
         self.fixed: list[tuple[int, int]] = []
-        self.uses = 0
         self._types, self._message, self._cdr = types, message, cdr
         self._order, self._position, self._visits = "<", 0, 0
         if cdr:  # four bytes: representation and byte order
@@ -207,8 +205,6 @@ KINDS = {
 #: Layouts that messages of one topic may have: joint names, and lengths of lists, hardly
 #: vary.
 LAYOUTS = 512
-#: Random messages of some batches that are walked one by one to confirm their layout.
-CHECKED_ROWS = 4
 
 
 @dataclass
@@ -270,7 +266,6 @@ class Decoder:
         self.budget = budget
         self.topics: dict[Channel, _Topic] = {}
         self.others: dict[str, str] = {}
-        self._chance = np.random.default_rng(0)
 
     def take(self, batch: Batch) -> None:
         """Decode one batch, or remember that its type carries nothing we hold."""
@@ -301,7 +296,9 @@ class Decoder:
         known, place = topic.layouts.setdefault(length, []), 0
         while rows.size:
             if place == len(known):
-                known.append(_layout_of(batch, topic, int(rows[0])))
+                start, channel = int(batch.offsets[rows[0]]), batch.channel
+                message, cdr = batch.buffer[start : start + length], channel.encoding == "cdr"
+                known.append(MessageLayout(topic.types, message, channel.type, cdr=cdr))
                 if sum(map(len, topic.layouts.values())) > LAYOUTS:
                     raise LayoutError(f"its messages have more than {LAYOUTS} layouts")
             fits = known[place].fits(batch.buffer, batch.offsets[rows])
@@ -310,11 +307,6 @@ class Decoder:
             rows, place = rows[~fits], place + 1
 
     def _decode(self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers) -> None:
-        layout.uses += 1
-        if layout.uses & (layout.uses - 1) == 0:  # the first, second, fourth, eighth … batch
-            for row in self._chance.choice(rows, min(CHECKED_ROWS, len(rows)), replace=False):
-                if _layout_of(batch, topic, int(row)).leaves != layout.leaves:
-                    raise LayoutError("two walks of one message differ")
         kind = KINDS[batch.channel.type]
         at = batch.buffer, batch.offsets[rows]
         each = {signal: layout.numbers(paths, *at) for signal, paths in kind.signals.items()}
@@ -361,12 +353,6 @@ class Decoder:
                     signals={name: found[name] for name in signals if name in found},
                     constants=topic.constants,
                 )
-
-
-def _layout_of(batch: Batch, topic: _Topic, row: int) -> MessageLayout:
-    start, channel = int(batch.offsets[row]), batch.channel
-    message = batch.buffer[start : start + int(batch.lengths[row])]
-    return MessageLayout(topic.types, message, channel.type, cdr=channel.encoding == "cdr")
 
 
 def _in_recorded_order(parts: list[Columns]) -> Iterator[tuple[str, Column]]:
