@@ -240,13 +240,12 @@ def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
         # pos_joint1 is found by its number, as pos_1 is.
         if not (name.endswith(match["joint"]) and NUMBERED_JOINT.fullmatch(match["joint"])):
             found.setdefault(match["stem"].lower(), {})[match["joint"]] = Cell(column)
-    joints = {stem: frozenset(cells) for stem, cells in found.items()}
+    joints = [cells.keys() for cells in found.values()]
     return {
         stem: cells
         for stem, cells in found.items()
-        if len(cells) >= FEWEST_JOINTS
-        and list(joints.values()).count(joints[stem]) > 1
-        and not any(AXES.fullmatch(joint) for joint in cells)
+        if len(cells) >= FEWEST_JOINTS and joints.count(cells.keys()) > 1
+        if not any(map(AXES.fullmatch, cells))
     }
 
 
@@ -276,17 +275,12 @@ def clock_pick(table: Table) -> Pick | None:
             wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
             there = [k for k, other in enumerate(names) if other in wanted]
             pairs += [(there[0], column)] if len(there) == 1 else []
-    in_pair = {column for pair in pairs for column in pair}
-    bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
-    single: list[tuple[int, ...]] = [
-        (column,)
-        for column, name in enumerate(names)
-        if column not in in_pair
-        and (name in CLOCKS or bare[column] in CLOCKS[:4] or HEADER_STAMP.fullmatch(name))
-    ]
-    found = [*pairs, *single]
-    own = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])]
-    found = own or found
+    found, in_pair = list(pairs), {column for pair in pairs for column in pair}
+    for column, name in enumerate(names):
+        bare = re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name)
+        called = name in CLOCKS or bare in CLOCKS[:4] or HEADER_STAMP.fullmatch(name)
+        found += [(column,)] if called and column not in in_pair else []
+    found = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])] or found
     if len(found) > 1:
         clocks = listed(["|".join(table.names[c] for c in columns) for columns in found])
         raise LogError(

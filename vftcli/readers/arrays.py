@@ -19,7 +19,14 @@ import numpy as np
 
 from vftcli.readers.aliases import CLOCKS
 from vftcli.readers.hdf5 import level_of, opened, table_of
-from vftcli.readers.objects import columns_of, columns_of_lines, lines_of, load_arrays_only, parsed
+from vftcli.readers.objects import (
+    columns_of,
+    columns_of_lines,
+    flat,
+    lines_of,
+    load_arrays_only,
+    parsed,
+)
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage, unpacked_limit
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
@@ -280,18 +287,12 @@ def _matlab_5(file: LogFile) -> Columns:
         check_unpacked(file.path, claimed, len(file.content))
         names = [name for name, _ in there]
         loaded = loadmat(stream, variable_names=names, simplify_cells=True)
-    return dict(_flat(loaded))
-
-
-def _flat(variables: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Column]]:
-    """Variables that are one or two dimensions of numbers, those of structs one level down."""
-    found: list[tuple[str, Column]] = []
-    for name, value in variables.items():
-        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim in {1, 2}:
-            found += [(prefix + name, value)] if value.size else []
-        elif isinstance(value, dict) and not prefix:
-            found += _flat(value, f"{name}.")
-    return found
+    return {
+        name: value
+        for name, value in flat(loaded, 1)
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+        if value.ndim in {1, 2} and value.size
+    }
 
 
 def _check_matlab(file: LogFile) -> None:

@@ -13,9 +13,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from io import BytesIO
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import parse_columns
@@ -186,19 +185,6 @@ DEEPEST_FOLDER = 8  #: Folders inside folders; DROID has five: version, lab, suc
 MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
 
 
-class Layout(NamedTuple):
-    """How a project lays its episodes out."""
-
-    name: str  #: The project.
-    anchor: str  #: Path of the positions, below the group of an episode.
-    read: Callable[[Hdf5Table, ReadChoice], RawLog]  #: Reads one episode of an open file.
-
-    def groups(self, names: Sequence[str]) -> Names:
-        """The groups of its episodes, in their order; none where the file is laid out otherwise."""
-        ends = [n.removesuffix(self.anchor) for n in names if n.endswith(self.anchor)]
-        return tuple(sorted((e for e in ends if not e or e.endswith("/")), key=natural))
-
-
 def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
     names = table.names
@@ -239,12 +225,12 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """Any other file: by --columns, or by alias among the datasets of one group."""
     if request.spec.item("q"):
         return from_table(table, request)
-    if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names)]) > 1:
+    names = table.names
+    if all(groups_of(names, anchor) for anchor in LAYOUTS):
         raise UnknownFormatError(
-            f"{table.path}: laid out as {' and as '.join(fitting)}. Say what is what with "
+            f"{table.path}: laid out as ALOHA and as DROID. Say what is what with "
             "--columns, as in t=…,q=PATH/OF/POSITIONS."
         )
-    names = table.names
     for path, project in TORQUELESS.items():
         if any(f"/{name}".endswith(f"/{path}") for name in names):
             raise LogError(
@@ -272,29 +258,31 @@ def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
     return "" if "" in levels or not levels else next(iter(levels))
 
 
-#: The layouts that are known.
-LAYOUTS = (
-    Layout("ALOHA", ALOHA, read_aloha),
-    Layout("DROID", f"{DROID_STATE}joint_positions", read_droid),
-)
+#: Path of a known project's positions below the group of an episode → what reads one.
+LAYOUTS = {ALOHA: read_aloha, f"{DROID_STATE}joint_positions": read_droid}
 
 
-def layout_of(table: Hdf5Table) -> tuple[Layout, dict[int, str]]:
-    """How a file is laid out, and the group of each episode; as any other where two ways fit.
+def groups_of(names: Sequence[str], anchor: str) -> Names:
+    """The groups of a layout's episodes, in their order; none of a file of another layout."""
+    ends = [name.removesuffix(anchor) for name in names if f"/{name}".endswith(f"/{anchor}")]
+    return tuple(sorted(ends, key=natural))
+
+
+def layout_of(table: Hdf5Table) -> tuple[str, dict[int, str]]:
+    """The layout of a file, and the group of each episode; "" of any other, or of two.
 
     An episode has the number that its group's name ends with, or is counted from 0.
     """
-    found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names))]
-    layout, groups = found[0] if len(found) == 1 else (Layout("HDF5", "", read_any), ("",))
-    return layout, dict(zip(numbers_of(groups), groups, strict=True))
+    found = [(x, groups) for x in LAYOUTS if (groups := groups_of(table.names, x))]
+    anchor, groups = found[0] if len(found) == 1 else ("", ("",))
+    return anchor, dict(zip(numbers_of(groups), groups, strict=True))
 
 
-def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
+def numbers_of(groups: Sequence[str]) -> Sequence[int]:
     """The episodes' numbers: those their groups' names end with, else counted from 0."""
-    ends = [re.search(r"(\d{1,9})\D*$", group) for group in groups]
-    numbers = tuple(int(end[1]) for end in ends if end)
-    rising = all(a < b for a, b in pairwise(numbers))
-    return numbers if rising and len(numbers) == len(groups) else tuple(range(len(groups)))
+    numbers = [int(end) for group in groups for end in re.findall(r"(\d{1,9})\D*$", group)]
+    rising = numbers == sorted(set(numbers)) and len(numbers) == len(groups)
+    return numbers if rising else range(len(groups))
 
 
 def trajectories(folder: Path) -> Iterator[Path | None]:
@@ -320,26 +308,24 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
     if not file.is_folder:
         with opened(file) as content:
             table = table_of(file.path, content)
-            layout, groups = layout_of(table)
-            several = len(groups) > 1
+            anchor, groups = layout_of(table)
+            read, several = LAYOUTS.get(anchor, read_any), len(groups) > 1
             yield {
-                number: partial(
-                    _placed, group.rstrip("/") * several, partial(layout.read, table.within(group))
-                )
-                for number, group in groups.items()
+                k: partial(_placed, g.rstrip("/") * several, partial(read, table.within(g)))
+                for k, g in groups.items()
             }
         return
     paths = [path for path in trajectories(file.path) if path is not None]
     if not paths:
         raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
 
-    def read(path: Path, request: ReadChoice) -> RawLog:
+    def read_file(path: Path, request: ReadChoice) -> RawLog:
         raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
         return replace(raw, part="", files=(path,))
 
     places = [str(path.parent.relative_to(file.path)) * (len(paths) > 1) for path in paths]
-    each = zip(places, paths, strict=True)
-    yield {k: partial(_placed, place, partial(read, path)) for k, (place, path) in enumerate(each)}
+    each = enumerate(zip(places, paths, strict=True))
+    yield {k: partial(_placed, place, partial(read_file, path)) for k, (place, path) in each}
 
 
 def _placed(place: str, read: Callable[[ReadChoice], RawLog], request: ReadChoice) -> RawLog:
@@ -353,7 +339,7 @@ def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
     stated = parse_columns(columns).item("q") if columns is not None else None
     with opened(file) as content:
         table = table_of(file.path, content)
-        layout, groups = layout_of(table)
-        anchor = (stated.pattern if stated is not None else None) or layout.anchor
+        anchor, groups = layout_of(table)
+        anchor = (stated.pattern if stated is not None else None) or anchor
         anchor = anchor or level_of(file.path, table.names, "/")
     return {k: group + anchor[: anchor.rfind("/") + 1] for k, group in groups.items()}

@@ -85,13 +85,16 @@ def _object_in(line: bytes) -> Object | None:
         found = json.loads(NOT_JSON.sub(lambda m: m[1] + words[m[2]], line))
     except (ValueError, RecursionError):
         return None
-    if not isinstance(found, dict):
-        return None
-    flat: Object = {}
-    for name, value in found.items():
-        inner = value.items() if isinstance(value, dict) else ()
-        flat |= {f"{name}.{key}": v for key, v in inner} if inner else {name: value}
-    return flat
+    return dict(flat(found, 1)) if isinstance(found, dict) else None
+
+
+def flat(values: Object, levels: int, prefix: str = "") -> Iterator[tuple[str, Data]]:
+    """Values by dotted path, those of objects some levels down; objects below as they are."""
+    for name, value in values.items():
+        if isinstance(value, dict) and value and levels:
+            yield from flat(value, levels - 1, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
 
 
 def columns_of(file: LogFile, objects: list[Object], first: int) -> Columns:

@@ -183,13 +183,9 @@ def estimates_columns(path: Path, observer: str) -> str | None:
 
 def stored_observers(path: Path) -> list[str]:
     """The observers whose estimates a file holds, none if it is not one of ours."""
-    if not path.is_file():
-        return []
-    with path.open("rb") as file:
-        if file.read(4) != b"PAR1":
-            return []
     try:
-        names = ParquetTable(open_log(path)).names
+        file = open_log(path)
+        names = ParquetTable(file).names if file.head.startswith(b"PAR1") else ()
     except LogError:  # what is damaged is said by whoever reads it
         return []
     held = sorted({n.split("/")[1] for n in names if n.startswith(PREFIX) and n.count("/") == 2})

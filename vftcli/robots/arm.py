@@ -364,14 +364,9 @@ class LumpedArm:
             names=tuple(joint.name for joint in self.joints),
             rotation=np.array(rotations),
             translation=np.array(translations),
-            mass=np.array([body.mass for body in self.bodies]),
+            mass=np.array([body.mass for _, body in self.turned]),
             com=np.array([body.com for _, body in self.turned]),
-            inertia=np.array(
-                [
-                    turn.T @ nearest_tensor(body.inertia) @ turn
-                    for (turn, _), body in zip(self.turned, self.bodies, strict=True)
-                ]
-            ),
+            inertia=np.array([nearest_tensor(body.inertia) for _, body in self.turned]),
             rotor_inertia=np.array([joint.rotor_inertia for joint in self.joints]),
             gravity=self.tree.gravity,
             flange_rotation=turn.T @ flange.rotation,

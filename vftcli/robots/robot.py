@@ -50,14 +50,9 @@ class JointFriction(Shown):
         """The model as ``[joints.friction]`` of a robot file has it; empty for none."""
         if self.model == "none":
             return {}
-        lists = {"speeds": self.speeds, "torques": self.torques, "temperature": self.temperature}
-        table = {"model": self.model, **self.parameters}
-        table |= {key: list(values) for key, values in lists.items() if values}
-        if self.temperature_at is not None:
-            table["temperature_at"] = self.temperature_at
-        if self.confidence:
-            table["confidence"] = self.confidence
-        return table
+        known = {key: value for key, value in vars(self).items() if value not in ((), None, "")}
+        table = {"model": known.pop("model"), **known.pop("parameters"), **known}
+        return {k: list(value) if isinstance(value, tuple) else value for k, value in table.items()}
 
 
 class PerJoint(Shown):

@@ -249,14 +249,12 @@ class _Topic:
 
     types: Types
     layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
-    #: Times and signals by name, and `place` in the topic, of each layout of the batch at
-    #: hand.
+    #: Times and signals by name, and `place` in the batch at hand, of each layout in it.
     parts: dict[_Key, list[Columns]] = field(default_factory=dict)
     #: The times and signals of all batches.
     series: dict[_Key, dict[str, JoinedRows]] = field(default_factory=dict)
     mixed: set[_Key] = field(default_factory=set)
     constants: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    seen: int = 0
 
 
 class Decoder:
@@ -279,7 +277,6 @@ class Decoder:
                 topic = self.topics[channel] = _Topic(types=types_for(channel))
             for length in np.unique(batch.lengths):
                 self._of_length(batch, topic, int(length))
-            topic.seen += len(batch.offsets)
             for key, parts in topic.parts.items():
                 series = topic.series.setdefault(key, defaultdict(JoinedRows))
                 for name, value in _in_recorded_order(parts):
@@ -320,7 +317,7 @@ class Decoder:
         if kind.franka and "tau_ext" in signals:
             signals["tau_ext"] = 0.0 - signals["tau_ext"]
         key = names, "".join(layout.texts.get(kind.frame, ())), tuple(signals)
-        part = signals | {"place": topic.seen + rows, "receive": batch.times[rows]}
+        part = signals | {"place": rows, "receive": batch.times[rows]}
         if (clock := layout.numbers(["time"], *at)).size:  # a robot's own [s]
             part["robot"] = clock[:, 0]
         # float64 holds both whole.

@@ -13,6 +13,7 @@ import numpy as np
 from vftcli.readers.aliases import along_arm, laid_along
 from vftcli.readers.bags.container import Batch, Channel
 from vftcli.readers.bags.decode import KINDS, VECTORS, Stream
+from vftcli.readers.objects import flat
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import Column, Names
 from vftcli.readers.tables import ArrayTable, from_table
@@ -25,8 +26,7 @@ FOXGLOVE = "foxglove.JointStates"
 STAMPS = ("header.stamp", "timestamp", "stamp")
 SECONDS, NANOSECONDS = ("sec", "secs", "seconds"), ("nsec", "nsecs", "nanos", "nanosec")
 MAX_BYTES, MAX_DEPTH, MAX_VALUES = 1 << 20, 8, 4096  #: What a message of joints may be.
-Json = Any  #: A value of a document.
-Document = dict[str, Json]  #: A message, flattened: dotted path → value.
+Document = dict[str, Any]  #: A message, flattened: dotted path → value.
 
 
 class Documents:
@@ -191,27 +191,18 @@ def flattened(message: bytes, encoding: str) -> Document:
     document = json.loads(message) if encoding == "json" else joint_states(message)
     if not isinstance(document, dict):
         raise ValueError("not an object")  # noqa: TRY004 - damage, as what json finds
-    flat: Document = {}
-    _flatten(document, "", flat, 0)
-    return flat
-
-
-def _flatten(value: Json, path: str, flat: Document, depth: int) -> None:
-    listed = isinstance(value, list)
-    if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
-        raise ValueError("nested or long beyond any message of joints")
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            _flatten(inner, f"{path}.{key}" if path else str(key), flat, depth + 1)
-    elif listed and value and all(isinstance(v, dict) for v in value):
-        for key in ("name", "position", "velocity", "effort"):
-            found = [v[key] for v in value if key in v]
-            if len(found) == len(value):
-                flat[key] = found
-    elif listed and len(value) > MAX_VALUES:
-        raise ValueError("nested or long beyond any message of joints")
-    elif listed or isinstance(value, int | float | str | bool):
-        flat[path] = value
+    found: Document = {}
+    for path, value in flat(document, MAX_DEPTH - 1):
+        listed = value if isinstance(value, list) else []
+        if listed and all(isinstance(each, dict) for each in listed):
+            for key in ("name", "position", "velocity", "effort"):
+                if all(key in each for each in listed):
+                    found[key] = [each[key] for each in listed]
+        elif isinstance(value, list | int | float | str | bool):
+            found[path] = value
+        if (value and isinstance(value, dict)) or max(len(found), len(listed)) > MAX_VALUES:
+            raise ValueError("nested or long beyond any message of joints")
+    return found
 
 
 #: Number of a field of a joint in foxglove.JointStates → its name.

@@ -139,9 +139,8 @@ class Gathering:
         if stream.topic.startswith(OWN):
             self._take_own(stream)
         elif stream is not self.lead and same_arm(stream, self.lead):
-            for signal in [s for s in stream.signals if s != "effort" and s not in self.signals]:
-                if (values := self.interpolated(stream, signal)) is not None:
-                    self.signals[signal] = values
+            for signal in [s for s in stream.signals if s not in {"effort", *self.signals}]:
+                self.interpolate(stream, signal)
 
     def _take_own(self, stream: Stream) -> None:
         """Take a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
@@ -170,8 +169,7 @@ class Gathering:
             pass
         elif sensor.topic.startswith(OWN):
             frame = WrenchFrame.of_conversion(sensor.frame)
-        elif (values := self.interpolated(sensor, "wrench")) is not None:
-            self.signals["wrench"] = values
+        elif self.interpolate(sensor, "wrench"):
             # A frame_id is a link's name, of which the moment's point is the origin.
             frame = WrenchFrame(sensor.frame, sensor.frame) if sensor.frame else None
         if said is None:
@@ -185,10 +183,10 @@ class Gathering:
             self.signals["wrench"] = self.signals["wrench"] * said.factor + 0.0
         return frame if said.unit is None else WrenchFrame.parsed(said.unit)
 
-    def interpolated(self, stream: Stream, signal: str) -> Array | None:
-        """A smooth signal of another topic at the leading one's times, held at the ends. (T, k)
+    def interpolate(self, stream: Stream, signal: str) -> bool:
+        """Take a smooth signal of another topic at the leading one's times, held at the ends.
 
-        None, and a caution, where the other topic does not cover the leading one's time.
+        False, and a caution, where the other topic does not cover the leading one's time.
         """
         lead, times, topic = self.lead, self.host, stream.topic
         own = host_times(stream)
@@ -203,7 +201,7 @@ class Gathering:
         outside = (times < own[0] - NEAR * usual) | (times > own[-1] + NEAR * usual)
         if len(own) < 2 or np.mean(outside) > 0.05 or np.any(np.diff(own) < 0):
             self.remarks.append(caution("topic-too-short", signal=signal, topic=topic))
-            return None
+            return False
         start = int(own[0])  # whole nanoseconds are subtracted before they are scaled
         x, xp = np.asarray((times - start) * 1e-9, float), np.asarray((own - start) * 1e-9, float)
         self.used.add(topic)
@@ -211,7 +209,8 @@ class Gathering:
         self.remarks.append(
             fact("signal-interpolated", signal=signal, topic=topic, rate_Hz=rate, lead=leads)
         )
-        return resample_columns(x, xp, values)
+        self.signals[signal] = resample_columns(x, xp, values)
+        return True
 
     def report_left_out(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
         """Remark which messages and topics were left out, those with forces first."""
