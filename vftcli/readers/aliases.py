@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
 from vftcli.readers.reader import RawLog, ReadChoice
@@ -76,27 +75,20 @@ FEWEST_JOINTS = 3
 RESIDUAL_TURNED = fact("residual-turned")  #: Said wherever libfranka's residual is taken.
 
 
-class Group(NamedTuple):
-    """Columns of one name but for their index; `twice` is one that has the index of another."""
-
-    cells: Cells
-    indices: tuple[int, ...]
-    joints: Names = ()
-    twice: str = ""
-
-
 class NamedColumns:
     """The columns of a headed table by what their names say.
 
     Attributes:
-        groups: Columns by name without index, in lower case.
+        groups: Columns of one name but for their index, by that name in lower case and by index.
+        twice: Of such a name a column that has the index of another.
+        joints: Of such a name the joints' names where the columns have them.
     """
 
     def __init__(self, table: Table) -> None:
         self.table = table
-        self.groups: dict[str, Group] = {}
+        self.twice: dict[str, str] = {}
+        self.joints: dict[str, Names] = {}
         found: dict[str, dict[int, Cell]] = {}
-        twice: dict[str, str] = {}
         by_joint = _joint_columns(table)
         in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
         for column, name in enumerate(table.names):
@@ -110,31 +102,29 @@ class NamedColumns:
                 index = int(match["a"] or match["b"] or match["c"])
                 stem = FIELD.sub("", match["stem"].lower(), count=1)
                 if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
-                    twice[stem] = name
-        for stem, cells in found.items():
-            indices = tuple(sorted(cells))  # not by place: a table may hold q_10 before q_2
-            ordered = tuple(cells[i] for i in indices)
-            self.groups[stem] = Group(ordered, indices, twice=twice.get(stem, ""))
+                    self.twice[stem] = name
         for stem, of_joint in by_joint.items():
             each = tuple(of_joint)
-            names = tuple(each[k] for k in kinematic_order(each))
-            ordered = tuple(of_joint[name] for name in names)
-            self.groups[stem] = Group(ordered, tuple(range(len(names))), names)
+            names = self.joints[stem] = tuple(each[k] for k in kinematic_order(each))
+            found[stem] = {k: of_joint[name] for k, name in enumerate(names)}
+            self.twice.pop(stem, None)
+        # Not by place: a table may hold q_10 before q_2.
+        self.groups = {stem: dict(sorted(cells.items())) for stem, cells in found.items()}
 
     def cells(self, name: str) -> Cells:
         """The cells of a group."""
         group, path = self.groups[name.lower()], self.table.path
-        if group.twice:
+        if twice := self.twice.get(name.lower()):
             raise LogError(
-                f"{path}: two columns could be {name} of one index: {group.twice!r} and another. "
+                f"{path}: two columns could be {name} of one index: {twice!r} and another. "
                 "Name the columns with --columns."
             )
-        if not group.cells:
+        if not group:
             raise LogError(
                 f"{path}: {name} holds no number in its first row, so its width is unknown. "
                 "Cut the rows with empty lists out, or leave the column out with --columns."
             )
-        return group.cells
+        return tuple(group.values())
 
     def find(self, signal: str) -> Pick | None:
         """The columns of the clock or a signal, None where none bears a name of it."""
@@ -147,8 +137,8 @@ class NamedColumns:
                 f"--columns, as in q=…,{signal if signal != 'torque' else 'tau'}={found[0]}_{{i}}."
             )
         for name in found:
-            cells, indices = self.cells(name), self.groups[name].indices
-            if indices != tuple(range(indices[0], indices[0] + len(indices))):
+            cells, indices = self.cells(name), list(self.groups[name])
+            if indices[-1] - indices[0] >= len(indices):
                 raise LogError(
                     f"{self.table.path}: the columns of {name} are numbered "
                     f"{', '.join(map(str, indices[:12]))}, with holes. Name them with --columns."
@@ -167,7 +157,7 @@ class NamedColumns:
         signal = SIGNALS.get(item.signal, item.signal)
         found = self.find(signal)
         if found is None and signal == "wrench" and (own := self.groups.get("actual_tcp_force")):
-            found = Pick(signal, own.cells)  # UR's
+            found = Pick(signal, tuple(own.values()))  # UR's
         if found is None:
             raise missing_column(self.table, item.signal, item.signal)
         pick = pick_of(item, found.cells)
@@ -204,7 +194,6 @@ class NamedColumns:
 def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, Names]:
     """Find the signals of a headed table by the names of its columns, and the joints' names."""
     columns = NamedColumns(table)
-    groups = columns.groups
     rate = next((item.rate for item in stated if item.rate is not None), None)
     named = [item for item in stated if item.rate is None and item.signal != "_"]
     own = {item.signal: columns.stated(item) for item in named}
@@ -215,9 +204,10 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, Names]:
     # A group of another width is about something else: a gripper, a base.
     also = {"q", "wrench", *known}
     signals = [p for p in signals if not q or len(p.cells) == len(q) or p.signal in also]
-    names = next((g.joints for g in groups.values() if g.joints and g.cells == q), ())
+    each = columns.joints.items()
+    names = next((names for stem, names in each if columns.cells(stem) == q), ())
     if effort_of(names) == "current" and not known & set(EFFORTS):
-        efforts = [groups[name].cells for name in ("effort", "eff") if name in groups]
+        efforts = [tuple(columns.groups.get(name, {}).values()) for name in ("effort", "eff")]
         for k, pick in enumerate(signals):
             if pick.signal == "torque" and pick.cells in efforts:
                 signals[k] = pick._replace(signal="current", remark=fact("effort-is-current"))

@@ -23,7 +23,7 @@ import numpy as np
 
 from vftcli.robots.arm import BASE, BodyTree, LumpedArm, shortened
 from vftcli.robots.chain import Chain
-from vftcli.robots.kernels import LINK, TENSOR, momentum_terms, torque_regressor
+from vftcli.robots.kernels import chain_parameters, momentum_terms, torque_regressor
 from vftcli.robots.meshes import meshes_of, packages_near
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.robot import JointFriction, Limits, Robot
@@ -200,16 +200,16 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         yield caution("links-without-mass", Where(joints=bare))
     # What the nearest tensors that a body can have differ by, zero where the tensor was
     # right.
-    changes = chain.inertia - np.array([body.inertia for _, body in lumped.turned])
+    given = replace(chain, inertia=np.array([body.inertia for _, body in lumped.turned]))
+    changes = chain.inertia != given.inertia
     if changed := tuple(j + 1 for j, change in enumerate(changes) if change.any()):
         links = [lumped.joints[j - 1].child for j in changed]
-        parameters = np.zeros((chain.joints, LINK))
-        parameters[:, 4:] = np.stack([changes[:, row, col] for row, col in TENSOR], axis=1)
+        parameters = chain_parameters(chain) - chain_parameters(given)
         rng = np.random.default_rng(0)
         q = rng.uniform(-np.pi, np.pi, (POSES, chain.joints))
         sign = rng.choice([-1.0, 1.0], (2, *q.shape))
         regressor = torque_regressor(chain, q, SPEED * sign[0], ACCELERATION * sign[1])
-        worst = float(abs(regressor @ parameters.ravel()).max())
+        worst = float(abs(regressor @ parameters).max())
         yield caution("tensors-changed", Where(joints=changed), links=links, worst_Nm=worst)
     if bare:
         n = chain.joints

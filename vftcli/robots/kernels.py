@@ -113,7 +113,7 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
         omega = on.add(omega, (ZERO, ZERO, dq[j]))
         motion.append((omega, v, gamma))
 
-    results: dict[str, list[Value]] = {"p": [], "coriolis": [], "gravity": [], "bias": []}
+    results: list[dict[str, Value]] = []
     K, L, H = NOTHING, NOTHING, NOTHING  # of the links behind, in the axes of this one
     for j in range(n - 1, -1, -1):
         omega, v, gamma = motion[j]
@@ -123,17 +123,17 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
         H = on.add(h, H)
         coriolis = on.plus(on.cross_z(K, omega), on.cross_z(L, v))
         weight = on.cross_z(H, gamma)
-        found = {
-            "p": on.plus(K[2], on.times(Value(float(chain.rotor_inertia[j])), dq[j])),
-            "coriolis": coriolis,
-            "gravity": -weight,
-            "bias": on.plus(coriolis, weight),
-        }
-        for name, value in found.items():
-            results[name].insert(0, value)
+        results.append(
+            {
+                "p": on.plus(K[2], on.times(Value(float(chain.rotor_inertia[j])), dq[j])),
+                "coriolis": coriolis,
+                "gravity": -weight,
+                "bias": on.plus(coriolis, weight),
+            }
+        )
         K, L, H = (on.map(R[j], on.turn(x, cosine[j], sine[j])) for x in (K, L, H))
         K = on.add(K, on.cross(r[j], L))
-    return on, results
+    return on, {name: [found[name] for found in reversed(results)] for name in results[0]}
 
 
 #: The programs that a thread used last; each works in memory of its own.

@@ -68,16 +68,16 @@ class Documents:
             return []
         streams: list[Stream | None] = []
         for channel, (rows, times) in self.found.items():
-            if all(f"wrench.{path}" in row for row in rows for path in VECTORS):
-                streams.append(stream_of(channel, rows, times))
-            elif all(map(is_joint_state, rows)):
-                by_names: dict[Names, list[int]] = {}
+            are_wrenches = all(f"wrench.{path}" in row for row in rows for path in VECTORS)
+            by_names: dict[Names, list[int]] = {}
+            if are_wrenches or all(map(is_joint_state, rows)):
                 for k, row in enumerate(rows):
-                    by_names.setdefault(tuple(row["name"]), []).append(k)
-                for names, at in by_names.items():
-                    own, stamps = [rows[k] for k in at], [times[k] for k in at]
-                    streams.append(stream_of(channel, own, stamps, names))
-        return [stream for stream in streams if stream is not None]
+                    names = () if are_wrenches else tuple(row["name"])
+                    by_names.setdefault(names, []).append(k)
+            for names, at in by_names.items():
+                own, stamps = [rows[k] for k in at], [times[k] for k in at]
+                streams.append(stream_of(channel, own, stamps, names))
+        return list(filter(None, streams))
 
     def read(self, request: ReadChoice) -> RawLog:
         """Read the channel whose documents hold joint positions."""
