@@ -242,7 +242,6 @@ def replayed(
     controllers = control.controllers(arm)
     force = force_of(recording, arm, choice, control.force, named[0] if stored else None)
     made = replay(force.wrench, recording.q, arm, controllers, source=force.source, anyway=anyway)
-    made = replace(made, force_remarks=(*force.remarks, *made.force_remarks))
     return Replayed(made, recording, None, choice.examiner.examinations)
 
 

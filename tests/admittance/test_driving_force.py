@@ -32,7 +32,7 @@ def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed() -> None:
     expected = np.where(T[:, None] > 2.0, 10.0, 0.0) * np.ones(6)
     np.testing.assert_allclose(found.wrench.known, expected, atol=1e-8)  # κ(J)² times rounding
     assert found.source.values == {"observer": "kfo-fe"}
-    assert [remark.code for remark in found.remarks] == ["zero-removed"]
+    assert [remark.code for remark in found.wrench.remarks] == ["zero-removed"]
     with pytest.raises(MissingSignalError):
         stored_force(Recording(t=T, q=Q), UR5, choice(), "kfo-fe")
     with pytest.raises(ParameterError, match="needs the log itself"):
@@ -45,11 +45,12 @@ def test_the_logs_sensor_drives_as_the_log_states_it() -> None:
     )
     found = sensor_force(log, UR5, choice())
     np.testing.assert_array_equal(found.wrench.values, WRENCH)
-    assert found.remarks == ()
+    assert found.wrench.remarks == ()
     assert "BY the robot" in found.source.values["frame"]
     unstated = sensor_force(Recording(t=T, q=Q, wrench=WRENCH), UR5, choice())
     assert unstated.source.values["frame"] == "frame not stated"
-    assert [r.code for r in unstated.remarks] == ["wrench-frame-unstated", "sensor-pose-unstated"]
+    codes = [remark.code for remark in unstated.wrench.remarks]
+    assert codes == ["wrench-frame-unstated", "sensor-pose-unstated"]
 
 
 def truth(path: Path, **columns: np.ndarray) -> Path:

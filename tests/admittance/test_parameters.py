@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.law import (
     AXES,
     controllers,
@@ -99,7 +100,7 @@ def test_controllers_of_a_comparison() -> None:
     assert names == ["traditional", "α = 6 / 3"]
     assert [c.name for c in controllers(p, ["variable"], [1.0, 1.9])] == ["α = 1", "α = 1.9"]
     with pytest.raises(ParameterError, match="there is traditional, variable"):
-        controllers(p, ["adaptive"])
+        ControlChoice(kinds=("adaptive",))
     with pytest.raises(ParameterError, match="alpha of axis x is 0"):
         controllers(p, alphas=[0.0])
 

@@ -8,6 +8,7 @@ from vftcli.robots import PROFILES
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.option import NUMBERS, Choice, Option, names_at, numbers, setting
+from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.admittance.law import Controller
@@ -93,9 +94,10 @@ class ControlChoice(Choice):
     as_printed: bool = False  #: Whether the paper's printed formulas run.
 
     def __post_init__(self) -> None:
-        from vftcli.admittance.law import check_kinds
+        from vftcli.admittance.law import KINDS
 
-        check_kinds(self.kinds)
+        for kind in self.kinds:
+            check_known(kind, KINDS, f"no controller {kind!r}")
         if self.force is not None and self.force != "sensor" and not self.force.startswith(FILE):
             raise ParameterError(f"admittance.force={self.force} is neither sensor nor {FILE}PATH")
         _ = self.settings  # malformed ones are refused before a log is read

@@ -6,7 +6,6 @@ force, and as Figs 6 and 9 time them: from detection to motion, and from the est
 fall to the turn.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from vftcli.admittance.joints import FlangeSolver
 from vftcli.admittance.law import Controller, check_stable
-from vftcli.admittance.motion import Recursion, entering_force
+from vftcli.admittance.motion import Recursion, phases
 from vftcli.admittance.replay import deviation_of
 from vftcli.observers.paper import KalmanObserver
 from vftcli.robots import load_robot
@@ -185,26 +184,20 @@ class Loop:
 
     def control(self, wrench: Array) -> None:
         """One control period of Algorithm 1 under a wrench. (6,) [N, N·m]"""
-        p, size = self.controller.parameters, abs(wrench)
-        self.dragged = (size > p.threshold) | (self.dragged & (size > p.release_threshold))
-        x, v, turn = self.law.x.copy(), self.law.v.copy(), self.law.turn.copy()
-        self.law.step(entering_force(wrench, self.dragged, p), self.dragged)
-        q, self.reached = self.solve(self.law.x[0])
+        split = phases(wrench[None], self.controller.parameters, self.dragged)
+        (self.dragged,), (force,) = split
+        x, v, turn = self.law.x, self.law.v, self.law.turn
+        self.law.step(force, self.dragged)
+        self.reached, last, wanted = False, self.q_command, self.law.x[0]
+        if np.isfinite(wanted).all():
+            goal, point = exp_matrix(wanted[3:]) @ self.rotation, self.translation + wanted[:3]
+            q, good = self.solver.reach(goal, point, 2.0 * last - self.q_before)
+            self.reached = bool(good and np.max(abs(q - last) / self.reach_step) <= 1.0)
+        self.q_before = last
         if self.reached:
-            self.q_before, self.q_command = self.q_command, q
+            self.q_command = q
         else:  # out of reach or too fast for a joint: wait at rest, as at a wall
             self.law.x, self.law.v, self.law.turn = x, 0.0 * v, turn
-            self.q_before = self.q_command
-
-    def solve(self, x: Array) -> tuple[Array, bool]:
-        """Joint positions for a deviation (6,) [m, rad], inside the joints' limits and speeds."""
-        if not np.isfinite(x).all():
-            return self.q_command, False
-        goal = exp_matrix(x[3:]) @ self.rotation
-        guess = 2.0 * self.q_command - self.q_before
-        q, good = self.solver.reach(goal, self.translation + x[:3], guess)
-        fastest = np.max(abs(q - self.q_command) / self.reach_step)
-        return q, bool(good and fastest <= 1.0)
 
     @property
     def reference(self) -> Reference:
@@ -256,7 +249,21 @@ def run_closed_loop(
             if progress is not None:
                 progress(k, arm.steps)
         arm.command(reference.q[0], reference.dq[0], reference.ddq[0], forward)
-    return closed_loop_of(loop, log, zero)
+    columns = {name: np.array([row[name] for row in log]) for name in log[0]}
+    t, simulation = columns["t"], observe(arm) if arm.made == arm.steps else None
+    truth = np.full((len(t), 6), np.nan)
+    if simulation is not None:
+        truth = resample_columns(t, simulation.truth.t, simulation.truth.wrench)
+    if zero is not None:
+        columns["estimate"][t < zero[0]] = np.nan
+    return ClosedLoop(
+        controller=controller,
+        truth=truth,
+        moved=deviation_of(loop.solver, loop.start, columns["q"]),
+        zero=loop.zero,
+        simulation=simulation,
+        **columns,
+    )
 
 
 def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
@@ -280,28 +287,6 @@ def steps_in(interval: float, step: float, what: str) -> int:
             f"{1e3 * step:g} ms; set step to one that divides it"
         )
     return count
-
-
-def closed_loop_of(
-    loop: Loop, log: Sequence[dict[str, Any]], zero: tuple[float, float] | None
-) -> ClosedLoop:
-    """Put the run together; the truth is the simulator's."""
-    columns = {name: np.array([row[name] for row in log]) for name in log[0]}
-    t = columns["t"]
-    simulation, truth = None, np.full((len(t), 6), np.nan)
-    if loop.arm.made == loop.arm.steps:
-        simulation = observe(loop.arm)
-        truth = resample_columns(t, simulation.truth.t, simulation.truth.wrench)
-    if zero is not None:
-        columns["estimate"][t < zero[0]] = np.nan
-    return ClosedLoop(
-        controller=loop.controller,
-        truth=truth,
-        moved=deviation_of(loop.solver, loop.start, columns["q"]),
-        zero=loop.zero,
-        simulation=simulation,
-        **columns,
-    )
 
 
 @dataclass(frozen=True, kw_only=True)

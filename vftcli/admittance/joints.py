@@ -55,7 +55,7 @@ class FlangeSolver:
                 f"the start pose has {q.size} joints; {self.robot.name} has {self.robot.joints}"
             )
         if np.any(wrong := ~((q >= self.lower) & (q <= self.upper))):
-            j = int(wrong.argmax())
+            j = wrong.argmax()
             raise ParameterError(
                 f"the start pose is outside the joint limits of {self.robot.name}: joint {j + 1} "
                 f"is at {q[j]:.4g} rad and may be {self.lower[j]:.4g} to {self.upper[j]:.4g} rad"

@@ -97,7 +97,7 @@ class Admittance:
             zero, endless = name in MAY_BE_ZERO, name in MAY_BE_ENDLESS
             fits = ((array > 0.0) | (zero & (array == 0.0))) & (np.isfinite(array) | endless)
             if not fits.all():
-                k = int(fits.argmin())
+                k = fits.argmin()
                 raise ParameterError(
                     f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be "
                     f"{'zero or ' * zero}positive"
@@ -265,10 +265,10 @@ class Controller:
         numbers = {"law-unstable-in-drag": self.drag, "law-unstable-at-limit": at_limit}
         for code, number in numbers.items():
             for k in np.flatnonzero(number >= DISCRETE_BOUND):
-                yield warning(code, where, axis=AXES[k], number=float(number[k]))
+                yield warning(code, where, axis=AXES[k], number=number[k])
         risky = ~limited & np.isfinite(self.escape) & (size > self.escape)
         for k in np.flatnonzero(risky):
-            bound, unit = float(self.escape[k]), UNITS[k]
+            bound, unit = self.escape[k], UNITS[k]
             yield warning("law-escapes", where, axis=AXES[k], bound=bound, unit=unit)
 
 
@@ -291,18 +291,11 @@ def controllers(
     parameters: Admittance, kinds: Sequence[str] = (), alphas: Sequence[float] = ()
 ) -> tuple[Controller, ...]:
     """The controllers of a comparison, the traditional one first."""
-    check_kinds(kinds)
     wanted = kinds or KINDS
     found = [traditional(parameters)] if "traditional" in wanted else []
     if "variable" in wanted:
         found += [variable(parameters, alpha) for alpha in dict.fromkeys(alphas) or (None,)]
     return tuple(found)
-
-
-def check_kinds(kinds: Sequence[str]) -> None:
-    """Raise a ParameterError that lists the kinds if one is not in `KINDS`."""
-    for kind in kinds:
-        check_known(kind, KINDS, f"no controller {kind!r}")
 
 
 def kinetic_shape(u: Array) -> Array:

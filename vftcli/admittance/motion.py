@@ -24,14 +24,18 @@ class Phases(NamedTuple):
     """Algorithm 1's phases along a force record."""
 
     dragged: Mask  #: Whether each axis is in the drag phase. (T, 6)
-    force: Array  #: Force and moment that enter the law, see `entering_force`. (T, 6) [N, N·m]
+    force: Array  #: Force and moment that enter the law. (T, 6) [N, N·m]
 
 
-def phases(wrench: Array, parameters: Admittance) -> Phases:
+def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -> Phases:
     """Split a record (T, 6) [N, N·m] into drag and recovery phases, axis by axis.
 
-    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. An
-    unknown (NaN) force counts as none.
+    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i, those of
+    `before` (6,) from the start. An unknown (NaN) force counts as none.
+
+    By the threshold's mode "hard" the whole force of a dragged axis enters (49), by "soft"
+    F − F_tsd·sign(F), which starts from zero; an axis that recovers has none. "literal" is
+    Algorithm 1 as printed: all always enters.
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = abs(wrench)
@@ -39,22 +43,11 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     # The last row at which anything was switched tells the state: no loop over samples.
     rows = np.arange(len(on))[:, None]
     last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)
-    dragged = (last >= 0) & np.take_along_axis(on, np.maximum(last, 0), axis=0)
-    return Phases(dragged, entering_force(wrench, dragged, parameters))
-
-
-def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Array:
-    """The force that enters (49), by the threshold's mode. (…, 6) [N, N·m]
-
-    "hard" passes the whole force of a dragged axis, "soft" F − F_tsd·sign(F), which
-    starts from zero; an axis that recovers has none. "literal" is Algorithm 1 as printed:
-    all always enters.
-    """
+    dragged = np.where(last < 0, before, np.take_along_axis(on, np.maximum(last, 0), axis=0))
     if parameters.threshold_mode == "literal":
-        return wrench
-    soft = parameters.threshold_mode == "soft"
-    over = abs(wrench) - (parameters.threshold if soft else 0.0)
-    return np.where(dragged, np.sign(wrench) * np.maximum(over, 0.0), 0.0)
+        return Phases(dragged, wrench)
+    over = size - (parameters.threshold if parameters.threshold_mode == "soft" else 0.0)
+    return Phases(dragged, np.where(dragged, np.sign(wrench) * np.maximum(over, 0.0), 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,7 +212,7 @@ def row_of(
     axis, t = drag.axis, motion.t
     x, v = motion.x[:, n, axis], motion.v[:, n, axis]
     sizes = np.nan_to_num(abs(x[drag.begin : drag.end]), nan=np.inf)
-    top = drag.begin + int(sizes.argmax())
+    top = drag.begin + sizes.argmax()
     returns = {name: return_time(t, x, drag, share) for name, share in SHARES.items()}
     back, start, released = returns["return_2_s"], float(t[drag.begin]), float(t[drag.release])
     # Row k + 1 is what the force of row k made of row k.

@@ -150,7 +150,7 @@ def replay(
     start = solver.check_start(q[0])
     split = phases(force, parameters)
     motion = run(controllers, split.force, split.dragged)
-    unknown = int(np.count_nonzero(~np.isfinite(wrench.known).all(axis=1)))
+    unknown = np.count_nonzero(~np.isfinite(wrench.known).all(axis=1))
     missing = (caution("force-unknown", samples=unknown),) if unknown else ()
     return Replay(
         robot=robot,
@@ -162,7 +162,7 @@ def replay(
         motion=replace(motion, t=motion.t + clock[0]),
         drags=drags_of(split, parameters.period),
         logged=deviation_of(solver, start, q),
-        force_remarks=(*missing, *complaints),
+        force_remarks=(*wrench.remarks, *missing, *complaints),
     )
 
 
@@ -223,7 +223,7 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
         omega = controller.alpha * np.sqrt(p.stiffness / p.mass)
         xi = np.maximum(controller.xi, 1e-3)
         rate = omega * np.where(xi > 1.0, xi - np.sqrt(np.maximum(xi**2 - 1.0, 0.0)), xi)
-        slowest = min(slowest, float(rate[x != 0.0].min()))
+        slowest = min(slowest, rate[x != 0.0].min())
     return float(min(max(6.0 / slowest, 1.0), LONGEST))
 
 
@@ -266,9 +266,8 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
         largest = abs(np.nan_to_num(found.wrench)).max(axis=0)
         threshold = found.parameters.threshold
         share = largest / np.maximum(threshold, 1e-12)
-        k = int(share.argmax())
-        least = float(threshold[k])
-        yield caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=least)
+        k = share.argmax()
+        yield caution("no-drag", axis=AXES[k], share=share[k], threshold=threshold[k])
     longest: dict[str, int] = {}
     long, near = round(RESTING[0] / found.parameters.period), RESTING[1]
     for drag in found.drags:
@@ -295,25 +294,25 @@ def trouble(found: Replay) -> Iterator[Remark]:
     for n, controller in enumerate(found.controllers):
         where = Where(controller.name)
         if motion.escaped[n]:
-            k = int(np.isfinite(motion.x[:, n]).all(axis=1).argmin())
-            yield warning("motion-escaped", where, time_s=float(motion.t[k]))
-        if acted := int(np.count_nonzero(motion.clipped[:, n].any(axis=1))):
+            k = np.isfinite(motion.x[:, n]).all(axis=1).argmin()
+            yield warning("motion-escaped", where, time_s=motion.t[k])
+        if acted := np.count_nonzero(motion.clipped[:, n].any(axis=1)):
             yield fact("speed-limit-acted", where, periods=acted)
-        if lost := int(np.count_nonzero(~path.reached[:, n])):
-            first = float(motion.t[path.reached[:, n].argmin()])
+        if lost := np.count_nonzero(~path.reached[:, n]):
+            first = motion.t[path.reached[:, n].argmin()]
             rows = {"lost": lost, "poses": len(motion.t)}
             yield caution("poses-out-of-reach", where, **rows, first_s=first)
             way = np.linalg.norm(motion.x[:, n, :3], axis=1)
-            travel.append(float(np.nan_to_num(way, nan=np.inf).max()))
+            travel.append(np.nan_to_num(way, nan=np.inf).max())
         if path.speed[n] > 1.0:
-            yield caution("joint-too-fast", where, share=float(path.speed[n]))
-        if rises := int(found.lyapunov.rises[n]):
+            yield caution("joint-too-fast", where, share=path.speed[n])
+        if rises := found.lyapunov.rises[n]:
             yield warning("energy-rises", where, steps=rises)
     if travel:
         hard = "-hard" if found.parameters.threshold_mode == "hard" else ""
         yield caution(f"travel-implausible{hard}", travel_m=max(travel))
     if found.logged is not None:
-        far = float(np.linalg.norm(found.logged[:, :3], axis=1).max())
+        far = np.linalg.norm(found.logged[:, :3], axis=1).max()
         if far >= STILL:
             yield fact("log-arm-moved", distance_m=far)
 
@@ -323,14 +322,13 @@ class DrivingForce(NamedTuple):
 
     wrench: Wrench  #: Force on the robot, base axes, about the flange point.
     source: Remark  #: Where it comes from.
-    remarks: tuple[Remark, ...]  #: What a reader should know of it.
 
 
 def observed_force(reading: SensorReading) -> DrivingForce:
     """The virtual sensor's wrench of the one observer that ran."""
-    wrench = reading.wrenches[0]
+    wrench = replace(reading.wrenches[0], remarks=reading.remarks)
     code = "force-smoothed" if wrench.name in reading.smoothed else "force-of-observer"
-    return DrivingForce(wrench, fact(code, observer=wrench.name), reading.remarks)
+    return DrivingForce(wrench, fact(code, observer=wrench.name))
 
 
 def stored_force(
@@ -349,7 +347,8 @@ def stored_force(
     )
     # The band of a torque whose covariance nobody kept says nothing of the replay.
     seen = replace(sensor.wrench(estimate, recording.q, robot.chain), remarks=())
-    return less_zero(seen, fact("force-of-observer", observer=observer), choice)
+    source = fact("force-of-observer", observer=observer)
+    return DrivingForce(without_zero(seen, choice.zero), source)
 
 
 def sensor_force(recording: Recording, robot: Robot, choice: WrenchChoice) -> DrivingForce:
@@ -357,7 +356,7 @@ def sensor_force(recording: Recording, robot: Robot, choice: WrenchChoice) -> Dr
     frame = recording.wrench_frame
     source = fact("force-of-sensor", frame=str(frame) if frame else "frame not stated")
     wrench = logged_wrench(recording, robot.chain, choice.mounting(robot))
-    return less_zero(wrench, source, choice)
+    return DrivingForce(without_zero(wrench, choice.zero), source)
 
 
 def truth_force(
@@ -372,10 +371,4 @@ def truth_force(
         raise ReferenceTorqueError(
             f"{path}: it has no wrench; a truth file has wrench/fx … wrench/mz at the flange"
         )
-    return less_zero(wrench, fact("force-of-truth", file=path.name), choice)
-
-
-def less_zero(wrench: Wrench, source: Remark, choice: WrenchChoice) -> DrivingForce:
-    """A wrench that no observer of this run made, its zero removed as it is chosen."""
-    wrench = without_zero(wrench, choice.zero)
-    return DrivingForce(wrench, source, wrench.remarks)
+    return DrivingForce(without_zero(wrench, choice.zero), fact("force-of-truth", file=path.name))

@@ -201,15 +201,14 @@ def tilted(case: Case) -> Iterator[Cause]:
         return
     # No load beside gravity: they trade.
     fit = solve(case.given - windows.inertial, Terms(windows.gravity), windows.friction)
-    up, weight = fit.values[:3], float(np.linalg.norm(fit.values[:3]))
-    angle = float(np.arctan2(np.linalg.norm(up[:2]), up[2]))
+    up = fit.values[:3]
+    weight, angle = np.linalg.norm(up), np.arctan2(np.linalg.norm(up[:2]), up[2])
     if angle <= TILTED or not WEIGHT[0] < weight < WEIGHT[1]:
         return
     if case.lasts(fit, windows.gravity @ (up - case.up)):
         code = "upside-down" if angle > np.pi - 2 * TILTED else "tilted-base"
         gravity = -up_axes(windows.chain.gravity) @ up / weight  # base axes [m/s²]
-        rounded = [round(float(component), 2) for component in gravity]
-        values = {"angle_deg": float(np.rad2deg(angle)), "gravity": rounded}
+        values = {"angle_deg": np.rad2deg(angle), "gravity": gravity.round(2)}
         yield Cause(code, replace(case, up=up / weight), values=values)
 
 
@@ -251,7 +250,7 @@ def shifted(case: Case) -> Iterator[Cause]:
         column = np.zeros((*case.given.shape, 1))
         column[:, j] = 1.0
         fit = solve(case.given - case.needed, Terms(column), load, friction)
-        offset, sd = float(fit.values[0]), float(fit.sd[0])
+        offset, sd = fit.values[0], fit.sd[0]
         change = offset * column[:, :, 0]
         if abs(offset) >= max(OFFSET * case.effort_sizes[j], SURE * sd) and case.lasts(fit, change):
             healed = replace(case, given=case.given - change)
@@ -265,7 +264,7 @@ def scaled(case: Case) -> Iterator[Cause]:
     """
     n, needed, friction = len(case.constant), case.needed[:, :, None], case.windows.friction
     fit = solve(case.given, Terms(needed), friction)
-    factor, sd = float(fit.values[0]), float(fit.sd[0])
+    factor, sd = fit.values[0], fit.sd[0]
     # No load lightens an arm; a heavy one explains a factor above 1 too.
     worth = CLEARER if case.loaded.values[0] > 0 else 1 / CLEARER
     sure = abs(factor - 1) > OFF + SURE * sd and LEAST < factor < MOST
@@ -278,11 +277,10 @@ def scaled(case: Case) -> Iterator[Cause]:
     off = abs(factors - 1)
     (wrong,) = np.nonzero((off > ALONE + SURE * sds) & (sds < KNOWN))
     others = np.delete(off < np.maximum(OTHERS, SURE * sds), wrong)
-    if wrong.size == 1 and others.all() and LEAST < factors[wrong[0]] < MOST:
-        j = int(wrong[0])
+    if wrong.size == 1 and others.all() and LEAST < factors[wrong] < MOST:
+        (j,) = wrong.tolist()
         healed = replace(case, given=case.given / np.where(np.arange(n) == j, factors, 1.0))
-        values = {"factor": float(factors[j]), "sd": float(sds[j])}
-        yield Cause("drive-scale", healed, (j,), values)
+        yield Cause("drive-scale", healed, (j,), {"factor": factors[j], "sd": sds[j]})
 
 
 def swapped(case: Case) -> Iterator[Cause]:

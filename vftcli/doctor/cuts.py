@@ -76,7 +76,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
             here, (first, last) = samples[start:stop], log.t[[start, stop - 1]].tolist()
             joints, size = on_joints(np.any(here, axis=0)).joints, last - first
             if bad.sizes is not None:
-                size = float(np.max(abs(bad.sizes[start:stop][here])))
+                size = abs(bad.sizes[start:stop][here]).max()
             cuts.append(Cut(bad.code, first, last, stop - start, joints, size))
     return log.without(rows, cuts) if cuts and np.count_nonzero(~rows) > 2 else log
 
@@ -216,7 +216,7 @@ def without_turns(recording: Recording) -> Recording:
         return recording
     shift = np.zeros(recording.q.shape)
     shift[steps + 1] = TURN * turns * whole
-    first = float(recording.t[steps[whole.any(axis=1).argmax()] + 1])
+    first = recording.t[steps[whole.any(axis=1).argmax()] + 1]
     remark = fact("turn-unwrapped", on_joints(np.any(whole, axis=0)), at_s=first)
     source = replace(recording.source, remarks=(*recording.source.remarks, remark))
     return replace(recording, q=recording.q - shift.cumsum(axis=0), source=source)
@@ -233,7 +233,7 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
     rows, meets = np.zeros((2, *q.shape), bool)
     sizes = np.zeros(q.shape)
     for group in np.split(np.arange(len(steps)), np.flatnonzero(np.diff(steps) > FEW) + 1):
-        first, last = int(steps[group[0]]), int(steps[group[-1]]) + 1
+        first, last = steps[group[0]], steps[group[-1]] + 1
         joints, size = jumps[group].any(axis=0), abs(slips[group]).max(axis=0)
         lasts, speeds = t[last] - t[first], dq[[first, last]]
         over = q[last] - q[first] - speeds.mean(axis=0) * lasts
@@ -266,6 +266,6 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     if not free.any() or np.count_nonzero(heavy & (share > HELD)) <= np.count_nonzero(free):
         return
     # The drives release and grip again somewhere in the windows beside.
-    spans = [(start, start + length) for start in first[free].tolist()]
+    spans = [(start, start + length) for start in first[free]]
     off = covered(spans, recording.samples, length)
     yield Bad("brakes", off[:, None].repeat(recording.joints, axis=1), None, MOST)

@@ -88,7 +88,7 @@ class Examination(Shown):
         """Mass and standard deviation of a load that the model lacks, or None. [kg]"""
         for remark in self.findings:
             if "load_kg" in remark.values:
-                return float(remark.values["load_kg"]), float(remark.values["sd_kg"])
+                return remark.values["load_kg"], remark.values["sd_kg"]
         return None
 
 

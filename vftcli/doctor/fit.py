@@ -144,7 +144,7 @@ def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
     case = case or case_of(windows, robot, ignored)
     if case is None:
         return None
-    load = float(case.loaded.values[0]) if case.carries_load else 0.0
+    load = case.loaded.values[0] if case.carries_load else 0.0
     light = by_maker or load < HEAVY
     return RobotMatch(
         robot=robot.name,
@@ -273,7 +273,7 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
         return ArmFindings(tuple(explained(robot, diagnosis, fits)), fits)
     if fits[0].fits:
         return ArmFindings(robots=fits)
-    still = float(np.ptp(recording.q, axis=0).max()) < 0.05
+    still = np.ptp(recording.q, axis=0).max() < 0.05
     code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
     # Without an arm the work of its effort is all that tells its sign.
     remark = warning(code, ranked="; ".join(map(str, fits)))
@@ -284,10 +284,10 @@ def cause_remark(diagnosis: Diagnosis, cause: Cause) -> Remark:
     """The finding on the cause that explains a log."""
     recording, rival = diagnosis.case.windows.recording, diagnosis.rival
     if cause.code == "milliamperes":
-        typical = float(np.percentile(abs(recording.require("current")), 99))
-        return warning(cause.code, typical_A=typical)
+        currents = abs(recording.require("current"))
+        return warning(cause.code, typical_A=np.percentile(currents, 99))
     joints = [f"J{j + 1}" for j in rival.joints] if rival is not None else []
-    by_current = recording.current is not None and bool(np.any(cause.case.constant != 1))
+    by_current = recording.current is not None and np.any(cause.case.constant != 1)
     return warning(
         cause.code,
         on_joints(cause.joints),

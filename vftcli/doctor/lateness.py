@@ -72,9 +72,9 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
     if part is not None and (found := part.drift(known)) is not None:
         yield found
         return
-    best = int(together.argmin())
-    lag = float(lags[best])
-    better = float(np.exp(together[abs(lags).argmin()] - together[best]))
+    best = together.argmin()
+    lag = lags[best]
+    better = np.exp(together[abs(lags).argmin()] - together[best])
     alike = agreed(lags[rest.argmin(axis=1)], lag, STEP)
     if abs(lag) > LATE and better > BETTER and alike.any():
         order = "later" if lag > 0 else "earlier"
@@ -112,23 +112,23 @@ class Lateness(NamedTuple):
 
     def drift(self, known: Indices) -> Remark | None:
         """The finding that the effort's lag grows, None if it does not."""
-        span = float(self.when[-1])
+        span = self.when[-1]
         coarse = self._replace(lags=self.lags[::COARSE])
         tried = (0.0, -DRIFTS[1], DRIFTS[1])
-        rough = [float(np.log(coarse.rest(g / span)[known]).mean(axis=0).min()) for g in tried]
+        rough = [np.log(coarse.rest(g / span)[known]).mean(axis=0).min() for g in tried]
         if not np.isfinite(rough).all() or rough[0] == min(rough):
             return None
         each = np.array([g for size in (0.0, *DRIFTS) for g in dict.fromkeys((size, -size))])
         rests = np.stack([self.rest(g / span)[known] for g in each])
         left = np.log(rests).mean(axis=1)
-        best = int(left.min(axis=1).argmin())
-        grown, least = float(each[best]), left[best].min()
+        best = left.min(axis=1).argmin()
+        grown, least = each[best], left[best].min()
         alike = agreed(each[rests.min(axis=2).argmin(axis=0)], grown, DRIFTS[0])
         better = np.exp(left[0, abs(self.lags).argmin()] - least)
         steadily = np.exp(left[0].min() - least)
         if min(steadily / STEADY, better / BETTER) < 1 or not alike.any():
             return None
-        first = float(self.lags[left[best].argmin()])
+        first = self.lags[left[best].argmin()]
         values = {"first_ms": 1e3 * first, "last_ms": 1e3 * (first + grown), "span_s": span}
         return warning(
             "effort-drift",
@@ -136,7 +136,7 @@ class Lateness(NamedTuple):
             drift_percent=100 * abs(grown) / span,
             pace="slow" if grown > 0 else "fast",
             **values,
-            ratio=float(better),
+            ratio=better,
         )
 
 
@@ -150,7 +150,7 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
         return None
     length = max(8, round(WINDOW / step))
     lags = np.unique(np.round(np.arange(EARLIEST, LATEST + STEP / 2, STEP) / step).astype(int))
-    starts = window_starts(t, length, int(lags[0]), int(lags[-1]))
+    starts = window_starts(t, length, lags[0], lags[-1])
     if len(starts) < LEAST:
         return None
     rows = starts[:, None] + np.linspace(0, length, min(length, INSIDE) + 1).round().astype(int)

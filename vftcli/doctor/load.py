@@ -80,7 +80,7 @@ def load_remarks(robot: Robot, case: Case) -> Iterator[Remark]:
     if (changed := load_change(case)) is not None:
         yield changed
         return
-    mass, sd = float(case.loaded.values[0]), float(case.loaded.sd[0])
+    mass, sd = case.loaded.values[0], case.loaded.sd[0]
     carried = case.windows.load.columns @ case.loaded.values[:4]
     if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded, carried):
         return
@@ -93,7 +93,7 @@ def load_remarks(robot: Robot, case: Case) -> Iterator[Remark]:
         yield (warning if heavy else caution)(
             "unmodelled-load" if heavy else "light-load",
             load_kg=mass,
-            sd_kg=float(np.hypot(sd, gain_sd(recording, robot) * mass)),
+            sd_kg=np.hypot(sd, gain_sd(recording, robot) * mass),
             robot=robot.name,
             bare_percent=100 * case.bare.size / case.size,
             loaded_percent=100 * case.loaded.size / case.size,
@@ -115,15 +115,15 @@ def load_change(case: Case) -> Remark | None:
     tried = {k: with_two_loads(k) for k in map(int, np.linspace(*BETWEEN, 7) * count)}
     split, fit = min(tried.items(), key=lambda one: one[1].size)
     before, after = fit.values[0], fit.values[4]
-    sd = float(np.hypot(fit.sd[0], fit.sd[4]))
+    sd = np.hypot(fit.sd[0], fit.sd[4])
     # In one pose any residual passes for a load.
     varied = min(np.ptp(part, axis=0).max() for part in np.split(case.gravity, [split]))
     if fit.size > CHANGED * case.loaded.size or varied < RANGE:
         return None
     if abs(after - before) < max(CHANGE, SURE * sd):
         return None
-    first, last, at = float(before), float(after), float(case.windows.t[split, 0])
-    return warning("load-changes", first_kg=first, last_kg=last, sd_kg=sd, at_s=at)
+    at = case.windows.t[split, 0]
+    return warning("load-changes", first_kg=before, last_kg=after, sd_kg=sd, at_s=at)
 
 
 def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
@@ -158,9 +158,9 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
             "drive-constants",
             on_joints(wrong),
             robot=robot.name,
-            found_Nm_A=constants[wrong].tolist(),
-            profile_Nm_A=profile[wrong].tolist(),
-            worst_percent=100 * float(np.nanmax(abs(ratio))),
+            found_Nm_A=constants[wrong],
+            profile_Nm_A=profile[wrong],
+            worst_percent=100 * np.nanmax(abs(ratio)),
         )
 
 
@@ -183,9 +183,9 @@ def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]
     yield warning(
         "payload-mismatch" if recording.payload_mass is not None else "payload-mismatch-untold",
         on_joints(heavy),
-        carried_A=carried[heavy].tolist(),
-        expected_A=wanted[heavy].tolist(),
-        extra_Nm=torque[heavy].tolist(),
+        carried_A=carried[heavy],
+        expected_A=wanted[heavy],
+        extra_Nm=torque[heavy],
         payload_kg=recording.payload_mass,
     )
 
@@ -214,7 +214,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
         unknown = np.isnan(temperature[:, lawful])
         if unknown.any():
             gaps = unknown.any(axis=0)
-            share = 100.0 * float(unknown[:, gaps].mean())
+            share = 100.0 * unknown[:, gaps].mean()
             yield fact("temperature-gaps", on_joints(lawful[gaps]), **values, share_percent=share)
         yield from far_temperature(recording, robot, temperature)
     elif lawful.size:
@@ -222,7 +222,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
         colder[0, lawful] = np.array(reference) - 10.0
         if (factor := friction_factor(robot.friction, colder)) is not None:
             more = 100.0 * (factor[0, lawful] - 1.0)
-            values |= {"least_percent": float(more.min()), "most_percent": float(more.max())}
+            values |= {"least_percent": more.min(), "most_percent": more.max()}
             yield fact("no-temperature", **values)
 
 
@@ -244,9 +244,9 @@ def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> I
         below, above = low - coldest, warmest - high
         seen, colder = (coldest, below) if below > above else (warmest, -above)
         torque = steady_torque(joint, np.median(speeds[used, j], keepdims=True))[0]
-        wrong = abs(float(torque) * float(np.expm1(PER_KELVIN * colder)))
+        wrong = abs(torque * np.expm1(PER_KELVIN * colder))
         if max(below, above) > least and wrong >= NOTICED:
-            far.setdefault(code, []).append((j, float(seen), reference, wrong))
+            far.setdefault(code, []).append((j, seen, reference, wrong))
     for code, rows in far.items():
         joints, ends, references, torques = zip(*rows, strict=True)
         level = caution if code == "far-temperature-assumed" else warning

@@ -58,11 +58,11 @@ def unusable_findings(recording: Recording) -> Iterator[Remark]:
     if recording.samples < 3:
         yield warning("too-short", samples=recording.samples)
     elif abs(t).max() > FARTHEST:
-        yield warning("absurd-clock", least_s=float(t[0]), largest_s=float(t[-1]))
+        yield warning("absurd-clock", least_s=t[0], largest_s=t[-1])
     elif not STEPS[0] < recording.median_step < STEPS[1]:
         yield warning("absurd-steps", step_s=recording.median_step)
     for name in recording.signals:
-        largest = float(abs(getattr(recording, name)).max(initial=0.0))
+        largest = abs(getattr(recording, name)).max(initial=0.0)
         if largest > ABSURD:
             yield warning("absurd-values", signal=name, largest=largest)
 
@@ -75,11 +75,11 @@ def signal_findings(recording: Recording) -> Iterator[Remark]:
         yield warning("no-effort")
     # Radians and ampere are never so large. The last joint of some arms turns without
     # end.
-    largest = float(abs(recording.q[:, : max(1, recording.joints - 1)]).max())
+    largest = abs(recording.q[:, : max(1, recording.joints - 1)]).max()
     if largest > LARGE_ANGLE:
         yield warning("degrees", largest_rad=largest)
     if recording.current is not None:
-        typical = float(np.quantile(abs(recording.current[thinly(recording, SOME)]), 0.99))
+        typical = np.quantile(abs(recording.current[thinly(recording, SOME)]), 0.99)
         if typical > LARGE_CURRENT:
             yield warning("milliamperes", typical_A=typical)
     if (effort := effort_of(recording)) is not None:
@@ -89,7 +89,7 @@ def signal_findings(recording: Recording) -> Iterator[Remark]:
         share, bends = bends_of(t, effort[1][middle])
         knots = t[1:-1][bends]
         if min(straight, share) >= STRAIGHT and len(knots) > 2:
-            rate = 1 / float(np.median(np.diff(knots)))
+            rate = 1 / np.median(np.diff(knots))
             yield warning("interpolated", rate_Hz=rate, logged_Hz=1 / recording.median_step)
 
 
@@ -149,14 +149,14 @@ def inverted_effort(recording: Recording) -> Iterator[Remark]:
         turned = shares < ALONE
     if not turned.any():
         return
-    first = int(turned.argmax())
+    first = turned.argmax()
     forward = value[recording.dq[:, first] > NONZERO, first]
     yield warning(
         "effort-sign-by-work" if most else "effort-sign-of-some",
         on_joints(turned),
         signal=name,
-        shares_percent=(100 * shares[turned]).tolist(),
-        mean=float(forward.mean()) if forward.size else float("nan"),
+        shares_percent=100 * shares[turned],
+        mean=forward.mean() if forward.size else np.nan,
         unit="A" if name == "current" else "N·m",
         first=first + 1,
         column="current" if name == "current" else "tau",
@@ -169,15 +169,15 @@ def stuck_findings(recording: Recording) -> Iterator[Remark]:
     t, travel = recording.t, travel_of(recording)
     still = travel < HELD
     if still.all():
-        yield fact("at-rest", travel_mrad=1e3 * float(travel.max()))
+        yield fact("at-rest", travel_mrad=1e3 * travel.max())
     elif still.any():
         yield fact("still-joints" if still.sum() > 1 else "still-joint", on_joints(still))
     for name, code in STUCK.items():
         if stretches := stuck_stretches(recording, name):
             _, first, last = max(stretches, key=lambda found: t[found[2]] - t[found[1]])
-            values = {"longest_s": float(t[last] - t[first]), "at_s": float(t[first])}
-            joints = {joint for joint, _, _ in stretches}
-            yield warning(code, on_joints(sorted(joints)), signal=name, **values)
+            where = on_joints(sorted({joint for joint, _, _ in stretches}))
+            longest, begun = t[last] - t[first], t[first]
+            yield warning(code, where, signal=name, longest_s=longest, at_s=begun)
     yield from zero_signals(recording)
     least = max(10, round(CLIPPED / recording.median_step))
     for name, value in efforts_of(recording):
@@ -240,7 +240,7 @@ def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int
             slope = since @ speed / (since @ since)
             # An effort follows an acceleration that changes.
             bent = np.std(speed - slope * since) > max(BENT, 0.03 * np.ptp(speed))
-            varies = bool(column.any())  # zero throughout is a finding of its own
+            varies = column.any()  # zero throughout is a finding of its own
             stuck = (
                 farthest(time, turned) > WAY and bent and not is_extreme(column, rows) and varies
             )
@@ -340,7 +340,7 @@ def coarse_positions(recording: Recording) -> Iterator[Remark]:
     sizes = {}
     for j, column in enumerate(recording.q[thinly(recording, FEW)].T):
         steps = np.diff(np.unique(column))
-        if steps.size < 20 or (size := float(steps.min())) < COARSE:
+        if steps.size < 20 or (size := steps.min()) < COARSE:
             continue
         whole = steps / size
         if np.all(abs(whole - whole.round()) < 1e-3 * np.maximum(whole, 10)):

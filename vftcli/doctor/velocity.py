@@ -189,17 +189,17 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
         lost = median(1 - fit.amplitude[late] ** 2)
         damped = median(fit.lag[late]) > 0 and share > DAMPED and lost > share / 2
         code = "velocity-filtered" if damped else "velocity-lag"
-        yield warning(code, on_joints(late), lags_ms=(1e3 * fit.lag[late]).tolist())
+        yield warning(code, on_joints(late), lags_ms=1e3 * fit.lag[late])
     wrong = judged & ~late & (abs(gain - 1) - sure > GAIN)
     turned = wrong & (abs(gain + 1) < 0.3)
     beyond = wrong & ~turned & ((gain - sure > BEYOND) | (gain + sure < 1 / BEYOND))
     for code, mask in (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned & ~beyond)):
         if mask.any():
-            yield warning(code, on_joints(mask), slopes=gain[mask].tolist())
+            yield warning(code, on_joints(mask), slopes=gain[mask])
     seen = {j: quantity_of(fit, j) for j in np.flatnonzero(beyond).tolist()}
     for quantity in dict.fromkeys(seen.values()):
         alike = [j for j in seen if seen[j] == quantity]
-        values = {"slopes": gain[alike].tolist(), "quantity": quantity}
+        values = {"slopes": gain[alike], "quantity": quantity}
         yield warning("velocity-of-another-kind", on_joints(alike), **values)
 
 
@@ -278,7 +278,7 @@ def held_shares(recording: Recording) -> dict[int, float]:
         if jumps.size < 4 or short < HELD * same.sum():
             continue
         if np.mean(jumps < 1.5 * np.quantile(jumps, 0.05)) < 0.5:
-            found[j] = 100 * float(shares[j])
+            found[j] = 100 * shares[j]
     return found
 
 
@@ -325,12 +325,12 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
     """Samples that were missed, steps that vary, and gaps with the longest of them."""
     t, usual, source = recording.t, recording.median_step, recording.source
     steps = np.diff(t)
-    missed = int(np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)))
+    missed = np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual))
     if missed > 0.001 * len(steps):
         yield fact("missing-samples", missed=missed, steps=len(steps))
     # A gap is no jitter: it has its own finding.
     even = steps[steps < GAP_STEPS * usual]
-    low, high = np.percentile(even, [5, 95], overwrite_input=True).tolist()
+    low, high = np.percentile(even, [5, 95], overwrite_input=True)
     if (width := (high - low) / usual) > JITTER:
         values = {"spread_percent": 100 * width, "low_ms": 1e3 * low, "high_ms": 1e3 * high}
         yield fact("jitter", **values, clock=source.clock)
@@ -339,6 +339,6 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
     for cut in source.cuts:  # has a finding of its own
         gaps = gaps[(gaps[:, 1] > cut.start) | (gaps.sum(axis=1) < cut.start)]
     if len(gaps):
-        longest, begun = gaps[gaps[:, 0].argmax()].tolist()
+        longest, begun = gaps[gaps[:, 0].argmax()]
         level = warning if longest > LONG_GAP else fact
         yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=begun)

@@ -15,7 +15,7 @@ from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import NormalEquations, folds, normal_equations, robust_sd
-from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints, warning
 from vftcli.signals.rest import SLIDES, slower
 from vftcli.signals.series import intervals, median_step, near
 
@@ -74,7 +74,7 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     remarks += warm_up_remarks(data, fits)
     doubts = model_doubts(data, fits)
     if strict and any(doubt.code == "unexplained-torque" for doubt in doubts):
-        ratio = float(links_explain(data, fits).max(initial=0.0))
+        ratio = links_explain(data, fits).max(initial=0.0)
         if ratio > OTHER_LINKS:
             raise IdentificationError(
                 f"{doubts[0]}. Choose another --robot, find the load with --method payload, or "
@@ -113,9 +113,9 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     z = excess * usable / np.maximum(sd, 1e-9)
     found: list[ContactSpan] = []
     for start, stop in intervals(motion.t, z.max(axis=1) > TOUCH, least=TOUCH_TIME):
-        k, j = np.unravel_index(int(z[start:stop].argmax()), (stop - start, z.shape[1]))
-        begin, end = float(motion.t[start]), float(motion.t[stop - 1])
-        contact = ContactSpan(begin, end, int(j) + 1, float(residual[start + k, j]))
+        k, j = np.unravel_index(z[start:stop].argmax(), (stop - start, z.shape[1]))
+        begin, end = motion.t[start], motion.t[stop - 1]
+        contact = ContactSpan(begin, end, int(j) + 1, residual[start + k, j])
         if found and begin - found[-1].stop < 2 * TOUCH_MARGIN:
             before = found.pop()
             larger = max(before, contact, key=lambda c: abs(c.size))
@@ -187,8 +187,8 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
         left = np.where(log.weights > 0, residual, 0.0)[:, heavy]
         shares = 1.0 - np.mean(left**2, axis=0) / np.maximum(tau[:, heavy].var(axis=0), 1e-12)
         if (worst := shares.min(initial=1.0)) < WRONG:
-            where = Where(name, (int(heavy[shares.argmin()]) + 1,))
-            share = 100.0 * max(float(worst), 0.0)
+            where = on_joints([heavy[shares.argmin()]], name)
+            share = 100.0 * max(worst, 0.0)
             doubts.append(
                 warning("unexplained-torque", where, robot=robot.name, share_percent=share)
             )
@@ -213,7 +213,6 @@ def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Rem
         falls = np.all(np.diff(more, axis=0) < 0.0, axis=0) & data.moves
         joints = np.flatnonzero(falls & (fall > np.maximum(DRIFT * dry, LEAST)))
         if joints.size:
-            where = Where(log.recording.name, tuple(int(j) + 1 for j in joints))
-            values = {"first_Nm": more[0, joints].tolist(), "last_Nm": more[-1, joints].tolist()}
-            remarks.append(caution("warm-up", where, **values))
+            where, (first, *_, last) = on_joints(joints, log.recording.name), more[:, joints]
+            remarks.append(caution("warm-up", where, first_Nm=first, last_Nm=last))
     return remarks

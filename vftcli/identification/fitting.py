@@ -36,7 +36,7 @@ from vftcli.robots.terms import uses_current
 from vftcli.signals.arrays import Array, root_mean_square, root_mean_squares
 from vftcli.signals.least_squares import fit_column
 from vftcli.signals.recording import Recording, refuse_repeated_logs
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import faster
 from vftcli.signals.series import resample_columns
 
@@ -137,7 +137,7 @@ def score_remarks(traces: Sequence[Trace]) -> list[Remark]:
     held_out = [trace for trace in traces if trace.role == "held-out"]
     remarks = []
     for trace in traces:
-        left, before = float(trace.rms.mean()), float(trace.before.mean())
+        left, before = trace.rms.mean(), trace.before.mean()
         if left > BEHIND * before > 0.0:
             where = Where(trace.motion.recording.name)
             remarks.append(
@@ -154,7 +154,7 @@ def score_remarks(traces: Sequence[Trace]) -> list[Remark]:
     level = np.mean([trace.rms for trace in train], axis=0)
     for test in held_out:
         remarks += held_out_remarks(test, level)
-    return [*remarks, fact("training-residual", mean_Nm=float(level.mean()))]
+    return [*remarks, fact("training-residual", mean_Nm=level.mean())]
 
 
 def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
@@ -172,9 +172,9 @@ def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
         return [caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)]
     moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0)
     resting = [j for j in worse if moving[j] < ENOUGH]
-    remarks = [joint_remark(trace, j, float(trained[j])) for j in worse if j not in resting]
+    remarks = [joint_remark(trace, j, trained[j]) for j in worse if j not in resting]
     if resting:
-        remarks.append(fact("resting-joints", Where(name, tuple(j + 1 for j in resting))))
+        remarks.append(fact("resting-joints", on_joints(resting, name)))
     return remarks
 
 
@@ -184,20 +184,20 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     Coulomb and viscous friction and an offset are fitted to the residual; where they
     explain `EXPLAINS` of it, friction is named as its cause.
     """
-    motion, residual, size = trace.motion, trace.residual, float(trace.rms[j])
-    where = Where(motion.recording.name, (j + 1,))
+    motion, residual, size = trace.motion, trace.residual, trace.rms[j]
+    where = on_joints([j], motion.recording.name)
     values = {"rms_Nm": size, "ratio": size / trained}
     dq = motion.recording.require("dq")[:, j]
     used = ((motion.weights > 0) & faster(motion.dq))[:, j]
     sign = np.tanh(dq / SMOOTHING)
     A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
     fit = fit_column(A, residual[:, j], used.astype(float))
-    left = float(np.mean(fit.residual[used] ** 2))
-    explained = 1.0 - left / max(float(np.mean(residual[used, j] ** 2)), 1e-12)
+    left = np.mean(fit.residual[used] ** 2)
+    explained = 1.0 - left / max(np.mean(residual[used, j] ** 2), 1e-12)
     if explained < EXPLAINS:
         return caution("larger-residual", where, **values)
     speed = root_mean_square(motion.dq[used, j])
-    more = float(fit.values[0] + fit.values[1] * speed)
+    more = fit.values[0] + fit.values[1] * speed
     values |= {"friction_Nm": abs(more), "speed_rad_s": speed, "share_percent": 100.0 * explained}
     return caution("more-friction" if more > 0 else "less-friction", where, **values)
 

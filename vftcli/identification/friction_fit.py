@@ -94,7 +94,7 @@ class JointData(NamedTuple):
     def speeds(self) -> list[float]:
         """Speed that the joint exceeds in a hundredth of each log. [rad/s]"""
         each = (abs(log.dq[:, self.joint]) for log in self.logs)
-        return [float(np.quantile(speed, 0.99)) for speed in each]
+        return [np.quantile(speed, 0.99) for speed in each]
 
     @property
     def parts(self) -> list[Array]:
@@ -176,8 +176,8 @@ def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: boo
     shape, scores = choose_shape(given, presliding.length)
     fit, errors = given.fit(shape), (np.nan, np.nan)
     if given.profile is not None and scores:
-        miss = float(np.sum(fit.weights * (given.y - given.profile) ** 2) / fit.weights.sum())
-        errors = (scores[shape], float(np.sqrt(miss)))
+        miss = np.sum(fit.weights * (given.y - given.profile) ** 2) / fit.weights.sum()
+        errors = scores[shape], np.sqrt(miss)
     return JointFit(shape, fit, scores, constant, presliding, errors)
 
 
@@ -199,10 +199,10 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
         fixed=np.reshape(fixed, (-1, len(torque))).T,
         weights=joined(lambda log: log.weights),
         logs=data.logs,
-        load_spread=float(np.std(joined(lambda log: log.load))),
-        reverses=bool(data.reverses[j]),
+        load_spread=joined(lambda log: log.load).std(),
+        reverses=data.reverses[j],
         speed_limit=data.top_speed(j),
-        torque_limit=float(np.nan_to_num(data.robot.limits.tau_max[j], posinf=0.0)),
+        torque_limit=np.nan_to_num(data.robot.limits.tau_max[j], posinf=0.0),
         profile=None if constant else joined(lambda log: log.predicted - log.rigid),
     )
 
@@ -250,7 +250,7 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
         ratios[i] = np.array([none, *errors[len(rivals) :]]) / max(none, 1e-300)
     whole = root_mean_squares(ratios)
     near = np.flatnonzero(whole <= LENGTH_MARGIN * whole.min())
-    return PreslidingScore(lengths[near[0]], dict(zip(lengths, whole.tolist(), strict=True)))
+    return PreslidingScore(lengths[near[0]], dict(zip(lengths, whole, strict=True)))
 
 
 def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shape, float]]:

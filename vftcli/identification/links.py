@@ -87,7 +87,7 @@ def stack(layout: ParameterColumns, logs: Sequence[PreparedLog], start: Array) -
 
     The first one is the profile's with fitted friction, `start`. (size,)
     """
-    rows = sum(int(np.count_nonzero(log.weights)) for log in logs)
+    rows = sum(np.count_nonzero(log.weights) for log in logs)
     if rows < 4 * layout.size:
         raise IdentificationError(
             f"{rows} equations for {layout.size} unknowns; record a longer log, "
@@ -110,7 +110,7 @@ def triangulate(
     """
     weights = np.concatenate([log.weights for log in logs])
     pairs = zip(np.concatenate(left).T, weights.T, strict=True)
-    sigma = np.array([max(float(robust_sd(r[w > 0])), 1e-9) for r, w in pairs])
+    sigma = np.array([max(robust_sd(r[w > 0]), 1e-9) for r, w in pairs])
     parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
     correlation = []
     for log, residual in zip(logs, left, strict=True):
@@ -190,7 +190,7 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
         A = np.concatenate([A, ddq[:, :, None] * np.eye(n)], axis=2)
     R, order = qr(A.reshape(-1, A.shape[2]), mode="r", pivoting=True)
     diagonal = abs(np.diag(R))
-    rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
+    rank = np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0])
     beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), float)
     beta[abs(beta) < 1e-9] = 0.0  # rounding would enter the names
     first, friction = order[:rank].argsort(), range(layout.rotor_places.stop, layout.size)
@@ -274,14 +274,14 @@ class Problem(NamedTuple):
         n, places = self.layout.inertial, self.layout.rotor_places
         J, J0 = x[places], self.start[places]
         if not is_physical(x[:n]) or np.any(J <= 0):
-            return float("inf")
+            return np.inf
         P, P0 = pseudo_inertias(x[:n]), pseudo_inertias(self.start[:n])
         ratio = np.linalg.solve(P0, P)
-        distance = float(np.trace(ratio, axis1=1, axis2=2).sum() - 4 * len(P))
-        distance -= float(np.linalg.slogdet(ratio)[1].sum())
-        distance += float(np.sum(J / J0 - np.log(J / J0) - 1.0))
+        distance = np.trace(ratio, axis1=1, axis2=2).sum() - 4 * len(P)
+        distance -= np.linalg.slogdet(ratio)[1].sum()
+        distance += np.sum(J / J0 - np.log(J / J0) - 1.0)
         misfit = self.R @ x - self.z
-        return 0.5 * float(misfit @ misfit) + self.weight * distance
+        return float(0.5 * (misfit @ misfit) + self.weight * distance)
 
     def step(self, x: Array) -> tuple[Array, float]:
         """Newton's step and the square of its decrement."""

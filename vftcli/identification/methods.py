@@ -41,7 +41,7 @@ from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import robust_sd
-from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints, warning
 
 #: Parameter → its unit.
 UNITS = {
@@ -116,7 +116,7 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
     for j, fit in enumerate(fits):
         if fit is None:
             continue
-        count, where = len(fit.shape.terms), Where(joints=(j + 1,))
+        count, where = len(fit.shape.terms), on_joints([j])
         if fit.is_kept:
             found_rms, profile_rms = fit.errors
             missed = {"found_Nm": found_rms, "profile_Nm": profile_rms}
@@ -154,7 +154,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
     comes out as scale times what it must be, the true K is K / scale, and so are all
     coefficients beside it.
     """
-    scale, scale_sd = float(values[-1]), float(sd[-1])
+    scale, scale_sd = values[-1], sd[-1]
     if scale <= LEAST_SLOPE:
         raise IdentificationError(
             f"{data.recordings[0].name}: the current of joint {j + 1} does not follow its torque "
@@ -179,7 +179,7 @@ def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number
         return J, []
     values = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
     code = "refuted-rotor-inertia" if refuted else "undetermined-rotor-inertia"
-    return J, [caution(code, Where(joints=(j + 1,)), **values)]
+    return J, [caution(code, on_joints([j]), **values)]
 
 
 def identified_friction(
@@ -211,7 +211,7 @@ def identified_friction(
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
     """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
-    speed = max(float(abs(log.dq[:, j]).max()) for log in data.logs)
+    speed = max(abs(log.dq[:, j]).max() for log in data.logs)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(log.tau)[j] for log in data.logs)
     # A hundredth of the torque's spread: no friction comes out on either side of zero.
@@ -221,9 +221,9 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
             f"{torque[-1]:.2g} N·m: it would push. Velocity and effort differ in sign, or this "
             "is another robot; check --columns and --robot"
         )
-    where = Where(joints=(j + 1,))
+    where = on_joints([j])
     if np.any(torque < 0):
-        return [caution("negative-friction", where, least_Nm=float(torque.min()))]
+        return [caution("negative-friction", where, least_Nm=torque.min())]
     limit = data.top_speed(j)
     if np.isfinite(falls := falling_speed(friction, limit)):
         return [warning("falling-friction", where, speeds_rad_s=[falls], limits_rad_s=[limit])]
@@ -244,7 +244,7 @@ def fitted_result(
     for j, fit in known:
         if fit.at_bound:
             terms = " and ".join(fit.at_bound)
-            remarks.append(caution("friction-at-bound", Where(joints=(j,)), terms=terms))
+            remarks.append(caution("friction-at-bound", on_joints([j - 1]), terms=terms))
     presliding = known[0][1].presliding
     if len(presliding.errors) > 1:
         values = {
@@ -256,9 +256,9 @@ def fitted_result(
     remarks += temperature_remarks(data)
     for j, (moves, reverses) in enumerate(zip(data.moves, data.reverses, strict=True), start=1):
         if not moves:
-            remarks.append(fact("static-joint", Where(joints=(j,))))
+            remarks.append(fact("static-joint", on_joints([j - 1])))
         elif not reverses:
-            remarks.append(caution("one-way-joint", Where(joints=(j,))))
+            remarks.append(caution("one-way-joint", on_joints([j - 1])))
     choices = [
         (j, shape.words, error, shape == fit.shape)
         for j, fit in known
@@ -272,7 +272,7 @@ def temperature_remarks(data: Training) -> list[Remark]:
     remarks = []
     for log in data.logs:
         if (warmth := log.warmth) is not None:
-            factors = [float(warmth.min()), float(warmth.max())]
+            factors = [warmth.min(), warmth.max()]
             where = Where(log.recording.name)
             remarks.append(fact("friction-by-temperature", where, factors=factors))
     return remarks
@@ -285,7 +285,7 @@ def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
 
 def profile_constant(robot: Robot, j: int) -> float:
     """The profile's drive constant of joint j (from 0), nan if it has none. [N·m/A]"""
-    return float(robot.torque_constant[j]) if robot.torque_constant is not None else float("nan")
+    return float(robot.torque_constant[j]) if robot.torque_constant is not None else np.nan
 
 
 #: Share of undetermined base parameters from which a motion is narrow.
@@ -382,7 +382,7 @@ def chosen_method(data: Training) -> MethodResult:
     spread = np.concatenate([log.tau for log in free.logs]).std(axis=0)
     much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * spread
     ratios = links_explain(free, fits)[much[heavy_joints(free)]]
-    ratio = float(ratios.max(initial=0.0))
+    ratio = ratios.max(initial=0.0)
     doubted = any(remark.level == "warning" for remark in fitted.remarks)
     if ratio <= OTHER_LINKS or doubted or data.fit_constants:
         return kept

@@ -92,7 +92,7 @@ def load_at_flange(
     R = robot.chain.flange_rotation
     com = R.T @ (x[1:STATIC] / mass - robot.chain.flange_translation)
     spread = np.sqrt(np.diag(R.T @ np.diag((sd[1:STATIC] / mass) ** 2) @ R))
-    if (away := float(np.linalg.norm(com))) > REACH:
+    if (away := np.linalg.norm(com)) > REACH:
         raise IdentificationError(
             f"{names}: the load's centre of mass comes out {away:.2g}"
             " m from the flange; the logs do not fit this robot"
@@ -214,7 +214,7 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
         inside = (at >= other.t[0]) & (at <= other.t[-1])
         # Short ends may agree by chance: half of the motion must overlap.
         if np.count_nonzero(inside) < 0.5 * len(at):
-            return float("inf")
+            return np.inf
         there = resample_columns(at[inside], other.t, other.q)
         return root_mean_square(there - motion.q[inside])
 
@@ -306,7 +306,7 @@ def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFi
         )
     runs = [Run(recording=recording, robot=robot) for recording in recordings]
     x, covariance, left, share = weigh_motion(runs, np.zeros(STATIC))
-    least = max(LEAST, SURE * float(np.sqrt(covariance[0, 0])))
+    least = max(LEAST, SURE * np.sqrt(covariance[0, 0]))
     if not x[0] >= least or share > PARTLY:
         raise IdentificationError(
             f"{names}: no load shows; in this motion one from "

@@ -76,12 +76,12 @@ class Shape(NamedTuple):
 
     def friction(self, values: Array, confidence: str = "") -> JointFriction:
         """The joint's friction with these coefficients, one a term."""
-        parameters = {k: round_digits(float(v)) for k, v in zip(self.terms, values, strict=True)}
+        parameters = {k: round_digits(v) for k, v in zip(self.terms, values, strict=True)}
         torques = tuple(parameters.pop(term) for term in self.points)
         parameters["smoothing"] = self.smoothing
         for term in ("stribeck", "logarithmic"):
             if term in self.terms:
-                parameters[f"{term}_velocity"] = float(getattr(self, f"{term}_velocity"))
+                parameters[f"{term}_velocity"] = getattr(self, f"{term}_velocity")
         if "presliding" in self.terms:
             parameters["presliding_length"] = self.presliding_length
         # A dry torque that is all presliding's leaves none to what slides.

@@ -32,7 +32,7 @@ from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.least_squares import fit_column, solve
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, caution, fact, on_joints
 from vftcli.signals.rest import NONZERO, SLIDES, faster
 from vftcli.signals.series import runs_of
 
@@ -70,7 +70,7 @@ class Estimate(NamedTuple):
     known: bool
 
 
-UNKNOWN = Estimate(float("nan"), float("inf"), False)
+UNKNOWN = Estimate(np.nan, np.inf, False)
 #: A friction shape, its coefficients, their deviations. (k,), (k,)
 FrictionLaw = tuple[Shape, Array, Array]
 
@@ -112,7 +112,7 @@ def targets_method(data: Training) -> MethodResult:
 
 def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]:
     """Remarks on joint j's (from 0) open numbers: the profile's stay."""
-    remarks, where = [], Where(joints=(j + 1,))
+    remarks, where = [], on_joints([j])
     if not model.constant.known:
         values = {"profile_NmA": profile_constant(robot, j)}
         if np.isfinite(model.constant.sd):
@@ -121,7 +121,7 @@ def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]
         else:
             remarks.append(caution("unexcited-drive-constant", where, **values))
     if not model.rotor.known:
-        J = float(robot.chain.rotor_inertia[j])
+        J = robot.chain.rotor_inertia[j]
         remarks.append(caution("unaccelerated-joint", where, profile_kgm2=J))
     if model.friction is None:
         remarks.append(caution("unexcited-friction", where))
@@ -135,8 +135,8 @@ def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
         return []
     # All joints feel one gravity: weights are inverse variances.
     weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
-    ratio = float(weights @ np.array([s.value for s in scales]) / weights.sum())
-    least = max(SAME_GRAVITY, 2.0 / float(np.sqrt(weights.sum())))
+    ratio = weights @ [s.value for s in scales] / weights.sum()
+    least = max(SAME_GRAVITY, 2.0 / np.sqrt(weights.sum()))
     return [fact("controller-gravity", ratio=ratio)] if abs(ratio - 1.0) >= least else []
 
 
@@ -184,7 +184,7 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[Con
     motions, signals = tuple(log.logs[0] for log in logs), (log[1:] for log in logs)
     every = ControllerTargets(motions, *map(np.concatenate, zip(*signals, strict=True)))
     models = []
-    for j, before in enumerate(robot.torque_constant.tolist()):
+    for j, before in enumerate(robot.torque_constant):
         # Of two ways to K, the surer one wins; friction needs it.
         ways = constant_at_rest(j, every), constant_in_motion(j, every)
         K = min(ways, key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
@@ -211,10 +211,10 @@ def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
     if not points:
         return UNKNOWN
     i, m, steps = np.array(points).T
-    value = float(i @ m / (i @ i))
-    scatter = float(np.std(m - value * i)) if len(i) > 1 else 0.0
-    rounding = abs(value) * float(steps.max()) / np.sqrt(12.0)
-    sd = float(np.hypot(rounding, scatter) / np.sqrt(i @ i))
+    value = i @ m / (i @ i)
+    scatter = np.std(m - value * i) if len(i) > 1 else 0.0
+    rounding = abs(value) * steps.max() / np.sqrt(12.0)
+    sd = np.hypot(rounding, scatter) / np.sqrt(i @ i)
     return Estimate(value, sd, value > 0 and sd <= CONSTANT_KNOWN * value)
 
 
@@ -236,12 +236,12 @@ def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:
                 continue
             fit = fit_column(A, log.current[:, j], used)
             if fit.values[0] > 0:
-                constants.append(1.0 / float(fit.values[0]))
-                spread.append(float(fit.sd[0] / fit.values[0] ** 2))
+                constants.append(1.0 / fit.values[0])
+                spread.append(fit.sd[0] / fit.values[0] ** 2)
     if len(constants) < len(SPEEDS):
         return UNKNOWN
-    value = float(np.median(constants))
-    sd = float(np.hypot(np.median(spread), 0.5 * np.ptp(constants)))
+    value = np.median(constants)
+    sd = np.hypot(np.median(spread), 0.5 * np.ptp(constants))
     return Estimate(value, sd, sd <= CONSTANT_KNOWN * value)
 
 
@@ -258,11 +258,11 @@ def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
         return UNKNOWN, UNKNOWN
     # Half of robustness's change joins the spread, for the model's error.
     fit, plain = fit_column(A, y, np.ones(len(y))), solve(A, y)
-    value, sd = float(plain[0]), float(np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0])))
+    value, sd = plain[0], np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0]))
     rotor = Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)
     # With nearly constant gravity only constant and scale together show.
-    scale = 1.0 + float(plain[1])
-    scale_sd = float(np.hypot(fit.sd[1], 0.5 * (fit.values[1] - plain[1])))
+    scale = 1.0 + plain[1]
+    scale_sd = np.hypot(fit.sd[1], 0.5 * (fit.values[1] - plain[1]))
     return rotor, Estimate(scale, scale_sd, scale_sd < 1e-3)
 
 
@@ -273,12 +273,12 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
     elsewhere a logarithm. None at rest.
     """
     speed = abs(log.dq[:, j])
-    fast = float(np.quantile(speed, 0.9))
+    fast = np.quantile(speed, 0.9)
     if fast < SLIDES:
         return None
     y = constant * log.current[:, j] - log.moment[:, j]
     load = np.concatenate([motion.load[motion.kept, j] for motion in log.logs])
-    line = bent(float(speed.max()))
+    line = bent(speed.max())
     shapes = WRITTEN if line is None else (line,)
     if load.std() >= LIGHT:
         shapes = (*shapes, *(s._replace(terms=(*s.terms, "load_coulomb")) for s in shapes))
@@ -303,17 +303,17 @@ def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) ->
     shows the hand.
     """
     moves = faster(recording.require("dq"), SLIDES)
-    guided = False
+    guided: bool | np.bool = False
     if recording.target_dq is not None:
         asked = np.any(recording.target_dq != 0.0, axis=1)
-        guided = bool(asked[moves.any(axis=1)].mean() < UNASKED) if moves.any() else False
+        guided = moves.any() and asked[moves.any(axis=1)].mean() < UNASKED
     elif robot.torque_constant is not None and robot.friction:
         law = friction_torque(robot.friction, log.dq)
         fed = robot.torque_constant * log.current - log.moment
         used = np.where(faster(log.dq, SLIDES), law, 0.0)
         size = np.sum(used**2, axis=0)
         shares = np.sum(used * fed, axis=0)[size > 0] / size[size > 0]
-        guided = bool(shares.min(initial=1.0) < GUIDED)
+        guided = shares.min(initial=1.0) < GUIDED
     if guided:
         raise IdentificationError(
             f"{recording.name}: a hand led the arm, and the controller feeds less friction forward "

@@ -244,7 +244,7 @@ class ParameterColumns(NamedTuple):
     def frictions(self) -> tuple[slice, ...]:
         """Places of each joint's friction coefficients, behind the rotors."""
         edges = np.cumsum([self.rotor_places.stop, *(len(s.terms) for s in self.shapes)])
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(edges))
+        return tuple(slice(a, b) for a, b in pairwise(edges.tolist()))
 
     @property
     def size(self) -> int:
@@ -291,7 +291,7 @@ class Training:
 
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), else its fastest motion. [rad/s]"""
-        fastest = max(float(abs(log.dq[:, j]).max()) for log in self.logs)
+        fastest = max(abs(log.dq[:, j]).max() for log in self.logs)
         return float(np.fmax(self.robot.limits.qd_max[j], fastest))
 
 

@@ -53,7 +53,9 @@ class Remark(Shown):
     where: Where = field(default_factory=Where)  #: What it is about.
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+        # Numbers and rows of NumPy become Python's, which JSON knows.
+        plain = {k: v.tolist() if hasattr(v, "tolist") else v for k, v in self.values.items()}
+        object.__setattr__(self, "values", MappingProxyType(plain))
 
     def __str__(self) -> str:
         """The remark on one line."""
@@ -94,11 +96,11 @@ class Remarks(Shown, tuple[Remark, ...]):
         return table.with_columns(pl.Series("joints", joints, pl.List(pl.Int64)))
 
 
-def on_joints(joints: "Iterable[int] | Mask") -> Where:
+def on_joints(joints: "Iterable[int] | Mask", about: str = "") -> Where:
     """The place of a remark about some joints: a mask, or their numbers from zero."""
     is_mask = str(getattr(joints, "dtype", "")) == "bool"
     numbers = (j for j, one in enumerate(joints) if one) if is_mask else joints
-    return Where(joints=tuple(int(j) + 1 for j in numbers))
+    return Where(about, tuple(int(j) + 1 for j in numbers))
 
 
 def fact(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008 - immutable
