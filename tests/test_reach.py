@@ -235,7 +235,7 @@ def test_an_effort_is_told_from_four_others_on_real_logs(logs: Path, name: str) 
     """Each is explained best as what it is; what explains it less than 1.5 × better is said."""
     from vftcli.doctor.causes import readings
     from vftcli.doctor.windows import windows_of
-    from vftcli.identification.training import gravity_torque
+    from vftcli.robots.terms import gravity_torque
 
     robot = load_robot("ur10e")
     log = read(logs / name, columns=LOGS[name])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.choice import ControlChoice
-from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.law import (
     AXES,
     controllers,

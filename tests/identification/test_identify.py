@@ -9,10 +9,11 @@ import pytest
 from vftcli.identification import Task, identify
 from vftcli.identification.fitting import repeated_share
 from vftcli.identification.payload import payload_from_pair, payload_from_poses
-from vftcli.identification.training import gravity_torque, prepare
+from vftcli.identification.training import prepare
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters, torque_regressor
+from vftcli.robots.terms import gravity_torque
 from vftcli.signals.errors import (
     IdentificationError,
     MissingSignalError,

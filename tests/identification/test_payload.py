@@ -19,9 +19,9 @@ from vftcli.identification.payload import (
     payload_from_poses,
     resting_poses,
 )
-from vftcli.identification.training import gravity_torque
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.kernels import LINK, chain_parameters, torque_regressor
+from vftcli.robots.terms import gravity_torque
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact

@@ -102,7 +102,7 @@ class Admittance:
                     f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be "
                     f"{'zero or ' * zero}positive"
                 )
-        if np.any(np.asarray(self.hysteresis) >= 1.0):
+        if np.any(self.hysteresis >= 1.0):
             raise ParameterError(
                 "admittance.hysteresis is a share of the threshold and must be below 1; "
                 f"it is {np.max(self.hysteresis):g}"

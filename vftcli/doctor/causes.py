@@ -134,7 +134,7 @@ class Diagnosis(NamedTuple):
 
 def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> Diagnosis | None:
     """The cause of a log's misfit with its arm; None without an effort to judge."""
-    may_be = list(readings(windows_of(recording, robot), robot, ignored))
+    may_be = list(readings(windows_of(recording, robot, ignored)))
     if not may_be:
         return None
     case, found = may_be[0].case, list[Cause]()
@@ -159,18 +159,19 @@ def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
     return diagnosis
 
 
-def case_of(windows: Windows, robot: Robot, ignored: Sequence[int] = ()) -> Case | None:
+def case_of(windows: Windows) -> Case | None:
     """The log with its effort as named, None without any."""
-    return next((named.case for named in readings(windows, robot, ignored)), None)
+    return next((named.case for named in readings(windows)), None)
 
 
-def readings(windows: Windows, robot: Robot, ignored: Sequence[int] = ()) -> Iterator[Cause]:
+def readings(windows: Windows) -> Iterator[Cause]:
     """Readings of a log's effort, the named one first."""
+    robot, idle = windows.robot, list(windows.ignored)
     name = effort_name(windows.recording, robot)
     value, constant = getattr(windows.recording, name), robot.torque_constant
     if value is None or (name == "current" and constant is None):
         return
-    mean, idle = windows.mean(value), list(ignored)
+    mean = windows.mean(value)
     mean[:, idle] = 0.0
     if not mean.any() or not np.isfinite(mean).all():
         return
@@ -207,7 +208,7 @@ def tilted(case: Case) -> Iterator[Cause]:
         return
     if case.lasts(fit, windows.gravity @ (up - case.up)):
         code = "upside-down" if angle > np.pi - 2 * TILTED else "tilted-base"
-        gravity = -up_axes(windows.chain.gravity) @ up / weight  # base axes [m/s²]
+        gravity = -up_axes(windows.robot.chain.gravity) @ up / weight  # base axes [m/s²]
         values = {"angle_deg": np.rad2deg(angle), "gravity": gravity.round(2)}
         yield Cause(code, replace(case, up=up / weight), values=values)
 
@@ -330,16 +331,16 @@ def is_plain(case: Case, cause: Cause) -> bool:
     return bool(np.linalg.norm(after) < TURNED * np.linalg.norm(before))
 
 
-def is_modelled(case: Case, robot: Robot) -> bool:
+def is_modelled(case: Case) -> bool:
     """Whether an effort comes from a model, without the arm's own friction.
 
     Another model of its arm does not judge a simulation without friction.
     """
-    n = len(case.constant)
-    if len(robot.friction) != n:
+    n, friction = len(case.constant), case.windows.robot.friction
+    if len(friction) != n:
         return False
     typical = root_mean_squares(case.windows.motion[:, 1])
-    pairs = zip(robot.friction, typical[:, None], strict=True)
+    pairs = zip(friction, typical[:, None], strict=True)
     stated = abs(np.concatenate([steady_torque(joint, speed) for joint, speed in pairs]))
     moving = (case.windows.ways.min(axis=0) >= FORTH_AND_BACK) & (stated > 0)
     if moving.sum() < WITHOUT:

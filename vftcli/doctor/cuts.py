@@ -12,9 +12,8 @@ import numpy as np
 
 from vftcli.doctor.signals import edges_of, repeated_rows
 from vftcli.doctor.velocity import GAP_STEPS
-from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import effort_name
+from vftcli.robots.terms import effort_name, gravity_torque
 from vftcli.signals.arrays import Array, Indices, Mask, median
 from vftcli.signals.recording import EFFORTS, Cut, Recording
 from vftcli.signals.remarks import Remark, Where, fact, on_joints, warning
@@ -254,8 +253,7 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     first = np.arange(0, recording.samples - length, length)
     if first.size < 3:
         return
-    middle = recording.q[first + length // 2]
-    gravity = momentum_terms(robot.loaded_chain, middle, np.zeros_like(middle)).gravity
+    gravity = gravity_torque(robot, recording.q[first + length // 2])
     weight = np.sum(gravity**2, axis=1)
     rows = slice(len(first) * length)
     given = torque[rows].reshape(len(first), length, -1).mean(axis=1)

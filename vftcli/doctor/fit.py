@@ -138,10 +138,10 @@ def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
     """Robot's fit to the log's best torque, some joints ignored; None of other joints."""
     if recording.joints != robot.joints:
         return None
-    windows = windows_of(recording, robot)
+    windows = windows_of(recording, robot, ignored)
     evidence, case = maker_case(windows)
     by_maker = case is not None
-    case = case or case_of(windows, robot, ignored)
+    case = case or case_of(windows)
     if case is None:
         return None
     load = case.loaded.values[0] if case.carries_load else 0.0
@@ -203,14 +203,14 @@ def arm_findings(
             best, *more = others
             # A user's own file may be nearer to the arm than its maker's model.
             arm = load_robot(best.robot)
-            driven = case_of(windows_of(recording, arm), arm)
+            driven = case_of(windows_of(recording, arm))
             if robot.path in PROFILES.values() or (
                 driven is not None and driven.misfit < ANOTHER * diagnosis.healed.misfit
             ):
                 remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
                 return ArmFindings((remark,), (best, replace(own, fits=False), *more))
     robots = (own, *(replace(other, fits=False) for other in others))
-    return ArmFindings(tuple(explained(robot, diagnosis, robots)), robots)
+    return ArmFindings(tuple(explained(diagnosis, robots)), robots)
 
 
 def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
@@ -224,11 +224,12 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
     return other.fits and other.misfit < share * diagnosis.healed.misfit
 
 
-def explained(robot: Robot, diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Remark]:
+def explained(diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Remark]:
     """Findings on the cause, or on none; then on the log once it is put right."""
     healed, cause = diagnosis.healed, diagnosis.cause
-    recording, misfit = healed.windows.recording, 100 * diagnosis.case.misfit
-    if cause is None and is_modelled(healed, robot):
+    recording, robot = healed.windows.recording, healed.windows.robot
+    misfit = 100 * diagnosis.case.misfit
+    if cause is None and is_modelled(healed):
         yield warning("no-friction-in-effort", robot=robot.name)
         return
     if cause is not None:
@@ -245,7 +246,7 @@ def explained(robot: Robot, diagnosis: Diagnosis, robots: Iterable[RobotMatch]) 
         left = 100 * other.misfit
         yield warning("effort-unclear", other=other.code, misfit_percent=misfit, other_percent=left)
     yield from declared_payload(recording, robot)
-    yield from load_remarks(robot, healed)
+    yield from load_remarks(healed)
     yield from vendor_sign(healed)
 
 
@@ -261,16 +262,16 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
     # A maker's own model that fits no profile is of another arm.
     tried = fits[:1] if fits[0].fits else [fit for fit in fits if not fit.by_maker]
     found = []
-    for robot in (robots[fit.robot] for fit in tried):
-        diagnosis = diagnose(recording, robot, ignored)
+    for fit in tried:
+        diagnosis = diagnose(recording, robots[fit.robot], ignored)
         if diagnosis is None:
             continue
         mistaken = diagnosis.cause is not None and diagnosis.healed.misfit < MISTAKEN
         if fits[0].fits or mistaken:
-            found.append((diagnosis.healed.misfit, robot, diagnosis))
+            found.append(diagnosis)
     if found:
-        _, robot, diagnosis = min(found, key=lambda one: one[0])
-        return ArmFindings(tuple(explained(robot, diagnosis, fits)), fits)
+        best = min(found, key=lambda one: one.healed.misfit)
+        return ArmFindings(tuple(explained(best, fits)), fits)
     if fits[0].fits:
         return ArmFindings(robots=fits)
     still = np.ptp(recording.q, axis=0).max() < 0.05

@@ -74,9 +74,9 @@ def resting(recording: Recording) -> Mask:
     return np.asarray((slower(speed, COMMANDED) & slower(recording.dq)).all(axis=1))
 
 
-def load_remarks(robot: Robot, case: Case) -> Iterator[Remark]:
+def load_remarks(case: Case) -> Iterator[Remark]:
     """A load that the drives carry and neither the robot file nor the log knows of."""
-    recording = case.windows.recording
+    recording, robot = case.windows.recording, case.windows.robot
     if (changed := load_change(case)) is not None:
         yield changed
         return
@@ -147,7 +147,7 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
     yield from payload_mismatch(recording, constants)
     if robot is None or robot.torque_constant is None:
         return
-    profile = np.asarray(robot.torque_constant)
+    profile = robot.torque_constant
     ratio = constants / profile - 1
     # Freedrive and old controllers follow other laws than K·i: a real joint's constant
     # counts.

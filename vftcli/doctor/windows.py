@@ -8,6 +8,7 @@ Least squares set contact aside, with terms that cannot be negative. A round of 
 only adds up the normal equations of the windows that are kept.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -100,7 +101,8 @@ class Windows:
     """Windows of a log, and what a robot's model says of them."""
 
     recording: Recording  #: The log.
-    chain: Chain  #: The arm with its payload.
+    robot: Robot  #: The arm with its payload.
+    ignored: tuple[int, ...]  #: Joints of which the effort is no evidence, from zero.
     first: Indices  #: First sample of each window. (W,)
     last: Indices  #: Last sample of each window. (W,)
     t: Array  #: Those instants. (W, K) [s]
@@ -126,7 +128,9 @@ class Windows:
     def inertial(self) -> Array:
         """Torque of inertia and rotors. (W, n) [N·m]"""
         count, points, n = self.q.shape
-        terms = momentum_terms(self.chain, self.q.reshape(-1, n), self.dq.reshape(-1, n))
+        terms = momentum_terms(
+            self.robot.loaded_chain, *(x.reshape(-1, n) for x in (self.q, self.dq))
+        )
         p = terms.p.reshape(count, points, n)
         rise = (p[:, -1] - p[:, 0]) / (self.t[:, -1:] - self.t[:, :1])
         coriolis = terms.coriolis_transpose_dq.reshape(p.shape)
@@ -139,7 +143,7 @@ class Windows:
         The third axis of "up" is the robot file's own.
         """
         few = self.q[:, GRAVITY]
-        held = gravity_by_up(self.chain, few.reshape(-1, few.shape[2]))
+        held = gravity_by_up(self.robot.loaded_chain, few.reshape(-1, few.shape[2]))
         return np.asarray(np.einsum("k,wk...->w...", SIMPSON, held.reshape(*few.shape, 3)))
 
     @cached_property
@@ -152,15 +156,15 @@ class Windows:
     def load(self) -> Terms:
         """Torque that carries a load, by its mass and its first moment about the flange."""
         middle = self.q[:, self.q.shape[1] // 2]
-        return Terms(-load_regressor(self.chain, middle), prior=LOAD)
+        return Terms(-load_regressor(self.robot.loaded_chain, middle), prior=LOAD)
 
     def mean(self, value: Array) -> Array:
         """Mean of a signal over each window, of all its samples. (W, n)"""
         return means(self.recording.t, value, self.first, self.last)
 
 
-def windows_of(recording: Recording, robot: Robot) -> Windows:
-    """Cut a log with velocities into windows."""
+def windows_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> Windows:
+    """Windows of a log with velocities, some joints' effort ignored."""
     t, dq = recording.t, recording.require("dq")
     length = max(1, min(round(WINDOW / recording.median_step), (recording.samples - 1) // 3))
     first = np.arange(0, recording.samples - length, max(1, length // 2))
@@ -169,7 +173,8 @@ def windows_of(recording: Recording, robot: Robot) -> Windows:
     at = first[:, None] + np.linspace(0, length, POINTS).round().astype(int)
     return Windows(
         recording=recording,
-        chain=robot.loaded_chain,
+        robot=robot,
+        ignored=tuple(ignored),
         first=first,
         last=last,
         t=t[at],
@@ -290,7 +295,7 @@ class Case:
     def effort_sizes(self) -> Array:
         """Root mean square of each joint's effort, contact set aside. (n,) [N·m]"""
         sizes = root_mean_squares(self.given[self.bare.kept])
-        return np.asarray(np.maximum(sizes, 1e-9 * self.size))
+        return np.maximum(sizes, 1e-9 * self.size)
 
     @cached_property
     def by_joint(self) -> Array:

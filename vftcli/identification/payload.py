@@ -11,7 +11,6 @@ from vftcli.identification.shapes import round_digits
 from vftcli.identification.training import (
     STATIC,
     PreparedLog,
-    gravity_torque,
     load_columns,
     prepare,
 )
@@ -21,7 +20,7 @@ from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.kernels import LINK, chain_parameters, momentum_terms, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import drive_torque, gain_sd
+from vftcli.robots.terms import drive_torque, gain_sd, gravity_torque
 from vftcli.signals.arrays import Array, Indices, handed_over, root_mean_square, root_mean_squares
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase

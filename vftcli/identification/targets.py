@@ -24,9 +24,10 @@ from vftcli.identification.methods import (
     temperature_remarks,
 )
 from vftcli.identification.shapes import LOGARITHMIC_VELOCITIES, Shape, bent, round_digits
-from vftcli.identification.training import PreparedLog, Training, gravity_torque, prepare
+from vftcli.identification.training import PreparedLog, Training, prepare
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import derivative, zero_phase

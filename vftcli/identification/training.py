@@ -15,12 +15,11 @@ from vftcli.robots.kernels import (
     INERTIAL_NAMES,
     LINK,
     chain_parameters,
-    momentum_terms,
     torque_regressor,
 )
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature, play
-from vftcli.robots.terms import drive_torque, uses_current
+from vftcli.robots.terms import drive_torque, gravity_torque, uses_current
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -202,11 +201,6 @@ def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
     for k in gaps_of(t, GAP):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
     return usable
-
-
-def gravity_torque(robot: Robot, q: Array) -> Array:
-    """Gravity torques of the loaded arm. (T, n) [N·m]"""
-    return momentum_terms(robot.loaded_chain, q, np.zeros_like(q)).gravity
 
 
 def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:

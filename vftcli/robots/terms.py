@@ -62,6 +62,11 @@ def gain_sd(recording: Recording, robot: Robot) -> float:
     return CONSTANT_SD if uses_current(recording, robot) else SENSOR_SD
 
 
+def gravity_torque(robot: Robot, q: Array) -> Array:
+    """Gravity torque of the loaded arm at positions (T, n) [rad]. (T, n) [N·m]"""
+    return momentum_terms(robot.loaded_chain, q, np.zeros_like(q)).gravity
+
+
 def drive_torque(recording: Recording, robot: Robot) -> Array:
     """Torque of the drives at the joints, friction not yet taken off. (T, n) [N·m]
 
@@ -78,8 +83,7 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
         )
     effort = recording.require(name)
     if name == "torque_without_gravity":
-        still = np.zeros_like(recording.q)
-        return effort + momentum_terms(robot.loaded_chain, recording.q, still).gravity
+        return effort + gravity_torque(robot, recording.q)
     if name == "torque":
         return effort
     if robot.torque_constant is None:

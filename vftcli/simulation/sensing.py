@@ -11,7 +11,7 @@ import numpy as np
 
 from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import rpy_matrix
@@ -152,8 +152,7 @@ def controller_signals(
     """
     nominal, K = arm.true.nominal, drive_constants(arm.robot)
     target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
-    still, warm = np.zeros_like(samples.target_q), arm.temperature(samples.time)
-    load = momentum_terms(nominal.loaded_chain, samples.target_q, still).gravity
+    load, warm = gravity_torque(nominal, samples.target_q), arm.temperature(samples.time)
     target_torque = rigid_torque(nominal.model, target)
     signals = dict[str, Array]()
     if nominal.torque_constant is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots import Robot
-from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
@@ -103,12 +103,12 @@ def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
     import pinocchio as pin
 
     samples, signals = simulation.samples, simulation.measured.signals
-    chain, model = simulation.nominal.loaded_chain, simulation.nominal.model
+    model = simulation.nominal.model
     actual, target = simulation.actual_flange, simulation.target_flange
     time = simulation.measured.stamp + simulation.scenario.sensing.start
-    gravity = momentum_terms(chain, samples.target_q, np.zeros_like(samples.target_q)).gravity
     weightless = np.gradient(samples.target_dq, samples.time, axis=0)
     felt = np.einsum("kij,kj->ki", target.jacobian[:, :3], weightless) - model.gravity.linear
+    weight = gravity_torque(simulation.nominal, samples.target_q)
     data, states = model.createData(), zip(signals["q"], signals["dq"], strict=True)
     linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
     matrix = np.zeros((len(time), 4, 4))
@@ -129,7 +129,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
         "target_twist": target.twist,
         "accelerometer": np.einsum("kji,kj->ki", target.rotation, felt),
         "momentum": np.linalg.norm(linear, axis=1),
-        "torque_command": signals["target_torque"] - gravity,
+        "torque_command": signals["target_torque"] - weight,
     }
 
 
