@@ -187,7 +187,7 @@ def model(constant=KNOWN, rotor=KNOWN, friction=True, gravity=UNKNOWN):
     ],
 )
 def test_what_the_targets_leave_open_is_told(believed, codes):
-    remarks = target_remarks(2, believed, UR5)
+    remarks = list(target_remarks(2, believed, UR5))
     assert [r.code for r in remarks] == codes
     assert all(r.where.joints == (3,) for r in remarks)
     for remark in remarks:

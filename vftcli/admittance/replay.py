@@ -33,7 +33,7 @@ from vftcli.admittance.motion import (
 )
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import refuse_mostly_gap
@@ -117,8 +117,14 @@ class Replay:
                 np.stack([of(one, motion.x[:, n], motion.v[:, n]) for n, one in each], 1)
                 for of in (energy, printed_energy)
             )
-        left_alone = ~split.dragged & (split.force == 0.0)
-        rises = np.array([count_rises(W, left_alone) for W in corrected.swapaxes(0, 1)])
+        # The three axes of a rotation turn together, and so they count together.
+        alone = ~split.dragged & (split.force == 0.0)
+        alone = np.column_stack([alone[:, :3], alone[:, 3:].all(axis=1)])[:, None]
+        W = np.concatenate([corrected[..., :3], corrected[..., 3:].sum(axis=2, keepdims=True)], 2)
+        begins = alone & ~np.concatenate([np.zeros((1, 1, 4), bool), alone[:-1]])
+        start = np.where(begins, np.arange(len(alone))[:, None, None], 0)
+        before = np.take_along_axis(W[:-1], np.maximum.accumulate(start, axis=0), axis=0)
+        rises = np.sum(alone & (np.diff(W, axis=0) > RISE * before), axis=(0, 2))
         corrected, printed = (np.where(dragged, np.nan, W) for W in (corrected, printed))
         return Lyapunov(corrected=corrected, printed=printed, rises=rises)
 
@@ -243,19 +249,6 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     rotation, translation = solver.pose(start)
     turned = log_matrix(poses.rotation[:, -1] @ rotation.T)
     return np.concatenate([poses.translation[:, -1] - translation, turned], axis=1)
-
-
-def count_rises(W: Array, recovering: Mask) -> int:
-    """Steps in which W (T+1, 6) rises while its axes recover through the whole step (T, 6)."""
-    together = recovering[:, 3:].all(axis=1, keepdims=True)
-    columns = np.column_stack([W[:, :3], W[:, 3:].sum(axis=1)])
-    inside = np.column_stack([recovering[:, :3], together])
-    rises = 0
-    for w, flags in zip(columns.T, inside.T, strict=True):
-        begins = flags & ~np.concatenate([[False], flags[:-1]])
-        origin = np.maximum.accumulate(np.where(begins, np.arange(len(flags)), 0))
-        rises += int(np.count_nonzero(flags & (np.diff(w) > RISE * w[:-1][origin])))
-    return rises
 
 
 def drag_remarks(found: Replay) -> Iterator[Remark]:

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor.signals import TRAVEL
-from vftcli.doctor.windows import Case, Terms, Windows, size_of, solve, spread, up_axes, windows_of
+from vftcli.doctor.windows import Case, Terms, Windows, solve, spread, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
 from vftcli.robots.terms import effort_name
-from vftcli.signals.arrays import root_mean_squares
+from vftcli.signals.arrays import root_mean_square, root_mean_squares
 from vftcli.signals.recording import Recording
 
 #: Least range of gravity's torque that shows the kind of an effort. [N·m]
@@ -177,7 +177,7 @@ def readings(windows: Windows) -> Iterator[Cause]:
         return
     gravity, unit = windows.gravity[:, :, 2], np.ones(mean.shape[1])
     # The rest is relative to the whole torque, mostly gravity.
-    whole = size_of(mean + gravity) if name == "torque_without_gravity" else 0.0
+    whole = root_mean_square(mean + gravity) if name == "torque_without_gravity" else 0.0
     for code in MAY_BE[name]:
         # Nothing corrects currents without gravity.
         none = Reading("current_without_gravity" if code else "")
@@ -187,7 +187,9 @@ def readings(windows: Windows) -> Iterator[Cause]:
         if drives is None:
             continue
         given = reading.factor * mean * drives
-        size = size_of(given) if drives is constant else max(size_of(mean), whole)
+        size = root_mean_square(given)
+        if drives is not constant:
+            size = max(root_mean_square(mean), whole)
         if kind.endswith("without_gravity"):
             given += gravity
         given[:, idle] = (windows.inertial + gravity)[:, idle]

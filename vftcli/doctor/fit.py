@@ -17,9 +17,10 @@ from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, di
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import efforts_of, inverted_effort
-from vftcli.doctor.windows import Case, Windows, size_of, windows_of
+from vftcli.doctor.windows import Case, Windows, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.run import paired
+from vftcli.signals.arrays import root_mean_square
 from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
@@ -170,7 +171,7 @@ def maker_case(windows: Windows) -> tuple[str, Case | None]:
     else:
         return MEASURED, None
     given = windows.mean(target)
-    if not 0 < (size := size_of(given)) < 1e9:
+    if not 0 < (size := root_mean_square(given)) < 1e9:
         return MEASURED, None
     return evidence, Case(windows=windows, given=given, size=size, constant=np.ones(log.joints))
 
@@ -314,11 +315,11 @@ def vendor_sign(case: Case) -> Iterator[Remark]:
     # A load that the vendor's model knows and the robot file does not is in neither of
     # them.
     vendor = vendor - np.median(vendor, axis=0)
-    if size_of(vendor) < FELT * case.size:
+    if root_mean_square(vendor) < FELT * case.size:
         return
     # What the arm leaves over in all windows, contact among them.
     straight, turned = (
-        size_of(replace(case, given=given).best.rest)
+        root_mean_square(replace(case, given=given).best.rest)
         for given in (case.given + vendor, case.given - vendor)
     )
     if turned < CLEARLY * straight:

@@ -58,7 +58,7 @@ class RobustFit(NamedTuple):
     @property
     def size(self) -> float:
         """Root mean square of the torque left over in the kept windows. [N·m]"""
-        return size_of(self.rest[self.kept])
+        return root_mean_square(self.rest[self.kept])
 
     @property
     def by_joint(self) -> Array:
@@ -320,8 +320,3 @@ class Case:
         logged = self.given / self.constant
         logged[:, [i, j]] = logged[:, [j, i]]
         return replace(self, given=logged * self.constant)
-
-
-def size_of(given: Array) -> float:
-    """Root mean square of a torque. [N·m]"""
-    return root_mean_square(given)

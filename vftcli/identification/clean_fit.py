@@ -1,6 +1,6 @@
 """Friction fitted on free motion: contacts left out, another robot doubted."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -59,20 +59,21 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
             touched = [(t > c.start - TOUCH_MARGIN) & (t < c.stop + TOUCH_MARGIN) for c in contacts]
             free = ~np.any(touched, axis=0)
             logs[k] = replace(log, weights=log.weights * free[:, None])
+            starts, stops, joints, sizes = map(np.array, zip(*contacts, strict=True))
             values = {
                 "count": len(contacts),
-                "total_s": sum(c.stop - c.start for c in contacts),
-                "starts_s": [c.start for c in contacts],
-                "stops_s": [c.stop for c in contacts],
-                "worst_joints": [c.joint for c in contacts],
-                "residuals_Nm": [c.size for c in contacts],
+                "total_s": np.sum(stops - starts),
+                "starts_s": starts,
+                "stops_s": stops,
+                "worst_joints": joints,
+                "residuals_Nm": sizes,
             }
             remarks.append(caution("suspected-contacts", Where(name), **values))
     if remarks:
         data = replace(data, logs=tuple(logs))
         fits = fit_frictions(data)
     remarks += warm_up_remarks(data, fits)
-    doubts = model_doubts(data, fits)
+    doubts = list(model_doubts(data, fits))
     if strict and any(doubt.code == "unexplained-torque" for doubt in doubts):
         ratio = links_explain(data, fits).max(initial=0.0)
         if ratio > OTHER_LINKS:
@@ -172,9 +173,8 @@ def heavy_joints(data: Training) -> Mask:
     return heavy
 
 
-def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
+def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> Iterator[Remark]:
     """Remarks on torque that profile links and friction leave."""
-    doubts = list[Remark]()
     heavy, robot = np.flatnonzero(heavy_joints(data)), data.robot
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
         tau, name = log.tau, log.recording.name
@@ -183,23 +183,19 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
         mass, explained = apparent_load(log, tau - log.predicted)
         if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
             load = {"mass_kg": mass, "robot": robot.name, "share_percent": 100.0 * explained}
-            doubts.append(warning("unknown-load", Where(name), **load))
+            yield warning("unknown-load", Where(name), **load)
         left = np.where(log.weights > 0, residual, 0.0)[:, heavy]
         shares = 1.0 - np.mean(left**2, axis=0) / np.maximum(tau[:, heavy].var(axis=0), 1e-12)
         if (worst := shares.min(initial=1.0)) < WRONG:
             where = on_joints([heavy[shares.argmin()]], name)
             share = 100.0 * max(worst, 0.0)
-            doubts.append(
-                warning("unexplained-torque", where, robot=robot.name, share_percent=share)
-            )
-    return doubts
+            yield warning("unexplained-torque", where, robot=robot.name, share_percent=share)
 
 
-def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
+def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> Iterator[Remark]:
     """Remarks on logs in which dry friction falls from third to third."""
     models = [JointFriction() if fit is None else fit.friction for fit in fits]
     dry = dry_friction(models, data.robot.joints)
-    remarks = []
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
         sign = np.tanh(log.dq / SMOOTHING) * log.weights
         more = np.array(
@@ -214,5 +210,4 @@ def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Rem
         joints = np.flatnonzero(falls & (fall > np.maximum(DRIFT * dry, LEAST)))
         if joints.size:
             where, (first, *_, last) = on_joints(joints, log.recording.name), more[:, joints]
-            remarks.append(caution("warm-up", where, first_Nm=first, last_Nm=last))
-    return remarks
+            yield caution("warm-up", where, first_Nm=first, last_Nm=last)

@@ -3,7 +3,7 @@
 A log is scored filtered and in motion, from its first to its last sample that moves.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, get_type_hints
 
@@ -118,11 +118,11 @@ class Identification:
     remarks: tuple[Remark, ...] = ()  #: What the reader should know.
 
 
-def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float) -> Trace:
-    """Measured torque of a log, and the identified robot's and the profile's."""
+def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float) -> Trace | None:
+    """Measured torque of a log, the identified robot's and the profile's; None at rest."""
     motion = prepare(log, profile, cutoff)
     if motion.samples < 2:
-        return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
+        return None
     before = root_mean_squares(motion.tau - motion.predicted)
     old, new, measured = profile.torque_constant, robot.torque_constant, motion.tau
     # What was made from currents with the old constants is made with the new.
@@ -131,33 +131,29 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
     return Trace(motion, role, measured, motion.with_robot(robot).predicted, before)
 
 
-def score_remarks(traces: Sequence[Trace]) -> list[Remark]:
+def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
     """Remarks on worse or repeated logs, and on joints much worse elsewhere."""
     train = [trace for trace in traces if trace.role == "train"]
     held_out = [trace for trace in traces if trace.role == "held-out"]
-    remarks = []
     for trace in traces:
         left, before = trace.rms.mean(), trace.before.mean()
         if left > BEHIND * before > 0.0:
             where = Where(trace.motion.recording.name)
-            remarks.append(
-                caution("worse-than-profile", where, identified_Nm=left, profile_Nm=before)
-            )
+            yield caution("worse-than-profile", where, identified_Nm=left, profile_Nm=before)
     for test in held_out:
         where = Where(test.motion.recording.name)
         for other in (trace.motion for trace in train):
             if (share := repeated_share(other, test.motion)) >= REPEATED:
                 values = {"training_log": other.recording.name, "share_percent": 100.0 * share}
-                remarks.append(caution("repeated-trajectory", where, **values))
-    if not train:
-        return remarks
-    level = np.mean([trace.rms for trace in train], axis=0)
-    for test in held_out:
-        remarks += held_out_remarks(test, level)
-    return [*remarks, fact("training-residual", mean_Nm=level.mean())]
+                yield caution("repeated-trajectory", where, **values)
+    if train:
+        level = np.mean([trace.rms for trace in train], axis=0)
+        for test in held_out:
+            yield from held_out_remarks(test, level)
+        yield fact("training-residual", mean_Nm=level.mean())
 
 
-def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
+def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
     """Causes of a held-out residual far above the training's. (n,) [N·m]
 
     A load on the flange, which explains all joints at once, is looked for first.
@@ -165,17 +161,17 @@ def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
     motion, name = trace.motion, trace.motion.recording.name
     worse = np.flatnonzero(trace.rms > WORSE * trained).tolist()
     if not worse:
-        return []
+        return
     mass, explained = apparent_load(motion, trace.residual)
     if explained > EXPLAINS and abs(mass) > HEAVY:
         share = 100.0 * explained
-        return [caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)]
+        yield caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)
+        return
     moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0)
     resting = [j for j in worse if moving[j] < ENOUGH]
-    remarks = [joint_remark(trace, j, trained[j]) for j in worse if j not in resting]
+    yield from (joint_remark(trace, j, trained[j]) for j in worse if j not in resting)
     if resting:
-        remarks.append(fact("resting-joints", on_joints(resting, name)))
-    return remarks
+        yield fact("resting-joints", on_joints(resting, name))
 
 
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
@@ -251,12 +247,12 @@ def identify(
         data = prepare_training(train, robot, task.cutoff, task.constants, task.friction)
         result = FITS[task.method](data)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
-    scored = [
-        score(log, role, robot, new, task.cutoff)
+    traces = tuple(
+        trace
         for role, some in (("train", train), ("held-out", held_out))
         for log in some
-    ]
-    traces = tuple(trace for trace in scored if trace.motion.samples > 1)
+        if (trace := score(log, role, robot, new, task.cutoff)) is not None
+    )
     remarks += score_remarks(traces)
     if load is not None:
         new = new.with_payload(load.payload)

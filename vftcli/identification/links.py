@@ -248,13 +248,11 @@ def thicken_links(phi: Array) -> Array:
     """
     out = phi.reshape(-1, LINK).copy()
     for row in out:
-        row[0] = max(row[0], 1e-3)
-        com = row[1:4] / row[0]
-        P = pseudo_inertias(row)[0]
-        about = P[:3, :3] - row[0] * np.outer(com, com)
-        values, vectors = np.linalg.eigh(about)
-        values = np.maximum(values, row[0] * SMALLEST_RADIUS**2)
-        second = (vectors * values) @ vectors.T + row[0] * np.outer(com, com)
+        mass = row[0] = max(row[0], 1e-3)
+        shift = np.outer(row[1:4], row[1:4]) / mass
+        values, vectors = np.linalg.eigh(pseudo_inertias(row)[0, :3, :3] - shift)
+        values = np.maximum(values, mass * SMALLEST_RADIUS**2)
+        second = (vectors * values) @ vectors.T + shift
         tensor = np.trace(second) * np.eye(3) - second
         row[4:] = [tensor[r, c] for r, c in TENSOR]
     return out.ravel()

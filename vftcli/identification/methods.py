@@ -3,7 +3,7 @@
 What method "targets" says of a joint's friction is made here too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -267,15 +267,12 @@ def fitted_result(
     return MethodResult(method, robot, numbers, remarks, choices, base)
 
 
-def temperature_remarks(data: Training) -> list[Remark]:
+def temperature_remarks(data: Training) -> Iterator[Remark]:
     """Remarks on the factors of friction by the joints' temperatures."""
-    remarks = []
     for log in data.logs:
         if (warmth := log.warmth) is not None:
-            factors = [warmth.min(), warmth.max()]
-            where = Where(log.recording.name)
-            remarks.append(fact("friction-by-temperature", where, factors=factors))
-    return remarks
+            factors, where = [warmth.min(), warmth.max()], Where(log.recording.name)
+            yield fact("friction-by-temperature", where, factors=factors)
 
 
 def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:

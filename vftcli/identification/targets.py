@@ -7,7 +7,7 @@ friction. Free motion is not needed: a hand on the arm changes the measured effo
 the target.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -111,22 +111,20 @@ def targets_method(data: Training) -> MethodResult:
     return MethodResult("targets", new, numbers, remarks)
 
 
-def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]:
+def target_remarks(j: int, model: ControllerModel, robot: Robot) -> Iterator[Remark]:
     """Remarks on joint j's (from 0) open numbers: the profile's stay."""
-    remarks, where = [], on_joints([j])
+    where = on_joints([j])
     if not model.constant.known:
         values = {"profile_NmA": profile_constant(robot, j)}
         if np.isfinite(model.constant.sd):
             values |= {"found_NmA": model.constant.value, "sd_NmA": model.constant.sd}
-            remarks.append(caution("undetermined-drive-constant", where, **values))
+            yield caution("undetermined-drive-constant", where, **values)
         else:
-            remarks.append(caution("unexcited-drive-constant", where, **values))
+            yield caution("unexcited-drive-constant", where, **values)
     if not model.rotor.known:
-        J = robot.chain.rotor_inertia[j]
-        remarks.append(caution("unaccelerated-joint", where, profile_kgm2=J))
+        yield caution("unaccelerated-joint", where, profile_kgm2=robot.chain.rotor_inertia[j])
     if model.friction is None:
-        remarks.append(caution("unexcited-friction", where))
-    return remarks
+        yield caution("unexcited-friction", where)
 
 
 def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:

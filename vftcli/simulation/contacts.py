@@ -144,11 +144,11 @@ def stop_of(spec: StopSpec) -> SimulatedContact:
     """A hard stop: it pushes along its normal where it is met, and never pulls."""
     if not any(spec.normal):
         raise ParameterError(f"contacts.{spec.name}.normal has no length")
-    normal = np.array(spec.normal) / float(np.linalg.norm(spec.normal))
+    normal = np.array(spec.normal) / np.linalg.norm(spec.normal)
 
     def wrench(_k: int, _t: float, place: Place) -> Array:
-        depth = float(normal @ (np.array(spec.through) - place.position))
-        size = max(spec.stiffness * depth - spec.damping * float(normal @ place.velocity), 0.0)
+        depth = normal @ (spec.through - place.position)
+        size = max(spec.stiffness * depth - spec.damping * (normal @ place.velocity), 0.0)
         return np.concatenate([size * (depth > 0.0) * normal, np.zeros(3)])
 
     return SimulatedContact([(-math.inf, math.inf)], wrench)
