@@ -48,7 +48,7 @@ def test_profile_in_link_axes_turns_with_the_link() -> None:
 @pytest.mark.parametrize("style", STYLES)
 def test_pushes_stay_inside_what_they_are_drawn_from(style: str) -> None:
     limits = STYLES[style]
-    pushes = drawn(PushesSpec(name="h", style=style, begin=1.0), rng(), 200.0)
+    pushes = list(drawn(PushesSpec(name="h", style=style, begin=1.0), rng(), 200.0))
     assert len(pushes) > 50
     assert pushes[0].start >= 1.0
     assert pushes[-1].stop <= 200.0

@@ -103,9 +103,9 @@ class OnlineKalman:
         gravity = pin.computeGeneralizedGravity(model, data, q)
         mu = C.T @ dq - gravity
         if self.robot.friction:  # presliding friction goes on from the sample before
-            mu = mu - self.friction.torque(q[None], dq[None], gravity[None])[0]
+            mu -= self.friction.torque(q[None], dq[None], gravity[None])[0]
         if not self.averaged:
-            mu = mu + torque
+            mu += torque
         if self.p is None:
             self.p, self.mu = p, mu
             return self.tau

@@ -197,7 +197,7 @@ def replay_release(
         controllers=tuple(controllers),
         start=FlangeSolver(robot).check_start(start),
         wrench=force,
-        phases=Phases(np.zeros_like(force, bool), force),
+        phases=phases(force, controllers[0].parameters),
         motion=motion,
         drags=releases_of(x, len(motion.t)),
         force_remarks=complaints,

@@ -109,8 +109,6 @@ def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMat
 
 def ranking(recording: Recording, robots: Iterable[Robot]) -> tuple[RobotMatch, ...]:
     """Robots with as many joints as the log, best fit first."""
-    if not is_judgeable(recording):
-        return ()
     fits = []
     for robot in robots:
         with suppress(RobotError):  # joints of other names are another arm's
@@ -136,8 +134,8 @@ def is_judgeable(recording: Recording) -> bool:
 
 
 def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> RobotMatch | None:
-    """Robot's fit to the log's best torque, some joints ignored; None of other joints."""
-    if recording.joints != robot.joints:
+    """Robot's fit to the log's best torque, some joints ignored; None where nothing tells."""
+    if recording.joints != robot.joints or not is_judgeable(recording):
         return None
     windows = windows_of(recording, robot, ignored)
     evidence, case = maker_case(windows)
@@ -189,7 +187,7 @@ def arm_findings(
         robot = load_robot(str(recording.robot_hint))
     if robot is None:
         return of_unknown_arm(recording, ignored)
-    own = match_of(recording, robot, ignored) if is_judgeable(recording) else None
+    own = match_of(recording, robot, ignored)
     diagnosis = None if own is None else diagnose(recording, robot, ignored)
     if diagnosis is None or own is None:
         return ArmFindings()
@@ -314,7 +312,7 @@ def vendor_sign(case: Case) -> Iterator[Remark]:
     vendor = case.windows.mean(recording.tau_ext)
     # A load that the vendor's model knows and the robot file does not is in neither of
     # them.
-    vendor = vendor - np.median(vendor, axis=0)
+    vendor -= np.median(vendor, axis=0)
     if root_mean_square(vendor) < FELT * case.size:
         return
     # What the arm leaves over in all windows, contact among them.

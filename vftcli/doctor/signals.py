@@ -173,7 +173,7 @@ def stuck_findings(recording: Recording) -> Iterator[Remark]:
     elif still.any():
         yield fact("still-joints" if still.sum() > 1 else "still-joint", on_joints(still))
     for name, code in STUCK.items():
-        if stretches := stuck_stretches(recording, name):
+        if stretches := list(stuck_stretches(recording, name)):
             _, first, last = max(stretches, key=lambda found: t[found[2]] - t[found[1]])
             where = on_joints(sorted({joint for joint, _, _ in stretches}))
             longest, begun = t[last] - t[first], t[first]
@@ -219,12 +219,11 @@ def stuck_joints(recording: Recording, name: str) -> list[int]:
     return sorted({joint for joint, _, _ in stuck_stretches(recording, name)})
 
 
-def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int]]:
+def stuck_stretches(recording: Recording, name: str) -> Iterator[tuple[int, int, int]]:
     """Joint, first and last sample where a signal wrongly repeats itself."""
     t, dq, value = recording.t, recording.dq, getattr(recording, name)
     if dq is None or value is None:
-        return []
-    found = []
+        return
     for j, first, last in long_repeats(recording, name):
         rows, column = slice(first, last + 1), value[:, j]
         time, turned, speed = t[rows], recording.q[rows, j], dq[rows, j]
@@ -245,8 +244,7 @@ def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int
                 farthest(time, turned) > WAY and bent and not is_extreme(column, rows) and varies
             )
         if stuck:
-            found.append((j, first, last))
-    return found
+            yield j, first, last
 
 
 def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, int]]:

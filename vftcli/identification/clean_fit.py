@@ -160,7 +160,7 @@ def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
 
 def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
     """Weighted RMS of each joint over all logs; 0 without weight. (n,) [N·m]"""
-    weights = np.concatenate([log.weights for log in data.logs])
+    weights = data.joined("weights")
     square = np.sum(weights * np.concatenate(residual) ** 2, axis=0)
     value: Array = np.sqrt(square / np.maximum(weights.sum(axis=0), 1e-12))
     return value
@@ -168,7 +168,7 @@ def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
 
 def heavy_joints(data: Training) -> Mask:
     """Joints that move and carry the arm's weight. (n,)"""
-    spread = np.concatenate([log.load for log in data.logs]).std(axis=0)
+    spread = data.joined("load").std(axis=0)
     heavy: Mask = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.moves
     return heavy
 

@@ -1,6 +1,6 @@
 """Friction, rotor inertia and drive constant per joint, links fixed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -187,23 +187,20 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     For an unknown drive constant the rigid body's torque is a column; its coefficient
     would be 1 with the profile's right constant. Else it is subtracted.
     """
-
-    def joined(signal: Callable[[PreparedLog], Array]) -> Array:
-        return np.concatenate([signal(log)[:, j] for log in data.logs])
-
-    torque, rigid = joined(lambda log: log.tau), joined(lambda log: log.rigid)
-    fixed = [joined(lambda log: log.ddq)] * data.rotor + [rigid] * constant
+    names = ("tau", "rigid", "ddq", "weights", "load", "predicted")
+    torque, rigid, ddq, weights, load, predicted = (data.joined(name)[:, j] for name in names)
+    fixed = [ddq] * data.rotor + [rigid] * constant
     return JointData(
         joint=j,
         y=torque if constant else torque - rigid,
         fixed=np.reshape(fixed, (-1, len(torque))).T,
-        weights=joined(lambda log: log.weights),
+        weights=weights,
         logs=data.logs,
-        load_spread=joined(lambda log: log.load).std(),
+        load_spread=load.std(),
         reverses=data.reverses[j],
         speed_limit=data.top_speed(j),
         torque_limit=np.nan_to_num(data.robot.limits.tau_max[j], posinf=0.0),
-        profile=None if constant else joined(lambda log: log.predicted - log.rigid),
+        profile=None if constant else predicted - rigid,
     )
 
 

@@ -47,19 +47,13 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints, warn
 UNITS = {
     "torque_constant": "N·m/A",
     "rotor_inertia": "kg·m²",
-    "coulomb": "N·m",
-    "viscous": "N·m·s/rad",
-    "offset": "N·m",
-    "quadratic": "N·m·s²/rad²",
-    "logarithmic": "N·m",
-    "load_coulomb": "1",
-    "presliding": "N·m",
+    **dict.fromkeys(("coulomb", "offset", "logarithmic", "presliding", "stribeck"), "N·m"),
     **{f"point{k}": "N·m" for k in range(1, 5)},
-    "stribeck": "N·m",
+    "viscous": "N·m·s/rad",
+    "quadratic": "N·m·s²/rad²",
+    "load_coulomb": "1",
     "mass": "kg",
-    "com_x": "m",
-    "com_y": "m",
-    "com_z": "m",
+    **dict.fromkeys(("com_x", "com_y", "com_z"), "m"),
 }
 #: Standard deviation over value up to which a number counts as determined by the logs.
 DETERMINED = 0.3
@@ -96,9 +90,19 @@ class MethodResult(NamedTuple):
     robot: Robot  #: The identified robot.
     numbers: Sequence[Number] = ()  #: Its identified numbers.
     remarks: Sequence[Remark] = ()  #: What the reader of the numbers should know.
-    shape_choices: Sequence[tuple[int, str, float, bool]] = ()  #: Rows of `SHAPE_CHOICES`.
+    fits: Sequence[JointFit | None] = ()  #: Its fits of friction, one a joint.
     base: pl.DataFrame | None = None  #: Base parameters (`BASE`), if the method has them.
     is_narrow: bool = False  #: Whether the motion tells the links too little.
+
+    @property
+    def shape_choices(self) -> list[tuple[int, str, float, bool]]:
+        """Rows of `SHAPE_CHOICES`, one a joint and candidate."""
+        known = ((j, fit) for j, fit in enumerate(self.fits, start=1) if fit is not None)
+        return [
+            (j, shape.words, error, shape == fit.shape)
+            for j, fit in known
+            for shape, error in fit.scores.items()
+        ]
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
@@ -144,7 +148,8 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
         friction=tuple(frictions) if data.rubs else (),
         torque_constant=constants,
     )
-    return fitted_result("friction", data, fits, new, numbers, remarks)
+    remarks += fit_remarks(data, fits)
+    return MethodResult("friction", new, numbers, remarks, fits)
 
 
 def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
@@ -209,9 +214,9 @@ def identified_friction(
     ]
 
 
-def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
+def check_friction(j: int, friction: JointFriction, data: Training) -> Iterator[Remark]:
     """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
-    speed = max(abs(log.dq[:, j]).max() for log in data.logs)
+    speed = data.fastest(j)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(log.tau)[j] for log in data.logs)
     # A hundredth of the torque's spread: no friction comes out on either side of zero.
@@ -223,48 +228,33 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
         )
     where = on_joints([j])
     if np.any(torque < 0):
-        return [caution("negative-friction", where, least_Nm=torque.min())]
+        yield caution("negative-friction", where, least_Nm=torque.min())
+        return
     limit = data.top_speed(j)
     if np.isfinite(falls := falling_speed(friction, limit)):
-        return [warning("falling-friction", where, speeds_rad_s=[falls], limits_rad_s=[limit])]
-    return []
+        yield warning("falling-friction", where, speeds_rad_s=[falls], limits_rad_s=[limit])
 
 
-def fitted_result(
-    method: str,
-    data: Training,
-    fits: Sequence[JointFit | None],
-    robot: Robot,
-    numbers: list[Number],
-    remarks: list[Remark],
-    base: pl.DataFrame | None = None,
-) -> MethodResult:
-    """The result of a method that fits friction, with the remarks on these fits."""
-    known = [(j, fit) for j, fit in enumerate(fits, start=1) if fit is not None]
+def fit_remarks(data: Training, fits: Sequence[JointFit | None]) -> Iterator[Remark]:
+    """Remarks on fits of friction, and on the motion that they are made from."""
+    known = [(j, fit) for j, fit in enumerate(fits) if fit is not None]
     for j, fit in known:
         if fit.at_bound:
-            terms = " and ".join(fit.at_bound)
-            remarks.append(caution("friction-at-bound", on_joints([j - 1]), terms=terms))
+            yield caution("friction-at-bound", on_joints([j]), terms=" and ".join(fit.at_bound))
     presliding = known[0][1].presliding
     if len(presliding.errors) > 1:
-        values = {
-            "length_mrad": 1e3 * presliding.length,
-            "lengths_mrad": [1e3 * length for length in presliding.errors],
-            "errors": [*presliding.errors.values()],
-        }
-        remarks.append(Remark("presliding-length", values=values))
-    remarks += temperature_remarks(data)
-    for j, (moves, reverses) in enumerate(zip(data.moves, data.reverses, strict=True), start=1):
+        yield fact(
+            "presliding-length",
+            length_mrad=1e3 * presliding.length,
+            lengths_mrad=[1e3 * length for length in presliding.errors],
+            errors=[*presliding.errors.values()],
+        )
+    yield from temperature_remarks(data)
+    for j, (moves, reverses) in enumerate(zip(data.moves, data.reverses, strict=True)):
         if not moves:
-            remarks.append(fact("static-joint", on_joints([j - 1])))
+            yield fact("static-joint", on_joints([j]))
         elif not reverses:
-            remarks.append(caution("one-way-joint", on_joints([j - 1])))
-    choices = [
-        (j, shape.words, error, shape == fit.shape)
-        for j, fit in known
-        for shape, error in fit.scores.items()
-    ]
-    return MethodResult(method, robot, numbers, remarks, choices, base)
+            yield caution("one-way-joint", on_joints([j]))
 
 
 def temperature_remarks(data: Training) -> Iterator[Remark]:
@@ -314,9 +304,9 @@ def whole_arm(data: Training) -> MethodResult:
     share = undetermined / max(count, 1)
     narrow = share > NARROW or (share > MOST and predicts_best_unpulled(triangles, start))
     x = nearest_physical_links(triangles, start, TABLE if narrow else WEIGHTS[0])
-    remarks.append(fact("nearest-physical-model"))
     level = caution if narrow else fact
-    remarks.append(level("undetermined-base-parameters", count=count, undetermined=undetermined))
+    lost = level("undetermined-base-parameters", count=count, undetermined=undetermined)
+    remarks += [fact("nearest-physical-model"), lost]
     if data.robot.payload is not None:
         remarks.append(fact("payload-in-link"))
     numbers, frictions = list[Number](), list(profile_friction(data.robot))
@@ -331,8 +321,8 @@ def whole_arm(data: Training) -> MethodResult:
             numbers += more
             remarks += check_friction(j, frictions[j], data)
     robot = with_vector(data.robot, layout, x, tuple(frictions) if data.rubs else ())
-    result = fitted_result("base", data, fits, robot, numbers, remarks, base)
-    return result._replace(is_narrow=narrow)
+    remarks += fit_remarks(data, fits)
+    return MethodResult("base", robot, numbers, remarks, fits, base, narrow)
 
 
 def initial_columns(
@@ -376,7 +366,7 @@ def chosen_method(data: Training) -> MethodResult:
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)
     free, fits = fitted.data, fitted.fits
-    spread = np.concatenate([log.tau for log in free.logs]).std(axis=0)
+    spread = free.joined("tau").std(axis=0)
     much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * spread
     ratios = links_explain(free, fits)[much[heavy_joints(free)]]
     ratio = ratios.max(initial=0.0)

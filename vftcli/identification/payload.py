@@ -253,11 +253,10 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     noise = fit.inverse / (1.0 - STATIC / extra.size)
     gain = max(gain_sd(recording, robot) for recording in recordings)
     covariance = noise + fit.gain_covariance(extra, gain)
-    ends = np.cumsum([len(poses) for poses, _ in each])
-    logs = [slice(end - len(poses), end) for end, (poses, _) in zip(ends, each, strict=True)]
-    logs = [log for log in logs if log.stop > log.start]
+    counts = [len(poses) for poses, _ in each if len(poses)]
+    logs = np.split(np.arange(len(q)), np.cumsum(counts)[:-1])
     if len(logs) > 1:
-        covariance = covariance + fit.cluster_covariance(logs)
+        covariance += fit.cluster_covariance(logs)
     sd, left = np.sqrt(np.diag(covariance)), fit.left.std(axis=0)
     origin = fact("load-from-poses", poses=len(q), different=different, logs=len(logs))
     return load_at_flange(fit.x, sd, left, robot, recordings, origin)
@@ -349,7 +348,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
     gain = max(gain_sd(run.recording, robot) for run in runs)
     covariance = fit.motion_covariance(weight, gain)[:STATIC, :STATIC]
     power = np.sum(usable * fit.left**2) / max(np.sum(usable * bare.left**2), 1e-12)
-    return x, covariance, root_mean_squares(fit.left), float(np.sqrt(power))
+    return x, covariance, root_mean_squares(fit.left), np.sqrt(power)
 
 
 def carrying(run: Run, x: Array) -> Run:

@@ -103,7 +103,7 @@ def bent(speed: float) -> Shape | None:
     tells the next one too; behind its last point it goes on as it came.
     """
     reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
-    count = 1 + int(np.argmin([*reached, False]))
+    count = 1 + [*reached, False].index(False)
     if count < 2:
         return None
     points = tuple(f"{POINT}{k}" for k in range(1, count + 1))

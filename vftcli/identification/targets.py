@@ -127,16 +127,17 @@ def target_remarks(j: int, model: ControllerModel, robot: Robot) -> Iterator[Rem
         yield caution("unexcited-friction", where)
 
 
-def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
+def gravity_remarks(models: Sequence[ControllerModel]) -> Iterator[Remark]:
     """A remark if the controller's gravity differs from the profile's."""
     scales = [m.gravity for m in models if m.gravity.known]
     if not scales:
-        return []
+        return
     # All joints feel one gravity: weights are inverse variances.
     weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
     ratio = weights @ [s.value for s in scales] / weights.sum()
     least = max(SAME_GRAVITY, 2.0 / np.sqrt(weights.sum()))
-    return [fact("controller-gravity", ratio=ratio)] if abs(ratio - 1.0) >= least else []
+    if abs(ratio - 1.0) >= least:
+        yield fact("controller-gravity", ratio=ratio)
 
 
 class ControllerTargets(NamedTuple):

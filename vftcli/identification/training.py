@@ -214,7 +214,7 @@ def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:
     A = np.concatenate([load_columns(log.robot, *part).reshape(-1, STATIC) for part in signals])
     y = residual.ravel()
     x = np.linalg.lstsq(A, y, rcond=1e-6)[0]
-    return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
+    return x[0], 1.0 - np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12)
 
 
 class ParameterColumns(NamedTuple):
@@ -283,10 +283,17 @@ class Training:
         """Whether torque is measured before the gear and accelerates the rotor too."""
         return self.robot.torque_source != "link_torque"
 
+    def joined(self, name: str) -> Array:
+        """A signal of all logs, one after the other. (M, n)"""
+        return np.concatenate([getattr(log, name) for log in self.logs])
+
+    def fastest(self, j: int) -> float:
+        """Largest speed of joint j (from 0). [rad/s]"""
+        return float(abs(self.joined("dq")[:, j]).max())
+
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), else its fastest motion. [rad/s]"""
-        fastest = max(abs(log.dq[:, j]).max() for log in self.logs)
-        return float(np.fmax(self.robot.limits.qd_max[j], fastest))
+        return float(np.fmax(self.robot.limits.qd_max[j], self.fastest(j)))
 
 
 def prepare_training(

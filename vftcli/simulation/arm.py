@@ -112,16 +112,6 @@ class JointSignals:
     target_ddq: Array
 
 
-@dataclass(frozen=True, kw_only=True)
-class History(JointSignals):
-    """Course of a run, one row an inner step; row k covers k·step to (k+1)·step.
-
-    State and reference are those at the start of a step, all else holds over it.
-    """
-
-    wrenches: Array  #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
-
-
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
@@ -154,10 +144,15 @@ class Arm:
         self.touching = Touching(
             scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
         )
-        # One row more is for the state after the last step.
-        room = {f.name: np.zeros((self.steps + 1, len(q))) for f in fields(JointSignals)}
-        wrenches = np.zeros((self.steps + 1, *self.touching.wrenches.shape))
-        self.history = History(wrenches=wrenches, **room)
+        #: Course of the run, one row an inner step; row k covers k·step to (k+1)·step, and one
+        #: more is for the state after the last. State and reference are those at the start of a
+        #: step, all else holds over it.
+        rows = self.steps + 1
+        self.history = JointSignals(
+            **{f.name: np.zeros((rows, len(q))) for f in fields(JointSignals)}
+        )
+        #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
+        self.wrenches = np.zeros((rows, *self.touching.wrenches.shape))
 
     @property
     def t(self) -> float:
@@ -210,7 +205,7 @@ class Arm:
         # Contacts cost Jacobians; most steps have none.
         if self.touching.anything(t):
             plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
-            history.wrenches[k] = self.touching.wrenches
+            self.wrenches[k] = self.touching.wrenches
         else:
             plant.advance(tau)
         history.a[k], history.friction[k] = plant.a, plant.friction
@@ -220,7 +215,7 @@ class Arm:
 
     def check_motion(self) -> None:
         """Raise a ParameterError if the loop has become unstable."""
-        fastest = float(abs(self.plant.v).max())
+        fastest = abs(self.plant.v).max()
         if not fastest < RUNAWAY:
             raise ParameterError(
                 f"the arm runs away at {self.t:.3f} s: servo or contacts are too stiff for a step "
@@ -238,7 +233,7 @@ class Arm:
         share = (t / (self.steps * self.scenario.step))[:, None]
         return np.asarray(begin + (end - begin) * share)
 
-    def close(self) -> History:
+    def close(self) -> JointSignals:
         """The history so far; what has no value after the last step keeps its last."""
         self.check_motion()
         history, k = self.history, self.made
@@ -246,8 +241,7 @@ class Arm:
         for name in ("target_q", "target_dq", "target_ddq", "tau", "friction", "a"):
             array = getattr(history, name)
             array[k] = array[k - 1]
-        every = [field.name for field in fields(History)]
-        return History(**{name: getattr(history, name)[: k + 1] for name in every})
+        return JointSignals(**{name: x[: k + 1] for name, x in vars(history).items()})
 
     def mean_torque(self, interval: float) -> Array:
         """Mean drive torque over the last `interval` [s], as the log measures it. (n,) [N·m]"""
@@ -294,7 +288,7 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
     gain = 1.0 + deviate(rng, sizes.torque_constant, (n,))
     offset = deviate(rng, sizes.torque_offset, (n,))
     # Drawn whether or not there is a payload, so that other draws do not move.
-    scale = 1.0 + float(deviate(rng, sizes.payload, (1,))[0])
+    scale = 1.0 + deviate(rng, sizes.payload, (1,))[0]
     if scenario.payload is not None:
         chain = chain.with_payload(as_payload(scenario.payload, scale))
         if scenario.payload.known:

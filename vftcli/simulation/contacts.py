@@ -4,7 +4,7 @@ A contact acts ON the robot at `point` of a `link` (0: the flange), in base axes
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,7 +87,7 @@ def direction(rng: np.random.Generator, vertical: float) -> Array:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def drawn(spec: PushesSpec, rng: np.random.Generator, duration: float) -> list[Push]:
+def drawn(spec: PushesSpec, rng: np.random.Generator, duration: float) -> Iterator[Push]:
     """The pushes of a run of `duration` [s], one after another until none fits."""
     check_known(spec.style, STYLES, f"no style {spec.style!r}")
     given = {k: v for k in PushStyle._fields if (v := getattr(spec, k)) is not None}
@@ -95,16 +95,14 @@ def drawn(spec: PushesSpec, rng: np.random.Generator, duration: float) -> list[P
     if min(style.length[0], style.pause[0]) <= 0:
         raise ParameterError(f"contacts.{spec.name}: length and pause must be positive")
     stop, t = spec.end or duration, spec.begin
-    pushes: list[Push] = []
     while True:
         t += rng.uniform(*style.pause)
         length = rng.uniform(*style.length)
         force = rng.uniform(*style.force) * direction(rng, spec.vertical)
         torque = rng.uniform(*style.torque) * direction(rng, 1.0)
         if t + length > stop:
-            return pushes
-        wrench = np.concatenate([force, torque])
-        pushes.append(Push(t, t + length, 0.5 * length, 0.5 * length, wrench))
+            return
+        yield Push(t, t + length, 0.5 * length, 0.5 * length, np.concatenate([force, torque]))
         t += length
 
 
@@ -134,7 +132,7 @@ class Hand:
             import pinocchio as pin
 
             goal = pin.exp3(way * turn) @ self.held_as
-            torque = torque + spec.twist_stiffness * pin.log3(goal @ place.rotation.T)
+            torque += spec.twist_stiffness * pin.log3(goal @ place.rotation.T)
         left = spec.spans[k][1] - t
         hold = min(left / spec.release, 1.0) if spec.release > 0 else 1.0
         return hold * np.concatenate([force, torque])
@@ -170,7 +168,7 @@ def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Simu
     """A contact ready to act in a run of `duration` [s]; only pushes are drawn."""
     where = f"contacts.{spec.name}"
     if isinstance(spec, PushesSpec):
-        return pushes_of(drawn(spec, rng, duration))
+        return pushes_of(list(drawn(spec, rng, duration)))
     if isinstance(spec, StopSpec):
         return stop_of(spec)
     if isinstance(spec, HandSpec):

@@ -201,7 +201,7 @@ def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
     touching, made, chain = arm.touching, arm.made, arm.true.chain
     middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
-    time, wrenches = samples.time, arm.history.wrenches[:made].swapaxes(0, 1)
+    time, wrenches = samples.time, arm.wrenches[:made].swapaxes(0, 1)
     walks = {k: resample_columns(time, middle, w[:made]) for k, w in touching.walks.items()}
     tau_ext, flange = np.zeros(samples.q.shape), np.zeros((len(samples.time), 6))
     poses, contacts = link_poses(chain, samples.q), dict[str, Array]()

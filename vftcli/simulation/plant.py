@@ -93,17 +93,17 @@ class TrueFriction:
         slope = self.viscous + 2.0 * self.quadratic * speed
         if "logarithmic" in self.present:
             bend = self.logarithmic_velocity
-            torque = torque + self.logarithmic * np.log1p(speed / bend) * np.sign(dq)
-            slope = slope + self.logarithmic / (bend + speed)
+            torque += self.logarithmic * np.log1p(speed / bend) * np.sign(dq)
+            slope += self.logarithmic / (bend + speed)
         if len(self.bends):
             beyond = np.maximum(speed - self.bends, 0.0)
-            torque = torque + np.add.reduce(self.bend_slopes * beyond) * np.sign(dq)
-            slope = slope + np.add.reduce(np.where(beyond > 0.0, self.bend_slopes, 0.0))
+            torque += np.add.reduce(self.bend_slopes * beyond) * np.sign(dq)
+            slope += np.add.reduce(np.where(beyond > 0.0, self.bend_slopes, 0.0))
         if "amplitude" in self.present:
             bell = 1.0 / (1.0 + np.exp(-self.slope * (dq + self.shift)))
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
-            torque = torque + self.amplitude * (bell - rest)
-            slope = slope + self.amplitude * self.slope * bell * (1.0 - bell)
+            torque += self.amplitude * (bell - rest)
+            slope += self.amplitude * self.slope * bell * (1.0 - bell)
         # The slope is implicit: a negative one would pump energy into the joint.
         return torque, np.maximum(slope, 0.0)
 
@@ -142,11 +142,11 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
                 table[name][j] = value
         table["coulomb"][j] += sum(joint.torques[:1])
     dry = spec.sticking * table["amplitude"]
-    table["amplitude"] = table["amplitude"] - dry
-    table["coulomb"] = table["coulomb"] + 0.5 * dry
+    table["amplitude"] -= dry
+    table["coulomb"] += 0.5 * dry
     giving = spec.presliding * table["coulomb"]
-    table["coulomb"] = table["coulomb"] - giving
-    table["presliding"] = table["presliding"] + giving
+    table["coulomb"] -= giving
+    table["presliding"] += giving
     table["bends"], table["bend_slopes"] = bends_of(joints)
     return TrueFriction(**table, stribeck=spec.stribeck, stribeck_velocity=spec.stribeck_velocity)
 
@@ -154,7 +154,7 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
 def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
     """Friction of the scenario, for an arm without any in its robot file. (n,) each"""
     given = {"coulomb": spec.coulomb, "viscous": spec.viscous}
-    table = {name: np.array(values) for name, values in given.items() if values is not None}
+    table = {name: np.array(own, float) for name, own in given.items() if own is not None}
     for name, values in table.items():
         if robot.friction:
             raise ParameterError(
@@ -257,7 +257,7 @@ class Plant:
         if external is not None:
             pin.computeJointJacobians(model, data, q_mid)
             self.external = external(model, data, v_mid)
-            torque = torque + self.external
+            torque += self.external
         M.flat[:: len(slope) + 1] += 0.5 * h * slope
         after, impulse, self.signs = slide_or_stick(M, h * torque, self.v, h * dry, self.signs)
         self.friction = smooth + 0.5 * slope * (after - self.v) + impulse / h

@@ -12,7 +12,7 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.terms import gravity_torque
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import rpy_matrix
 from vftcli.signals.series import resample_columns
@@ -39,7 +39,7 @@ class Measured(NamedTuple):
     stamp: Array  #: Time stamps, jittering. (M,) [s]
     #: Which sample each row of the log holds; lost ones are missing, repeated ones
     #: doubled.
-    rows: tuple[int, ...]
+    rows: Indices
     #: Field of a recording → its signal: what the sensors and the flange's own report,
     #: and the controller's targets and estimate of contact. (M, n) each
     signals: dict[str, Array]
@@ -135,7 +135,7 @@ def measure_run(arm: Arm, samples: Samples, wrench: Array) -> Measured:
     signals |= controller_signals(arm, samples, signals)
     if (reading := read_force_sensor(arm, samples, wrench)) is not None:
         signals["wrench"] = reading
-    return Measured(stamp, tuple(source[~(lost & inner)].tolist()), signals)
+    return Measured(stamp, source[~(lost & inner)], signals)
 
 
 def rounded(q: Array, step: float) -> Array:

@@ -80,7 +80,7 @@ class Stretches:
         out = Reference(*(np.zeros((len(t), n)) for _ in range(3)))
         for k, path in enumerate(self.paths):
             rows = np.flatnonzero(which == k)
-            length = float(self.times[k, 1] - self.times[k, 0])
+            length = self.times[k, 1] - self.times[k, 0]
             u = np.clip((t[rows] - self.times[k, 0]) / length, 0.0, 1.0)
             s = minimum_jerk(u)
             ds = 30.0 * u**2 * (1.0 - u) ** 2 / length
@@ -243,7 +243,7 @@ class PosesSpec:
             )
         starts = self.dwell + np.arange(self.count - 1) * (self.move + self.dwell)
         times = np.column_stack([starts, starts + self.move])
-        return Stretches(times, straight_paths(points), float(times[-1, 1] + self.dwell))
+        return Stretches(times, straight_paths(points), times[-1, 1] + self.dwell)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -263,7 +263,7 @@ class JointwiseSpec:
         t, times, paths = self.rest, [], []
         for axis, speed in product(self.amplitude * np.eye(robot.joints), self.speeds):
             for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
-                length = max(float(abs(b - a).sum()) / speed, 0.2)
+                length = max(abs(b - a).sum() / speed, 0.2)
                 times.append((t, t + length))
                 paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
                 t += length
@@ -343,7 +343,7 @@ def reach(model: Any, goal: Any, guess: Array) -> Array | None:  # noqa: ANN401
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
         # Damping keeps far steps short at singularities and must not slow near ones.
         damping = 1e-3 * min(size, 1.0) ** 2
-        q = q + J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
+        q += J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
     return None
 
 

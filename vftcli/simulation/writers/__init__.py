@@ -159,7 +159,7 @@ class VendorTable(NamedTuple):
                 own = {name: own[name] for name in SHORT}
             if "wrench" in simulation.measured.signals:
                 own["ft_raw_wrench"] = "wrench"
-        known, rows = vendor_signals(simulation), np.array(simulation.measured.rows)
+        known, rows = vendor_signals(simulation), simulation.measured.rows
         names, texts = [], []
         for name, content in own.items():
             if isinstance(content, str):
@@ -195,7 +195,7 @@ def write_parquet(path: Path, simulation: Simulation) -> None:
         if name != "target_current" or "current" in signals:
             label = "tau" if name == "torque" else name
             columns |= flat(label, values, AXES if name == "wrench" else ())
-    write_columns(path, {name: values[list(rows)] for name, values in columns.items()})
+    write_columns(path, {name: values[rows] for name, values in columns.items()})
 
 
 def write_truth(path: Path, truth: Truth, start: float) -> None:

@@ -47,7 +47,7 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    rows, signals = np.array(simulation.measured.rows), simulation.measured.signals
+    rows, signals = simulation.measured.rows, simulation.measured.signals
     clock = simulation.measured.stamp[rows] + simulation.scenario.sensing.start
     stamps = np.array([round(float(t) * 1e9) for t in clock], np.int64)
     make = robot_states if simulation.robot.ros_state == ROBOT_STATE else joint_states
