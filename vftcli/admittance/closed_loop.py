@@ -304,8 +304,7 @@ class Latency:
     reaction: float | None
     #: Time from the estimate's fall below the threshold until the flange goes no farther.
     turn: float | None
-    #: Whether the flange was at rest when the force came, without which `motion` says
-    #: nothing.
+    #: Whether the flange was at rest when the force came; else `motion` says nothing.
     rested: bool
 
 

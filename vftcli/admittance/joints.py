@@ -14,11 +14,9 @@ from vftcli.signals.pose import exp_matrix
 ITERATIONS = 12
 #: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-6
-#: λ² of the damped step is this times the error, so that it vanishes where the pose is
-#: reached.
+#: λ² of the damped step is this times the error, so that it vanishes at the pose.
 DAMPING = 1e-3
-#: If the error after three steps is still this share of what it was, the pose is out of
-#: reach.
+#: Share of the error that is left after three steps where a pose is out of reach.
 STALLED = 0.7
 LARGEST_STEP = 0.2  #: Longest joint step of one iteration. [rad]
 

@@ -48,8 +48,7 @@ from vftcli.virtual_sensor.frames import logged_wrench
 from vftcli.virtual_sensor.sensor_reading import SensorReading, without_zero
 from vftcli.virtual_sensor.solvers import VirtualSensor
 
-#: A step in which W rises by more than this share of its value at the phase's start gets
-#: a remark.
+#: Rise of W in a step that gets a remark, as a share of W at the start of the phase.
 RISE = 1e-12
 LONGEST = 600.0  #: Longest release that is computed. [s]
 #: A drag in which the log's arm stays within this distance for so long has a remark.

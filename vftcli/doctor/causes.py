@@ -62,8 +62,7 @@ LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
 SURE = 4.0  #: Least standard deviations of an offset, a factor or missing friction.
 KNOWN = 0.05  #: Largest standard deviation of a factor from motion.
 CLEARER = 1.5  #: Ratio of misfits by which a factor beats a load.
-#: Misfit that a model of the arm leaves of another's; measured efforts leave 1.3 % and
-#: more.
+#: Misfit of a model of the arm to another model; measured efforts leave 1.3 % and more.
 MODELLED = 0.02
 #: Least share of the robot file's friction in any arm, and joints that judge it.
 RUBS, WITHOUT = 0.1, 3

@@ -52,7 +52,7 @@ class Bad(NamedTuple):
     """Bad samples by one rule."""
 
     code: str  #: The finding.
-    samples: Mask  #: The samples, joint by joint. (T, n)
+    samples: Mask  #: The samples, joint by joint or of all. (T, n) or (T, 1)
     #: By how much, in the unit of the finding's words; None without one. (T, n)
     sizes: Array | None = None
     most: float = SHARE  #: Most of the log to cut for it. [1]
@@ -66,7 +66,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
     rows = np.zeros(log.samples, bool)
     cuts = list[Cut]()
     for bad in rules(log, robot):
-        samples = bad.samples & ~rows[:, None]
+        samples = np.broadcast_to(bad.samples, log.q.shape) & ~rows[:, None]
         fresh = np.any(samples, axis=1)
         if not 0 < np.mean(fresh) <= bad.most:
             continue
@@ -102,7 +102,7 @@ def cut_findings(recording: Recording) -> Iterator[Remark]:
 def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     """Bad samples of a log, rule by rule."""
     dq, step, frozen = recording.require("dq"), recording.median_step, frozen_rows(recording)
-    yield Bad("frozen-rows", frozen[:, None].repeat(recording.joints, axis=1), None, MOST)
+    yield Bad("frozen-rows", frozen[:, None], None, MOST)
     yield from position_jumps(recording, frozen)
     fast = FAST * np.nan_to_num(robot.limits.qd_max, nan=2.0)
     yield Bad("isolated-velocity", isolated(dq, fast, step), dq)
@@ -266,4 +266,4 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     # The drives release and grip again somewhere in the windows beside.
     spans = [(start, start + length) for start in first[free]]
     off = covered(spans, recording.samples, length)
-    yield Bad("brakes", off[:, None].repeat(recording.joints, axis=1), None, MOST)
+    yield Bad("brakes", off[:, None], None, MOST)

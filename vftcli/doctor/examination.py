@@ -33,11 +33,9 @@ REFUSING = NO_FIT | {
     "upside-down", "tilted-base", "time-unit", "clock-rate",
     "velocity-unit", "velocity-of-another-kind", "velocity-sign", "no-friction-in-effort",
 }  # fmt: skip
-#: Findings that say how large a current is: a model of the arm knows better than its
-#: numbers.
+#: Findings on the size of a current, which a model of the arm knows better.
 SIZED = CORRECTIONS.keys() - {"torque-with-gravity"}
-#: Findings that every command says: nothing is wrong, and results stand on what is
-#: assumed.
+#: Findings that every command says: nothing is wrong, but results rest on assumptions.
 ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 
 

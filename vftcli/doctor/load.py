@@ -18,10 +18,8 @@ from vftcli.signals.rest import COMMANDED, MOVES, slower
 
 MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly explains. [N·m]
 USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives lie. [N·m/A]
-#: Torque per current of UR's five joint sizes, e-Series and CB3: the controllers' own
-#: tables.
-#:
-#: [N·m/A]
+#: Torque per current of UR's five joint sizes, e-Series and CB3, by the controllers'
+#: own tables. [N·m/A]
 JOINT_CONSTANTS = np.array([3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756])
 SAME = 0.02  #: Constants of one joint size scatter by this much from firmware to firmware.
 #: Load that is worth a remark, as a hand is; and one that nobody overlooks.

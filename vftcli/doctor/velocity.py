@@ -23,8 +23,7 @@ from vftcli.signals.series import gaps_of, runs_of
 WINDOW = 0.2
 #: Steps of a window of a slow log, and of a fast one after thinning.
 LEAST_STEPS, MOST_STEPS = 8, 40
-#: Sample times beyond which the clock's unit is in doubt [s], and a window's
-#: steps then.
+#: Sample times beyond which the clock's unit is in doubt [s]; steps of a window then.
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
 #: Most windows; those of a short log; least windows with motion.
 WINDOWS, WANTED, LEAST = 600, 12, 8
@@ -283,8 +282,7 @@ def held_shares(recording: Recording) -> dict[int, float]:
 
 
 SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
-#: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly
-#: wrong.
+#: Spread of nine steps in ten over their median at which a fixed step is visibly wrong.
 JITTER = 0.05
 GAP_STEPS = 4.0  #: A step this many times the median is a gap.
 LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]

@@ -29,8 +29,7 @@ GRAVITY = [0, 3, 6]  #: Those of them at which gravity is asked: between them it
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
 FAST = 0.8  #: Mean direction of a window in which a joint moves.
-#: Mass [kg] and first moment [kg·m] that a load may well have, before the log says
-#: anything.
+#: Mass [kg] and first moment [kg·m] that a load may well have, before any data.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
 KEPT = 0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
 ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
@@ -42,8 +41,7 @@ class Terms(NamedTuple):
 
     columns: Array  #: Torque per unit of each coefficient. (W, n, k)
     positive: bool = False  #: Whether they only make sense above zero, as friction's do.
-    #: Standard deviations that they have before any data, one for all or (k,); inf for
-    #: none.
+    #: Standard deviations before any data, one for all or (k,); inf for none.
     prior: Array | float = np.inf
 
 

@@ -62,8 +62,7 @@ WORSE = 1.5  #: Times the training's residual from which a held-out joint is rem
 BEHIND = 1.01
 NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
 SLOWNESS = 0.1  #: Velocity difference that counts as much as that distance, as a time. [s]
-#: Share of a log's samples on another's trajectory from which on it repeats that
-#: trajectory.
+#: Share of a log's samples on another's trajectory from which it repeats that one.
 REPEATED = 0.8
 #: One row a number: its value, standard deviation, and what the profile said.
 PARAMETERS = pl.Schema(get_type_hints(Number))

@@ -68,8 +68,7 @@ class PreslidingScore(NamedTuple):
     """The presliding length of an arm."""
 
     length: float  #: The chosen one, 0 for none. [rad]
-    #: Cross-validated error of every length over that of none, root mean square of the
-    #: joints.
+    #: Cross-validated error of every length over that of none, rms over the joints.
     errors: dict[float, float]
 
 

@@ -20,8 +20,7 @@ from vftcli.simulation.trajectories import Reference
 
 #: Natural frequency of the position loop by name. [rad/s]
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
-#: Largest natural frequency times step: beyond it the sampled loop is badly damped or
-#: unstable.
+#: Largest natural frequency times step: beyond it the loop is badly damped or unstable.
 FASTEST_LOOP = 0.4
 WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
 CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still moves like an arm.

@@ -24,8 +24,7 @@ from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
 FOLDER = Path(__file__).parent / "scenarios"
 Section = TypeVar("Section")
-#: Largest number of a scenario in any unit; a clock that counts from 1970 begins below
-#: it.
+#: Largest number of a scenario in any unit; clocks that count from 1970 begin below it.
 LARGEST = 1e10
 #: Type of a field → its kind.
 KINDS = {

@@ -37,8 +37,7 @@ class Measured(NamedTuple):
     """A controller's log, one row a sample."""
 
     stamp: Array  #: Time stamps, jittering. (M,) [s]
-    #: Which sample each row of the log holds; lost ones are missing, repeated ones
-    #: doubled.
+    #: Sample in each row of the log; lost ones are missing, repeated ones come twice.
     rows: Indices
     #: Field of a recording → its signal: what the sensors and the flange's own report,
     #: and the controller's targets and estimate of contact. (M, n) each
