@@ -72,6 +72,11 @@ def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
         ('[[log]]\narm = "x"\ntruth = "free"\n', "log.name is missing"),
         (ENTRY.replace('"a"', '"../a"'), "a name has letters"),
         ("x = \n", "not valid TOML"),
+        (ENTRY.replace("free", "weight"), "weight_N is missing"),
+        (ENTRY + 'protocols = ["identified"]\n', "identified is missing"),
+        (ENTRY + 'protocols = ["both"]\n', "protocol 'both'"),
+        (ENTRY + "pushes = [[1, 0, [1, 0, 0]]]\n", "longer than 0 s"),
+        (ENTRY.replace('file = "a.csv"', 'parts = ["t"]'), "t=time.txt"),
     ],
 )
 def test_a_wrong_entry_is_refused_in_one_line(tmp_path: Path, text: str, complaint: str) -> None:

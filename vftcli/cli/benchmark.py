@@ -30,7 +30,12 @@ class BenchChoice(Choice):
 def benchmark(
     what: Annotated[
         str,
-        Option("", "[sim|field|speed|FILE]", "Simulated or public logs, times, or your manifest."),
+        Option(
+            "",
+            "[sim|field|speed|FILE]",
+            "Simulated or public logs, times, or your manifest.",
+            completes=lambda: ("sim", "field", "speed"),
+        ),
     ] = "sim",
     *,
     data: Annotated[
@@ -95,12 +100,14 @@ def benchmark(
     )
     results = run.run(force=force)
     if form == "json":
-        say_json([], rows=results.rows(), left_out=run.left_out)
+        say_json([], rows=results.rows, left_out=run.absent)
     elif form == "terminal":
         show(shown.to_terminal(results, every=talk.details))
     else:
         echo_data(shown.FORMS[form](results))
-    say("\n".join([*run.left_out, f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
+    for name, failure in run.failures:
+        echo(printable(f"error: {name}: {failure.line}"), err=True)
+    say("\n".join([*run.absent, f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
     if open_page:
         open_made(output)
     if run.failures:

@@ -52,7 +52,8 @@ def read_outside(path: Path, name: str) -> OutsideTable:
             f"{listed(table.names)}"
         )
     picks = [Pick(kind, each) for kind, each in found.items() if each]
-    raw = load_signals(table, Picks(tuple(picks), Pick("t", (columns["t"],))), ReadChoice())
+    clock = Pick("t", (columns["t"],), unit="s")
+    raw = load_signals(table, Picks(tuple(picks), clock), ReadChoice())
     sd, band = raw.signals.get("sd"), raw.signals.get("band")
     if band is not None:
         sd = band if ours else band / COVERS

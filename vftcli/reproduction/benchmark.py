@@ -83,11 +83,10 @@ class BenchmarkRun:
             return results
 
     @property
-    def left_out(self) -> list[str]:
-        """A line on each log that is missing and each task that failed."""
+    def absent(self) -> list[str]:
+        """A line on each log that is missing."""
         none = "no log of the manifest is there; --data DIR says where they are"
-        failed = [f"{name} failed: {failure.line}" for name, failure in self.failures]
-        return [*self.manifest.absent(), *failed, *[none] * (not self.files)]
+        return [*self.manifest.absent(), *[none] * (not self.files and not self.failures)]
 
     def note(self, name: str, outcome: Outcome[Any]) -> None:
         """Keep why a task failed and what it took."""
@@ -144,11 +143,12 @@ class BenchmarkRun:
             return
         logs = [self.files[name] for name in robot.train]
         choice = self.manifest.choice(self.manifest.by_name[robot.train[0]], "alone", logs[0])
-        span = interval(robot.interval) if robot.interval else None
-        read = replace(choice.read, interval=span)
+        read = replace(choice.read, interval=interval(robot.interval) if robot.interval else None)
+        arm = replace(choice.robot, name=robot.robot or choice.robot.name)
         task = Task(method=robot.method or None, name=robot.name)
         examiner = Examiner(fitting=task.keeps_links)
-        choice = replace(choice, read=read, wrench=None, library=Library(logs), examiner=examiner)
+        choice = replace(choice, read=read, robot=arm, wrench=None)
+        choice = replace(choice, library=Library(logs), examiner=examiner)
         key = key_of(content_digest(logs), options_digest([choice, task]))
         path = self.folder.made("robots") / f"{robot.name}-{key[:8]}.toml"
 
@@ -217,7 +217,8 @@ class BenchmarkRun:
         found = {
             "manifest": manifest.name,
             "manifest_sha256": digest_of(manifest.path),
-            "left_out": self.left_out,
+            "left_out": self.absent,
+            "failures": {name: failure.line for name, failure in self.failures},
             "outside": {rival.name: rival.declared for rival in self.rivals},
             "tasks": self.efforts,
         }

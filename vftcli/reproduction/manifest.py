@@ -91,6 +91,17 @@ class BenchmarkLog:
             raise ParameterError(f"log {self.name!r}: a name has letters, digits, . + - and _")
         if bool(self.file) + bool(self.parts) + bool(self.scenario) != 1:
             raise ParameterError(f"log {self.name}: give one of file, parts, scenario")
+        needs = {"weight": "weight_N", "contacts": "contacts", "simulated": "scenario"}
+        wanted = [needs[self.truth]] if self.truth in needs else []
+        wanted += [protocol for protocol in self.asked if protocol != "alone"]
+        for key in wanted:
+            check_known(key, (*needs.values(), *PROTOCOLS), f"log {self.name}: protocol {key!r}")
+            if not getattr(self, key):
+                raise ParameterError(f"log {self.name}: {key} is missing")
+        if any(length <= 0.0 for _, length, _ in self.pushes):
+            raise ParameterError(f"log {self.name}: a push lasts longer than 0 s")
+        if any("=" not in part for part in self.parts):
+            raise ParameterError(f"log {self.name}: parts are as t=time.txt, q=positions.txt")
 
     @property
     def asked(self) -> tuple[str, ...]:
