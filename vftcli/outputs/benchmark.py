@@ -11,7 +11,7 @@ import polars as pl
 
 from vftcli.evaluation.detection import rate_interval, share_interval
 from vftcli.evaluation.scores import LAGS, Score, percentiles
-from vftcli.outputs.charts import Span, colours_of_names
+from vftcli.outputs.charts import REFERENCE, Chart, ChartLine, Span, colours_of_names, paint
 from vftcli.outputs.grid import (
     Column,
     Grid,
@@ -92,7 +92,9 @@ class ArmResult(NamedTuple):
         """The row for machines and tables; `best` is what it is compared with draw by draw."""
         score, drawn = self.score, self.score.drawn
         other = None if best is None else best.score.drawn
-        less = None if drawn is None or other is None else drawn - other
+        less = None
+        if drawn is not None and other is not None and best is not self:
+            less = drawn - other
         ends = {"rmse": percentiles(drawn), "over_best": percentiles(less)}
         return {
             **{name: getattr(self, name) for name in (*BY, "part", "exact_model")},
@@ -240,14 +242,14 @@ def shown_rows(rows: Sequence[dict[str, Any]], error: float) -> Iterator[dict[st
                 text, mark=near, html=f'<span class="soft">{text}</span>' * bool(near)
             ),
             "interval": between(row["rmse_low_Nm"], row["rmse_high_Nm"]),
-            "over_best": between(row["over_best_low_Nm"], row["over_best_high_Nm"]),
+            "over_best": between(row["over_best_low_Nm"], row["over_best_high_Nm"], "+.3g", " to "),
             "lag": lag if np.isfinite(row["lag_s"]) else DASH,
         }
 
 
-def between(low: float, high: float, form: str = ".3g") -> str:
+def between(low: float, high: float, form: str = ".3g", to: str = "–") -> str:
     """An interval as text, a dash for none."""
-    return f"{low:{form}}–{high:{form}}" if np.isfinite(low) else DASH
+    return f"{low:{form}}{to}{high:{form}}" if np.isfinite(low) else DASH
 
 
 def list_row(row: Mapping[str, Any]) -> Sequence[Any]:
@@ -298,9 +300,21 @@ def dots(results: Results, protocol: str) -> tuple[Scales, list[tuple[float, str
         high, least = (1.0 - end / level for end in percentiles(r.score.drawn))
         x, left, right = scales.across(np.clip([r.score.skill, least, high], low, 1.05)).tolist()
         text = f"{r.arm}, {r.method}: {r.score.skill:.2f}"
-        found.append(Dot(x, left, right, y, colours[r.method], text))
+        found.append(Dot(x, left, right, y, paint(colours[r.method]), text))
     names = [(float(scales.up(len(arms) - k - 0.5)), arm) for k, arm in enumerate(arms)]
     return scales, names, found
+
+
+def worst_charts(results: Results) -> Iterator[Chart]:
+    """The worst 10 s of `best` in every log, by the first protocol that it is scored by."""
+    drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
+    for row in drawn.iter_rows(named=True):
+        t, *values = (np.array(row[f"worst_{k}"]) for k in ("t", "truth", "estimate"))
+        styles = (("truth", REFERENCE), ("best", colours_of_names(["best"])["best"]))
+        named = zip(styles, values, strict=True)
+        lines = [ChartLine(name, x[:, None], colour) for (name, colour), x in named]
+        title = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
+        yield Chart.of_one(row["log"], title, "N·m", t, lines)
 
 
 def to_terminal(results: Results, *, every: bool) -> str:
@@ -336,6 +350,7 @@ def render_benchmark(results: Results, title: str, record: Mapping[str, Any]) ->
         styles={method: (colour, "") for method, colour in colours.items()},
         results=results,
         plots=each,
+        worst=list(worst_charts(results)),
         logs=logs,
         record=record,
     )

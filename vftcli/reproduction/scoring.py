@@ -34,6 +34,7 @@ from vftcli.virtual_sensor.frames import NOTHING
 
 #: Torque from which a joint's truth is a contact where no force is known, and its end. [N·m]
 TOUCHED, UNTOUCHED = 0.05, 0.025
+WORST = 10.0  #: Length of the span that is drawn. [s]
 NO_WRENCH = np.zeros((0, 6))
 #: Rows of a log × protocol × method: of a part and joint; of lists; of wrench, weight and lag.
 SCHEMA: dict[str, Any] = {
@@ -51,6 +52,9 @@ SCHEMA: dict[str, Any] = {
     **dict.fromkeys(wrench_sums(NO_WRENCH, NO_WRENCH, np.zeros(0)), Float64),
     **dict.fromkeys(("weight_N", "mean_N", "rms_error_N", "answered"), Float64),
     "lag_squares": pl.List(Float64),
+    # The worst 10 s of `best`, on the joint that errs most in them.
+    "worst_joint": Int64,
+    **dict.fromkeys(("worst_t", "worst_truth", "worst_estimate"), pl.List(Float64)),
 }
 LIST, WITH_CANDIDATES = "list", "list with candidates"  #: Parts of rows of lists.
 
@@ -242,35 +246,57 @@ def rows_of(
     answer: Answer, truth: KnownTruth, log: BenchmarkLog, t: Array, scored: Mask
 ) -> Iterator[dict[str, Any]]:
     """Every row of one method on one log."""
-    torque, w = answer.torque, weights(t)
-    touched = truth.contacts or ()
+    w, known = weights(t), scored
     if truth.tau is not None:
-        scored = scored & np.isfinite(truth.tau).all(axis=1)
-        parts = parts_of(t, scored, touched)
-        for part, inside in parts.items():
-            # What is free of a log with planted pushes is scored of the log without them.
-            if (
-                not inside.any()
-                or (part == "all" and not touched)
-                or (part == "free" and log.pushes)
-            ):
-                continue
-            score = Score.of(torque, truth.tau, inside)
-            for j, sums in enumerate(score.by_joint()):
-                means = {"rmse_Nm": float(score.rmse[j]), "l1_Nm": float(score.l1[j])}
-                yield {"part": part, "joint": j + 1, **means, **sums}
-        if touched and scored.any() and torque.name != "zero":
-            yield {"part": "all", "lag_squares": lag_sums(torque, truth.tau, scored).tolist()}
-        touch = parts["contact"]
-        if truth.wrench is not None and answer.wrench is not None and touch.any():
-            samples = answer.wrench[touch], truth.wrench[touch], w[touch]
-            yield {"part": "wrench", **wrench_sums(*samples)}
-    if log.weight_N and answer.wrench is not None:
+        known = scored & np.isfinite(truth.tau).all(axis=1)
+    parts = parts_of(t, known, truth.contacts or ())
+    touch = parts["contact"]
+    if truth.tau is not None and known.any():
+        if not truth.contacts:
+            del parts["all"]
+        if log.pushes:
+            del parts["free"]  # it is scored of the log without them
+        yield from torque_rows(answer.torque, truth.tau, parts)
+    if answer.wrench is not None and truth.wrench is not None and touch.any():
+        samples = answer.wrench[touch], truth.wrench[touch], w[touch]
+        yield {"part": "wrench", **wrench_sums(*samples)}
+    if answer.wrench is not None and log.weight_N:
         yield {"part": "weight", **weighed(-answer.wrench[scored, 2], log.weight_N, w[scored])}
     if truth.contacts is not None:
         for part, rows in answer.rows.items():
             counts = score_list(rows, truth.contacts, log.trusted, float(t[-1]))
             yield {"part": part, **counts._asdict()}
+
+
+def torque_rows(
+    torque: ExternalTorque, truth: Array, parts: Mapping[str, Mask]
+) -> Iterator[dict[str, Any]]:
+    """The rows of a torque: sums of each part and joint, of shifts, and where `best` is worst."""
+    for part, inside in parts.items():
+        if not inside.any():
+            continue
+        score = Score.of(torque, truth, inside)
+        for j, sums in enumerate(score.by_joint()):
+            means = {"rmse_Nm": float(score.rmse[j]), "l1_Nm": float(score.l1[j])}
+            yield {"part": part, "joint": j + 1, **means, **sums}
+    if torque.name == BEST:
+        yield {"part": "worst", **worst_of(torque, truth, np.any([*parts.values()], axis=0))}
+    if "all" in parts and torque.name != "zero":
+        yield {"part": "all", "lag_squares": lag_sums(torque, truth, parts["all"]).tolist()}
+
+
+def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, Any]:
+    """The `WORST` seconds with the largest Σ w e², and the joint that has most of it."""
+    t, answer = torque.t, np.where(torque.known, torque.tau, 0.0)
+    squares = np.where(scored[:, None], weights(t)[:, None] * (answer - truth) ** 2, 0.0)
+    total = np.concatenate([[0.0], squares.sum(axis=1).cumsum()])
+    ends = np.searchsorted(t, t + WORST)
+    first = int(np.argmax(total[ends] - total[:-1]))
+    part = slice(first, int(ends[first]))
+    joint = int(squares[part].sum(axis=0).argmax())
+    seen = [np.where(scored, x[:, joint], np.nan) for x in (truth, answer)]
+    lists = dict(zip(("t", "truth", "estimate"), (t, *seen), strict=True))
+    return {"worst_joint": joint + 1, **{f"worst_{k}": v[part].tolist() for k, v in lists.items()}}
 
 
 def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
