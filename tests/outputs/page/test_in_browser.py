@@ -15,6 +15,7 @@ from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.outputs.page import shell
 from vftcli.outputs.page.pages import render, render_index
 from vftcli.outputs.page.shell import HERE, part
+from vftcli.outputs.page.stage import HEIGHT, WIDTH, arrow_of, view_of
 from vftcli.robots.chain import link_poses
 
 FOCUSED = """() => { const x = document.activeElement; const style = getComputedStyle(x);
@@ -168,6 +169,93 @@ def recording_of_a_panda() -> Analysis:
 
     log = Path(__file__).parents[3] / "fixtures" / "panda_bearing.csv"
     return analyse_log(log, AnalysisChoice(robot=RobotChoice(name="panda"), contacts=False))
+
+
+#: Draws the arm and gives every stroke: its colour, width and points on the canvas.
+STROKES = """() => {
+  const found = [], own = CanvasRenderingContext2D.prototype, kept = {};
+  let points = [];
+  const hook = (name, act) => { kept[name] = own[name]; own[name] = function (...a) {
+    act(this, a); return kept[name].apply(this, a); }; };
+  hook("beginPath", () => { points = []; });
+  hook("moveTo", (c, a) => points.push(a));
+  hook("lineTo", (c, a) => points.push(a));
+  hook("stroke", (c) => found.push([c.strokeStyle, c.lineWidth, points]));
+  vftcli.arm.draw();
+  Object.assign(own, kept);
+  const { clientWidth, clientHeight } = vftcli.arm.canvas;
+  return { found, size: [clientWidth, clientHeight] };
+}"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [6, 1])
+def test_the_force_is_drawn_where_it_acts_and_comes_from_where_it_should(
+    opened: Callable, html: str, pushed: Analysis, number: int
+) -> None:
+    """The projection of the still drawing, for the size of the canvas."""
+    page = live(opened(html, reduced_motion="reduce"))
+    page.locator(f"#contact-{number}").click()
+    page.wait_for_timeout(60)
+    drawn = page.evaluate(STROKES)
+    (shaft,) = (points for _, wide, points in drawn["found"] if abs(wide - 3.2) < 1e-6)
+    view, contact = view_of(pushed), pushed.contacts.contacts[number - 1]
+    tail, tip = view.seen(arrow_of(pushed, contact, view.reach))[:, :2]
+    (width, height), middle = drawn["size"], np.array([WIDTH, HEIGHT]) / 2
+    ratio = min(np.array([width, height]) / view.span) / min(2 * middle / view.span)
+    tail, tip = (ratio * (place - middle) + np.array([width, height]) / 2 for place in (tail, tip))
+    # The peak is half a sample away at most, 2 mm; the shaft ends 9 pixels before its tip.
+    np.testing.assert_allclose(shaft[0], tail, atol=1.5)
+    ahead = (tip - tail) / np.linalg.norm(tip - tail)
+    np.testing.assert_allclose(shaft[1], tip - 9.0 * ahead, atol=1.5)
+
+
+@pytest.mark.slow
+def test_a_zoomed_view_follows_a_contact(opened: Callable, html: str) -> None:
+    page = live(opened(html, reduced_motion="reduce"))
+    page.evaluate("vftcli.clock.zoom(6, 8)")
+    page.locator("#contact-10").click()
+    page.wait_for_timeout(60)
+    low, high = page.evaluate("vftcli.clock.view")
+    assert high - low == pytest.approx(2.0)
+    assert low < 16.9 < high
+
+
+@pytest.mark.slow
+def test_a_command_is_copied_and_play_has_four_speeds(opened: Callable, html: str) -> None:
+    page = live(opened(html))
+    copy = page.locator("button.copy").first
+    command = page.locator("code.remedy").first.inner_text()
+    copy.click()
+    page.wait_for_timeout(60)
+    assert copy.inner_text() in {"copied", "selected"}  # what the browser allows a file
+    assert page.evaluate("getSelection().toString()").strip() == command
+    for speed in (0.25, 0.1, 4, 1):
+        page.locator("#speed").click()
+        assert page.locator("#speed").inner_text() == f"{speed:g} ×"
+        assert page.evaluate("vftcli.clock.speed") == speed
+
+
+@pytest.mark.slow
+def test_a_line_is_broken_at_a_gap_of_the_clock(opened: Callable, analysis: Analysis) -> None:
+    """600 samples with one gap: two pieces of `best`, 400 and 200 points."""
+    page = live(opened(render(analysis)))
+    pieces = page.evaluate(
+        """() => {
+          const plot = vftcli.clock.plots.find((each) => each.chart.key === "tau");
+          const own = CanvasRenderingContext2D.prototype;
+          const { beginPath, moveTo, lineTo, stroke } = own;
+          let found = [], pieces = [];
+          own.beginPath = function () { found = []; beginPath.apply(this); };
+          own.moveTo = function (...a) { found.push(1); moveTo.apply(this, a); };
+          own.lineTo = function (...a) { found[found.length - 1]++; lineTo.apply(this, a); };
+          own.stroke = function () { pieces.push(found); stroke.apply(this); };
+          plot.draw(2);
+          Object.assign(own, { beginPath, moveTo, lineTo, stroke });
+          return pieces;
+        }"""
+    )
+    assert [400, 200] in pieces
 
 
 def test_a_look_shows_one_moment_everywhere_and_comes_back(
@@ -334,6 +422,8 @@ def test_a_finger_goes_to_the_time_it_touches(opened: Callable, html: str) -> No
     page.touchscreen.tap(*place_of(page, "#force", 7.3))
     page.wait_for_timeout(60)
     assert page.evaluate("vftcli.clock.head") == pytest.approx(7.3, abs=0.06)  # a pixel
+    # A finger leaves nothing behind that only looks.
+    assert page.evaluate("vftcli.clock.look") is None
     assert "contact 3" in page.locator(".now span").inner_text()
 
 
