@@ -72,9 +72,7 @@ def benchmark(
     from vftcli.readers.library import absolute
     from vftcli.reproduction.benchmark import BenchmarkRun
     from vftcli.reproduction.manifest import load_manifest, rival_of
-    from vftcli.signals.packages import check_installed
 
-    check_installed("pinocchio", "vftcli benchmark")
     form = table.form
     manifest = load_manifest(what, data)
     rivals = [rival_of(text, ("zero", "vendor", *DEFAULT)) for text in outside or ()]

@@ -30,6 +30,7 @@ from vftcli.readers.outside import read_parts
 from vftcli.reproduction.manifest import PUSHED, BenchmarkLog, Manifest, Rival, TrainedRobot
 from vftcli.reproduction.scoring import SCHEMA, ScoreTask, planted, score_log
 from vftcli.signals.option import interval
+from vftcli.signals.packages import check_installed
 from vftcli.signals.shown import frame_of, per_joint
 from vftcli.signals.wrench import per_axis
 from vftcli.simulation import load_scenario, simulate
@@ -129,6 +130,7 @@ class BenchmarkRun:
             put_table(path, pl.DataFrame(read_parts(files, signals)))
 
         def run(path: Path) -> None:
+            check_installed("pinocchio", "a simulated log")
             made = simulate(load_scenario(log.scenario, log.changes), log.seed)
             save({path: made}, "parquet", force=True, command=self.command)
 

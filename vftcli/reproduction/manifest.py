@@ -20,7 +20,7 @@ from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.library import Library, absolute
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import interval
-from vftcli.signals.parsing import check_known, toml_tables
+from vftcli.signals.parsing import check_known, toml_file
 from vftcli.simulation.scenario import Vector, section_from
 
 BUILT_IN = ("sim", "field")  #: Manifests that come with the package.
@@ -289,7 +289,7 @@ def load_manifest(name: str, data: Path | None) -> Manifest:
         path = Path(str(files("vftcli.reproduction") / f"{name}.toml"))
     elif path.suffix != ".toml":
         check_known(name, (*BUILT_IN, "speed"), f"no FILE.toml and no benchmark {name!r}")
-    tables = tables_of(path)
+    tables = toml_file(path, "a manifest")
     for key in tables:
         check_known(key, ("log", "robot"), f"{path}: no table {key!r}")
     logs = tuple(each for table in tables.get("log", ()) for each in logs_of(table))
@@ -319,17 +319,6 @@ def check_names(manifest: Manifest) -> None:
         for word in log.free:
             if ":" not in word:
                 check_known(word, names, f"log {log.name}: no free log {word!r}")
-
-
-def tables_of(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file; a ParameterError names it where it cannot be read."""
-    try:
-        return toml_tables(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not text"
-        raise ParameterError(f"{path}: cannot be read as a manifest ({reason})") from None
-    except ParameterError as error:
-        raise ParameterError(f"{path}: {error}") from None
 
 
 def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
@@ -364,6 +353,7 @@ def rival_of(text: str, ours: Sequence[str]) -> Rival:
     if not folder.is_dir():
         raise ParameterError(f"--outside {text}: there is no folder {folder}")
     file = folder / "rival.toml"
-    declared = section_from(Declaration, tables_of(file) if file.is_file() else {}, "rival.toml")
+    table = toml_file(file, "a declaration") if file.is_file() else {}
+    declared = section_from(Declaration, table, "rival.toml")
     check_known(declared.protocol, PROTOCOLS, f"{file}: protocol {declared.protocol!r}")
     return Rival(name, folder, declared)

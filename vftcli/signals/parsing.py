@@ -107,3 +107,18 @@ def toml_tables(text: str) -> dict[str, Any]:
         raise ParameterError("not valid TOML: nested too deep") from None
     except ValueError as error:  # TOML's own, and that of an integer of thousands of digits
         raise ParameterError(f"not valid TOML: {error}") from None
+
+
+def toml_file(path: Path, what: str) -> dict[str, Any]:
+    """The tables of a user's file of TOML that is to be `what`, as "a scenario".
+
+    Raises:
+        ParameterError: If it cannot be read, or is no TOML; it names the file.
+    """
+    try:
+        return toml_tables(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text"
+        raise ParameterError(f"{path}: cannot be read as {what} ({reason})") from None
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None

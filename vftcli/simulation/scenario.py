@@ -19,7 +19,7 @@ from vftcli.robots.robot_file import (
 )
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment
-from vftcli.signals.parsing import check_known, toml_tables
+from vftcli.signals.parsing import check_known, toml_file, toml_tables
 from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
 FOLDER = Path(__file__).parent / "scenarios"
@@ -287,13 +287,7 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         path = Path(name)
         if path.suffix.lower() != ".toml":
             check_known(str(name), scenario_names(), f"no FILE.toml and no scenario {str(name)!r}")
-    try:
-        table = toml_tables(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not text"
-        raise ParameterError(f"{path}: cannot be read as a scenario ({reason})") from None
-    except ParameterError as error:
-        raise ParameterError(f"{path}: {error}") from None
+    table = toml_file(path, "a scenario")
     table.setdefault("name", path.stem)
     for override in overrides:
         apply_override(table, override)
