@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from rerun_rows import rows_of
 
+from vftcli.outputs.capsules import capsules
 from vftcli.outputs.rerun_arm import (
     LINK,
     LONGEST,
     MOST_POSES,
     arrow_scale,
-    capsules,
     collada,
     motion,
     rgba,

@@ -15,6 +15,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.capsules import capsules
 from vftcli.outputs.charts import PLACES
 from vftcli.robots.chain import Chain, link_poses
 from vftcli.robots.meshes import COLOURED, FORMATS
@@ -27,11 +28,8 @@ Packed = NDArray[np.uint32]  #: Colours as Rerun takes them.
 Painted = tuple[float, float, str]  #: Start and stop [s] of a link's other colour ``#rrggbb``.
 
 ROBOT, CONTACTS = "/robot", "/contacts"  #: Roots of the arm and of the contacts, by number.
-#: Radius of the first and of the last link, as a share of the arm's length.
-THICKNESS = (0.048, 0.030)
 RATE = 50.0  #: Poses a second that are drawn. [Hz]
 MOST_POSES = 20_000  #: Poses that are drawn, however long the log is.
-SHORTEST = 0.02  #: A link shorter than this share of the arm's length is not drawn: its joints are.
 NEWTON_PER_METRE = 200.0  #: Length of a force arrow where nothing else is said: 200 N are 1 m.
 #: Colours of links, joints and the force arrow.
 LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
@@ -42,15 +40,6 @@ LONGEST = 0.5  #: The hardest force's arrow is as long at most. [m]
 #: The unit of a DAE, and the axis that it calls up.
 UNIT = re.compile(rb"(<unit\b[^>]*?\bmeter\s*=\s*[\"'])([^\"']*)")
 UP = re.compile(rb"(<up_axis>\s*)[XY]_UP")
-
-
-class Capsule(NamedTuple):
-    """A cylinder with round ends, in the axes of the frame it moves with."""
-
-    start: Array  #: Centre of one end. (3,) [m]
-    direction: Array  #: From one end's centre to the other's. (3,) [m]
-    radius: float  #: Radius. [m]
-    joint: bool  #: Whether it is a joint, not a link.
 
 
 class ArmPoses(NamedTuple):
@@ -65,25 +54,6 @@ class ArmPoses(NamedTuple):
 def rgba(*colours: str) -> Packed:
     """Colours ``#rrggbb`` as 0xRRGGBBAA: Rerun 0.30 takes three numbers for three colours."""
     return np.array([int(f"{colour[1:]}ff", 16) for colour in colours], dtype=np.uint32)
-
-
-def capsules(chain: Chain) -> list[list[Capsule]]:
-    """Parts on the base and on each link: n + 1 lists, base first."""
-    n = chain.joints
-    offsets = np.vstack([chain.translation, chain.flange_translation])
-    length = float(np.linalg.norm(offsets, axis=1).sum())  # of the stretched arm
-    radii = length * np.linspace(*THICKNESS, n + 1)
-    shapes: list[list[Capsule]] = []
-    for j in range(n + 1):
-        shapes.append([])
-        # A joint is a short thick cylinder about its axis, which is z of the link that it
-        # moves.
-        if j > 0:
-            axis = np.array([0.0, 0.0, 2.2 * radii[j]])
-            shapes[j].append(Capsule(-0.5 * axis, axis, 1.18 * radii[j], joint=True))
-        if np.linalg.norm(offsets[j]) > SHORTEST * length:
-            shapes[j].append(Capsule(np.zeros(3), offsets[j], radii[j], joint=False))
-    return shapes
 
 
 def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:

@@ -5,6 +5,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.capsules import capsules
 from vftcli.outputs.page.packing import Blob, PageClock
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.page.stage import (
@@ -15,12 +16,10 @@ from vftcli.outputs.page.stage import (
     axes_of,
     cone_of,
     free_spans,
-    shapes_of,
     stage_data,
     still_arm,
     view_of,
 )
-from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 
 
@@ -44,23 +43,6 @@ def test_the_camera_looks_level_along_y_or_down_on_the_floor() -> None:
     np.testing.assert_allclose([right, up, ahead], [[1, 0, 0], [0, 1, 0], [0, 0, -1]], atol=1e-15)
     turned = axes_of(0.7, 0.3)
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-15)
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_capsules_join_the_frames(name: str) -> None:
-    """A link's capsule ends where the next frame begins, at any pose."""
-    chain = load_robot(name).chain
-    poses = link_poses(chain, np.full((1, chain.joints), 0.4))
-    rotation = np.concatenate([np.eye(3)[None], poses.rotation[0]])
-    origin = np.concatenate([np.zeros((1, 3)), poses.translation[0]])
-    links = [shape for shape in shapes_of(chain) if not shape.joint]
-    assert links
-    for shape in links:
-        np.testing.assert_allclose(shape.start, 0.0)
-        end = rotation[shape.frame] @ shape.end + origin[shape.frame]
-        np.testing.assert_allclose(end, origin[shape.frame + 1], atol=1e-12)
-    joints = [shape for shape in shapes_of(chain) if shape.joint]
-    assert [shape.frame for shape in joints] == list(range(1, chain.joints + 1))
 
 
 def test_the_whole_log_is_in_view_and_the_arm_reaches_to_the_right(pushed: Analysis) -> None:
@@ -117,7 +99,7 @@ def test_the_touched_links_are_marked(
 ) -> None:
     contact = replace(listed(pushed).contacts[0], places=places)
     drawn = still_arm(pushed, view_of(pushed), contact)
-    parts = sum(shape.frame in hit for shape in shapes_of(pushed.robot.chain))
+    parts = sum(len(capsules(pushed.robot.chain)[frame]) for frame in hit)
     assert [kind for _, _, kind in drawn.parts].count("hit") == parts
     assert part("svg/still", drawn, "The arm", "9 N").count('class="shaft"') == 1
 

@@ -10,35 +10,23 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.capsules import capsules
 from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
 from vftcli.outputs.page.packing import PageClock
 from vftcli.outputs.page.shell import polyline
 from vftcli.outputs.quantity import at_least_shown
-from vftcli.robots.chain import Chain, link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import VftError
 from vftcli.signals.external_torque import COVERS
 from vftcli.signals.pose import Pose
 from vftcli.signals.series import resample_columns, runs_of
 
-#: Radius of the first and of the last link, as a share of the stretched arm's length, and
-#: of the shortest link that is drawn.
-THICKNESS, SHORTEST = (0.048, 0.030), 0.02
 ASIDE, PITCH = 0.45, 0.3  #: Turn of the view from the arm's side, and downwards. [rad]
 AWAY = 4.2  #: Distance of the camera, in reaches.
 POSES = 600  #: Poses of the log that the view is fitted to.
 SHARES = 0.14, 0.6  #: Length of an arrow of no force, and what the largest adds, in reaches.
 WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92  #: Size of the still drawing, and the part it fills.
-
-
-class LinkShape(NamedTuple):
-    """A capsule that moves with a frame of the chain, 0 the base."""
-
-    frame: int  #: The frame, from 1 for the first link.
-    start: Array  #: Centre of one end in its axes. (3,) [m]
-    end: Array  #: Centre of the other. (3,) [m]
-    radius: float  #: Radius. [m]
-    joint: bool  #: Whether it is a joint, not a link.
 
 
 class View(NamedTuple):
@@ -79,21 +67,6 @@ def axes_of(yaw: float, pitch: float) -> Array:
     return np.array([[cy, sy, 0.0], [-sy * sp, cy * sp, cp], [-sy * cp, cy * cp, -sp]])
 
 
-def shapes_of(chain: Chain) -> list[LinkShape]:
-    """Capsules of base, links and joints."""
-    offsets = np.vstack([chain.translation, chain.flange_translation])
-    lengths = np.linalg.norm(offsets, axis=1)
-    length, shapes = float(lengths.sum()), list[LinkShape]()
-    for j, radius in enumerate(length * np.linspace(*THICKNESS, len(offsets))):
-        if j > 0:
-            # A joint is short and thick, about its axis, z of the link that it moves.
-            half = np.array([0.0, 0.0, 1.1 * radius])
-            shapes.append(LinkShape(j, -half, half, 1.18 * radius, joint=True))
-        if lengths[j] > SHORTEST * length:
-            shapes.append(LinkShape(j, np.zeros(3), offsets[j], radius, joint=False))
-    return shapes
-
-
 def view_of(analysis: Analysis) -> View:
     """The view that holds the arm in all its poses, and the arrows at their peaks."""
     q = analysis.recording.q
@@ -113,7 +86,7 @@ def view_of(analysis: Analysis) -> View:
         x, y = ((places - view.centre) @ axes[:2].T * view.nearness(places)[:, None]).T
         middle = 0.5 * np.array([x.min() + x.max(), y.min() + y.max()])
         view = view._replace(centre=view.centre + middle @ axes[:2])
-    thick = 4.0 * max(shape.radius for shape in shapes_of(analysis.robot.chain))
+    thick = 4.0 * max(each.radius for part in capsules(analysis.robot.chain) for each in part)
     return view._replace(span=np.array([np.ptp(x), np.ptp(y)]) + thick)
 
 
@@ -169,12 +142,13 @@ def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillA
     last = analysis.robot.joints
     touched = {place or last for place in contact.places} if contact is not None else set()
     parts = []
-    for shape in shapes_of(analysis.robot.chain):
-        ends = np.vstack([shape.start, shape.end]) @ rotation[shape.frame].T + origin[shape.frame]
-        drawn = view.seen(ends)
-        kind = "hit" if shape.frame in touched else "joint" if shape.joint else "link"
-        path = polyline(drawn[:, :2])
-        parts.append((float(drawn[:, 2].sum()), path, 2.0 * shape.radius * drawn[0, 3], kind))
+    for frame, shapes in enumerate(capsules(analysis.robot.chain)):
+        for shape in shapes:
+            ends = np.vstack([shape.start, shape.start + shape.direction])
+            drawn = view.seen(ends @ rotation[frame].T + origin[frame])
+            kind = "hit" if frame in touched else "joint" if shape.joint else "link"
+            width = 2.0 * shape.radius * drawn[0, 3]
+            parts.append((float(drawn[:, 2].sum()), polyline(drawn[:, :2]), width, kind))
     parts.sort(key=lambda part: -part[0])
     arrow, label = list[str](), (0.0, 0.0)
     if contact is not None and contact.wrench is not None and contact.peak_force is not None:
@@ -221,8 +195,14 @@ def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, An
         "chain": {key: matrix.tolist() for key, matrix in matrices.items()},
         "q": [clock.pose(column) for column in analysis.recording.q.T],
         "shapes": [
-            (s.frame, *(np.round(end, 4).tolist() for end in (s.start, s.end)), s.radius, s.joint)
-            for s in shapes_of(chain)
+            (
+                frame,
+                *(np.round(end, 4).tolist() for end in (s.start, s.start + s.direction)),
+                s.radius,
+                s.joint,
+            )
+            for frame, shapes in enumerate(capsules(chain))
+            for s in shapes
         ],
         "wrench": {"flange": sensed.sensor.frame == "flange"} if turns and sensed else None,
         "view": view._replace(centre=view.centre.tolist(), span=view.span.tolist())._asdict(),
