@@ -167,7 +167,7 @@ def test_digits_are_the_smallest_step():
 
 def test_a_robot_without_constants_has_no_targets():
     with pytest.raises(IdentificationError, match="no torque constants"):
-        controller_models([], load_robot("panda"))
+        list(controller_models([], load_robot("panda")))
 
 
 def model(constant=KNOWN, rotor=KNOWN, friction=True, gravity=UNKNOWN):

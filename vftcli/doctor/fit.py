@@ -194,7 +194,7 @@ def arm_findings(
     case, cause = diagnosis.case, diagnosis.cause
     heavy = case.carries_load and case.loaded.values[0] > GENERATION
     refuted = cause is not None and cause.code != "effort-offset"
-    others: list[RobotMatch] = []
+    others = list[RobotMatch]()
     if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
         arms = (other for name, other in profiles().items() if name != robot.name)
         others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)

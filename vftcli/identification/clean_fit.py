@@ -112,7 +112,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     sticks = near(slower(motion.dq, SLIDES), reach)
     excess = np.maximum(abs(residual) - abs(dry) * sticks, 0.0)
     z = excess * usable / np.maximum(sd, 1e-9)
-    found: list[ContactSpan] = []
+    found = list[ContactSpan]()
     for start, stop in intervals(motion.t, z.max(axis=1) > TOUCH, least=TOUCH_TIME):
         k, j = np.unravel_index(z[start:stop].argmax(), (stop - start, z.shape[1]))
         begin, end = motion.t[start], motion.t[stop - 1]

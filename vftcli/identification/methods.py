@@ -116,7 +116,7 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
     remarks, robot = [*remarks], data.robot
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = None if robot.torque_constant is None else robot.torque_constant.copy()
-    numbers: list[Number] = []
+    numbers = list[Number]()
     for j, fit in enumerate(fits):
         if fit is None:
             continue

@@ -274,10 +274,9 @@ def different_poses(q: Array) -> int:
 def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
     """Mean position and torque of every rest. (P, n) [rad], (P, n) [N·m]"""
     effort, still = drive_torque(recording, robot), held(recording.q, recording.median_step)
-    spans = []
-    for start, stop in intervals(recording.t, still, least=DWELL):
-        edge = (stop - start) // 5  # the arm still settles or leaves
-        spans.append(slice(start + edge, stop - edge))
+    rests = intervals(recording.t, still, least=DWELL)
+    # In the outer fifths the arm still settles or leaves.
+    spans = [slice(a + (b - a) // 5, b - (b - a) // 5) for a, b in rests]
     means = [[x[span].mean(axis=0) for span in spans] for x in (recording.q, effort)]
     q, torque = np.reshape(means, (2, -1, robot.joints))
     return q, torque

@@ -88,11 +88,10 @@ class ControllerModel(NamedTuple):
 def targets_method(data: Training) -> MethodResult:
     """K, rotor inertia and friction of the controller's own model."""
     robot = data.robot
-    models = controller_models(data.recordings, robot)
+    models = list(controller_models(data.recordings, robot))
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = np.array(robot.torque_constant, float)
-    numbers: list[Number] = []
-    remarks: list[Remark] = []
+    numbers, remarks = list[Number](), list[Remark]()
     for j, model in enumerate(models):
         for name, found, own in (
             ("torque_constant", model.constant, constants),
@@ -157,7 +156,7 @@ class ControllerTargets(NamedTuple):
         return np.concatenate([log.friction(j, shape) for log in self.logs])
 
 
-def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[ControllerModel]:
+def controller_models(recordings: Sequence[Recording], robot: Robot) -> Iterator[ControllerModel]:
     """The controller's model of every joint, by its filtered targets."""
     if robot.torque_constant is None:
         raise IdentificationError(
@@ -183,15 +182,13 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[Con
         logs.append(log)
     motions, signals = tuple(log.logs[0] for log in logs), (log[1:] for log in logs)
     every = ControllerTargets(motions, *map(np.concatenate, zip(*signals, strict=True)))
-    models = []
     for j, before in enumerate(robot.torque_constant):
         # Of two ways to K, the surer one wins; friction needs it.
         ways = constant_at_rest(j, every), constant_in_motion(j, every)
         K = min(ways, key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
         friction = controller_friction(j, every, K.value if K.known else before)
         rotor, gravity = rotor_inertia(j, every)
-        models.append(ControllerModel(K, rotor, friction, gravity))
-    return models
+        yield ControllerModel(K, rotor, friction, gravity)
 
 
 def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:

@@ -229,7 +229,7 @@ class PosesSpec:
         rng, home = np.random.default_rng(1), check_start(robot, ())
         low = np.nan_to_num(robot.limits.q_min + 0.05, nan=-np.pi)
         high = np.nan_to_num(robot.limits.q_max - 0.05, nan=np.pi)
-        points: list[Array] = []
+        points = list[Array]()
         for _ in range(100 * self.count):
             pose = np.clip(home + rng.uniform(-self.spread, self.spread, robot.joints), low, high)
             if flange_pose(robot.model, pose).translation[2] > TABLE:
