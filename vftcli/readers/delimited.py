@@ -295,12 +295,9 @@ class EchoTable(TextTable):
     def __init__(self, file: LogFile) -> None:
         super().__init__(file)
         fields = ("name", "position", "velocity", "effort")
-        count, more = self.joints, range(self.width - STAMP)
-        each = (
-            f"{fields[k // count]}{k % count}" if k < 4 * count else f"_{k - 4 * count}"
-            for k in more
-        )
-        self.names = ("sec", "nanosec", "frame_id", *each)
+        each = [f"{field}{k}" for field in fields for k in range(self.joints)]
+        each += [f"_{k}" for k in range(self.width)]
+        self.names = ("sec", "nanosec", "frame_id", *each[: self.width - STAMP])
 
     @cached_property
     def joints(self) -> int:

@@ -34,7 +34,8 @@ BLOCK_ROWS, BUFFER_BYTES = 1 << 13, 1 << 18
 
 FILE_MAGIC = b"ARROW1\0\0"  #: How a file of Arrow begins.
 ARROW = (FILE_MAGIC, b"\xff\xff\xff\xff")  #: How a file and a stream of Arrow begin.
-NUMBER = struct.Struct("<q")  #: A whole number in a message.
+#: Whole numbers in a message: an offset or a count, and a number of 64 bits.
+COUNT, NUMBER = struct.Struct("<I"), struct.Struct("<q")
 #: Places of fields in Arrow's Message, RecordBatch and DictionaryBatch
 #: (format/Message.fbs).
 MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 0, 2, 3, 1
@@ -225,60 +226,38 @@ def claims(content: Arrow) -> Iterator[tuple[int, int]]:
     for message in pa.ipc.MessageReader.open_stream(content):
         if message.type not in {"record batch", "dictionary"}:
             continue
+        rows, size = 0, 0
+        data, body = memoryview(message.metadata), memoryview(message.body or b"")
         try:
-            table = Flat(memoryview(message.metadata)).table(MESSAGE_HEADER)
+            table = fields_at(data, fields_at(data, 0)[MESSAGE_HEADER])
             if message.type == "dictionary":
-                table = table.table(DICTIONARY_BATCH)
-            rows = table.number(BATCH_ROWS) if message.type == "record batch" else 0
-            size, body = 0, memoryview(message.body or b"")
-            packed = table.place(BATCH_PACKING) is not None
-            for start, length in table.pairs(BATCH_BUFFERS):
-                behind = packed and length >= NUMBER.size
+                table = fields_at(data, table[DICTIONARY_BATCH])
+            elif BATCH_ROWS in table:
+                (rows,) = NUMBER.unpack_from(data, table[BATCH_ROWS])
+            place = table.get(BATCH_BUFFERS, 0)
+            place += COUNT.unpack_from(data, place)[0]
+            count = COUNT.unpack_from(data, place)[0] if BATCH_BUFFERS in table else 0
+            pairs = iter(struct.unpack_from(f"<{2 * count}q", data, place + COUNT.size))
+            for start, length in zip(pairs, pairs, strict=True):
+                behind = BATCH_PACKING in table and length >= NUMBER.size
                 claimed = NUMBER.unpack_from(body, start)[0] if behind else length
                 size += length if claimed == -1 else claimed  # -1: stored as it is
-        except struct.error:
+        except (struct.error, KeyError):
             raise ValueError("a batch that contradicts itself") from None
         if rows < 0 or size < 0:
             raise ValueError("a batch of negative size")
         yield rows, size
 
 
-class Flat:
-    """A table of a flatbuffer, in which Arrow describes a batch."""
-
-    def __init__(self, data: memoryview, start: int = 0) -> None:
-        self._data = data
-        self._start = start + self._at("<I", start)
-        self._fields = self._start - self._at("<i", self._start)
-
-    def _at(self, kind: str, place: int) -> int:
-        if place < 0:
-            raise struct.error
-        return int(struct.unpack_from(kind, self._data, place)[0])
-
-    def place(self, index: int) -> int | None:
-        """Place of a field, None where it is left out."""
-        if 4 + 2 * index >= self._at("<H", self._fields):
-            return None
-        offset = self._at("<H", self._fields + 4 + 2 * index)
-        return self._start + offset if offset else None
-
-    def number(self, index: int) -> int:
-        """A field of 64 bits, 0 where it is left out."""
-        place = self.place(index)
-        return 0 if place is None else self._at("<q", place)
-
-    def table(self, index: int) -> "Flat":
-        """A field that is a table."""
-        return Flat(self._data, -1 if (place := self.place(index)) is None else place)
-
-    def pairs(self, index: int) -> Iterator[tuple[int, int]]:
-        """A field that is a row of pairs of numbers."""
-        if (place := self.place(index)) is None:
-            return
-        place += self._at("<I", place)
-        for at in range(place + 4, place + 4 + 16 * self._at("<I", place), 16):
-            yield self._at("<q", at), self._at("<q", at + 8)
+def fields_at(data: memoryview, place: int) -> dict[int, int]:
+    """Places of the fields of a flatbuffer's table, in which Arrow describes a batch."""
+    start = place + COUNT.unpack_from(data, place)[0]
+    own = start - struct.unpack_from("<i", data, start)[0]
+    if own < 0:
+        raise struct.error
+    size, _ = struct.unpack_from("<2H", data, own)
+    offsets = enumerate(struct.unpack_from(f"<{size // 2 - 2}H", data, own + 4))
+    return {k: start + offset for k, offset in offsets if offset}
 
 
 @contextmanager

@@ -307,20 +307,22 @@ class LumpedArm:
         }
 
     @cached_property
-    def bodies(self) -> tuple[Body, ...]:
-        """The arm's links with all that is locked on them, each in its joint's frame."""
+    def turned(self) -> list[tuple[Array, Body]]:
+        """Rotation of each joint's axis onto z, and there its link with all locked on it."""
         parts = [[NO_BODY] for _ in self.joints]
         for link in self.tree.links:
             group, pose = self.groups[link]
             if group != BASE:
                 parts[group].append(self.tree.bodies[link].moved(pose))
-        merged = tuple(map(merge_bodies, parts))
-        for joint, body in zip(self.joints, merged, strict=True):
+        found = []
+        for joint, body in zip(self.joints, map(merge_bodies, parts), strict=True):
             if why := improper(body.mass, body.inertia):
                 raise RobotError(
                     f"{self.tree.path}: the link of joint {joint.name!r} is unphysical: {why}"
                 )
-        return merged
+            turn = rotation_onto(joint.axis)
+            found.append((turn, body.moved(Pose(turn.T, np.zeros(3)))))
+        return found
 
     @cached_property
     def flange(self) -> tuple[str, Pose]:
@@ -341,13 +343,6 @@ class LumpedArm:
                 if name == wanted or name.endswith(f"_{wanted}"):
                     return name, pose
         return max(frames, key=lambda frame: float(np.linalg.norm(frame[1].translation)))
-
-    @cached_property
-    def turned(self) -> list[tuple[Array, Body]]:
-        """Rotation of each joint's axis onto z, and its body in those axes."""
-        turns = [rotation_onto(joint.axis) for joint in self.joints]
-        still = np.zeros(3)
-        return [(R, b.moved(Pose(R.T, still))) for R, b in zip(turns, self.bodies, strict=True)]
 
     @cached_property
     def chain(self) -> Chain:

@@ -50,10 +50,11 @@ def load_profile(path: Path) -> Robot:
 def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     """The Robot of a chain and the rest of its file (drives, friction, gains)."""
     source = root.choice("torque_source", TORQUE_SOURCES, "joint_torque")
-    payloads = {
-        name: checked_payload(section)
-        for name, section in root.section("payload").named_sections("mass").items()
-    }
+    payloads = {}
+    for own, section in root.section("payload").named_sections("mass").items():
+        turn = Pose(rpy_matrix(section.vector("rpy", 3, ORIGIN).tolist()), np.zeros(3))
+        body = checked_body(section, default=[0.0] * 6).moved(turn)
+        payloads[own] = Payload(**body._asdict())
     friction = tuple(friction_of(joint) for joint in joints)
     if all(joint.model == "none" for joint in friction):
         friction = ()
@@ -259,13 +260,6 @@ def checked_admittance(section: Section) -> Mapping[str, Any]:
     return section.values
 
 
-def checked_payload(section: Section) -> Payload:
-    """The load of a payload section; `rpy` turns its axes into the flange's."""
-    body = checked_body(section, default=np.zeros(6).tolist())
-    turn = Pose(rpy_matrix(section.vector("rpy", 3, ORIGIN).tolist()), np.zeros(3))
-    return Payload(**body.moved(turn)._asdict())
-
-
 def poses(section: Section) -> dict[str, Pose]:
     """The poses that ``[name]``, under "", and each ``[name.NAME]`` state."""
     found = {}
@@ -318,17 +312,11 @@ def robot_document(robot: Robot) -> Table:
             table["friction"] = friction
     document = {**old, "schema": SCHEMA, "name": robot.name, "title": robot.title or robot.name}
     document |= {"torque_source": robot.torque_source, "gravity": robot.chain.gravity.tolist()}
-    document |= {"dof": robot.joints, "joints": tables, "payload": payload_tables(robot)}
+    held = robot.document.get("payload", {})
+    loads = {} if robot.payload is None else kept_or_new(held, robot.payload)
+    loads |= {name: kept_or_new(held.get(name, {}), x) for name, x in robot.payloads.items()}
+    document |= {"dof": robot.joints, "joints": tables, "payload": loads}
     return {key: value for key, value in document.items() if value != {}}
-
-
-def payload_tables(robot: Robot) -> Table:
-    """The ``[payload]`` section: what is mounted, and the loads that can be named."""
-    old = robot.document.get("payload", {})
-    tables = {} if robot.payload is None else kept_or_new(old, robot.payload)
-    for name, load in robot.payloads.items():
-        tables[name] = kept_or_new(old.get(name, {}), load)
-    return tables
 
 
 def kept_or_new(old: Table, payload: Payload) -> Table:

@@ -141,10 +141,21 @@ class Program:
 
     def __init__(self, tape: Tape, outputs: Sequence[Value]) -> None:
         """Plan the operations."""
-        wanted = rows_of_their_own(tape, outputs)
+        # The row of each output, None for constants: made by an operation, without sign, once.
+        rows: list[int | None] = []
+        for sign, row in outputs:
+            if row is None or (sign > 0.0 and row >= tape.inputs and row not in rows):
+                rows.append(row)
+            else:
+                rows.append(tape.record(np.multiply, row, np.float64(sign)))
+        wanted, needed = set(rows), list[Operation]()
+        for operation in reversed(tape.operations):
+            if operation.out in wanted:
+                wanted |= operation.reads
+                needed.insert(0, operation)
         self._inputs = slice(len(outputs), len(outputs) + tape.inputs)
         self._constants = {k: v.factor for k, v in enumerate(outputs) if v.row is None}
-        self._operations, self._rows = in_few_rows(needed(tape, wanted), tape.inputs, wanted)
+        self._operations, self._rows = in_few_rows(needed, tape.inputs, rows)
         self._memory = empty_rows(self._rows, 0)
         self._samples, self._calls = 0, []  # type: tuple[int, list[tuple[Any, ...]]]
 
@@ -179,27 +190,6 @@ def empty_rows(rows: int, samples: int) -> Array:
     memory = np.empty(rows * width + 8)
     start = -memory.ctypes.data // 8 % 8
     return memory[start : start + rows * width].reshape(rows, width)[:, :samples]
-
-
-def rows_of_their_own(tape: Tape, outputs: Sequence[Value]) -> list[int | None]:
-    """The row of each output, None for constants: made by an operation, without sign, used once."""
-    rows: list[int | None] = []
-    for sign, row in outputs:
-        if row is None or (sign > 0.0 and row >= tape.inputs and row not in rows):
-            rows.append(row)
-        else:
-            rows.append(tape.record(np.multiply, row, np.float64(sign)))
-    return rows
-
-
-def needed(tape: Tape, outputs: Sequence[int | None]) -> list[Operation]:
-    """The operations that some rows depend on, in their order."""
-    wanted, kept = set(outputs), []
-    for operation in reversed(tape.operations):
-        if operation.out in wanted:
-            wanted |= operation.reads
-            kept.append(operation)
-    return kept[::-1]
 
 
 def in_few_rows(

@@ -12,25 +12,11 @@ from pathlib import Path
 from typing import Any
 
 
-def limit(seconds: int, memory: int) -> None:
-    """Let the system end this process after some time [s] or memory [B]."""
-    with suppress(ImportError):  # Windows has no such limits
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-
-
 def refuse_variable(name: str) -> str:
     """Refuse a variable of the user's environment."""
     raise PermissionError(
         f"it reads the environment variable {name}, which may hold anything; write its value there"
     )
-
-
-def default_of(_name: str, default: str = "") -> str:
-    """The default of a variable, whatever the user's environment holds."""
-    return default
 
 
 def guarded(load: Callable[[str], Any], xacro: Any, folders: list[Path]) -> Callable[[str], Any]:  # noqa: ANN401
@@ -58,7 +44,9 @@ def expand(asked: Mapping[str, Any]) -> dict[str, Any]:
     folders = [Path(asked["path"]).resolve().parent, *map(Path, asked["packages"].values())]
     xacro.load_yaml = guarded(xacro.load_yaml, xacro, [folder.resolve() for folder in folders])
     xacro._global_symbols = xacro.create_global_symbols()
-    substitution_args._eval_env, substitution_args._eval_optenv = refuse_variable, default_of
+    substitution_args._eval_env = refuse_variable
+    # The default of a variable, whatever the user's environment holds.
+    substitution_args._eval_optenv = lambda _name, default="": default
     text = why = ""
     try:
         document = xacro.process_file(asked["path"], mappings=dict(asked["arguments"]))
@@ -71,7 +59,12 @@ def expand(asked: Mapping[str, Any]) -> dict[str, Any]:
 def main() -> None:
     """Expand what standard input asks for, and write the outcome to standard output."""
     asked = json.load(sys.stdin)
-    limit(asked["seconds"], asked["memory"])
+    seconds, memory = asked["seconds"], asked["memory"]
+    with suppress(ImportError):  # Windows has no such limits
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     with redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
         made = expand(asked)
     json.dump(made, sys.stdout)

@@ -1,6 +1,7 @@
 """MCAP channels without ROS: JSON documents, and Foxglove's JointStates in protobuf."""
 
 import json
+import re
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -81,19 +82,19 @@ class Documents:
 
     def read(self, request: ReadChoice) -> RawLog:
         """Read the channel whose documents hold joint positions."""
-        failures = []
+        failures: dict[int, LogError] = {}
         for channel, (rows, times) in self.found.items():
             try:
                 raw = self._read(channel, rows, times, request)
             except LogError as error:
-                failures.append((len(rows), error))
+                failures.setdefault(len(rows), error)
                 continue
             left = sorted({other.topic for other in self.found} - {channel.topic})
             said = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
             return replace(raw, remarks=(*raw.remarks, *said))
         # The fullest channel is the one that was meant; what it lacks is what the user
         # can mend.
-        raise max(failures, key=lambda failure: failure[0])[1]
+        raise failures[max(failures)]
 
     def _read(
         self, channel: Channel, rows: Sequence[Document], times: list[int], request: ReadChoice
@@ -205,6 +206,7 @@ def flattened(message: bytes, encoding: str) -> Document:
     return found
 
 
+VARINT = re.compile(rb"[\x80-\xff]{0,9}[\0-\x7f]")  #: A number of a protobuf message.
 #: Number of a field of a joint in foxglove.JointStates → its name.
 JOINT_FIELDS = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
 
@@ -233,14 +235,10 @@ def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
 
     def varint() -> int:
         nonlocal position
-        for shift in range(0, 64, 7):
-            if position >= len(message):
-                break
-            position += 1
-            if message[position - 1] < 128:
-                parts = message[position - 1 - shift // 7 : position]
-                return sum((byte & 127) << 7 * k for k, byte in enumerate(parts))
-        raise ValueError("a number ends outside its message")
+        if (found := VARINT.match(message, position)) is None:
+            raise ValueError("a number ends outside its message")
+        position = found.end()
+        return sum((byte & 127) << 7 * k for k, byte in enumerate(found[0]))
 
     while position < len(message):
         number, kind = divmod(varint(), 8)
