@@ -163,8 +163,9 @@ def _without_empty_joints(raw: RawLog) -> RawLog:
     if "q" not in raw.signals or raw.signals["q"].shape[1] != width:
         return raw
     empty = np.zeros(width, dtype=bool)
-    joints = [name for name, v in raw.signals.items() if name != "wrench" and v.shape[1] == width]
-    for value in (raw.signals[name] for name in joints):
+    every = raw.signals.items()
+    joints = {name: v for name, v in every if name != "wrench" and v.shape[1] == width}
+    for value in joints.values():
         if np.isnan(value[0]).any():
             missing = np.isnan(value).all(axis=0)
             empty |= missing & ~missing.all()

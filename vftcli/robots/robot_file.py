@@ -50,6 +50,11 @@ def is_finite(value: object) -> bool:
         return False
 
 
+def is_table(value: object) -> bool:
+    """Whether a value of TOML is a table."""
+    return isinstance(value, Mapping)
+
+
 def several(least: int) -> ValueKind:
     """The kind of a list of so many numbers or more."""
     words = f"a list of at least {least} finite numbers"
@@ -77,7 +82,7 @@ TEXTS = ValueKind(
     "text in quotes, or a list of it",
     lambda v: TEXT.fits(v) or (LIST.fits(v) and all(map(TEXT.fits, v))),
 )
-TABLE = ValueKind("a section", lambda v: isinstance(v, Mapping))
+TABLE = ValueKind("a section", is_table)
 PER_JOINT = one_each("a joint", is_finite)
 PER_AXIS = one_each("an axis", lambda v: is_finite(v) or v == math.inf)
 
@@ -280,7 +285,7 @@ class Section(NamedTuple):
     def tables(self, key: str) -> tuple[Mapping[str, Any], ...]:
         """The ``[[key]]`` tables, none if there are none."""
         words = f"tables, each headed [[{key}]]"
-        kind = ValueKind(words, lambda v: LIST.fits(v) and all(map(TABLE.fits, v)))
+        kind = ValueKind(words, lambda v: LIST.fits(v) and all(map(is_table, v)))
         return tuple(self.value(key, kind, ()))
 
     def section(self, name: str) -> "Section":
@@ -334,14 +339,9 @@ def lines_of(document: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterato
                 yield from lines_of(table, here)
 
 
-def is_table(value: object) -> bool:
-    """Whether a value is a table."""
-    return isinstance(value, Mapping)
-
-
-def is_tables(value: object) -> bool:
+def is_tables(value: Any) -> bool:  # noqa: ANN401 - TOML's
     """Whether a value is a list of tables, which may not be empty."""
-    return isinstance(value, list | tuple) and bool(value) and all(map(is_table, value))
+    return LIST.fits(value) and bool(value) and all(map(is_table, value))
 
 
 def bare(key: str) -> str:

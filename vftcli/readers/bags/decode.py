@@ -271,10 +271,10 @@ class Decoder:
         if channel.type not in KINDS or channel.encoding not in {"ros1", "cdr"}:
             self.others[channel.topic] = channel.type or channel.encoding
             return
-        topic = self.topics.get(channel)
         try:
-            if topic is None:
-                topic = self.topics[channel] = _Topic(types=types_for(channel))
+            if channel not in self.topics:
+                self.topics[channel] = _Topic(types=types_for(channel))
+            topic = self.topics[channel]
             for length in np.unique(batch.lengths):
                 self._of_length(batch, topic, int(length))
             for key, parts in topic.parts.items():
@@ -325,7 +325,8 @@ class Decoder:
         if all(number.size for number in stamp):
             part["header"] = np.hstack(stamp).astype(np.int64) @ (10**9, 1)
         topic.parts.setdefault(key, []).append(part)
-        topic.mixed |= {key} if names != own else set()
+        if names != own:
+            topic.mixed.add(key)
 
     def streams(self) -> Iterator[Stream]:
         """All streams that were decoded, each in the order of recording."""

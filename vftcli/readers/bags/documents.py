@@ -106,13 +106,12 @@ class Documents:
             if column is not None and not key.lower().startswith(("timestamp", "stamp", "header"))
         }
         stamps = [stamp_of(row) for row in rows]
-        base = next((b for b in STAMPS if isinstance(rows[0].get(b), int | float)), None)
-        number = column_of(rows, base) if None in stamps and base is not None else None
+        base = next((b for b in STAMPS if isinstance(rows[0].get(b), int | float)), "")
         clock = f"stamps in the messages of {channel.topic}"
-        if number is not None:
-            columns["timestamp"] = number
-        elif None not in stamps:
+        if None not in stamps:
             columns["timestamp_ns"] = np.array(stamps, dtype=np.int64)
+        elif base and (number := column_of(rows, base)) is not None:
+            columns["timestamp"] = number
         else:
             clock = "log time of the recorder"
             columns["timestamp_ns"] = np.array(times, dtype=np.int64)

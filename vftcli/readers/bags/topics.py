@@ -42,8 +42,7 @@ def aligned(
     for stream in streams:
         gathering.take(stream)
         for values in (stream.receive, stream.header, stream.robot, *stream.signals.values()):
-            if values is not None:
-                release(values)
+            release(values)
     frame = gathering.take_wrench(streams)
     gathering.report_left_out(streams, others)
     width = lead.width
