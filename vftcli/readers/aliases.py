@@ -79,9 +79,9 @@ class NamedColumns:
     """The columns of a headed table by what their names say.
 
     Attributes:
-        groups: Columns of one name but for their index, by that name in lower case and by index.
-        twice: Of such a name a column that has the index of another.
-        joints: Of such a name the joints' names where the columns have them.
+        groups: Name without index, in lower case → index → column.
+        twice: Name of a group → a column that has the index of another.
+        joints: Name of a group → the joints' names, if it has any.
     """
 
     def __init__(self, table: Table) -> None:

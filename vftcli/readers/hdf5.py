@@ -263,7 +263,7 @@ LAYOUTS = {ALOHA: read_aloha, f"{DROID_STATE}joint_positions": read_droid}
 
 
 def groups_of(names: Sequence[str], anchor: str) -> Names:
-    """The groups of a layout's episodes, in their order; none of a file of another layout."""
+    """The groups of a layout's episodes, in their order; none in other files."""
     ends = [name.removesuffix(anchor) for name in names if f"/{name}".endswith(f"/{anchor}")]
     return tuple(sorted(ends, key=natural))
 

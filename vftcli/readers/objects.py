@@ -89,7 +89,7 @@ def _object_in(line: bytes) -> Object | None:
 
 
 def flat(values: Object, levels: int, prefix: str = "") -> Iterator[tuple[str, Data]]:
-    """Values by dotted path, those of objects some levels down; objects below as they are."""
+    """Values by dotted path down to some level; objects below it as they are."""
     for name, value in values.items():
         if isinstance(value, dict) and value and levels:
             yield from flat(value, levels - 1, f"{prefix}{name}.")

@@ -308,7 +308,7 @@ class LumpedArm:
 
     @cached_property
     def turned(self) -> list[tuple[Array, Body]]:
-        """Rotation of each joint's axis onto z, and there its link with all locked on it."""
+        """Rotation of each joint's axis onto z; its link with what is locked there."""
         parts = [[NO_BODY] for _ in self.joints]
         for link in self.tree.links:
             group, pose = self.groups[link]

@@ -183,9 +183,9 @@ class Gathering:
         return frame if said.unit is None else WrenchFrame.parsed(said.unit)
 
     def interpolate(self, stream: Stream, signal: str) -> bool:
-        """Take a smooth signal of another topic at the leading one's times, held at the ends.
+        """Whether a smooth signal of another topic could be put on the leading one's times.
 
-        False, and a caution, where the other topic does not cover the leading one's time.
+        It is held at the ends. A caution where the other topic does not cover that time.
         """
         lead, times, topic = self.lead, self.host, stream.topic
         own = host_times(stream)
