@@ -26,8 +26,8 @@ ORDER = (
     "robots",
     "free_motion",
     "observers",
-    "virtual_sensor",
-    "refinement",
+    "wrench",
+    "bias",
     "evaluation",
     "identification",
     "simulation",
@@ -48,10 +48,10 @@ ORDER = (
 )
 """Rooms, lowest floor first: a room knows those before it."""
 
-APART = {"refinement", "evaluation", "identification", "simulation", "doctor", "contacts"}
+APART = {"bias", "evaluation", "identification", "simulation", "doctor", "contacts"}
 """Rooms that do not know each other."""
 
-KNOWN = {("evaluation", "refinement"), ("contacts", "refinement")}
+KNOWN = {("evaluation", "bias"), ("contacts", "bias")}
 """Pairs of those that do, the first the second."""
 
 FILES = (

@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 
 import vftcli as vft
 from vftcli import pipeline
+from vftcli.bias.choice import RefinementChoice
 from vftcli.cli import app
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion import free_motion
@@ -27,13 +28,12 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers import reading
 from vftcli.readers.reader import ReadChoice
-from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots import run as modelled
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
 from vftcli.signals.remarks import Remark
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"

@@ -38,7 +38,7 @@ from vftcli.robots.chain import flange_jacobian
 
 PACKAGE = Path(vftcli.__file__).parent
 ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", "outputs",
-         "refinement", "free_motion", "reproduction", "simulation", "virtual_sensor",
+         "bias", "free_motion", "reproduction", "simulation", "wrench",
          "answering.py", "notebook.py", "pipeline.py", "proposal.py", "streaming.py")  # fmt: skip
 
 AWAY, FLAG = "leave it away", "takes no value"

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     import polars as pl
     from matplotlib.figure import Figure
 
+    from vftcli.bias.refine import Refinement
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.published import Comparison
     from vftcli.free_motion.free_motion import FreeMotion
-    from vftcli.refinement.refine import Refinement
     from vftcli.signals.wrench import Wrench
-    from vftcli.virtual_sensor.sensing import FreeLog
-    from vftcli.virtual_sensor.sensor_reading import SensorReading
+    from vftcli.wrench.sensing import FreeLog
+    from vftcli.wrench.sensor_reading import SensorReading
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -150,7 +150,7 @@ class Analysis(Shown):
     def free_log(self, name: str | None = None) -> "FreeLog":
         """The log with what nobody touched, as an observer has it; for None as the model does."""
         from vftcli.free_motion.free_motion import without_load
-        from vftcli.virtual_sensor.sensing import FreeLog, as_modelled
+        from vftcli.wrench.sensing import FreeLog, as_modelled
 
         if self.refinement is None:
             return as_modelled(self.motion)

@@ -16,7 +16,7 @@ from vftcli.robots.run import Run, Runs
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 if TYPE_CHECKING:
     import polars as pl

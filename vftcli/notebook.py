@@ -28,6 +28,7 @@ from vftcli.answering import (
     replayed,
 )
 from vftcli.batch.log_work import for_comparison, for_estimates
+from vftcli.bias.choice import RefinementChoice
 from vftcli.doctor.examination import Examination, Examiner, examine
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
@@ -36,7 +37,6 @@ from vftcli.observers.choice import GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
@@ -44,7 +44,7 @@ from vftcli.signals.option import Choice, settings_as_typed
 from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remarks
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vftcli.bias.choice import RefinementChoice
 from vftcli.doctor.examination import Examiner
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
@@ -15,7 +16,6 @@ from vftcli.observers.table import BEST, LogSpectra
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.references import refuse_estimates
-from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs
@@ -25,12 +25,12 @@ from vftcli.signals.recording import Recording, refuse_repeated_logs
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
+    from vftcli.bias.baseline import Baselines
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.refinement.baseline import Baselines
-    from vftcli.virtual_sensor.choice import WrenchChoice
-    from vftcli.virtual_sensor.detection import KnownContacts
-    from vftcli.virtual_sensor.sensing import Gate
+    from vftcli.wrench.choice import WrenchChoice
+    from vftcli.wrench.detection import KnownContacts
+    from vftcli.wrench.sensing import Gate
 
 WRITING = 0.7  # share of a log's work that is done before its files are written
 
@@ -207,7 +207,7 @@ def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baselines | None":
     """The log's free part, spectra and bias, None where nothing asks for them."""
     if not choice.looks_back:
         return None
-    from vftcli.refinement.baseline import find_baselines
+    from vftcli.bias.baseline import find_baselines
 
     return find_baselines(motion, choice.refinement, best=BEST in choice.observers.names)
 
@@ -246,7 +246,7 @@ def refine(
     """Give the estimates what only the complete log allows: their bands."""
     if baselines is None:
         return analysis
-    from vftcli.refinement import refine as room
+    from vftcli.bias import refine as room
 
     bias, of_file = choice.refinement.bias, choice.observers.of_robot_file
     made = room.refine(
@@ -287,8 +287,8 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         if analysis.contacts is None or BEST not in names or analysis.robot.joints < 6:
             return analysis
         names = (BEST,)
-    from vftcli.virtual_sensor import sensing
-    from vftcli.virtual_sensor.choice import WrenchChoice
+    from vftcli.wrench import sensing
+    from vftcli.wrench.choice import WrenchChoice
 
     observers = [o for o in analysis.observers if o.name in names]
     estimates = [e for e in analysis.estimates if e.name in names]
@@ -306,7 +306,7 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
 def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None":
     """The contacts, outside of which nothing touches; None where the whole log may be one."""
-    from vftcli.virtual_sensor.sensing import Gate
+    from vftcli.wrench.sensing import Gate
 
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
@@ -318,7 +318,7 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
 def known_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "KnownContacts":
     """What is known of the log's contacts: its list, and where nothing touches the arm."""
     from vftcli.contacts.free_statistics import free_part
-    from vftcli.virtual_sensor.detection import KnownContacts, read_in_free_runs
+    from vftcli.wrench.detection import KnownContacts, read_in_free_runs
 
     motion, rows = unloaded_motion(analysis.motion, choice), analysis.contacts
     part = free_part(motion)

@@ -76,7 +76,7 @@ def analysed_in_blocks(
         every = slice(None)
         yield replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed), every
     if sensed is not None:
-        from vftcli.virtual_sensor.sensing import mask_remark
+        from vftcli.wrench.sensing import mask_remark
 
         hidden = np.concatenate(masked)
         more = (*mask_remark(hidden, np.array([least])), caution("no-wrench-band"))

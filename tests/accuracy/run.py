@@ -27,6 +27,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
 import scenarios  # noqa: E402
 
+from vftcli.bias.whole_log import whole_log_bias  # noqa: E402
 from vftcli.free_motion.free_motion import FreeMotion  # noqa: E402
 from vftcli.observers import spectra  # noqa: E402
 from vftcli.observers.choice import ObserverChoice  # noqa: E402
@@ -36,7 +37,6 @@ from vftcli.observers.tuning import (  # noqa: E402
     natural_frequencies,
     tune_to_spectra,
 )
-from vftcli.refinement.whole_log import whole_log_bias  # noqa: E402
 from vftcli.robots.run import Run, RunSamples  # noqa: E402
 from vftcli.signals.rest import standing  # noqa: E402
 

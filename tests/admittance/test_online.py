@@ -7,7 +7,7 @@ from vftcli.admittance.closed_loop import OnlineKalman
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.virtual_sensor.solvers import VirtualSensor
+from vftcli.wrench.solvers import VirtualSensor
 
 KFO = KalmanObserver(discretisation="fe", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
 

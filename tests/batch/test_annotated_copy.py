@@ -23,7 +23,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError, VftError
 from vftcli.signals.progress import no_stage
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
 FILES = [f"data/chunk-000/file-{k:03d}.parquet" for k in (0, 1)]

@@ -11,7 +11,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError
 from vftcli.signals.recording import Recording
-from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 
 T = np.arange(40) / 25
 Q = 0.3 * np.sin(T)[:, None] * np.ones(6)

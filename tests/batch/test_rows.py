@@ -13,7 +13,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.batch.choice import WorkersChoice
+from vftcli.bias.choice import RefinementChoice
 from vftcli.cli.analysis import AnalysisOptions, LogOptions
 from vftcli.cli.options import FORMS, Bundle, Needed, Typed, checked_form, command
 from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -18,11 +19,10 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import OutputChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import PackageError, ParameterError
 from vftcli.signals.option import Choice, Option
-from vftcli.virtual_sensor.choice import FIT, WrenchChoice
+from vftcli.wrench.choice import FIT, WrenchChoice
 
 EVERY = (
     ReadChoice, RobotChoice, ObserverChoice, FreeChoice, RefinementChoice, WrenchChoice,

@@ -4,7 +4,7 @@ import numpy as np
 
 from vftcli.contacts.contact_list import Contact, ContactList, ContactModel
 from vftcli.signals.remarks import caution, fact
-from vftcli.virtual_sensor.smoother import WrenchPrior
+from vftcli.wrench.smoother import WrenchPrior
 
 
 def contact(**changed: object) -> Contact:

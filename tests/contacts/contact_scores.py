@@ -1,7 +1,7 @@
 """Truth beside lists of contacts: which row is credited to which true contact, and by how much.
 
 A true contact is |F| > 1 N or |M| > .2 N·m, pauses shorter than .12 s closed. Rows are credited one
-to one, as `vftcli.virtual_sensor.detection` does it.
+to one, as `vftcli.wrench.detection` does it.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 from vftcli.contacts.contact_list import Contact
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import intervals
-from vftcli.virtual_sensor.detection import assignment, overlaps
+from vftcli.wrench.detection import assignment, overlaps
 
 LEAST_FORCE, LEAST_MOMENT, GAP = 1.0, 0.2, 0.12
 

@@ -34,7 +34,7 @@ from vftcli.robots.kernels import load_wrench
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import resample_columns
 from vftcli.simulation import load_scenario, simulate
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 LOGS = Path(os.environ.get("VFT_LOGS", "."))
 AXES = "Fx|Fy|Fz|Mx|My|Mz"

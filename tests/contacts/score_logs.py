@@ -28,7 +28,7 @@ from vftcli.pipeline import AnalysisChoice, analyse_log, analyse_logs, list_touc
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 LOGS = Path(os.environ.get("VFT_LOGS", "."))
 FREE = ("free_12harm.csv", "free_12harm_40s.csv.gz", "free_10harm.csv.gz", "free_repeat_a.csv",

@@ -15,7 +15,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import load_regressor, load_wrench
 from vftcli.signals.series import resample_columns
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 NAMES = "ur5_circle.csv", "ur5_table1.csv"
 

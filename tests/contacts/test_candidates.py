@@ -19,7 +19,7 @@ from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
 from vftcli.signals.series import runs_of
-from vftcli.virtual_sensor.model_error import ErrorProcess, error_process
+from vftcli.wrench.model_error import ErrorProcess, error_process
 
 
 def joints_of(d: Array) -> tuple[Blocks, Array]:

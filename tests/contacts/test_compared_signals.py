@@ -13,7 +13,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import RobotError
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.virtual_sensor.solvers import VirtualSensor
+from vftcli.wrench.solvers import VirtualSensor
 
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
 

@@ -9,7 +9,7 @@ from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
-from vftcli.virtual_sensor.model_error import (
+from vftcli.wrench.model_error import (
     LEAST_TIME,
     UNKNOWN,
     TorqueNoise,

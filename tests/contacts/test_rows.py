@@ -22,8 +22,8 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.virtual_sensor.model_error import error_process
-from vftcli.virtual_sensor.smoother import hidden_by_blocks
+from vftcli.wrench.model_error import error_process
+from vftcli.wrench.smoother import hidden_by_blocks
 
 
 def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:

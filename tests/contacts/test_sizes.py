@@ -13,8 +13,8 @@ from vftcli.contacts.windows import (
     smooth_lanes,
 )
 from vftcli.robots.terms import Blocks
-from vftcli.virtual_sensor.model_error import TorqueNoise, error_process
-from vftcli.virtual_sensor.smoother import BlockLog
+from vftcli.wrench.model_error import TorqueNoise, error_process
+from vftcli.wrench.smoother import BlockLog
 
 
 def wrench(size: list[float], sd: float) -> WindowWrench:

@@ -16,7 +16,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
-from vftcli.virtual_sensor.solvers import VirtualSensor
+from vftcli.wrench.solvers import VirtualSensor
 
 ROBOT = load_robot("ur5")
 T = 0.01 * np.arange(300)

@@ -6,7 +6,7 @@ import pytest
 
 from vftcli.evaluation import evaluate_wrenches, with_contacts
 from vftcli.signals.wrench import AXES, Wrench
-from vftcli.virtual_sensor.detection import ContactScore, Detection
+from vftcli.wrench.detection import ContactScore, Detection
 
 T = 0.01 * np.arange(200)
 WAVE = np.column_stack([np.sin((k + 1) * T) for k in range(6)])

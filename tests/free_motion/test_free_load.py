@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.bias.baseline import Baseline, baseline_of, free_reading
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, columns, free_load, weigh
 from vftcli.observers.tuning import tune_to_spectra
 from vftcli.readers import read
-from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.kernels import load_regressor

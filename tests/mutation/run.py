@@ -39,15 +39,15 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     ),
     "free_motion": (
         ["free_motion/*.py"],
-        ["tests/free_motion", "tests/refinement/test_reference_runs.py", "tests/test_pipeline.py"],
+        ["tests/free_motion", "tests/bias/test_reference_runs.py", "tests/test_pipeline.py"],
     ),
-    "virtual_sensor": (
-        ["virtual_sensor/**/*.py"],
-        ["tests/virtual_sensor", "tests/evaluation", "tests/outputs"],
+    "wrench": (
+        ["wrench/**/*.py"],
+        ["tests/wrench", "tests/evaluation", "tests/outputs"],
     ),
     "evaluation": (
         ["evaluation/*.py"],
-        ["tests/evaluation", "tests/virtual_sensor/test_sensor.py", "tests/test_pipeline.py"],
+        ["tests/evaluation", "tests/wrench/test_sensor.py", "tests/test_pipeline.py"],
     ),
     "identification": (
         ["identification/*.py"],
@@ -57,9 +57,9 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["admittance/*.py"],
         ["tests/admittance", "tests/cli/test_admit.py"],
     ),
-    "refinement": (
-        ["refinement/*.py"],
-        ["tests/refinement", "tests/test_pipeline.py", "tests/outputs"],
+    "bias": (
+        ["bias/*.py"],
+        ["tests/bias", "tests/test_pipeline.py", "tests/outputs"],
     ),
     "robots": (
         ["robots/*.py"],
@@ -76,7 +76,7 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     ),
     "signals": (
         ["signals/*.py"],
-        ["tests/signals", "tests/free_motion", "tests/observers", "tests/virtual_sensor"],
+        ["tests/signals", "tests/free_motion", "tests/observers", "tests/wrench"],
     ),
     "contacts": (["contacts/*.py"], ["tests/contacts", "tests/cli/test_contacts.py"]),
     "simulation": (["simulation/*.py"], ["tests/simulation", "tests/cli/test_simulate.py"]),

@@ -22,7 +22,7 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import caution, fact
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'
 

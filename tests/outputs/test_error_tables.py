@@ -24,7 +24,7 @@ from vftcli.outputs.grid import GridCell, latex, markdown, terminal
 from vftcli.outputs.grids import contact_grids, drift_grid, pairs_text
 from vftcli.outputs.page.shell import part
 from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.sensor_reading import Drift
+from vftcli.wrench.sensor_reading import Drift
 
 
 def errors_of(*changed: dict[str, object]) -> pl.DataFrame:

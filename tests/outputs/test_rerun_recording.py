@@ -18,9 +18,9 @@ from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
-from vftcli.virtual_sensor.frames import frame_pose
-from vftcli.virtual_sensor.solvers import wrench_of
+from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench.frames import frame_pose
+from vftcli.wrench.solvers import wrench_of
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 

@@ -16,7 +16,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
 from vftcli.simulation.arm import build_arm
 from vftcli.simulation.experiment import simulate_pair
-from vftcli.virtual_sensor.solvers import wrench_of
+from vftcli.wrench.solvers import wrench_of
 
 EXACT = [
     *(f"mismatch.{k}=0" for k in ("mass", "com", "rotor_inertia", "friction", "torque_constant")),

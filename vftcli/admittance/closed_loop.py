@@ -29,7 +29,7 @@ from vftcli.simulation.experiment import Progress, Simulation, observe
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants, log_rate, noise_sizes, rounded
 from vftcli.simulation.trajectories import Reference, plan
-from vftcli.virtual_sensor.solvers import wrench_of
+from vftcli.wrench.solvers import wrench_of
 
 FARTHEST = 3.0  #: A flange this far from its start has run away. [m]
 STARTED = 5e-3  #: Displacement of the flange at which it is said to have moved. [m]

@@ -43,10 +43,10 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.choice import SMOOTHER, WrenchChoice
-from vftcli.virtual_sensor.frames import logged_wrench
-from vftcli.virtual_sensor.sensor_reading import SensorReading, without_zero
-from vftcli.virtual_sensor.solvers import VirtualSensor
+from vftcli.wrench.choice import SMOOTHER, WrenchChoice
+from vftcli.wrench.frames import logged_wrench
+from vftcli.wrench.sensor_reading import SensorReading, without_zero
+from vftcli.wrench.solvers import VirtualSensor
 
 #: Rise of W in a step that gets a remark, as a share of W at the start of the phase.
 RISE = 1e-12

@@ -26,8 +26,8 @@ from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, 
 from vftcli.signals.recording import Recording
 from vftcli.signals.version import VERSION
 from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.choice import WrenchChoice
-from vftcli.virtual_sensor.frames import FRAMES
+from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench.frames import FRAMES
 
 USUAL = "kfo-zoh"  #: The observer where none is named: it needs no sample that comes later.
 Record = dict[str, Any]  #: What is recorded of episodes, by name.

@@ -4,6 +4,7 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
+from vftcli.bias.choice import RefinementChoice
 from vftcli.cli.console import health_of, stages
 from vftcli.cli.options import Anyway, Bundle, TalkOptions, Typed, Wrench
 from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -11,10 +12,9 @@ from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import OutputChoice
 from vftcli.readers.reader import ReadChoice
-from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import WRITE, Option
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 if TYPE_CHECKING:
     from vftcli.pipeline import AnalysisChoice

@@ -11,7 +11,7 @@ from vftcli.cli.console import command_line, detail, echo_data, say, stages
 from vftcli.observers.choice import ObserverChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.signals.parsing import check_known
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.wrench.choice import WrenchChoice
 
 ADDED = ("wrench", "sd", "contact")  #: What ``--add`` takes.
 

@@ -256,7 +256,7 @@ def say_analysis(analysis: "Analysis") -> None:
     if (sensed := analysis.virtual_sensor) is not None:
         from vftcli.outputs.grid import terminal
         from vftcli.outputs.grids import drift_grid
-        from vftcli.virtual_sensor.frames import FRAMES
+        from vftcli.wrench.frames import FRAMES
 
         detail(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
         if sensed.drifts:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+from vftcli.bias.choice import RefinementChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.console import (
@@ -22,7 +23,6 @@ from vftcli.cli.console import (
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice
-from vftcli.refinement.choice import RefinementChoice
 from vftcli.signals.errors import ParameterError
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vftcli.contacts.windows import ArmPart
     from vftcli.free_motion.free_motion import FreeLoad
     from vftcli.robots.run import Run
-    from vftcli.virtual_sensor.smoother import WrenchPrior
+    from vftcli.wrench.smoother import WrenchPrior
 
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
 #: Evidence and band of a row that is good; a wider band makes it weak.

@@ -6,11 +6,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vftcli.bias.whole_log import WholeLogBias
 from vftcli.contacts.windows import smooth_lanes, window_of
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
 from vftcli.observers import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
-from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run, RunSamples
@@ -21,7 +21,7 @@ from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
 from vftcli.signals.series import covered, intervals, median_step, near, runs_of
-from vftcli.virtual_sensor.model_error import (
+from vftcli.wrench.model_error import (
     DRY_SHARE,
     LEAST_ERROR,
     TorqueNoise,
@@ -29,7 +29,7 @@ from vftcli.virtual_sensor.model_error import (
     infer_noise,
     learn_noise,
 )
-from vftcli.virtual_sensor.smoother import BlockLog, Lane, WrenchPrior
+from vftcli.wrench.smoother import BlockLog, Lane, WrenchPrior
 
 #: Length of a block [s]; on a clock with steps that differ by this share it holds so many
 #: samples.

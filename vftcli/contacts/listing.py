@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vftcli.bias.whole_log import WholeLogBias, whole_log_bias
 from vftcli.contacts.contact_list import (
     CarriedLoad,
     Contact,
@@ -36,7 +37,6 @@ from vftcli.contacts.rows import (
 from vftcli.contacts.search import Candidates, search
 from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places
 from vftcli.free_motion.free_motion import FreeMotion
-from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.robots.terms import disturbance_blocks
@@ -46,8 +46,8 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.signals.series import covered
-from vftcli.virtual_sensor.model_error import UNSEEN_SHARE, error_process
-from vftcli.virtual_sensor.smoother import (
+from vftcli.wrench.model_error import UNSEEN_SHARE, error_process
+from vftcli.wrench.smoother import (
     DRIVES,
     BlockLog,
     BlockSpan,

@@ -29,8 +29,8 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import covered, resample_columns
-from vftcli.virtual_sensor.model_error import ErrorProcess, error_model, error_process
-from vftcli.virtual_sensor.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
+from vftcli.wrench.model_error import ErrorProcess, error_model, error_process
+from vftcli.wrench.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
 
 #: What the model's own standard deviations of force and moment are multiplied by: the
 #: error of the friction is not Gaussian. Chosen on simulated seeds together, for all

@@ -36,14 +36,14 @@ from vftcli.robots.terms import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
 from vftcli.signals.series import covered, intervals, runs_of
-from vftcli.virtual_sensor.model_error import (
+from vftcli.wrench.model_error import (
     ErrorProcess,
     TorqueNoise,
     error_process,
     spiked_white,
     steps,
 )
-from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan, WrenchPrior
+from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior
 
 #: A torque that stays beyond the threshold for longer than this beside a contact is part
 #: of it: the observer's lag is over, friction has turned. [s]

@@ -27,14 +27,14 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, POINTS, Wrench
-from vftcli.virtual_sensor.detection import (
+from vftcli.wrench.detection import (
     EARLY,
     TRUE_TORQUE,
     ContactInterval,
     match_contacts,
     true_intervals,
 )
-from vftcli.virtual_sensor.solvers import VirtualSensor
+from vftcli.wrench.solvers import VirtualSensor
 
 GAIN = 10.0  #: Of the momentum observer. [1/s]
 

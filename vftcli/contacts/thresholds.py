@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 from vftcli.signals.series import median_step
-from vftcli.virtual_sensor.detection import ContactInterval, contact_intervals
+from vftcli.wrench.detection import ContactInterval, contact_intervals
 
 SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero. [s]
 BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]

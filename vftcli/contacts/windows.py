@@ -24,8 +24,8 @@ from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.linear_model import SPIKE, LinearModel, log_likelihood, smoothed
 from vftcli.signals.pose import Pose
 from vftcli.signals.series import covered
-from vftcli.virtual_sensor.model_error import UNKNOWN, ErrorProcess, error_model, innovations
-from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan, Lane, WrenchPrior, assembled
+from vftcli.wrench.model_error import UNKNOWN, ErrorProcess, error_model, innovations
+from vftcli.wrench.smoother import BlockLog, BlockSpan, Lane, WrenchPrior, assembled
 
 ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
 POINTS = 10  #: Points along each link that a force is tried at.

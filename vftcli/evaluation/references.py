@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
+from vftcli.bias.refine import EXPECTED, MEASURED, gap_remark
 from vftcli.evaluation.errors import evaluate, joint_means
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.wrenches import evaluate_wrenches, with_contacts
@@ -16,7 +17,6 @@ from vftcli.free_motion.two_cycle import two_cycle_reference
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
 from vftcli.readers.references import ReferenceTable, read_reference
-from vftcli.refinement.refine import EXPECTED, MEASURED, gap_remark
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
@@ -29,10 +29,10 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, warning
 from vftcli.signals.series import resample_columns, runs_of
 from vftcli.signals.wrench import Wrench, WrenchFrame
-from vftcli.virtual_sensor.detection import KnownContacts, judge_contacts
-from vftcli.virtual_sensor.frames import NOTHING, Mounting, from_base, in_base_axes, logged_wrench
-from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
-from vftcli.virtual_sensor.solvers import VirtualSensor
+from vftcli.wrench.detection import KnownContacts, judge_contacts
+from vftcli.wrench.frames import NOTHING, Mounting, from_base, in_base_axes, logged_wrench
+from vftcli.wrench.sensor_reading import SensorReading, with_reference
+from vftcli.wrench.solvers import VirtualSensor
 
 #: Cutoff of the open torque's low-pass: a hand's push lasts longer, reversals do not.
 #: [Hz]

@@ -16,10 +16,10 @@ from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, Wrench
-from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
-from vftcli.virtual_sensor.detection import ContactScore
-from vftcli.virtual_sensor.sensor import RESEMBLES, fit_axes
-from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose, null_space, wrench_of
+from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench.detection import ContactScore
+from vftcli.wrench.sensor import RESEMBLES, fit_axes
+from vftcli.wrench.solvers import LEAST_SIGMA, decompose, null_space, wrench_of
 
 #: Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
 #:

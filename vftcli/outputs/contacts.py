@@ -28,7 +28,7 @@ from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, range
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, Where, sentence
-from vftcli.virtual_sensor.smoother import WrenchPrior
+from vftcli.wrench.smoother import WrenchPrior
 
 PART = 0.35  #: An axis that holds more than this share of a force is named in its direction.
 AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")  #: An axis' two directions, base axes.

@@ -34,7 +34,7 @@ from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.parsing import printable
 from vftcli.signals.wrench import AXES, unit_of
-from vftcli.virtual_sensor.solvers import LEAST_SIGMA
+from vftcli.wrench.solvers import LEAST_SIGMA
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from vftcli.evaluation.published import Comparison
     from vftcli.observers.tuning import Tuned
     from vftcli.robots.robot import Robot
-    from vftcli.virtual_sensor.sensor_reading import Drift
+    from vftcli.wrench.sensor_reading import Drift
 
 SURE = 0.05  #: Below this p a difference between two observers is called sure.
 #: Columns of the contact table, and how they are headed.

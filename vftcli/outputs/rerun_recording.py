@@ -49,8 +49,8 @@ from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.progress import steps
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.choice import SMOOTHER
-from vftcli.virtual_sensor.solvers import ForceArrow, VirtualSensor
+from vftcli.wrench.choice import SMOOTHER
+from vftcli.wrench.solvers import ForceArrow, VirtualSensor
 
 #: Stretches of a long log of which a plot keeps the lowest and highest samples of its
 #: lines.

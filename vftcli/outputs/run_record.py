@@ -239,7 +239,7 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
     sensed = analysis.virtual_sensor
     if sensed is None:
         return None
-    from vftcli.virtual_sensor.frames import FRAMES
+    from vftcli.wrench.frames import FRAMES
 
     return {
         "frame": sensed.sensor.frame,

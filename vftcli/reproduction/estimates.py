@@ -30,8 +30,8 @@ from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.simulation import load_scenario, simulate
-from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
-from vftcli.virtual_sensor.solvers import VirtualSensor
+from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench.solvers import VirtualSensor
 
 #: Variant → how its observers are chosen; the last moves all to FDO's bandwidth, 10
 #: rad/s.

@@ -30,7 +30,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.virtual_sensor.frames import NOTHING
+from vftcli.wrench.frames import NOTHING
 
 #: Torque from which a joint's truth is a contact where no force is known, and its end. [N·m]
 TOUCHED, UNTOUCHED = 0.05, 0.025

@@ -27,7 +27,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.packages import installed, needed
 from vftcli.signals.recording import Recording
-from vftcli.virtual_sensor.smoother import smooth_wrench
+from vftcli.wrench.smoother import smooth_wrench
 
 SAMPLES = 30_060  #: Samples of the paper's Table II.
 #: Length of the part that counts as free for the observers that the log tunes. [s]

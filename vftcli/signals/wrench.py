@@ -117,7 +117,7 @@ class Wrench(TimeSeries):
     #: Force, then moment; also where the pose cannot tell them, so that a blow-up can be
     #: seen: use `known` for numbers. (T, 6) [N, N·m]
     values: Array
-    frame: str  #: Axes and reference point: a key of `vftcli.virtual_sensor.frames.FRAMES`.
+    frame: str  #: Axes and reference point: a key of `vftcli.wrench.frames.FRAMES`.
     sd: Array | None = None  #: One standard deviation of `values`. (T, 6) [N, N·m]
     #: Smallest singular value of J with angular rows × 0.3 m, None where no Jacobian was
     #: inverted. (T,) [m]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.bias.refine import Budget
 from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.published import Comparison, advice, facts
 from vftcli.observers.table import OBSERVERS
@@ -16,7 +17,6 @@ from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, wor
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.quantity import DASH, banded, significant, vector
 from vftcli.outputs.run_record import observer_record
-from vftcli.refinement.refine import Budget
 from vftcli.signals.arrays import Array
 
 MOST = 40  #: Contacts in numbers at most.

@@ -28,7 +28,7 @@ from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, signi
 from vftcli.outputs.run_record import run_record
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
-from vftcli.virtual_sensor.frames import FRAMES
+from vftcli.wrench.frames import FRAMES
 
 if TYPE_CHECKING:
     import polars as pl

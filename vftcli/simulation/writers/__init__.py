@@ -24,7 +24,7 @@ from vftcli.simulation.experiment import FlangeMotion, Simulation, Truth, flat
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
-from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
+from vftcli.wrench.solvers import LEAST_SIGMA, wrench_of
 
 #: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next
 #: NAME" the row that follows, the last repeated: a command is executed one cycle later.

@@ -17,7 +17,7 @@ from vftcli.readers.bags.ros_messages import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.simulation.experiment import FlangeMotion, Simulation
-from vftcli.virtual_sensor.solvers import wrench_of
+from vftcli.wrench.solvers import wrench_of
 
 RECEIVED_LATER_NS = 400_000  #: How long after its stamp a message reaches the recorder. [ns]
 MODE_MOVE = 2  #: ROBOT_MODE_MOVE of FrankaRobotState.

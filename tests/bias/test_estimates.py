@@ -1,0 +1,261 @@
+"""What a complete log allows, on the reference fixture: tuned gains, bands, bias, limits."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.bias.choice import RefinementChoice
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
+from vftcli.readers.library import Library
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.robots.friction import dry_friction
+from vftcli.signals.errors import ParameterError, VftError
+from vftcli.signals.remarks import Remark
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+WHOLE_LOG = RefinementChoice(bias="whole-log")
+DENSITIES = ObserverChoice.parsed(
+    observer=["rts-auto", "kfo-rts"], settings={"kfo.noise_convention": "density"}
+)
+"""A tuned smoother, and what it falls back to."""
+MOVING = np.array([1, 2, 3, 4, 6])
+"""Joint 5 of the circle rests."""
+
+
+def codes(analysis: Analysis) -> set[str]:
+    return {remark.code for remark in analysis.remarks if isinstance(remark, Remark)}
+
+
+def mean_rmse(analysis: Analysis, observer: str) -> float:
+    assert analysis.errors is not None
+    rows = analysis.errors.filter(pl.col("observer") == observer)
+    rows = rows.filter(pl.col("joint").is_in(MOVING.tolist()))
+    return float(rows["rmse_Nm"].mean())
+
+
+@pytest.mark.slow
+def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis) -> None:
+    found = worked_up.refinement
+    assert found is not None
+    assert found.remarks[0].code == "free-cycle-found"
+    assert (found.remarks[0].values["cycles"], found.remarks[0].values["whole"]) == ([1], 5)
+    inside = worked_up.t[found.baselines.plain.part.own]
+    assert inside[0] == pytest.approx(0.0, abs=0.05)
+    assert inside[-1] == pytest.approx(4.0, abs=0.05)
+    band = next(r for r in found.remarks if r.code == "band-of-a-standing-joint")
+    assert band.where.joints == (5,)
+
+
+@pytest.mark.slow
+def test_ratios_to_the_hand_set_filter(worked_up: Analysis, request_: AnalysisChoice) -> None:
+    """Bounds of the reference simulation for this one run, seed 1 of mixed pushes."""
+    discrete = replace(
+        request_.observers,
+        names=("kfo-zoh", "kfo-rts"),
+        settings={"kfo": {"noise_convention": "discrete"}},
+    )
+    by_hand = mean_rmse(worked_up, "kfo-zoh")
+    quick = analyse_log(FIXTURE, replace(request_, observers=discrete))
+    faster = mean_rmse(quick, "kfo-zoh")
+    for error, bounds in (
+        (mean_rmse(quick, "kfo-rts"), (0.60, 0.85)),
+        (mean_rmse(worked_up, "rts-auto"), (0.45, 0.70)),
+    ):
+        assert error <= bounds[0] * by_hand
+        assert error <= bounds[1] * faster
+    assert mean_rmse(worked_up, "kfo-auto") <= 1.05 * min(by_hand, faster)
+
+
+@pytest.mark.slow
+def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None:
+    assert worked_up.errors is not None
+    rows = worked_up.errors.filter(pl.col("joint").is_in(MOVING.tolist()))
+    for observer in ("kfo-auto", "rts-auto"):
+        share = rows.filter(pl.col("observer") == observer)["coverage_95"].mean()
+        assert 0.93 <= share <= 0.99
+    # Pushes slide the resting joint in 23 of 2501 samples; at rest stiction hides them.
+    assert np.count_nonzero(worked_up.estimates[-1].moving[:, 4]) == 23
+
+
+@pytest.mark.slow
+def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
+    found = worked_up.refinement
+    assert found is not None
+    spectra = found.baselines.plain.spectra
+    assert spectra is not None
+    for observer, estimate in zip(worked_up.observers, worked_up.estimates, strict=True):
+        response = observer.frequency_response(spectra.frequency, spectra.step, 6)
+        lag = np.sum(np.abs(1 - response) ** 2 * spectra.external, axis=0) * spectra.width
+        own = found.baselines.plain.part.own
+        rests = found.baselines.plain.motion.log.rests
+        friction = dry_friction(worked_up.robot.friction, 6)
+        j, moves = MOVING - 1, ~rests & own[:, None]
+        free = np.array([np.mean(estimate.tau[moves[:, k], k] ** 2) for k in j])
+        sd = np.sqrt(free + lag[j])
+        k = int(np.argmin(rests[:, j].any(axis=1)))
+        np.testing.assert_allclose(estimate.error_sd[k, j], sd, rtol=1e-12)
+        # J5 rests, and reads less than .45 of its dry friction meanwhile
+        still = np.sqrt((0.45 * friction[4]) ** 2 + lag[4])
+        assert estimate.error_sd[k, 4] == pytest.approx(still, rel=1e-12)
+        assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.error_sd[7])
+
+
+def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None:
+    found = worked_up.refinement
+    assert found is not None
+    budget = found.budgets[-1]
+    limits = found.remarks[-1]
+    assert (limits.code, limits.where.about) == ("limits", "rts-auto")
+    assert limits.values["causes"][4] == "stiction at rest"  # J5 rests
+    for j in (0, 1, 2, 3, 5):
+        cause, size = limits.values["causes"][j], limits.values["size_Nm"][j]
+        assert size == max(budget.parts[c][j] for c in ("noise", "friction", "model", "bandwidth"))
+        assert size == budget.parts[cause][j]
+    assert all(np.all(part >= 0.0) for part in budget.parts.values())
+    # its parts but bandwidth are the free rms, cause by cause
+    read = np.mean(worked_up.estimates[-1].tau[found.baselines.plain.part.own] ** 2, axis=0)
+    parts = sum(budget.parts[cause] ** 2 for cause in ("noise", "friction", "model"))
+    np.testing.assert_allclose(parts, read, rtol=1e-9)
+
+
+def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
+    request = AnalysisChoice(
+        read=ReadChoice(interval=(4.5, 6.0)),
+        robot=RobotChoice(name="ur5"),
+        observers=DENSITIES,
+    )
+    analysis = analyse_log(FIXTURE, request)
+    assert any("rts-auto: no free part to tune on" in str(note) for note in analysis.remarks)
+    assert "no-free-part" in codes(analysis)
+    auto, by_hand = analysis.estimates
+    np.testing.assert_array_equal(auto.tau, by_hand.tau)
+    assert auto.error_sd is None
+
+
+@pytest.mark.slow
+def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
+    request = AnalysisChoice(
+        free=FreeChoice(spans=((0.0, 0.1),)),
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("rts-auto",)),
+    )
+    analysis = analyse_log(FIXTURE, request)
+    assert "no-spectra" in codes(analysis)
+    assert analysis.estimates[0].error_sd is None
+
+
+def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
+    """Two free cycles of one log: the part is no quieter than the rest."""
+    recording = Library().open(FIXTURE, ReadChoice(interval=(0.0, 4.0)))
+    twice = replace(
+        recording,
+        t=np.concatenate([recording.t, recording.t + 4.0 + recording.median_step]),
+        **{
+            name: np.concatenate([value, value])
+            for name in ("q", "dq", "current")
+            if (value := getattr(recording, name)) is not None
+        },
+        **dict.fromkeys(
+            ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
+        ),
+    )
+    request = AnalysisChoice(
+        robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("kfo-auto",))
+    )
+    analysis = analyse(twice, request.robot.load(twice), request)
+    assert "free-part-not-quiet" in codes(analysis)
+    assert analysis.estimates[0].error_sd is None
+
+
+@pytest.mark.slow
+def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: AnalysisChoice) -> None:
+    """Its quietest cycle is pushed too: hand-set gains, no bands, both said."""
+    always = replace(
+        request_,
+        read=ReadChoice(interval=(4.3, 20.0)),
+        observers=DENSITIES,
+    )
+    analysis = analyse_log(FIXTURE, always)
+    assert "free-part-not-quiet" in codes(analysis)
+    np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)
+    assert analysis.estimates[0].error_sd is None
+    # what the user states is not doubted
+    stated = analyse_log(FIXTURE, replace(always, free=FreeChoice(cycles=(1,))))
+    assert stated.estimates[0].error_sd is not None
+
+
+@pytest.mark.slow
+def test_a_gap_in_the_log_is_survived() -> None:
+    """Half a second is missing amid a push: everything stays finite."""
+    request = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("kfo-auto", "rts-auto")),
+        refinement=WHOLE_LOG,
+    )
+    whole = request.library.open(FIXTURE, request.read)
+    keep = (whole.t < 9.0) | (whole.t > 9.5)
+    names = ("t", "q", "dq", "current")
+    cut = replace(
+        whole,
+        **{name: getattr(whole, name)[keep] for name in names},
+        **dict.fromkeys(
+            ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
+        ),
+    )
+    analysis = analyse(cut, request.robot.load(cut), request)
+    for estimate in analysis.estimates:
+        assert np.all(np.isfinite(estimate.tau))
+        assert estimate.error_sd is not None
+        assert np.all(np.isfinite(estimate.error_sd))
+
+
+def test_what_cannot_be_done_is_one_line() -> None:
+    request = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("kfo-zoh",)),
+        free=FreeChoice(spans=((40.0, 50.0),)),
+    )
+    with pytest.raises(VftError, match="it must be a part of the log") as caught:
+        analyse_log(FIXTURE, request)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_bias_removal_needs_no_tuned_observer() -> None:
+    request = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("gmo",)),
+        refinement=WHOLE_LOG,
+    )
+    estimate = analyse_log(FIXTURE, request).estimates[0]
+    plain = analyse_log(
+        FIXTURE,
+        AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("gmo",))),
+    ).estimates[0]
+    assert estimate.error_sd is not None
+    assert plain.error_sd is None
+    assert np.max(np.abs(estimate.tau - plain.tau)) > 0.5
+
+
+@pytest.mark.slow
+def test_an_unknown_gains_file_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "gains.toml"
+    file.write_text("[observers.gmo]\ngian = 3.0\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match="Did you mean gain"):
+        analyse_log(
+            FIXTURE,
+            AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains=file)),
+        )
+    file.write_text("gain = 3.0\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"no \[observers"):
+        analyse_log(
+            FIXTURE,
+            AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains=file)),
+        )

@@ -1,0 +1,132 @@
+"""The normal equations against dense matrices, and the choice of loads against all of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_errors import drawn_error, shortened, ur10e, wrong_run
+
+from vftcli.bias.model_error import (
+    column_numbers,
+    error_columns,
+    expected_error,
+    smooth_motion,
+)
+from vftcli.bias.robust_fit import Rows, slow_loads
+
+JOINTS, STRIDE = 4, 10
+
+
+def push(t, _q):
+    """A torque that rises along the log. (T, n) [N·m]"""
+    return 0.4 * t[:, None] * np.ones(JOINTS)
+
+
+@pytest.fixture(scope="module")
+def rows():
+    robot = shortened(ur10e(), JOINTS)
+    run = wrong_run(robot, drawn_error(robot), push, seconds=26.0, noise=0.5)
+    motion = smooth_motion(run)
+    d = np.gradient(run.terms.p, motion.t, axis=0) - run.terms.mu
+    return Rows(
+        columns=error_columns(run, motion, expected_error(robot), STRIDE),
+        loads=slow_loads(robot.chain, motion.t[::STRIDE], motion.q[::STRIDE]),
+        d=d[::STRIDE],
+    )
+
+
+@pytest.fixture(scope="module")
+def weight(rows):
+    """Of every row, differing. Seed 4."""
+    return np.random.default_rng(4).uniform(0.01, 2.0, rows.d.shape)
+
+
+def dense(rows):
+    """All columns as one matrix a joint: the model's, then each knot's and component's load."""
+    samples, P = len(rows.d), rows.unknowns
+    loads = rows.loads
+    A = np.zeros((samples, rows.joints, P + loads.sizes[-1]))
+    for j, column in enumerate(rows.columns):
+        A[:, j, column_numbers(j, rows.joints)] = column
+    for size in range(loads.sizes[-1]):
+        A[:, :, P + size] = loads.torque_of(np.eye(loads.sizes[-1])[size])
+    return A
+
+
+def by_hand(A, d, weight, sd):
+    """u and its objective for some columns: (AᵀWA + diag(sd⁻²))⁻¹ AᵀWd with its sign turned."""
+    A = A.reshape(-1, A.shape[-1])
+    w, d = weight.ravel(), d.ravel()
+    u = -np.linalg.solve(A.T @ (A * w[:, None]) + np.diag(sd**-2.0), A.T @ (w * d))
+    return u, np.sum(w * (d + A @ u) ** 2) + np.sum((u / sd) ** 2)
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0])
+def test_the_solution_is_that_of_the_dense_matrix(rows, weight, scale):
+    """The group of loads is the one with the least objective and twice its columns."""
+    A, P, sizes = dense(rows), rows.unknowns, rows.loads.sizes
+    found = rows.solution(rows.sums(weight)[0], scale)
+    costs, solutions = [], []
+    for size in sizes:
+        sd = np.concatenate([np.full(P, scale), np.ones(size)])
+        u, objective = by_hand(A[:, :, : P + size], rows.d, weight, sd)
+        costs.append(objective + 2.0 * size)
+        solutions.append(u)
+    best = int(np.argmin(costs))
+    assert len(found.loads) == sizes[best]
+    # condition numbers of up to 1e8 leave seven digits
+    np.testing.assert_allclose(found.model, solutions[best][:P], atol=1e-6)
+    np.testing.assert_allclose(found.loads, solutions[best][P:], atol=1e-6)
+
+
+def test_the_model_alone_is_solved_alike(rows, weight):
+    A, P = dense(rows), rows.unknowns
+    alone = replace(rows, loads=rows.loads.none)
+    found = alone.solution(alone.sums(weight)[0])
+    u, _ = by_hand(A[:, :, :P], rows.d, weight, np.ones(P))
+    np.testing.assert_allclose(found.model, u, atol=1e-6)
+    torque = np.einsum("tnp,p->tn", A[:, :, :P], u)
+    np.testing.assert_allclose(rows.modelled(found.model), torque, atol=1e-5)
+    np.testing.assert_allclose(rows.modelled(found.model, slice(7, 20)), torque[7:20], atol=1e-5)
+
+
+def test_the_spread_is_that_of_the_inverse(rows, weight):
+    """diag(A N⁻¹ Aᵀ) with the loads' columns in N."""
+    P, found = rows.unknowns, rows.solution(rows.sums(weight)[0], 0.3)
+    used = len(found.loads)
+    assert used > 0
+    A = dense(rows)[:, :, : P + used]
+    flat = A.reshape(-1, A.shape[-1])
+    prior = np.concatenate([np.full(P, 0.3), np.ones(used)]) ** -2.0
+    N = flat.T @ (flat * weight.ravel()[:, None]) + np.diag(prior)
+    covariance = np.linalg.inv(N)[:P, :P]
+    expected = np.sqrt(np.einsum("tnp,pq,tnq->tn", A[:, :, :P], covariance, A[:, :, :P]))
+    np.testing.assert_allclose(rows.spread(found.covariance), expected, rtol=1e-6)
+
+
+def test_sums_over_parts_are_sums_over_their_samples(rows, weight):
+    """Parts that overlap, and samples that are left out: each against its own samples alone."""
+    samples = len(rows.d)
+    taken = np.random.default_rng(6).uniform(size=samples) > 0.3
+    places = np.arange(samples)
+    parts = [(places >= 20) & (places < 90), (places >= 80) & (places < 200)]
+    whole, *sums = rows.sums(weight, taken, parts)
+    A = dense(rows)
+    for part, found in zip(parts, sums, strict=True):
+        kept = part & taken
+        flat, w = A[kept].reshape(-1, A.shape[-1]), weight[kept].ravel()
+        d = rows.d[kept].ravel()
+        np.testing.assert_allclose(found.gram, flat.T @ (flat * w[:, None]), atol=1e-8)
+        np.testing.assert_allclose(found.right, flat.T @ (w * d), atol=1e-8)
+        assert found.square == pytest.approx(np.sum(w * d**2))
+        rest = taken & ~part
+        flat, w = A[rest].reshape(-1, A.shape[-1]), weight[rest].ravel()
+        left = whole.minus(found)
+        np.testing.assert_allclose(left.gram, flat.T @ (flat * w[:, None]), atol=1e-8)
+
+
+def test_no_load_is_believed_where_there_is_none(rows):
+    """Noise of a tenth of the scale gains less than two a column."""
+    quiet = Rows(columns=rows.columns, loads=rows.loads,
+                 d=np.random.default_rng(8).normal(0.0, 0.1, rows.d.shape))  # fmt: skip
+    assert len(quiet.solution(quiet.sums(np.ones(rows.d.shape))[0]).loads) == 0

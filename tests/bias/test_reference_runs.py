@@ -1,0 +1,149 @@
+"""The figures a complete log was asked for: reference simulation, other engines, real logs."""
+
+import gzip
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.bias.refine import refine
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse_log, model, read
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.robots.run import Runs
+from vftcli.signals.remarks import Remark
+from vftcli.simulation import load_scenario, simulate
+
+UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+
+
+def mean_rmse(analysis: Analysis, observer: str) -> float:
+    assert analysis.errors is not None
+    return float(analysis.errors.filter(pl.col("observer") == observer)["rmse_Nm"].mean())
+
+
+def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
+    """Ratios to the hand-set filters, and coverages, of one reference run."""
+    settings = [f"contacts.hand.style={style}", "friction.presliding=0"]
+    run = simulate(load_scenario("ur5-circle", settings), seed)
+    log, robot, truth = run.recording, run.robot, run.truth.tau_ext
+    asked = AnalysisChoice(
+        observers=ObserverChoice(
+            names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"),
+            settings={"kfo": {"noise_convention": "density"}},
+        ),
+    )
+    motion = read(log, robot, asked, Runs())
+    terms, found = motion.log.terms, model(motion, asked)
+    assert found is not None
+    observers, _ = asked.observers.build(robot, log.median_step, found.spectra(gains=False))
+    estimates = [observer.estimate(terms) for observer in observers]
+    discrete = replace(asked.observers, settings={"kfo": {"noise_convention": "discrete"}})
+    quick = [
+        o.estimate(terms)
+        for o in discrete.build(robot, log.median_step, found.spectra(gains=False))[0][:2]
+    ]
+    banded = refine(found, observers, estimates).estimates
+    moving = ~found.plain.stuck
+
+    def error(tau: np.ndarray) -> float:
+        return float(np.sqrt(np.mean((tau - truth) ** 2, axis=0))[moving].mean())
+
+    density, faster = error(estimates[0].tau), error(quick[0].tau)
+    shown = [error(x) for x in (quick[1].tau, estimates[3].tau)]
+    ratios = [e / d for e in shown for d in (density, faster)]
+    covered = [
+        float(np.mean((np.abs(e.tau - truth) <= 1.96 * e.error_sd)[:, moving]))
+        for e in (banded[2], banded[3])
+        if e.error_sd is not None
+    ]
+    return [*ratios, error(estimates[2].tau) / min(density, faster)], covered
+
+
+@pytest.mark.statistical
+def test_reference_runs_reach_their_ratios_and_coverage() -> None:
+    """Five seeds each of taps, mixed and slow pushes, of an arm whose joints stick.
+
+    Measured means: smoother .287/.549 of KFO density/discrete, tuned .259/.500; the tuned filter at
+    worst .956 of the better hand setting; bands cover 95.3 % and 96.4 %.
+    """
+    runs = [one_run(style, seed) for style in ("taps", "mixed", "slow") for seed in range(1, 6)]
+    ratios, covered = (np.array(x) for x in zip(*runs, strict=True))
+    assert np.all(ratios[:, :4].mean(axis=0) <= [0.60, 0.85, 0.45, 0.70])
+    assert np.all(ratios[:, 4] <= 1.05)
+    assert np.all((covered.mean(axis=0) >= 0.93) & (covered.mean(axis=0) <= 0.99))
+
+
+@pytest.mark.slow
+def test_mujoco_ur5e(logs: Path) -> None:
+    """An independent engine: the tuned smoother at most 0.6 of GMO(30). Measured .53."""
+    folder = logs / "mujoco_ur5e"
+    request = AnalysisChoice(
+        robot=RobotChoice(name=str(folder / "robot.toml")),
+        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")),
+        reference=ReferenceChoice(name="vendor"),
+    )
+    analysis = analyse_log(folder / "circle.csv", request)
+    assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
+
+
+@pytest.mark.slow
+def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
+    """Behind Franka's own protocol; the log repeats nothing, so its free part is stated.
+
+    Measured .39 of GMO(30).
+    """
+    folder = logs / "libfranka_sim"
+    for name in ("pushes.csv", "pushes_truth.csv"):
+        with gzip.open(folder / f"{name}.gz") as packed, (tmp_path / name).open("wb") as plain:
+            shutil.copyfileobj(packed, plain)
+    request = AnalysisChoice(
+        free=FreeChoice(spans=((1.5, 6.0),)),
+        read=ReadChoice(interval=(1.5, 27.5)),
+        robot=RobotChoice(name=str(folder / "robot.toml")),
+        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")),
+        reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
+    )
+    analysis = analyse_log(tmp_path / "pushes.csv", request)
+    assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
+
+
+@pytest.mark.slow
+def test_ur10e_payload(logs: Path) -> None:
+    """Real: at most the error of the best causal observer. Measured .92: friction is in all."""
+    folder = logs / "ur10e"
+    request = AnalysisChoice(
+        free=FreeChoice(logs=(folder / "free_14harm.csv",)),
+        read=ReadChoice(columns=UR10E),
+        robot=RobotChoice(name="ur10e"),
+        observers=ObserverChoice(names=("fdo", "gmo", "kfo-fe", "kfo-zoh", "rts-auto")),
+        reference=ReferenceChoice(name="two-cycle"),
+    )
+    plain = analyse_log(folder / "load_14harm.csv", request)
+    causal = min(mean_rmse(plain, name) for name in request.observers.names[:4])
+    assert mean_rmse(plain, "rts-auto") <= causal
+
+
+@pytest.mark.slow
+def test_ur10e_pushes_between_which_stiction_is_named(logs: Path) -> None:
+    """Real: a held pose; what is left between pushes is stiction, and is said to be."""
+    request = AnalysisChoice(
+        free=FreeChoice(spans=((0.0, 2.0),)),
+        read=ReadChoice(columns=UR10E),
+        robot=RobotChoice(name="ur10e"),
+        observers=ObserverChoice(names=("rts-auto",)),
+    )
+    analysis = analyse_log(logs / "ur10e" / "push_pose.csv", request)
+    named = [
+        remark.where.joints
+        for remark in analysis.remarks
+        if isinstance(remark, Remark) and remark.code == "band-of-a-standing-joint"
+    ]
+    assert named == [(1, 2, 3, 4, 5, 6)]

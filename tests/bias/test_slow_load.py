@@ -1,0 +1,82 @@
+"""Slow external loads: their columns against Pinocchio, their knots against a dense sum."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from known_errors import motion, shortened, ur10e
+
+from vftcli.bias.robust_fit import (
+    FORCE,
+    MOMENT,
+    slow_loads,
+)
+from vftcli.robots import load_robot
+
+
+@pytest.mark.parametrize(("name", "joints"), [("ur5", (2, 3)), ("panda", (3, 4))])
+def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
+    """J of elbow and wrist on the links before, by Pinocchio: frames there, in world axes.
+
+    Joints from 0; of seven the axis of 5 passes where 6 is.
+    """
+    robot = load_robot(name)
+    q = np.random.default_rng(1).uniform(-2.0, 2.0, (5, robot.joints))
+    loads = slow_loads(robot.chain, np.arange(5.0), q)
+    for k, joint in enumerate(joints):
+        model = robot.model.copy()
+        point = pin.SE3(np.eye(3), robot.chain.translation[joint])
+        frame = model.addFrame(pin.Frame("point", joint, point, pin.FrameType.OP_FRAME))
+        data = model.createData()
+        for row, found in zip(q, loads.torque[:, :, 6 + 3 * k : 9 + 3 * k], strict=True):
+            J = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+            np.testing.assert_allclose(found, -FORCE * J.T, atol=1e-12 * FORCE)
+
+
+@pytest.mark.parametrize(("joints", "points"), [(3, 1), (4, 1), (5, 1), (6, 2)])
+def test_a_short_arm_has_fewer_points(joints, points):
+    q = np.zeros((4, joints))
+    loads = slow_loads(shortened(ur10e(), joints).chain, np.arange(4.0), q)
+    assert loads.torque.shape[2] == 6 + 3 * points
+
+
+@pytest.mark.parametrize(("seconds", "knots"), [(14.0, 1), (16.0, 3), (55.0, 7), (3600.0, 61)])
+def test_knots_lie_ten_seconds_apart(seconds, knots):
+    t = np.linspace(0.0, seconds, 40)
+    loads = slow_loads(load_robot("ur5").chain, t, np.zeros((40, 6)))
+    assert loads.knots == knots
+    assert loads.sizes == (0, 6 * knots, 12 * knots)
+    np.testing.assert_allclose(loads.knot + loads.share, t / seconds * (knots - 1), atol=1e-9)
+    assert loads.knot.max() <= max(knots - 2, 0)
+
+
+def test_a_load_runs_straight_from_knot_to_knot():
+    """Against the sum over all knots of hat functions, component by component."""
+    robot = load_robot("ur5")
+    t = np.linspace(0.0, 25.0, 60)
+    q = motion(t, 6)[0]
+    loads = slow_loads(robot.chain, t, q)
+    values = np.random.default_rng(3).normal(size=loads.sizes[-1])
+    at = np.linspace(0.0, 25.0, loads.knots)
+    expected = np.zeros((60, 6))
+    for k in range(loads.knots):
+        hat = np.interp(t, at, np.eye(loads.knots)[k])
+        for c in range(loads.torque.shape[2]):
+            value = values[loads.numbers[k, c]]
+            expected += value * hat[:, None] * loads.torque[:, :, c]
+    np.testing.assert_allclose(loads.torque_of(values), expected, atol=1e-10)
+    flange = loads.torque_of(values[: loads.sizes[1]])
+    np.testing.assert_allclose(
+        flange, loads.torque_of(np.append(values[: loads.sizes[1]], np.zeros(6 * loads.knots)))
+    )
+
+
+def test_columns_are_the_torque_with_its_sign_turned_of_one_standard_deviation():
+    robot = load_robot("ur5")
+    q = motion(np.arange(4.0), 6)[0]
+    loads = slow_loads(robot.chain, np.arange(4.0), q)
+    data = robot.model.createData()
+    frame = robot.model.getFrameId("flange")
+    for row, torque in zip(q, loads.torque, strict=True):
+        J = pin.computeFrameJacobian(robot.model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
+        sd = np.array([FORCE] * 3 + [MOMENT] * 3)
+        np.testing.assert_allclose(torque[:, :6], -J.T * sd, atol=1e-10)

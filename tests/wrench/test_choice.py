@@ -1,0 +1,60 @@
+"""What a user may choose of the virtual sensor: one meaning of each option."""
+
+import numpy as np
+import pytest
+
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+from vftcli.wrench.choice import FIT, WrenchChoice, ZeroChoice
+
+
+def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for_others() -> None:
+    choice = WrenchChoice.parsed(zero=[])
+    assert choice == WrenchChoice(frame="flange", solver=None)
+    assert choice.by_pose == "pinv"
+    assert choice.smooths("best")
+    assert not choice.smooths("kfo-fe")
+
+
+@pytest.mark.parametrize("name", ["best", "kfo-fe"])
+def test_a_named_solver_is_every_observers(name: str) -> None:
+    assert WrenchChoice(solver="smoother").smooths(name)
+    assert WrenchChoice(solver="smoother").by_pose == "pinv"  # σ_min, null space and mask
+    assert not WrenchChoice(solver="map").smooths(name)
+    assert WrenchChoice(solver="map").by_pose == "map"
+
+
+def test_a_zero_is_spans_or_the_start() -> None:
+    assert ZeroChoice.parsed(["1:2", "8:9"]).spans == ((1.0, 2.0), (8.0, 9.0))
+    assert ZeroChoice.parsed(["start"]) == ZeroChoice(start=True)
+    assert ZeroChoice.parsed([]) == ZeroChoice()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["free.csv"], "nor start; name a log of free motion by --free LOG"),
+        (["12:30.csv"], "nor start; name a log of free motion by --free LOG"),
+        (["start", "1:2"], "either start or spans A:B"),
+        (["2:1"], "A:B with A < B"),
+    ],
+)
+def test_a_zero_that_is_none(words: list[str], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        ZeroChoice.parsed(words)
+
+
+@pytest.mark.parametrize("wrong", [{"frame": "wrist"}, {"solver": "svd"}])
+def test_a_choice_is_checked_where_it_is_made(wrong: dict[str, str]) -> None:
+    with pytest.raises(ParameterError, match="for a wrench; there is"):
+        WrenchChoice(**wrong)  # type: ignore[arg-type]
+
+
+def test_what_is_asked_goes_before_the_robot_file() -> None:
+    robot = load_robot("ur5")
+    there = WrenchChoice(tool="0,0,0.1", sensor_pose="0,0,0.03").mounting(robot)
+    assert there.tool is not None
+    assert there.sensor is not None
+    np.testing.assert_array_equal(there.tool.translation, [0, 0, 0.1])
+    np.testing.assert_array_equal(there.sensor.translation, [0, 0, 0.03])
+    assert WrenchChoice(sensor_pose=FIT).mounting(robot).sensor is None

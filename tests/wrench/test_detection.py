@@ -1,0 +1,257 @@
+"""Contacts against the true ones: hysteresis, matching, limits, free part, settling."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.observers import MomentumObserver
+from vftcli.readers import read
+from vftcli.robots import load_robot
+from vftcli.robots.run import Run, RunSamples
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import Wrench
+from vftcli.wrench.detection import (
+    LEAST_TORQUE,
+    WRENCH_LIMITS,
+    ContactInterval,
+    KnownContacts,
+    assignment,
+    departure,
+    find_contacts,
+    floor_in_motion,
+    judge_contacts,
+    learned_free,
+    match_contacts,
+    read_in_free_runs,
+    true_intervals,
+)
+from vftcli.wrench.sensor_reading import SensorReading, zero_drift
+from vftcli.wrench.solvers import VirtualSensor
+
+T = np.arange(0.0, 20.0, 0.01)
+
+
+def pulses(*spans: tuple[float, float], height: float = 3.0) -> np.ndarray:
+    score = np.zeros(len(T))
+    for start, stop in spans:
+        score[(start <= T) & (stop > T)] = height
+    return score
+
+
+def test_a_score_that_dips_stays_one_contact_until_it_leaves_the_lower_threshold() -> None:
+    score = np.array([0, 0.5, 1.2, 0.8, 0.7, 1.1, 0.5, 0.0, 0.9, 0.0])
+    (found,) = find_contacts(np.arange(10.0), score)
+    assert (found.start, found.stop) == (2.0, 5.0)
+
+
+def test_short_spikes_are_dropped_and_close_contacts_joined() -> None:
+    score = pulses((2.0, 3.0), (3.1, 4.0), (8.0, 8.01), (12.0, 12.5))
+    found = find_contacts(T, score)
+    assert [(round(c.start, 2), round(c.stop, 2)) for c in found] == [(2.0, 3.99), (12.0, 12.49)]
+
+
+def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
+    true = find_contacts(T, pulses((2, 4), (8, 9), (14, 15)))
+    found = find_contacts(T, pulses((2.2, 4.3), (11, 11.5), (14.1, 15)))
+    told = match_contacts(found, true, 20.0)
+    assert (told.contacts, told.missed, told.false_alarms) == (3, 1, 1)
+    # one alarm in the 16 s without contact (each contact's last sample is 10 ms early)
+    assert told.false_alarms_per_h == pytest.approx(3600 / 16.03, rel=1e-3)
+    np.testing.assert_allclose(told.delay, [0.2, np.nan, 0.1], atol=1e-9)
+    assert told.mean_delay == pytest.approx(0.15)
+    assert told.longest_delay == pytest.approx(0.2)
+
+
+def test_a_found_contact_is_credited_to_one_true_one() -> None:
+    true = find_contacts(T, pulses((2, 4), (5, 6), (7, 8), (14, 15)))
+    # One interval over three contacts, the last of which it has most of; one in two pieces.
+    found = find_contacts(T, pulses((3.9, 8), (14, 14.3), (14.6, 15)))
+    told = match_contacts(found, true, 20.0)
+    assert (told.contacts, told.listed, told.found, told.missed) == (4, 3, 2, 2)
+    assert (told.merged, told.split, told.false_alarms) == (2, 1, 0)
+    assert assignment(found, true)[3] == 2  # the longer piece
+
+
+def test_as_many_contacts_as_possible_are_credited() -> None:
+    """The first interval overlaps the second contact more, but the second has nothing else."""
+    true = [ContactInterval(1.0, 2.0), ContactInterval(3.0, 6.0)]
+    found = [ContactInterval(1.9, 4.0), ContactInterval(4.5, 5.0)]
+    assert assignment(found, true) == [0, 1]
+    assert assignment([], true) == [None, None]
+    # Within a tenth of a second of its end a contact is still met, later no more.
+    assert assignment([ContactInterval(2.05, 2.5)], true[:1]) == [0]
+    late = match_contacts([ContactInterval(2.15, 2.5)], true[:1], 10.0)
+    assert (late.missed, late.split, late.false_alarms) == (1, 1, 0)
+
+
+def test_the_free_band_holds_the_free_part() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.standard_normal((500, 6))
+    assert np.max(departure(values, values[:300], 0.1)[:300]) < 1.0
+
+
+def test_contacts_are_told_from_torques_before_the_first_true_one() -> None:
+    truth = np.zeros((len(T), 6))
+    truth[:, 1] = 10 * pulses((5, 6), (10, 11), height=1.0)
+    rng = np.random.default_rng(2)
+    late = np.roll(truth, 8, axis=0) + 0.1 * rng.standard_normal(truth.shape)
+    estimate = ExternalTorque(name="gmo", t=T, tau=late)
+    reference = ExternalTorque(name="file:truth", t=T, tau=truth)
+    (told,) = judge_contacts([estimate], None, reference)
+    assert told.signal == "torque"
+    assert (told.detection.contacts, told.detection.missed) == (2, 0)
+    assert told.detection.mean_delay == pytest.approx(0.08, abs=0.011)  # eight samples late
+
+
+def test_a_log_that_starts_in_contact_has_no_free_part() -> None:
+    with pytest.raises(ParameterError, match=r"no free part.*--free A:B"):
+        learned_free(T, find_contacts(T, pulses((0.5, 2.0))))
+
+
+def push(height: float, start: float = 5.0, stop: float = 7.0) -> np.ndarray:
+    return np.where((start <= T) & (stop > T), height, 0.0)
+
+
+def test_a_score_beyond_one_is_a_contact_and_one_below_is_none() -> None:
+    """The default threshold is 1: 1.3 half widths of the free band are one contact."""
+    assert len(find_contacts(T, push(1.3))) == 1
+    assert find_contacts(T, push(0.99)) == ()
+
+
+def test_true_contacts_exceed_their_limits_on_any_axis() -> None:
+    truth = np.zeros((len(T), 6))
+    truth[:, 1], truth[:, 4] = push(1.1), push(0.3, 10.0, 11.0)
+    truth[:, 2], truth[0, 0] = push(0.9, 14.0, 15.0), np.nan
+    found = true_intervals(T, truth, WRENCH_LIMITS)
+    assert [(round(c.start, 1), round(c.stop, 1)) for c in found] == [(5.0, 7.0), (10.0, 11.0)]
+
+
+def reference(height: float, floor: np.ndarray | None = None) -> ExternalTorque:
+    tau = np.zeros((len(T), 2))
+    tau[:, 0] = push(height)
+    return ExternalTorque(name="truth", t=T, tau=tau, floor=floor)
+
+
+def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contact() -> None:
+    estimate = ExternalTorque(name="gmo", t=T, tau=reference(2.0).tau)
+    (one,) = judge_contacts([estimate], None, reference(2.0))
+    assert one.detection.contacts == 1
+    (none,) = judge_contacts([estimate], None, reference(2.0, np.array([0.5, np.nan])))
+    assert none.detection.contacts == 0
+
+
+def test_stiction_at_rest_deafens_no_reference() -> None:
+    """The floor in motion is 1 N·m, over all samples √((1 + 25)/2)."""
+    t = np.arange(200) * 0.01
+    moving = np.arange(200)[:, None] < 100
+    one = ExternalTorque(
+        name="two-cycle",
+        t=t,
+        tau=np.zeros((200, 1)),
+        sd=np.where(moving, 1.0, 5.0),
+        floor=np.array([np.sqrt(13.0)]),
+        moving=moving,
+    )
+    np.testing.assert_allclose(floor_in_motion(one), [1.0])
+
+
+def test_a_free_band_of_torques_is_never_narrower_than_half_a_newton_metre() -> None:
+    estimate = ExternalTorque(name="gmo", t=T, tau=reference(0.9 * LEAST_TORQUE).tau)
+    (score,) = judge_contacts([estimate], None, reference(2.0))
+    assert score.detection.missed == 1
+
+
+def test_settling_is_no_contact() -> None:
+    tau = reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0
+    (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
+    assert score.detection.false_alarms == 0
+    assert score.detection.delay == (0.0,)
+
+
+def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
+    wrench = Wrench(name="gmo", t=T, values=values, frame="base")
+    free = (zero[0] <= T) & (zero[1] >= T) if zero else np.zeros(len(T), dtype=bool)
+    return SensorReading(
+        sensor=VirtualSensor(frame="base"),
+        wrenches=(wrench,),
+        masked=wrench.hidden,
+        drifts=(zero_drift(wrench, zero),) if zero else (),
+        free=free,
+    )
+
+
+def test_contacts_are_told_from_wrenches_where_there_are_some() -> None:
+    values = np.zeros((len(T), 6))
+    values[:, 2] = push(8.0)
+    values[:, 0] = push(5.0, 12.0, 18.0)  # within the zero span, so part of its band
+    (before,) = judge_contacts([], reading(values, None), reference(2.0))
+    assert before.signal == "wrench"
+    assert (before.detection.missed, before.detection.false_alarms) == (0, 1)
+    (zeroed,) = judge_contacts([], reading(values, (11.0, 19.0)), reference(2.0))
+    assert (zeroed.detection.missed, zeroed.detection.false_alarms) == (0, 0)
+
+
+def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
+    true = find_contacts(T, push(3.0))
+    np.testing.assert_array_equal(learned_free(T, true), (T >= 1.0) & (true[0].start > T))
+    assert learned_free(T, ())[-2]
+    with pytest.raises(ParameterError, match=r"begins at 1.05 s.*--free A:B"):
+        learned_free(T, find_contacts(T, push(3.0, 1.05)))
+
+
+def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
+    """One alarm in 19.99 s, of which the push holds 5 to 6.99 s: one in 18.00 s, 200 an hour."""
+    tau = reference(2.0).tau + np.column_stack([push(2.0, 12.0, 13.0), np.zeros(len(T))])
+    (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
+    assert score.detection.false_alarms == 1
+    assert score.detection.false_alarms_per_h == pytest.approx(200.0)
+
+
+def test_what_is_listed_is_judged_as_it_stands() -> None:
+    """Two rows for one push: one is credited, the other a piece."""
+    told = KnownContacts(
+        untouched=np.zeros(len(T), dtype=bool),
+        listed={"best": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
+    )
+    best = ExternalTorque(name="best", t=T, tau=np.zeros((len(T), 2)))
+    (score,) = judge_contacts([best], None, reference(2.0), told)
+    assert score.signal == "list"
+    assert (score.detection.found, score.detection.listed, score.detection.split) == (1, 2, 1)
+
+
+def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
+    """A bump of 5 N·m at 12 s is a false alarm, unless the free part or a free run shows it."""
+    tau = reference(8.0).tau + np.column_stack([push(5.0, 12.0, 13.0), np.zeros(len(T))])
+    estimate = [ExternalTorque(name="gmo", t=T, tau=tau)]
+
+    def alarms(told: KnownContacts | None) -> int:
+        (score,) = judge_contacts(estimate, None, reference(8.0), told)
+        assert score.detection.missed == 0
+        return score.detection.false_alarms
+
+    nothing = np.zeros(len(T), dtype=bool)
+    assert alarms(None) == 1
+    assert alarms(KnownContacts(untouched=nothing)) == 1
+    assert alarms(KnownContacts(untouched=(T > 11.0) & (T < 14.0))) == 0
+    beside = np.outer(np.linspace(-5.0, 5.0, 50), [1.0, 0.1])
+    assert alarms(KnownContacts(untouched=nothing, beside={"gmo": beside})) == 0
+
+
+def test_observers_are_run_along_free_runs() -> None:
+    log = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
+    run = Run(recording=log, robot=load_robot("ur5"))
+    piece = RunSamples(run, (log.t > 0.3) & (log.t < 4.0))
+    gmo = MomentumObserver(gain=10.0)
+
+    def read_by(pieces, sensor):
+        return read_in_free_runs(pieces, [gmo], lambda _name, run: run, sensor)
+
+    torques = read_by([piece], None)["gmo"]
+    # From the settling, at 1 s, to 4 s.
+    settled = (log.t >= 1.0) & (log.t < 4.0)
+    np.testing.assert_array_equal(torques, gmo.estimate(run.terms).tau[settled])
+    wrenches = read_by([piece], VirtualSensor(frame="base"))["gmo"]
+    assert wrenches.shape == (len(torques), 6)
+    assert read_by([], None) == {}

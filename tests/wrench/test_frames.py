@@ -1,0 +1,177 @@
+"""Frames: the adjoint against Pinocchio, and what rotating a frame does to the answer."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
+from vftcli.wrench.frames import (
+    Mounting,
+    check_frame,
+    checked_pose,
+    pose_of_numbers,
+    read_pose,
+)
+from vftcli.wrench.solvers import VirtualSensor
+
+angle = st.floats(-3.0, 3.0)
+length = st.floats(-1.0, 1.0)
+poses = st.builds(
+    lambda a, p: Pose(rpy_matrix(a), np.array(p)),
+    st.tuples(angle, angle, angle),
+    st.tuples(length, length, length),
+)
+wrenches = st.lists(st.floats(-50.0, 50.0), min_size=6, max_size=6).map(np.array)
+
+EXACT = 1e-12  # products of a few rotations and lengths of order one: rounding only
+
+
+def motion(samples: int = 40, joints: int = 6, seed: int = 3) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (samples, joints))
+
+
+@settings(max_examples=50, deadline=None)
+@given(poses, wrenches)
+def test_adjoint_is_pinocchios_action_on_forces(pose: Pose, wrench: np.ndarray) -> None:
+    """(56) in its right form is SE3(R, p).act(Force)."""
+    moved = pin.SE3(pose.rotation, pose.translation).act(pin.Force(wrench[:3], wrench[3:]))
+    np.testing.assert_allclose(adjoint(pose) @ wrench, moved.vector, atol=1e-11)
+
+
+def test_the_printed_56_turns_the_rotation_round_in_its_lower_left_block() -> None:
+    """docs/paper.md: 20 mm off, turned by .5 rad, 20 N across: 20·.02·2 sin .5 = .38 N·m."""
+    c, s = np.cos(0.5), np.sin(0.5)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    right = adjoint(Pose(turn, np.array([0.0, 0.0, 0.02])))
+    cross = right[3:, :3] @ turn.T
+    error = (cross @ turn.T - right[3:, :3]) @ np.array([20.0, 0.0, 0.0])
+    assert np.linalg.norm(error) == pytest.approx(20.0 * 0.02 * 2.0 * np.sin(0.5), rel=1e-12)
+
+
+@settings(max_examples=50, deadline=None)
+@given(poses, poses)
+def test_adjoints_compose_and_invert(first: Pose, second: Pose) -> None:
+    np.testing.assert_allclose(
+        adjoint(first @ second), adjoint(first) @ adjoint(second), atol=EXACT
+    )
+    np.testing.assert_allclose(adjoint(inverse(first)) @ adjoint(first), np.eye(6), atol=EXACT)
+
+
+@settings(max_examples=50, deadline=None)
+@given(poses, wrenches, wrenches)
+def test_power_does_not_depend_on_the_frame(
+    pose: Pose, wrench: np.ndarray, twist: np.ndarray
+) -> None:
+    """wᵀv is the same in both frames: the adjoint of forces is the dual of that of motions."""
+    moved = pin.SE3(pose.rotation, pose.translation).act(pin.Motion(twist[:3], twist[3:]))
+    power = float((adjoint(pose) @ wrench) @ moved.vector)
+    # products of 50 N and 50 m/s: relative rounding of 1e-13 on sums of up to 1e4
+    assert power == pytest.approx(float(wrench @ twist), abs=1e-8)
+
+
+def sensed(frame: str, mounting: Mounting, robot: str = "ur5", turn: np.ndarray | None = None):
+    """The wrench of one random torque, optionally with the base turned."""
+    from dataclasses import replace
+
+    chain = load_robot(robot).chain
+    if turn is not None:
+        first = chain.rotation.copy(), chain.translation.copy()
+        first[0][0], first[1][0] = turn @ first[0][0], turn @ first[1][0]
+        chain = replace(chain, rotation=first[0], translation=first[1])
+    q = motion(joints=chain.joints)
+    tau = np.random.default_rng(5).normal(size=q.shape)
+    torque = ExternalTorque(name="x", t=np.arange(len(q)) * 0.01, tau=tau)
+    sensor = VirtualSensor(frame=frame, mounting=mounting)
+    return sensor.wrenches((torque,), q, chain, {"x": np.ones(chain.joints)})[0]
+
+
+TOOL = Pose(rpy_matrix((0.2, 0.5, -0.4)), np.array([0.05, -0.1, 0.15]))
+TURN = rpy_matrix((0.7, -0.3, 1.9))
+
+
+def test_turning_the_base_turns_the_answer_in_base_axes_only() -> None:
+    plain, turned = sensed("base", Mounting()), sensed("base", Mounting(), turn=TURN)
+    expected = np.concatenate([plain.force @ TURN.T, plain.moment @ TURN.T], axis=1)
+    np.testing.assert_allclose(turned.known, expected, rtol=1e-9, atol=1e-9)
+    for frame in ("flange", "tool"):
+        same = sensed(frame, Mounting(tool=TOOL)), sensed(frame, Mounting(tool=TOOL), turn=TURN)
+        np.testing.assert_allclose(same[1].known, same[0].known, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("frame", ["tool", "sensor"])
+def test_turning_what_is_mounted_turns_the_answer(frame: str) -> None:
+    """A tool turned about its own point reads the same force in turned axes."""
+    other = Pose(TOOL.rotation @ TURN, TOOL.translation)
+    plain = sensed(frame, Mounting(tool=TOOL, sensor=TOOL))
+    turned = sensed(frame, Mounting(tool=other, sensor=other))
+    expected = np.concatenate([plain.force @ TURN, plain.moment @ TURN], axis=1)
+    np.testing.assert_allclose(turned.known, expected, rtol=1e-9, atol=1e-9)
+    assert turned.sd is not None
+    assert plain.sd is not None
+    # the variance summed over the axes of force is a trace, which no rotation changes
+    for part in (slice(0, 3), slice(3, 6)):
+        trace = np.sum(plain.sd[:, part] ** 2, axis=1)
+        np.testing.assert_allclose(np.sum(turned.sd[:, part] ** 2, axis=1), trace, rtol=1e-9)
+
+
+def test_moving_the_tool_moves_the_moment_by_the_lever() -> None:
+    lever = np.array([0.1, -0.2, 0.3])
+    flange = sensed("flange", Mounting())
+    tool = sensed("tool", Mounting(tool=Pose(np.eye(3), lever)))
+    np.testing.assert_allclose(tool.force, flange.force, atol=1e-9)
+    np.testing.assert_allclose(
+        tool.moment, flange.moment - np.cross(lever, flange.force), atol=1e-9
+    )
+
+
+def test_an_unknown_frame_lists_those_there_are() -> None:
+    with pytest.raises(ParameterError, match=r"no frame 'wrist'.*flange.*base.*tool.*sensor"):
+        check_frame("wrist")
+
+
+def test_a_frame_without_its_pose_says_how_to_give_it() -> None:
+    with pytest.raises(
+        ParameterError, match=r"no tool, so there is no Jacobian.*virtual-sensor.tool"
+    ):
+        VirtualSensor(frame="tool")
+    with pytest.raises(ParameterError, match=r"virtual-sensor\.sensor"):
+        VirtualSensor(frame="sensor")
+
+
+@pytest.mark.parametrize(
+    ("matrix", "words"),
+    [
+        (np.eye(3) * 1.01, "RᵀR differs"),
+        (np.diag([1.0, 1.0, -1.0]), "determinant is −1"),
+        (np.full((3, 3), np.nan), "finite"),
+    ],
+)
+def test_a_pose_that_is_no_rotation_is_refused(matrix: np.ndarray, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        checked_pose(matrix, np.zeros(3), "virtual-sensor.sensor")
+
+
+def test_poses_are_read_as_three_six_or_twelve_numbers_or_a_name(tmp_path) -> None:
+    robot = load_robot("ur5")
+    short = read_pose("0.1,0,0.2", robot, "tool", "virtual-sensor.tool")
+    long = read_pose("0.1,0,0.2,0.1,0.2,0.3", robot, "tool", "virtual-sensor.tool")
+    np.testing.assert_array_equal(short.translation, [0.1, 0.0, 0.2])
+    np.testing.assert_allclose(long.rotation, rpy_matrix((0.1, 0.2, 0.3)))
+    whole = pose_of_numbers([0, 0, 1, *long.rotation.ravel()], "virtual-sensor.tool")
+    np.testing.assert_allclose(whole.rotation, long.rotation)
+    with pytest.raises(ParameterError, match="5 numbers"):
+        read_pose("1,2,3,4,5", robot, "tool", "virtual-sensor.tool")
+    with pytest.raises(ParameterError, match=r"no \[tool.gripper\]"):
+        read_pose("gripper", robot, "tool", "virtual-sensor.tool")
+    assert robot.path is not None
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        robot.path.read_text(encoding="utf-8") + "\n[tool.gripper]\nxyz = [0, 0, 0.15]\n"
+    )
+    named = read_pose("gripper", load_robot(path), "tool", "virtual-sensor.tool")
+    np.testing.assert_array_equal(named.translation, [0.0, 0.0, 0.15])

@@ -1,0 +1,166 @@
+"""The whole virtual sensor on the repository's own logs: order, zero, and what is remarked."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.readers import read
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots import load_robot
+from vftcli.robots.chain import link_poses
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.recording import Recording
+from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench.sensing import mask_remark, payload_remark
+from vftcli.wrench.sensor_reading import SensorReading
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+
+
+def analysed(log: str, names: tuple[str, ...], wrench: WrenchChoice, **read: object) -> Analysis:
+    choice = AnalysisChoice(
+        read=ReadChoice(**read),  # type: ignore[arg-type]
+        robot=RobotChoice(name="ur5" if log.startswith("ur5") else "panda"),
+        observers=ObserverChoice(names=names),
+        wrench=wrench,
+    )
+    return analyse_log(FIXTURES / log, choice)
+
+
+def reading(log: str, *names: str, **choice: object) -> SensorReading:
+    sensed = analysed(log, names, WrenchChoice(**choice)).virtual_sensor  # type: ignore[arg-type]
+    assert sensed is not None
+    assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
+    return sensed
+
+
+START = ZeroChoice(start=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frame", ["base", "flange"])
+def test_neither_order_nor_company_nor_frame_moves_the_zero(frame: str) -> None:
+    alone = reading("ur5_sensor.parquet", "gmo", zero=START, frame=frame)
+    orders = [("gmo", "fdo", "kfo-fe"), ("kfo-fe", "fdo", "gmo")]
+    for names in orders:
+        found = reading("ur5_sensor.parquet", *names, zero=START, frame=frame)
+        assert found.zero_span == alone.zero_span
+        ours, theirs = (
+            [remark for remark in each.remarks if remark.code.startswith("log-wrench")]
+            for each in (found, alone)
+        )
+        assert ours == theirs != []
+        np.testing.assert_array_equal(found.masked, alone.masked)
+        (same,) = (w for w in found.wrenches if w.name == "gmo")
+        np.testing.assert_array_equal(same.values, alone.wrenches[0].values)
+        np.testing.assert_array_equal(same.known_sd, alone.wrenches[0].known_sd)
+    base = reading("ur5_sensor.parquet", "gmo", zero=START, frame="base")
+    assert base.zero_span == alone.zero_span
+
+
+@pytest.mark.slow
+def test_further_spans_show_the_drift_and_only_the_first_is_removed() -> None:
+    zero = ZeroChoice(spans=((1.0, 2.0), (2.5, 3.5)))
+    found = reading("ur5_circle.csv", "gmo", "fdo", zero=zero, frame="base")
+    assert [(d.name, d.span[0], d.removed) for d in found.drifts] == [
+        ("gmo", 1.0, True), ("fdo", 1.0, True), ("gmo", 2.5, False), ("fdo", 2.5, False),
+    ]  # fmt: skip
+    for wrench in found.wrenches:
+        np.testing.assert_allclose(wrench.between(1.0, 2.0).mean(axis=0), 0.0, atol=1e-12)
+    moved = [remark for remark in found.remarks if remark.code == "zero-moved"]
+    first, later = found.drifts[0], found.drifts[2]
+    assert [remark.where.about for remark in moved] == ["gmo", "fdo"]
+    np.testing.assert_allclose(moved[0].values["force_N"], (later.mean - first.mean)[:3])
+
+
+@pytest.mark.slow
+def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded() -> None:
+    found = reading("ur5_circle.csv", "gmo")
+    assert found.drifts == ()
+    assert found.zero_span is None
+    zeroed = reading("ur5_circle.csv", "gmo", zero=START)
+    np.testing.assert_array_equal(found.free, zeroed.free)
+    assert found.free.any()
+
+
+@pytest.mark.slow
+def test_a_panda_has_the_null_space_channel() -> None:
+    found = reading("panda_bearing.csv", "gmo", zero=START)
+    assert found.null_space_limit is not None
+    assert found.null_space_limit > 0.0
+    assert reading("ur5_circle.csv", "gmo", zero=START).null_space_limit is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("choice", "code"),
+    [
+        ({"torque_sd": "0.5"}, "band-given"),
+        ({"torque_sd": "own"}, "no-covariance"),
+        ({"zero": START}, "band-from-free-part"),
+        ({}, "no-wrench-band"),
+        ({"solver": "map"}, "no-wrench-band"),
+    ],
+)
+def test_the_band_says_where_it_comes_from(choice: dict[str, object], code: str) -> None:
+    found = reading("ur5_circle.csv", "gmo", **choice)
+    assert code in [remark.code for remark in found.remarks]
+
+
+def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed() -> None:
+    short = analysed("ur5_circle.csv", ("best", "gmo", "fdo"), WrenchChoice(), interval=(0.0, 2.0))
+    found = short.virtual_sensor
+    assert found is not None
+    (unknown,) = [remark for remark in found.remarks if remark.code == "no-wrench-band"]
+    assert unknown.where.about == "gmo, fdo"
+    assert found.wrenches[0].sd is not None
+
+
+def recording(mass: float | None) -> Recording:
+    return Recording(t=np.arange(3.0), q=np.zeros((3, 6)), payload_mass=mass)
+
+
+def test_a_payload_that_is_not_mounted_is_told_in_the_arms_own_gravity() -> None:
+    ur5 = load_robot("ur5")
+    (remark,) = payload_remark(recording(0.5), ur5)
+    assert remark.values == {
+        "told_kg": 0.5,
+        "mounted_kg": 0.0,
+        "weight_N": pytest.approx(0.5 * np.linalg.norm(ur5.chain.gravity)),
+    }
+    moon = replace(ur5, chain=replace(ur5.chain, gravity=np.array([0.0, 0.0, -1.62])))
+    assert payload_remark(recording(0.5), moon)[0].values["weight_N"] == pytest.approx(0.81)
+    assert payload_remark(recording(0.04), ur5) == ()
+    assert payload_remark(recording(None), ur5) == ()
+
+
+@pytest.mark.slow
+def test_masked_samples_are_counted() -> None:
+    found = reading("ur5_circle.csv", "gmo")
+    codes = [remark.code for remark in found.remarks]
+    assert ("pose-hides-wrench" in codes) == bool(found.masked.any())
+    (wrench,) = found.wrenches
+    hidden = replace(wrench, masked=np.arange(len(wrench.t)) < 100)
+    (remark,) = mask_remark(hidden.masked, wrench.sigma_min)
+    assert remark.values["masked"] == 100
+    assert remark.values["share"] == pytest.approx(100 / len(wrench.t))
+    assert remark.values["sigma_min_m"] == pytest.approx(np.min(wrench.sigma_min))
+    assert mask_remark(np.zeros(len(wrench.t), dtype=bool), wrench.sigma_min) == ()
+
+
+@pytest.mark.slow
+def test_a_smoothed_wrench_turns_with_the_flange() -> None:
+    """Force and moment about the flange point in its own axes are those in base axes, turned."""
+    base, flange = (
+        reading("ur5_circle.csv", "best", frame=f).wrenches[0] for f in ("base", "flange")
+    )
+    log = read(FIXTURES / "ur5_circle.csv")
+    turn = link_poses(load_robot("ur5").chain, log.q).rotation[:, -1]
+    for part in (slice(0, 3), slice(3, 6)):
+        expected = np.einsum("tji,tj->ti", turn, base.values[:, part])
+        np.testing.assert_allclose(flange.values[:, part], expected, atol=1e-9)  # rounding of 100 N

@@ -1,0 +1,224 @@
+"""Solvers: against NumPy's pseudo-inverse, near singularities, and what the null space sees."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.robots import load_robot
+from vftcli.robots.chain import flange_jacobian, link_poses
+from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.wrench.solvers import (
+    LEAST_SIGMA,
+    PRIOR,
+    SCALE,
+    SOLVERS,
+    VirtualSensor,
+    decompose,
+    null_space,
+    wrench_of,
+)
+
+REGULAR = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2])
+"""A UR5 pose far from every singularity. [rad]"""
+
+
+def torque_of(robot: str, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    """τ = Jᵀw by Pinocchio, for a wrench in base axes about the flange."""
+    model = load_robot(robot).model
+    data = model.createData()
+    frame = model.getFrameId("flange")
+    J = [
+        pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED).copy()
+        for row in q
+    ]
+    return np.einsum("tij,ti->tj", np.array(J), np.broadcast_to(wrench, (len(q), 6)))
+
+
+def told(robot: str, q: np.ndarray, tau: np.ndarray, **how):
+    torque = ExternalTorque(name="x", t=np.arange(len(q)) * 0.01, tau=tau)
+    known = {"x": how.pop("sd")} if "sd" in how else {}
+    (found,) = VirtualSensor(frame="base", **how).wrenches(
+        (torque,), q, load_robot(robot).chain, known
+    )
+    return found
+
+
+def poses(robot: str, samples: int = 60, seed: int = 2) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-2.0, 2.0, (samples, load_robot(robot).joints))
+
+
+@pytest.mark.parametrize("robot", ["ur5", "ur10e", "panda", "fr3"])
+def test_a_wrench_at_the_flange_comes_back(robot: str) -> None:
+    q, wrench = poses(robot), np.array([10.0, -20.0, 5.0, 1.0, -0.5, 2.0])
+    found = told(robot, q, torque_of(robot, q, wrench))
+    regular = ~found.hidden
+    assert regular.sum() > 20
+    # normal equations square the condition number, at most (2 m / 0.05 m)² ~ 2e3: 1e-12 of 20 N
+    np.testing.assert_allclose(
+        found.values[regular], np.tile(wrench, (regular.sum(), 1)), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("robot", ["ur5", "panda"])
+def test_pinv_is_numpys(robot: str) -> None:
+    q = poses(robot)
+    tau = np.random.default_rng(8).normal(size=q.shape)
+    found = told(robot, q, tau)
+    J = flange_jacobian(load_robot(robot).chain, q)
+    expected = np.einsum("tij,tj->ti", np.linalg.pinv(np.swapaxes(J, 1, 2)), tau)
+    known = ~found.hidden
+    np.testing.assert_allclose(found.values[known], expected[known], rtol=1e-9, atol=1e-9)
+
+
+def test_sigma_min_is_that_of_the_jacobian_with_angular_rows_times_0_3() -> None:
+    q = poses("ur5")
+    J = flange_jacobian(load_robot("ur5").chain, q)
+    expected = np.linalg.svd(SCALE[:, None] * J, compute_uv=False)[:, -1]
+    # σ² is what the decomposition knows to 1e-15 of the largest, σ hence to 3e-8 near zero
+    np.testing.assert_allclose(decompose(J).sigma_min, expected, atol=1e-7)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver: str) -> None:
+    """One sample, dense: cov = A Σ Aᵀ, and the posterior covariance for the MAP solver."""
+    q, tau = REGULAR[None], np.array([[1.0, -2.0, 3.0, 0.5, -0.5, 0.2]])
+    sd = np.array([0.3, 0.5, 0.4, 0.1, 0.2, 0.15])
+    found = told("ur5", q, tau, solver=solver, sd=sd)
+    J = flange_jacobian(load_robot("ur5").chain, q)[0]
+    prior = np.diag((PRIOR * SCALE) ** -2.0)
+    information = J @ np.diag(sd**-2) @ J.T + prior
+    gain = {
+        "pinv": np.linalg.pinv(J.T),
+        "map": np.linalg.inv(information) @ J @ np.diag(sd**-2),
+    }[solver]
+    covariance = gain @ np.diag(sd**2) @ gain.T
+    if solver == "map":
+        covariance = np.linalg.inv(information)
+    np.testing.assert_allclose(found.values[0], gain @ tau[0], rtol=1e-9)
+    assert found.sd is not None
+    np.testing.assert_allclose(found.sd[0], np.sqrt(np.diag(covariance)), rtol=1e-9)
+
+
+def test_the_map_bias_is_a_hundredth_of_a_newton_in_a_regular_pose() -> None:
+    """27 N under 0.3 N·m of stated joint noise: the prior of 50 N pulls by 0.01 N (science §4)."""
+    wrench = np.array([0.0, 0.0, -27.0, 0.0, 0.0, 0.0])
+    tau = torque_of("ur5", REGULAR[None], wrench)
+    found = told("ur5", REGULAR[None], tau, solver="map", sd=np.full(6, 0.3))
+    assert np.max(np.abs(found.values[0, :3] - wrench[:3])) < 0.03
+
+
+NEAR_WRIST = np.array([0.3, -1.2, 1.4, -1.7, 0.02, 0.2])
+STRAIGHT_ELBOW = np.array([0.3, -1.2, 1e-3, -1.7, -1.5, 0.2])
+
+
+@pytest.mark.parametrize("pose", [NEAR_WRIST, STRAIGHT_ELBOW], ids=["q5 = 0.02", "straight elbow"])
+def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> None:
+    """0.3 N·m of joint noise: masked, tens of newtons of pinv, the prior's width at most of map."""
+    rng = np.random.default_rng(11)
+    q = np.tile(pose, (200, 1))
+    tau = 0.3 * rng.standard_normal(q.shape)
+    sd = np.full(6, 0.3)
+    blown, held = told("ur5", q, tau, sd=sd), told("ur5", q, tau, solver="map", sd=sd)
+    assert blown.hidden.all()
+    assert np.isnan(blown.known).all()
+    assert blown.sigma_min is not None
+    assert blown.sigma_min.max() < LEAST_SIGMA
+    assert held.sd is not None
+    assert np.max(np.abs(held.values[:, :3])) < 4.0 * PRIOR[0]
+    assert np.all(held.sd[:, :3] <= PRIOR[0] * (1 + 1e-9))
+    assert np.sqrt(np.mean(blown.values[:, :3] ** 2)) > 3 * np.sqrt(
+        np.mean(held.values[:, :3] ** 2)
+    )
+
+
+def test_joint_noise_is_newtons_in_a_regular_pose_and_tens_at_the_wrist() -> None:
+    """Science §4: 0.3 N·m is 1.2 N in a regular UR5 pose and 38 N at q5 = 0.02."""
+    q = np.array([REGULAR, NEAR_WRIST])
+    found = told("ur5", q, np.zeros_like(q), sd=np.full(6, 0.3))
+    assert found.sd is not None
+    rms = np.sqrt(np.mean(found.sd[:, :3] ** 2, axis=1))
+    assert 0.5 < rms[0] < 2.5
+    assert 15.0 < rms[1] < 80.0
+
+
+@pytest.mark.parametrize("robot", ["panda", "fr3"])
+def test_a_tip_wrench_leaves_the_null_space_and_a_link_wrench_does_not(robot: str) -> None:
+    q = poses(robot, samples=30)
+    chain = load_robot(robot).chain
+    parts = decompose(flange_jacobian(chain, q))
+    base = np.random.default_rng(4).normal(size=q.shape)
+    before = null_space(parts, base[:, :, None])[:, :, 0]
+    regular = parts.sigma_min > LEAST_SIGMA
+    tip = base + torque_of(robot, q, np.array([30.0, -20.0, 25.0, 3.0, -2.0, 4.0]))
+    np.testing.assert_allclose(
+        null_space(parts, tip[:, :, None])[:, :, 0][regular], before[regular], atol=1e-9
+    )
+
+    where = link_poses(chain, q)
+    axes = where.rotation[:, :4, :, 2]
+    arms = where.translation[:, 4:5] - where.translation[:, :4]
+    lever = np.cross(axes, arms)
+    elsewhere = base.copy()
+    elsewhere[:, :4] += lever @ np.array([30.0, -20.0, 25.0])
+    moved = np.linalg.norm(null_space(parts, elsewhere[:, :, None])[:, :, 0] - before, axis=1)
+    # a 44 N push on link 4; in some poses its torque happens to be that of some tip wrench
+    assert np.median(moved) > 0.1
+    assert np.max(moved) > 1.0
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_a_push_at_the_flange_is_found_from_a_given_jacobian(name: str) -> None:
+    robot = load_robot(name)
+    q = np.random.default_rng(2).uniform(-1.5, -0.5, (50, robot.joints))
+    wrench = np.array([10.0, -20.0, 5.0, 0.5, 0.2, -0.1])
+    J = flange_jacobian(robot.chain, q)
+    values, regular = wrench_of(np.einsum("sij,i->sj", J, wrench), J)
+    assert regular.any()
+    # λ = σ² ≥ .0025 m² of up to 3 m²: κ² times the rounding of torques of some 10 N·m
+    expected = np.tile(wrench, (np.count_nonzero(regular), 1))
+    np.testing.assert_allclose(values[regular], expected, atol=1e-10)
+
+
+def test_directions_that_are_left_out_read_nothing_and_the_others_stay() -> None:
+    """Against the SVD with its small singular values cut, the textbook's way to the same."""
+    rng = np.random.default_rng(5)
+    J, tau = rng.standard_normal((60, 6, 6)), rng.standard_normal((60, 6))
+    found = wrench_of(tau, J, left_out=0.3).values
+    U, s, Vt = np.linalg.svd(SCALE[:, None] * J)
+    cut = np.where(s > 0.3, 1.0 / s, 0.0)
+    expected = SCALE * np.einsum("kij,kj->ki", U, cut * np.einsum("kij,kj->ki", Vt, tau))
+    assert np.any(cut == 0.0)
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+
+
+def test_a_stretched_arm_cannot_tell_a_push_along_itself() -> None:
+    """A UR5 with q₃ = 0; any torque is still answered, for the plots of a blow-up."""
+    q = np.array([[0.0, -1.0, 0.0, 0.3, 1.2, 0.0], [0.0, -1.0, 1.0, 0.3, 1.2, 0.0]])
+    found = wrench_of(np.ones((2, 6)), flange_jacobian(load_robot("ur5").chain, q))
+    np.testing.assert_array_equal(found.known, [False, True])
+    assert np.all(np.isfinite(found.values))
+
+
+def test_six_joints_have_no_null_space_channel() -> None:
+    q = np.tile(REGULAR, (3, 1))
+    assert told("ur5", q, np.ones_like(q)).null_space is None
+
+
+def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    q = poses("panda", samples=50)
+    tau = np.random.default_rng(1).normal(size=q.shape)
+    whole = told("panda", q, tau)
+    monkeypatch.setattr("vftcli.wrench.solvers.CHUNK", 7)
+    pieces = told("panda", q, tau)
+    np.testing.assert_array_equal(pieces.values, whole.values)
+
+
+def test_a_five_joint_arm_is_refused() -> None:
+    with pytest.raises(RobotError, match="5 joint torques cannot determine"):
+        decompose(np.zeros((3, 6, 5)))
+
+
+def test_an_unknown_solver_lists_those_there_are() -> None:
+    with pytest.raises(ParameterError, match=r"no solver 'svd'.*pinv, map"):
+        VirtualSensor(solver="svd")

@@ -1,0 +1,241 @@
+"""A log's free part and spectra, and its observers' input less the bias.
+
+The bias of the whole log (`vftcli.bias.whole_log`) comes off μ before an observer
+runs. `best` runs on what is left, tuned on the spectra of that; the other observers do
+where ``bias.method=whole-log`` asks for it. Nothing here refuses a log: what cannot be
+done is said, and `best` is made of what is left.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.bias.choice import RefinementChoice
+from vftcli.bias.whole_log import WholeLogBias, whole_log_bias
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
+from vftcli.observers.observer import Observer
+from vftcli.observers.spectra import Spectra, looks_free, spectra_of
+from vftcli.observers.table import BEST, LogSpectra
+from vftcli.observers.tuning import Goal, tune_all
+from vftcli.robots.run import Run, RunSamples
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.remarks import Remark, caution, fact
+
+STANDS = 0.5  #: Stiction limits a joint at rest in more than this share of the samples.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baseline:
+    """Evidence of a log before any observer runs."""
+
+    motion: FreeMotion  #: The log and its free motion, without samples that stand alone.
+    part: FreePart | None = None  #: Its free part, None where there is none.
+    #: Spectra of the raw disturbance, None where the free part is too short or not free.
+    spectra: Spectra | None = None
+    #: Why there is no free part, or are no spectra; None where there are both.
+    missing: Remark | None = None
+    #: A load that the free part carries and the model lacks, None where none shows.
+    load: FreeLoad | None = None
+    #: The bias of the whole log, off the terms where its guards apply it; None where none
+    #: was fitted.
+    correction: WholeLogBias | None = None
+    #: Whether the free part is what the fit of that bias takes for free: no contact that
+    #: comes and goes, though a load that stays may be in it.
+    by_fit: bool = False
+    #: Its parts in use, those not in use, and the substitute for a free part.
+    on_correction: tuple[Remark, ...] = ()
+    _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
+
+    def of(self, run: Run) -> Run:
+        """The log or one of its free runs, as the observers have it. Made once.
+
+        Where a correction was looked for, an observer has no samples that stand alone either.
+        """
+        if not self.on_correction:
+            return run
+        run = run.steadied
+        if self.correction is None:
+            return run
+        if run not in self._made:
+            own = run is self.motion.log
+            self._made[run] = (self.correction.corrected if own else self.correction.of)(run)
+        return self._made[run]
+
+    @property
+    def log(self) -> Run:
+        """The log, as the observers have it."""
+        return self.of(self.motion.log)
+
+    @property
+    def tunable(self) -> Spectra | None:
+        """The spectra if gains may come from them, else None.
+
+        Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran
+        to the slowest.
+        """
+        return None if self.by_fit and self.load is not None else self.spectra
+
+    @property
+    def correction_sd(self) -> Array | None:
+        """Deviation of the model's error, None without a correction. (T, n) [N·m]"""
+        return None if self.correction is None else self.correction.sd
+
+    @property
+    def samples(self) -> list[RunSamples]:
+        """The free samples as the observers have them, less a load, which is no noise."""
+        return [
+            RunSamples(without_load(self.of(run), self.load), inside) for run, inside in self.pieces
+        ]
+
+    @property
+    def pieces(self) -> tuple[RunSamples, ...]:
+        """The free samples, of the log itself and of free runs; none without a free part."""
+        return self.part.pieces if self.part is not None else ()
+
+    @property
+    def untouched(self) -> tuple[RunSamples, ...]:
+        """The pieces in which nothing at all touches the arm, as far as it is known."""
+        return () if self.by_fit else self.pieces
+
+    @property
+    def stuck(self) -> Mask:
+        """Joints that stand in most samples, where stiction decides. (n,)"""
+        return np.asarray(self.motion.log.standing.mean(axis=0) > STANDS)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Findings, and the missing ones with reasons."""
+        found = () if self.part is None else self.part.remarks
+        load = () if self.load is None else (self.load.remark,)
+        missing = () if self.missing is None else (self.missing,)
+        return (*found, *load, *missing, *self.on_correction)
+
+
+def baseline_of(motion: FreeMotion) -> Baseline:
+    """Find the free part of a log and its spectra, or say why there are none."""
+    log = motion.log
+    bare = Baseline(motion=motion)
+    try:
+        part = motion.part
+    except ReferenceTorqueError as error:
+        return replace(bare, missing=caution("no-free-part", reason=str(error)))
+    known = replace(bare, part=part, load=free_load(part.pieces))
+    try:
+        spectra = spectra_of(RunSamples(log, ~part.own), known.samples)
+    except ParameterError as error:
+        return replace(known, missing=caution("no-spectra", reason=str(error)))
+    if not part.doubted or looks_free(spectra):
+        return replace(known, spectra=spectra)
+    residuals = motion.free_cycles.residuals
+    listed = [] if residuals is None else residuals[np.isfinite(residuals)].tolist()
+    return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baselines:
+    """Input of a log's observers."""
+
+    plain: Baseline  #: What all but `best` run on.
+    best: Baseline  #: What `best` runs on: less the bias of the whole log, where that was fitted.
+
+    def of(self, name: str) -> Baseline:
+        """Input of the observer of this name."""
+        return self.best if name == BEST else self.plain
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Findings, and the missing ones with reasons."""
+        apart = () if self.best is self.plain else self.best.on_correction
+        return (*self.plain.remarks, *apart)
+
+    def spectra(self, *, gains: bool) -> LogSpectra:
+        """Spectra for the observers built for the log."""
+        plain = self.plain.tunable
+        called_for = None
+        if gains and plain is not None:
+            least = tune_all(plain, Goal("auto"))
+            called_for = {line.section: dict(line.gains) for line in least}
+        return LogSpectra(plain=plain, best=self.best.tunable, gains=called_for)
+
+
+class FreeReading(NamedTuple):
+    """One observer's reading of a log, and its free samples."""
+
+    observer: Observer  #: The observer.
+    estimate: ExternalTorque  #: Its estimate of the log.
+    #: What it reads in the free samples, of all pieces in a row, less a load that the
+    #: free part carries. (S, n) [N·m]
+    samples: Array
+    resting: Mask  #: Whether a joint rests in them. (S, n)
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square of free samples, with bias; NaN without any. (n,)"""
+        known = np.isfinite(self.samples)
+        square = np.sum(np.where(known, self.samples, 0.0) ** 2, axis=0)
+        count = np.count_nonzero(known, axis=0)
+        return np.where(count, np.sqrt(square / np.maximum(count, 1)), np.nan)
+
+
+def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
+    """An observer's run along the free pieces; on the log it is its estimate."""
+    log = found.motion.log
+    read, rests = [np.zeros((0, estimate.joints))], [np.zeros((0, estimate.joints), bool)]
+    for run, inside in found.pieces:
+        tau = estimate.tau if run is log else observer.estimate(found.of(run).terms).tau
+        if found.load is not None:
+            # A load is torque, and no error of who reads it.
+            tau = tau - found.load.torque(run)
+        read.append(tau[inside])
+        rests.append(run.rests[inside])
+    return FreeReading(observer, estimate, np.concatenate(read), np.concatenate(rests))
+
+
+def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baselines:
+    """Input of a log's observers: `best` and, if asked, all less the bias."""
+    motion, as_read = motion.steadied, motion.log
+    found = baseline_of(motion)
+    if not (choice.corrects_all or (best and choice.corrects_best)):
+        return Baselines(plain=found, best=found)
+    try:
+        bias = whole_log_bias(motion.log)
+    except (VftError, np.linalg.LinAlgError) as error:
+        failed = caution("whole-log-bias-failed", reason=str(error))
+        found = replace(found, on_correction=(failed,))
+        return Baselines(plain=found, best=found)
+    if found.spectra is None and bias.fitted:
+        found = on_quiet_samples(found, bias.free)
+    made = corrected(found, bias)
+    if motion.log is not as_read:
+        evened = motion.log.recording.source.remarks[-1:]
+        made = replace(made, on_correction=(*evened, *made.on_correction))
+    return Baselines(plain=made if choice.corrects_all else found, best=made)
+
+
+def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
+    """A baseline without spectra with the bias fit's free part (T,), where that is enough."""
+    log = found.motion.log
+    share = float(quiet.mean())
+    remark = fact("free-by-the-fit", share=share)
+    if found.motion.choice.is_given and found.missing is not None:
+        # What was given is dropped, and why has to be said.
+        reason = found.missing.values["reason"]
+        remark = caution("free-by-the-fit-instead", share=share, reason=reason)
+    part = FreePart((RunSamples(log, quiet),), quiet, (remark,))
+    made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
+    try:
+        return replace(made, spectra=spectra_of(RunSamples(log, ~quiet), made.samples))
+    except ParameterError:  # all of it or nothing is assumed free, or never long enough
+        return found
+
+
+def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
+    """A baseline with the bias of the whole log off, where its guards apply any of it."""
+    fitted = bias if bias.fitted else None
+    made = replace(found, on_correction=bias.remarks, correction=fitted)
+    if not bias.applied.any() or made.part is None or made.spectra is None:
+        return made
+    return replace(made, spectra=spectra_of(RunSamples(made.log, ~made.part.own), made.samples))

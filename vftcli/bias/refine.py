@@ -1,0 +1,347 @@
+"""From a log's baseline to finished estimates: bands, limits, the paper's gains against the best.
+
+Bands come from the log's own free samples and spectra, and say what an estimate's error
+is expected to be without a reference: the root mean square of their standard deviation
+over the log, the mean over the joints. Gains from a log's spectra and a clock with gaps
+may together be more than numbers can hold. On such a joint the momentum observer, which
+adds up its input, replaces it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.bias.baseline import Baseline, Baselines, FreeReading, free_reading
+from vftcli.bias.choice import AUTOMATIC
+from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
+from vftcli.bias.whole_log import stride_of
+from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.observer import Complex, Observer, Tuning
+from vftcli.observers.spectra import (
+    ENOUGH,
+    UNSEEN,
+    FreeError,
+    Spectra,
+    error_band,
+    free_error,
+)
+from vftcli.observers.table import BEST, PAPER
+from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
+from vftcli.robots.friction import HELD, ONE_STOP
+from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares
+from vftcli.signals.errors import ClockError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
+from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
+from vftcli.signals.series import resample_columns
+from vftcli.signals.shown import Shown
+
+#: The cause that is not part of an error's sum: it says what a standing joint may hide.
+STICTION = "stiction at rest"
+SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
+#: Codes of the remark that holds what the bands let expect: the gains are off the best,
+#: or not.
+EXPECTED = ("paper-gains-expected", "paper-gains-expected-level")
+#: The same of the remark that holds what a reference says.
+MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
+AHEAD = 1.05  #: The best is ahead where the paper's gains make this many times its error.
+
+
+def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
+    """The estimate with its band, marked in motion; itself if nothing is known.
+
+    The band is `vftcli.observers.spectra`'s: a filter's own covariance, `sd`, knows no lag.
+    """
+    estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
+    if spectra is not None and len(reading.samples):
+        f, step, n = spectra.frequency, spectra.step, spectra.joints
+        missed = spectra.missed(reading.observer.frequency_response(f, step, n))
+        sd = error_band(known_error(found, reading), missed, run.rests, found.correction_sd)
+    elif estimate.name == BEST:
+        sd = stated_band(found, reading)
+    else:
+        return estimate
+    return replace(estimate, error_sd=handed_over(sd), moving=~run.standing)
+
+
+def stated_band(found: Baseline, reading: FreeReading) -> Array:
+    """Band of `best` without spectra, by the robot's own numbers. (T, n) [N·m]
+
+    Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a
+    bias was fitted it is what that leaves of it, and what is read where its fit sees no
+    contact. What the gains leave out of the torque is not known. In a log of a few
+    samples, or of hardly anything but gaps, a moving joint has `UNSEEN` of its dry
+    friction.
+    """
+    run = found.motion.log
+    friction, nothing = run.dry_friction, np.zeros_like(run.dry_friction)
+    called = fitted_error(found, reading)
+    if called is not None:
+        return error_band(called, nothing, run.rests, found.correction_sd)
+    held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
+    try:
+        motion = smooth_motion(run)
+    except ClockError:
+        usual = held._replace(moving=(UNSEEN * friction) ** 2)
+        return error_band(usual, nothing, run.rests)
+    t, stride = motion.t, stride_of(motion.t)
+    columns = error_columns(run, motion, friction_alone(run.robot), stride)
+    spread = np.column_stack([np.sqrt(np.sum(column**2, axis=1)) for column in columns])
+    return error_band(held, nothing, run.rests, resample_columns(t, t[::stride], spread))
+
+
+def known_error(found: Baseline, reading: FreeReading) -> FreeError:
+    """An estimator's reading without contact, as far as the log shows it.
+
+    Samples that a fitted bias calls free speak too, as a stated part is short and often
+    at rest: the larger of both counts.
+    """
+    stated = free_error(reading.samples, reading.resting, found.motion.log.dry_friction)
+    called = fitted_error(found, reading)
+    if called is None:
+        return stated
+    if found.by_fit:  # the free part is these samples, and the loads in them are no error
+        return called
+    moving = np.maximum(stated.moving, called.moving)
+    resting = np.maximum(stated.resting, called.resting)
+    return FreeError(moving, resting, unseen=stated.unseen & called.unseen)
+
+
+def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
+    """Readings in the correction fit's free samples; None in too few.
+
+    Slow loads that the fit believes in are no error of who reads them, nor is a load that
+    the free part carries where it believes in none.
+    """
+    run, tau, off = found.motion.log, reading.estimate.tau, found.correction
+    if off is None or np.count_nonzero(off.free) < ENOUGH:
+        return None
+    if off.load.any():
+        tau = tau - off.load
+    elif found.load is not None:
+        tau = tau - found.load.torque(run)
+    return free_error(tau[off.free], run.rests[off.free], run.dry_friction)
+
+
+def band_remarks(found: Baseline) -> list[Remark]:
+    """Meaning of the bands, and joints without known friction."""
+    if found.spectra is None:
+        return [caution("no-band")] if found.part is None else []
+    stuck = caution("band-of-a-standing-joint", on_joints(found.stuck))
+    return [fact("band"), stuck] if found.stuck.any() else [fact("band")]
+
+
+class Budget(NamedTuple):
+    """Sources of one observer's error, estimated on the log itself."""
+
+    name: str  #: The observer.
+    parts: dict[str, Array]  #: Cause → root mean square. (n,) [N·m]
+
+    @property
+    def total(self) -> Array:
+        """Root sum of squares of all causes but stiction at rest. (n,) [N·m]"""
+        squares = [v**2 for cause, v in self.parts.items() if cause != STICTION]
+        return np.asarray(np.sqrt(np.sum(squares, axis=0)))
+
+
+def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
+    """Divide an observer's error into its causes, each estimated from the log.
+
+    Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the
+    observer reads on the free part is model error: friction as far as sign and size of a
+    joint's own velocity explain it, the rest of the model otherwise. Stiction at rest is
+    the dry friction a resting joint may hide, F_c/√3, times the share of its time at
+    rest.
+    """
+    f, step, n = spectra.frequency, spectra.step, spectra.joints
+    response = reading.observer.frequency_response(f, step, n)
+    read = reading.rms**2
+    share = abs(response) ** 2
+    noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
+    velocity = np.concatenate([piece.run.dq[piece.inside] for piece in found.pieces])
+    by_friction = (read - noise) * friction_share(velocity, reading.samples)
+    log = found.motion.log
+    hidden = ONE_STOP * log.dry_friction
+    squares = {
+        "noise": noise,
+        "friction": by_friction,
+        "model": read - noise - by_friction,
+        "bandwidth": spectra.missed(response),
+        STICTION: hidden**2 * log.standing.mean(axis=0),
+    }
+    parts = {cause: np.sqrt(value) for cause, value in squares.items()}
+    return Budget(reading.observer.name, parts)
+
+
+def friction_share(dq: Array, tau: Array) -> Array:
+    """Share of a torque's power (S, n) by a joint's own velocity [rad/s], sign and size. (n,)"""
+    shares = []
+    for velocity, y in zip(dq.T, tau.T, strict=True):
+        X = np.column_stack([np.tanh(velocity / SIGN_SPEED), velocity])
+        weights, *_ = np.linalg.lstsq(X, y, rcond=None)
+        power = float(np.sum(y**2))
+        shares.append(1.0 - float(np.sum((y - X @ weights) ** 2)) / power if power > 0 else 0.0)
+    return np.clip(shares, 0.0, 1.0)
+
+
+def limits_remark(found: Budget, stuck: Mask) -> Remark:
+    """Limits of a log: each joint's largest cause, and its part of the error.
+
+    What stiction may hide is added to the error of a standing joint, one of `stuck`. (n,)
+    """
+    stiction = found.parts[STICTION]
+    moving = {cause: part for cause, part in found.parts.items() if cause != STICTION}
+    decided = stuck & (stiction > 0.0)  # no friction known: nothing known of stiction
+    named = [
+        STICTION if stands else max(moving, key=lambda cause: float(moving[cause][j]))
+        for j, stands in enumerate(decided)
+    ]
+    size = [float(found.parts[cause][j]) for j, cause in enumerate(named)]
+    total = np.hypot(found.total, np.where(stuck, stiction, 0.0))
+    where = Where(about=found.name)
+    return fact("limits", where, causes=named, size_Nm=size, total_Nm=total.tolist())
+
+
+def expected_gap(
+    found: Baseline, estimates: Sequence[ExternalTorque], *, gains_of_file: bool
+) -> Remark | None:
+    """Expected error of the paper's gains over `best`'s; None if unknown."""
+    known = {estimate.name: estimate for estimate in estimates}
+    if BEST not in known or known[BEST].error_sd is None:
+        return None
+    log = found.motion.log
+    step, n = log.recording.median_step, log.robot.joints
+    observers, _ = ObserverChoice(names=PAPER).build(log.robot, step)
+    paper = [o for o in observers if gains_of_file and o.name in known]
+    if not paper:
+        paper = [*observers]
+        readings = [free_reading(found, o, o.estimate(found.log.terms)) for o in paper]
+        known |= {r.observer.name: with_band(found, r) for r in readings}
+    errors = {}
+    for name in (BEST, *(o.name for o in paper)):
+        sd = known[name].error_sd
+        errors[name] = np.nan if sd is None else float(root_mean_squares(sd).mean())
+    return gap_remark(EXPECTED, errors, {o.name: o.tuning(step, n).delay for o in paper})
+
+
+def gap_remark(
+    codes: tuple[str, str], errors: Mapping[str, float], delays: Mapping[str, Array]
+) -> Remark | None:
+    """Distance of the paper's gains from the best by `MEASURED` or `EXPECTED` errors, or None.
+
+    Of observer → error [N·m], `best` among them, and observer of the paper → delay (n,) [s].
+    """
+    ratios = {name: errors[name] / errors[BEST] for name in delays} if errors[BEST] > 0.0 else {}
+    ratio = float(np.mean([*ratios.values()])) if ratios else float("nan")
+    if not np.isfinite(ratio):
+        return None
+    spread = np.concatenate([*delays.values()])
+    return fact(
+        codes[0] if ratio >= AHEAD else codes[1],
+        ratio=ratio,
+        ratios=ratios,
+        least_delay_ms=1e3 * float(spread.min()),
+        most_delay_ms=1e3 * float(spread.max()),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SparedObserver(Shown):
+    """An observer with some of its joints left to another."""
+
+    observer: Observer  #: Whose name it has.
+    spare: Observer  #: Who does those joints.
+    lost: Mask  #: Which they are. (n,)
+
+    @property
+    def name(self) -> str:
+        """Its name at the command line."""
+        return self.observer.name
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """Run over a whole log; without the filter's own deviation, which the spare has not."""
+        own, spare = (o.estimate(terms).tau for o in (self.observer, self.spare))
+        tau = handed_over(np.where(self.lost, spare, own))
+        return ExternalTorque(name=self.name, t=terms.t, tau=tau)
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """What the first one's parameters mean at a sample time. [s]"""
+        return self.observer.tuning(step, joints)
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
+        with np.errstate(all="ignore"):  # skip what is no number
+            own, spare = (
+                o.frequency_response(frequency, step, joints) for o in (self.observer, self.spare)
+            )
+        return np.where(self.lost, spare, own)
+
+
+def with_spare(
+    found: Baseline, observer: Observer, estimate: ExternalTorque
+) -> tuple[Observer, ExternalTorque, tuple[Remark, ...]]:
+    """An observer and its estimate, their lost joints left to the momentum observer, said so."""
+    lost = np.any(~estimate.known, axis=0)
+    if not lost.any():
+        return observer, estimate, ()
+    log = found.motion.log
+    (spare,), _ = ObserverChoice(names=("gmo",)).build(log.robot, log.recording.median_step)
+    made = SparedObserver(observer=observer, spare=spare, lost=lost)
+    where = on_joints(lost)._replace(about=observer.name)
+    remark = caution("estimate-without-number", where)
+    return made, made.estimate(found.log.terms), (remark,)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Refinement(Shown):
+    """What the complete log makes of its estimates."""
+
+    estimates: tuple[ExternalTorque, ...]  #: The estimates with their bands.
+    baselines: Baselines  #: The log's free part and spectra, as the observers have them.
+    curves: Mapping[str, Curve]  #: Observer that was tuned → the curve that was minimised.
+    #: Where each observer's error comes from, one an observer; none without spectra.
+    budgets: tuple[Budget, ...]
+    removed: str  #: What ``bias.method`` asked for.
+    remarks: tuple[Remark, ...]  #: What the reader of the estimates should know.
+
+
+def refine(
+    found: Baselines,
+    observers: Sequence[Observer],
+    estimates: Sequence[ExternalTorque],
+    removed: str = AUTOMATIC,
+    *,
+    gains_of_file: bool = False,
+) -> Refinement:
+    """The observers' estimates, in this order, with their bands and what limits them."""
+    remarks, budgets, shown, plain = [*found.remarks], list[Budget](), [], found.plain
+    for observer, estimate in zip(observers, estimates, strict=True):
+        # Observers may run on different terms: each is measured on its own.
+        on = found.of(observer.name)
+        runs, complete, lost = with_spare(on, observer, estimate)
+        reading = free_reading(on, runs, complete)
+        remarks += lost
+        if on.spectra is not None:
+            budgets.append(budget(on, on.spectra, reading))
+        shown.append(with_band(on, reading))
+    curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
+    for name, curve in curves.items():
+        omega, rmse = curve.best.tolist(), curve.least.tolist()
+        about = Where(about=name)
+        remarks.append(fact("tuned", about, omega_n_rad_s=omega, expected_rmse_Nm=rmse))
+    for name, curve in curves.items():
+        remarks += bound_remarks(name, curve.best, curve.omega_n)
+    remarks += band_remarks(plain)
+    # Of the most accurate estimate: of `best` if it ran, else of the last.
+    leading = [one for one in budgets if one.name == BEST] or budgets[-1:]
+    remarks += [limits_remark(one, plain.stuck) for one in leading]
+    gap = expected_gap(plain, shown, gains_of_file=gains_of_file)
+    return Refinement(
+        estimates=tuple(shown),
+        baselines=found,
+        curves=curves,
+        budgets=tuple(budgets),
+        removed=removed,
+        remarks=tuple(remarks) if gap is None else (*remarks, gap),
+    )

@@ -1,0 +1,238 @@
+"""The bias of the model from the whole log: what repeats with the motion is no contact.
+
+No free part is needed. The model's error δx is fitted to the raw disturbance
+d = τ_ext − A δx of all of the log, with contacts rejected and slow external loads left
+in; where it predicts motion that it has not seen, b = A δx is subtracted, μ ← μ − b, and
+any observer runs on the rest.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vftcli.bias.model_error import (
+    CUTOFF,
+    ModelError,
+    SmoothMotion,
+    error_columns,
+    error_of,
+    expected_error,
+    friction_alone,
+    smooth_motion,
+    usual_friction,
+    without_waits,
+)
+from vftcli.bias.robust_fit import (
+    Guarded,
+    Rows,
+    WholeLogFit,
+    faded,
+    fit_robustly,
+    guarded,
+    slow_loads,
+)
+from vftcli.robots.run import Run
+from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares, seal, seal_mask
+from vftcli.signals.external_torque import DynamicsTerms
+from vftcli.signals.filters import derivative, zero_phase
+from vftcli.signals.remarks import Remark, caution, fact, on_joints
+from vftcli.signals.rest import faster
+from vftcli.signals.series import median_step, resample_columns
+
+#: From its first to its last motion a log has to take this long: a shorter one tells
+#: inertia from a push no more, and friction alone is fitted. [s]
+LEAST_MOTION = 10.0
+#: A log that moves for less tells nothing: ten times the `CORRELATED` of a residual. [s]
+LEAST_FRICTION = 3.0
+#: An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a
+#: pose.
+LEAST_SHARE = 0.1
+#: Up to so many times the error of friction that is expected, rms over a short log, its
+#: fit is used in full, … Pieces of 5 s of UR10e logs reach 1.2 on their worst joint. [1]
+USUAL = 1.1
+#: … and from so many times on not at all: a hand leads the arm. With a hand of 20 N along
+#: the flange's path the worst joint reads 1.2 to 2.5. [1]
+LED = 1.4
+#: In a short log a joint's friction is corrected in full if so much of its error is left,
+#: …
+CLEAR = 0.45
+#: … and not at all if so much is: pieces of 5 s of UR10e logs leave .3 to .9, the same
+#: led by a hand .4 to .9, and with both limits they are no worse than a momentum
+#: observer. [1]
+UNCLEAR = 0.6
+RATE = 30.0  #: Samples a second that are fitted, …
+LONG = 60.0  #: … up to a log of this length [s], …
+LONG_RATE = 10.0  #: … and in a longer one.
+MOST_SAMPLES = 36_000  #: Samples that are fitted at most: an hour's.
+
+
+@dataclass(frozen=True, kw_only=True)
+class WholeLogBias:
+    """The model's bias along a log."""
+
+    #: How much of the model's error each joint loses: 0 on joints left alone, 1 where it
+    #: clearly predicts what it had not seen. (n,)
+    weight: Array
+    bias: Array  #: Subtracted torque, zero on joints left alone. (T, n) [N·m]
+    #: Standard deviation of the model's error as it was fitted, and of what is taken off
+    #: where that is a part of it: taken off or left alone, by chance. (T, n) [N·m]
+    sd: Array
+    free: Mask  #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
+    #: External torque of the slow loads that the fit believes in, which stays in the
+    #: estimates; zero where it believes in none. (T, n) [N·m]
+    load: Array
+    remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
+    fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing of the log.
+    #: The model's error on the joints left alone too, None where nothing was fitted.
+    error: ModelError | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        seal(self, "weight", "bias", "sd", "load")
+        seal_mask(self, "free")
+
+    @property
+    def applied(self) -> Mask:
+        """Joints on which the correction is used. (n,)"""
+        return self.weight > 0.0
+
+    def corrected(self, log: Run) -> Run:
+        """The log itself without the bias, μ ← μ − b."""
+        return log.less(-self.bias) if self.applied.any() else log
+
+    def of(self, other: Run) -> Run:
+        """Another run of the arm without this model error."""
+        if self.error is None or not self.applied.any():
+            return other
+        return other.less(-self.weight * self.error.torque(other, smooth_motion(other)))
+
+
+def whole_log_bias(run: Run) -> WholeLogBias:
+    """The model's bias along a log, of each joint where it predicts unseen samples."""
+    run = run.steadied
+    terms = run.terms
+    span, refused = motion_of(run)
+    if refused is not None:
+        return untouched(terms, refused)
+    expected = (expected_error if span >= LEAST_MOTION else friction_alone)(run.robot)
+    # What no arm does overflows, and is refused.
+    with np.errstate(all="ignore"):
+        try:
+            motion = smooth_motion(run)
+            t, stride = motion.t, stride_of(motion.t)
+            d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
+            loads = slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride])
+            columns = error_columns(run, motion, expected, stride)
+            rows = Rows(columns=columns, loads=loads, d=d[::stride])
+            fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot)[0])
+            tried = guarded(fit, motion.dq[::stride])
+            if span < LEAST_MOTION:
+                tried = tried._replace(weight=weight_of_friction(fit, tried))
+                if not tried.weight.any():
+                    return untouched(terms, caution("whole-log-friction-unclear", motion_s=span))
+            found = bias_of(run, motion, expected, fit, tried, stride)
+        except np.linalg.LinAlgError:
+            return untouched(terms, caution("whole-log-without-solution"))
+    if not (np.isfinite(found.bias).all() and np.isfinite(found.sd).all()):
+        return untouched(terms, caution("whole-log-without-solution"))
+    if span >= LEAST_MOTION:
+        return found
+    shorter = fact("whole-log-friction-alone", motion_s=span, least_s=LEAST_MOTION)
+    return replace(found, remarks=(shorter, *found.remarks))
+
+
+def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
+    """How much of a fit of friction alone each joint of a short log gets. (n,)
+
+    A hand that leads the arm looks like less friction: they differ in size and in foresight.
+    """
+    if tried.solution is None:
+        return tried.weight
+    found = np.mean(fit.rows.modelled(tried.solution.model) ** 2, axis=0)
+    usual = np.array([np.sum(column**2, axis=1).mean() for column in fit.rows.columns])
+    worst = np.sqrt(found / np.maximum(usual, np.finfo(float).tiny)).max()
+    return faded(worst, USUAL, LED) * faded(tried.share, CLEAR, UNCLEAR)
+
+
+def motion_of(run: Run) -> tuple[float, Remark | None]:
+    """How long a log moves from first to last [s], and why it tells no error of the model."""
+    t, dq = without_waits(run.t), run.dq
+    duration = float(t[-1] - t[0])
+    if duration < LEAST_FRICTION:
+        short = caution("whole-log-too-short", duration_s=duration, least_s=LEAST_FRICTION)
+        return duration, short
+    # noise is no motion
+    moves = faster(zero_phase(t, dq, CUTOFF)).any(axis=1)
+    moving = float(np.count_nonzero(moves) * median_step(t))
+    span = float(np.ptp(t[moves])) if moves.any() else 0.0
+    share = moving / duration
+    if not moves.any() or (moving < LEAST_MOTION <= span and share < LEAST_SHARE):
+        return span, caution("whole-log-at-rest", motion_s=moving, share=share)
+    if span < LEAST_FRICTION:
+        little = caution("whole-log-little-motion", motion_s=span, least_s=LEAST_FRICTION)
+        return span, little
+    return span, None
+
+
+def stride_of(t: Array) -> int:
+    """Every how many samples are fitted."""
+    rate = RATE if t[-1] - t[0] <= LONG else LONG_RATE
+    return max(1, int(1.0 / (rate * median_step(t)) + 1e-9), -(-len(t) // MOST_SAMPLES))
+
+
+def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
+    """No correction, and why."""
+    none = np.zeros((terms.samples, terms.joints))
+    return WholeLogBias(
+        weight=np.zeros(terms.joints),
+        bias=none,
+        sd=none,
+        free=np.ones(terms.samples, bool),
+        load=none,
+        remarks=(why,),
+        fitted=False,
+    )
+
+
+def bias_of(
+    run: Run,
+    motion: SmoothMotion,
+    expected: ModelError,
+    fit: WholeLogFit,
+    found: Guarded,
+    stride: int,
+) -> WholeLogBias:
+    """The bias on the log's own clock, with its uncertainty and what is said of it."""
+    t, n = motion.t, run.robot.joints
+    free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
+    load = handed_over(resample_columns(t, t[::stride], -fit.rows.loads.torque_of(found.loads)))
+    if found.solution is None:
+        said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
+        bare = untouched(run.terms, said[0])
+        return replace(bare, free=free, load=load, remarks=said, fitted=True)
+    error = error_of(expected.values * found.solution.model, n)
+    whole = error.torque(run, motion)
+    bias = found.weight * whole
+    spread = resample_columns(t, t[::stride], fit.rows.spread(found.solution.covariance))
+    # all of it with this probability, else nothing: w(1 − w) of its square
+    undecided = np.sqrt(found.weight * (1.0 - found.weight)) * whole
+    return WholeLogBias(
+        weight=found.weight,
+        bias=handed_over(bias),
+        sd=handed_over(np.hypot(spread, undecided)),
+        free=free,
+        load=load,
+        remarks=remarks_of(found, root_mean_squares(bias), float(fit.free.mean())),
+        error=error,
+    )
+
+
+def remarks_of(found: Guarded, changed: Array, free_share: float) -> tuple[Remark, ...]:
+    """Joints that were corrected, by how much (n,) [N·m] rms, and those left alone."""
+    applied, remarks = found.weight > 0.0, []
+    for code, joints in {"applied": applied, "left-alone": ~applied}.items():
+        values: dict[str, object] = {"unseen_share": found.share[joints].tolist()}
+        if code == "applied":
+            values |= {"changed_Nm": changed[joints].tolist(), "free_share": free_share}
+        if joints.any():
+            remarks.append(fact(f"whole-log-{code}", on_joints(joints), **values))
+    return tuple(remarks)

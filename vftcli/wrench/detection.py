@@ -1,0 +1,294 @@
+"""Contacts of every observer, or of a list, against the true ones, one to one.
+
+A contact is where a wrench or a joint torque leaves its free band, what is read untouched.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from vftcli.observers.observer import Observer
+from vftcli.robots.run import Run, RunSamples
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.series import intervals, runs_of
+from vftcli.wrench.sensor_reading import SETTLING, SensorReading
+from vftcli.wrench.solvers import VirtualSensor
+
+#: A contact ends where the score falls below this share of its threshold, 1: hysteresis.
+LEAVE = 0.6
+HOLD = 0.02  #: A contact must last at least this long, so that one noisy sample is none. [s]
+GAP = 0.25  #: Two contacts closer than this are one: a hand that slips has not let go. [s]
+BAND = 1.3  #: The free band reaches this far beyond the largest departure seen in the free part.
+#: An alarm that begins earlier than this before a true contact, or later than this after
+#: its end, is false, whatever it meets: a slow observer shows a contact for a while after
+#: it. [s]
+EARLY, LATE = 0.1, 1.0
+TRUE_TORQUE = 0.5  #: A true joint torque beyond this is a contact. [N·m]
+#: A true wrench beyond this is a contact, and half a free band at least so wide. (6,)
+#: [N, N·m]
+WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
+LEAST_TORQUE = 0.5  #: Smallest half width of a free band of joint torques. [N·m]
+#: Contacts of an exact reference closer than this are one; those of a measured one, which
+#: has a floor, as those of an observer. [s]
+TRUE_GAP = 0.12
+
+
+class ContactInterval(NamedTuple):
+    """One interval of contact."""
+
+    start: float  #: When the score rises above 1. [s]
+    stop: float  #: When it has fallen below `LEAVE`. [s]
+
+
+def contact_intervals(
+    t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0
+) -> tuple[ContactInterval, ...]:
+    """Stretches of a mask as `vftcli.signals.series.intervals` has them, in time."""
+    runs = intervals(t, mask, least, gap)
+    return tuple(ContactInterval(float(t[start]), float(t[stop - 1])) for start, stop in runs)
+
+
+def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInterval, ...]:
+    """Intervals in which a score (T,) rises above 1 until it falls below `LEAVE`.
+
+    Those shorter than `HOLD` are dropped, those closer than `gap` joined.
+    """
+    inside = np.zeros(len(t), bool)
+    for begin, end in runs_of(score > LEAVE):
+        # It starts where 1 is first exceeded, not where the lower threshold is.
+        inside[begin:end] = np.logical_or.accumulate(score[begin:end] > 1.0)
+    return contact_intervals(t, inside, HOLD, gap)
+
+
+def true_intervals(
+    t: Array, truth: Array, limits: Array | float, gap: float = GAP
+) -> tuple[ContactInterval, ...]:
+    """Contacts of a true wrench or torque (T, k)."""
+    return find_contacts(t, np.nan_to_num(abs(truth) / limits).max(axis=1), gap=gap)
+
+
+def departure(values: Array, quiet: Array, least: Array | float) -> Array:
+    """Largest departure over the columns, in half widths of the free band; 0 if unknown. (T,)
+
+    The band is the median of what is read untouched (S, k) ± `BAND` × its largest
+    departure, at least so much.
+    """
+    inside = quiet[np.isfinite(quiet).all(axis=1)]
+    if len(inside) == 0:
+        raise ParameterError("the free part holds no sample in which the wrench is known")
+    centre = np.median(inside, axis=0)
+    half = np.maximum(BAND * abs(inside - centre).max(axis=0), least)
+    return np.asarray(np.nan_to_num(abs(values - centre) / half, nan=0.0).max(axis=1))
+
+
+class Interval(Protocol):
+    """Anything with a beginning and an end: a found interval, a listed contact, a true one."""
+
+    @property
+    def start(self) -> float:
+        """When it begins. [s]"""
+
+    @property
+    def stop(self) -> float:
+        """When it ends. [s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detection:
+    """How well found contacts agree with the true ones, one to one."""
+
+    contacts: int  #: True contacts.
+    listed: int  #: Found contacts, right or wrong.
+    missed: int  #: True contacts to which no found one is credited.
+    merged: int  #: Those of them that run into another: what overlaps them is credited elsewhere.
+    #: Found contacts that are neither credited nor false: pieces of a true one, its echo.
+    split: int
+    false_alarms: int  #: Found contacts that begin where nothing touches the arm.
+    false_alarms_per_h: float  #: Those per hour without contact. [1/h]
+    #: Time from each true contact's start to the one found; NaN where missed. [s]
+    delay: tuple[float, ...]
+
+    @property
+    def found(self) -> int:
+        """True contacts that were found."""
+        return self.contacts - self.missed
+
+    @property
+    def mean_delay(self) -> float:
+        """Mean delay of the contacts that were found, NaN if none was. [s]"""
+        return float(np.nanmean(self.delay)) if self.found else float("nan")
+
+    @property
+    def longest_delay(self) -> float:
+        """Longest delay of the contacts that were found, NaN if none was. [s]"""
+        return float(np.fmax.reduce(self.delay, initial=np.nan))
+
+
+def overlaps(found: Sequence[Interval], true: Sequence[Interval]) -> Array:
+    """How long each found contact lies on each true one, within `EARLY` of it. (F, C) [s]"""
+    begin, end = np.reshape([(f.start, f.stop) for f in found], (-1, 2)).T[:, :, None]
+    first, last = np.reshape([(c.start, c.stop) for c in true], (-1, 2)).T
+    shared = np.minimum(end, last + EARLY) - np.maximum(begin, first - EARLY)
+    return np.asarray(np.maximum(shared, 0.0))
+
+
+def assignment(found: Sequence[Interval], true: Sequence[Interval]) -> list[int | None]:
+    """Of each true contact the number of the found one that is credited to it, None if missed.
+
+    A found contact is credited to one true contact, so that as many as possible are
+    found, and of the ways to do so to that which overlaps most.
+    """
+    given: list[int | None] = [None] * len(true)
+    if not found or not true:
+        return given
+    from scipy.optimize import linear_sum_assignment
+
+    shared = overlaps(found, true)
+    # One more pair is worth more than all that may overlap.
+    worth = np.where(shared > 0.0, 1.0 + float(shared.sum()), 0.0) + shared
+    for i, j in zip(*linear_sum_assignment(worth, maximize=True), strict=True):
+        if shared[i, j] > 0.0:
+            given[int(j)] = int(i)
+    return given
+
+
+def match_contacts(
+    found: Sequence[Interval], true: Sequence[Interval], duration: float
+) -> Detection:
+    """Match found contacts one to one with the true ones of a log that lasts `duration` [s].
+
+    What begins within `LATE` of a true contact's end is no false alarm, but credited only
+    where it overlaps one; what begins too early is one, credited or not.
+    """
+    given, shared = assignment(found, true), overlaps(found, true) > 0.0
+    missed = [j for j, i in enumerate(given) if i is None]
+    false = {
+        i
+        for i, f in enumerate(found)
+        if not any(c.start - EARLY <= f.start <= c.stop + LATE for c in true)
+    }
+    free = duration - sum(c.stop - c.start for c in true)
+    return Detection(
+        contacts=len(true),
+        listed=len(found),
+        missed=len(missed),
+        merged=int(np.count_nonzero(shared[:, missed].any(axis=0))),
+        split=len(found) - len({i for i in given if i is not None} | false),
+        false_alarms=len(false),
+        false_alarms_per_h=len(false) * 3600.0 / free if free > 0 else float("nan"),
+        delay=tuple(
+            float("nan") if i is None else max(found[i].start - c.start, 0.0)
+            for i, c in zip(given, true, strict=True)
+        ),
+    )
+
+
+class ContactScore(NamedTuple):
+    """How well one observer detects contacts."""
+
+    name: str  #: The observer.
+    signal: str  #: In what it detects them: "torque", "wrench", or "list" of contacts.
+    detection: Detection  #: Counts and delays, of the free band itself or of the list.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class KnownContacts:
+    """What is known of a log's contacts before they are judged."""
+
+    untouched: Mask  #: Samples of the log that are known to be free; none where nothing is. (T,)
+    #: What each observer reads in free runs of other logs, by name. (S, k) each
+    beside: Mapping[str, Array] = field(default_factory=dict)
+    #: Contacts of a list, by the observer in whose wrench they were found.
+    listed: Mapping[str, Sequence[Interval]] = field(default_factory=dict)
+
+
+def read_in_free_runs(
+    pieces: Sequence[RunSamples],
+    observers: Sequence[Observer],
+    run_of: Callable[[str, Run], Run],
+    sensor: VirtualSensor | None,
+) -> dict[str, Array]:
+    """Readings of each observer in free runs once it has settled, by name: (S, 6) or (S, n)."""
+    read: dict[str, list[Array]] = {}
+    for piece in pieces:
+        t, q, chain = piece.run.t, piece.run.q, piece.run.robot.chain
+        settled = piece.inside & (t >= t[0] + SETTLING)
+        for observer in observers:
+            torque = observer.estimate(run_of(observer.name, piece.run).terms)
+            values = torque.tau if sensor is None else sensor.wrench(torque, q, chain).known
+            read.setdefault(observer.name, []).append(values[settled])
+    return {name: np.concatenate(each) for name, each in read.items()}
+
+
+def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
+    """Samples from `SETTLING` after the start to the first true contact. (T,)"""
+    first = true[0].start if true else float(t[-1])
+    free: Mask = (t >= t[0] + SETTLING) & (t < first)
+    if np.count_nonzero(free) < 10:
+        raise ParameterError(
+            f"contacts: the first true one begins at {first:g} s, so there is no free part to "
+            f"learn the band from; name one with --free A:B"
+        )
+    return free
+
+
+def floor_in_motion(reference: ExternalTorque) -> Array:
+    """A reference's own error while a joint moves, zero where it states none. (n,) [N·m]
+
+    Stiction at rest would deafen the reference to contacts in motion.
+    """
+    if reference.floor is None or reference.sd is None or reference.moving is None:
+        return np.zeros(reference.joints) if reference.floor is None else reference.floor
+    known = reference.moving & np.isfinite(reference.sd)
+    square = np.sum(np.where(known, reference.sd, 0.0) ** 2, axis=0)
+    count = np.count_nonzero(known, axis=0)
+    return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), reference.floor)
+
+
+def judge_contacts(
+    estimates: Sequence[ExternalTorque],
+    measured: SensorReading | None,
+    reference: ExternalTorque,
+    known: KnownContacts | None = None,
+) -> tuple[ContactScore, ...]:
+    """Every observer's contacts against those of a reference torque.
+
+    An observer whose contacts are listed is judged by its list. The others' are found in
+    their wrenches where they were asked for, else in their joint torques, by a free band:
+    learned in the zero spans, else in the log's own free part, else in free runs, else
+    before the first true contact.
+    """
+    t = reference.t
+    limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
+    gap = TRUE_GAP if reference.floor is None else GAP
+    true = true_intervals(t, reference.tau, limits, gap)
+    kind, least = "torque", np.asarray(LEAST_TORQUE)
+    signals = {estimate.name: estimate.tau for estimate in estimates}
+    if measured is not None:
+        kind, least = "wrench", WRENCH_LIMITS
+        signals = {wrench.name: wrench.known for wrench in measured.wrenches}
+    known = known or KnownContacts(untouched=np.zeros(len(t), bool))
+    settled = t >= t[0] + SETTLING
+    quiet = known.untouched & settled
+    if measured is not None and measured.drifts:
+        quiet = measured.free
+    scores = []
+    for name, values in signals.items():
+        found: Sequence[Interval]
+        if (listed := known.listed.get(name)) is not None:
+            kind_of_it, found = "list", listed
+        else:
+            free = values[quiet] if quiet.any() else known.beside.get(name, ())
+            if not len(free):
+                free = values[learned_free(t, true)]
+            # Observers rise from zero: what they read before they have settled touches
+            # nothing.
+            score = np.where(settled, departure(values, np.asarray(free), least), 0.0)
+            kind_of_it, found = kind, find_contacts(t, score)
+        counts = match_contacts(found, true, float(t[-1] - t[0]))
+        scores.append(ContactScore(name, kind_of_it, counts))
+    return tuple(scores)

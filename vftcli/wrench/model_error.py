@@ -1,0 +1,364 @@
+"""The model error b: of each joint d = b + n where nobody touches the arm.
+
+n is white of variance R, b an Ornstein–Uhlenbeck process of variance s² and correlation
+time T. Over blocks of B seconds the spectrum of d is
+
+    S(f) = B [R + s² (1 − a²)/(1 − 2a cos 2πfB + a²)],    a = exp(−B/T),
+
+and the free part's periodogram P fixes the three by Whittle's likelihood, Σ ln S + P/S.
+
+The smoother of a whole log takes b so (`torque_noise`). A list of contacts is measured
+against the quiet blocks on either side, so there b is modelled closer
+(`learn_noise`, `error_process`): reversals are cut out before the spectrum is learned,
+what the spectrum misses of the tails inflates it, and a joint that comes to rest draws
+its stiction anew.
+
+References:
+    P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.friction import (
+    CREEP_SHARE,
+    PUSHED_SHARE,
+    REST_SHARE,
+    STOP_SHARE,
+    dry_torques,
+)
+from vftcli.robots.robot import Robot
+from vftcli.robots.run import RunSamples
+from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
+from vftcli.signals.arrays import Array, Mask, median
+from vftcli.signals.least_squares import robust_sd
+from vftcli.signals.linear_model import SPIKE, LinearModel, filtered
+from vftcli.signals.rest import NEAR_REST
+from vftcli.signals.series import grown, near, runs_of
+from vftcli.wrench.solvers import TORQUE_SD
+
+REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]
+#: A joint that rests under a contact: the push re-settles its stiction within so long.
+#: [s]
+PUSHED_TIME = 0.3
+#: Such a push adds to the variance of motion that of rest, by the drives' share under a
+#: push.
+RESETTLED = (PUSHED_SHARE / REST_SHARE) ** 2
+#: A joint that moves in less than the share `SEEN` of the free part's blocks: the model
+#: error of its motion, as a share of F_c, and its least correlation time. [s]
+UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
+#: Prior of the correlation time T: its median [s] and the spread of ln T.
+USUAL_TIME, TIME_SPREAD = 0.5, 1.5
+LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
+LEAST_BLOCKS = 20  #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
+ASSUMED_SHARE = 0.2  #: Model error of motion as a share of F_c, where no free part is known.
+#: Share of the free part's blocks in which a joint must move for its reversals to be
+#: bridged.
+MOVES = 0.3
+#: Shares of the normalised squares ν²/S, and where χ² of one degree has them.
+QUANTILES = (0.9, 2.706), (0.97, 4.709)
+#: Smallest model error that is inferred where no free motion is known: this share of F_c,
+#: and so much [N·m]; its correlation time is no shorter where it is this error. [s]
+DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
+#: Where nothing was learned the quietest 60 % of the blocks in which a joint moves count
+#: as free; 60 % of a normal variable lie within so many standard deviations.
+QUIET, QUIET_SD = 0.6, 0.8416
+#: The block in which a joint comes to rest draws b anew: this share is left of what it
+#: was.
+STOP_DECAY = float(np.exp(-5.0))
+#: What a joint has just done: it stops if it moved for more than half of this time
+#: before, and for this time after a start b changes within `START_TIME`. [s]
+RECENT = 0.1
+START_TIME = 0.05  #: Correlation time of b while a joint breaks away. [s]
+#: How often a joint's innovation is a spike within so long [s] of its motion, and at
+#: rest.
+SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
+UNKNOWN = 1e9  #: Variance of the white noise of a block that says nothing. [(N·m)²]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueNoise:
+    """White noise and model error of every joint, by blocks of one length."""
+
+    white: Array  #: R, variance of the white noise. (n,) [(N·m)²]
+    variance: Array  #: s² of motion that the free part shows. (n,) [(N·m)²]
+    time: Array  #: T, its correlation time. (n,) [s]
+    dry: Array  #: F_c. (n,) [N·m]
+    seen: Mask  #: Whether the free part moved the joint; else motion errs by its friction. (n,)
+    at_rest: Array  #: Variance that rest adds. (n,) [(N·m)²]
+    pushed: Array  #: Variance that rest under a contact adds. (n,) [(N·m)²]
+    near: float = 0.0  #: How long before and after a rest that of rest holds. [s]
+    #: How much free motion it was learned from; 0 where it is assumed. [s]
+    free_seconds: float = 0.0
+
+    @property
+    def moving(self) -> Array:
+        """Variance of the model error in motion. (n,) [(N·m)²]"""
+        return self.variance + ~self.seen * (UNSEEN_SHARE * self.dry) ** 2
+
+    @property
+    def moving_time(self) -> Array:
+        """Its correlation time. (n,) [s]"""
+        return np.where(self.seen, self.time, np.maximum(self.time, UNSEEN_TIME))
+
+    def stationary(self, blocks: Blocks, touched: Mask | None = None) -> tuple[Array, Array]:
+        """Variance and time of b in blocks; `touched` ones may re-settle. (K, n) each"""
+        rests = np.column_stack([grown(blocks.t, rest, self.near) for rest in blocks.rests.T])
+        variance = np.where(rests, self.variance + self.at_rest, self.moving)
+        time = np.where(rests, np.maximum(self.time, REST_TIME), self.moving_time)
+        if touched is not None:
+            held = blocks.rests & touched[:, None]
+            variance = np.where(held, self.variance + self.pushed, variance)
+            time = np.where(held, PUSHED_TIME, time)
+        return variance, time
+
+
+def steps(blocks: Blocks) -> Array:
+    """Time from the middle of the block before; 0 for the first. (K,) [s]"""
+    return np.diff(blocks.t, prepend=blocks.t[:1])
+
+
+def torque_noise(
+    log: Blocks, free: Sequence[RunSamples], robot: Robot, seconds: float
+) -> TorqueNoise:
+    """Noise of a whole log: from free motion of this log or of others, else assumed.
+
+    At rest the model error is at least `REST_SHARE` of the dry friction, whatever the
+    free part shows: stiction keeps what the last motion, or the last touch, left. The
+    free part counts from its first motion to its last, since rest has a model error of
+    its own; a piece without motion counts as it is. Without any the model error is
+    assumed as shares of the dry friction, and the white noise as neighbouring blocks
+    differ.
+    """
+    dry, pieces = dry_torques(robot), []
+    for piece in free:
+        blocks = disturbance_blocks(piece.run.terms, piece.run.q, seconds, piece.inside)
+        motion = np.flatnonzero(blocks.known & ~blocks.rests.all(axis=1))
+        ends = (int(motion[0]), int(motion[-1]) + 1) if len(motion) else (0, len(blocks.t))
+        pieces += long_stretches(blocks.part(slice(*ends)))
+    if pieces:
+        noise = fitted_noise(pieces, dry)
+        resting = np.maximum(noise.variance, (REST_SHARE * dry) ** 2)
+        unseen = ~noise.seen * (UNSEEN_SHARE * dry) ** 2
+        at_rest, pushed = resting - noise.variance, unseen + RESETTLED * resting
+        return replace(noise, at_rest=at_rest, pushed=pushed)
+    moving, rest = (np.maximum(share * dry, TORQUE_SD) for share in (ASSUMED_SHARE, REST_SHARE))
+    bend = log.d[1:-1] - 0.5 * (log.d[2:] + log.d[:-2])
+    white = np.full(len(dry), TORQUE_SD**2)
+    if len(bend):
+        # The median square of a normal variable is .455 of its mean square; the bend has
+        # 1.5 R.
+        white = np.median(bend**2, axis=0) / (0.455 * 1.5)
+    return TorqueNoise(
+        white=np.maximum(white, LEAST_NOISE),
+        variance=moving**2,
+        time=np.full(len(dry), USUAL_TIME),
+        dry=dry,
+        seen=np.ones(len(dry), bool),
+        at_rest=rest**2 - moving**2,
+        pushed=RESETTLED * rest**2,
+        near=NEAR_REST,
+    )
+
+
+def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
+    """Noise of free pieces for a list of contacts, None where no stretch is long enough."""
+    pieces = [stretch for piece in free for stretch in long_stretches(piece)]
+    if not pieces:
+        return None
+    share = (~np.concatenate([piece.rests for piece in pieces])).mean(axis=0)
+    bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
+    noise = fitted_noise(bridged, dry)
+    # The tails of the innovations may ask for more than the spectrum.
+    processes = [error_process(noise, piece) for piece in pieces]
+    squares = np.concatenate(
+        [
+            innovations(error_model(piece.d, process), process.spikes)[0]
+            for piece, process in zip(pieces, processes, strict=True)
+        ]
+    )
+    each = [np.quantile(squares, share, axis=0) / value for share, value in QUANTILES]
+    factor = np.maximum(np.max(each, axis=0), 1.0)
+    return replace(noise, white=noise.white * factor, variance=noise.variance * factor)
+
+
+def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueNoise | None:
+    """Noise of a log without known free motion, None in too few blocks."""
+    bends = [np.diff(log.d[a:b], n=2, axis=0) for a, b in runs_of(log.known) if b - a > 2]
+    if not bends:
+        return None
+    # A second difference of white noise has 6 R.
+    white = np.maximum(robust_sd(np.concatenate(bends)) ** 2 / 6.0, LEAST_NOISE)
+    least = np.maximum(DRY_SHARE * dry, LEAST_ERROR)
+    moving = log.known[:, None] & ~log.rests
+    asked = moving.mean(axis=0) >= SEEN
+    if learned is not None:
+        # The fit calls the quietest samples free; what its friction says is a floor, if
+        # it is any.
+        asked &= DRY_SHARE * dry < LEAST_ERROR
+    for j in np.flatnonzero(asked):
+        quiet = np.quantile(abs(log.d[moving[:, j], j]), QUIET) / QUIET_SD
+        least[j] = max(least[j], quiet)
+    variance, time, seconds = least**2, np.full(len(dry), LEAST_TIME), 0.0
+    if learned is not None:
+        white, variance = np.maximum(white, learned.white), np.maximum(learned.variance, variance)
+        floored = variance > learned.variance
+        time = np.where(floored, np.maximum(learned.time, LEAST_TIME), learned.time)
+        seconds = learned.free_seconds
+    return TorqueNoise(
+        white=white,
+        variance=variance,
+        time=time,
+        dry=dry,
+        seen=np.ones(len(dry), bool),
+        at_rest=(CREEP_SHARE * dry) ** 2,
+        pushed=(PUSHED_SHARE * dry) ** 2,
+        free_seconds=seconds,
+    )
+
+
+def fitted_noise(stretches: Sequence[Blocks], dry: Array) -> TorqueNoise:
+    """Noise by Whittle's likelihood over all stretches together, joint by joint."""
+    # A block holds whole samples, so that it is not quite as long as was asked.
+    seconds = median(np.concatenate([s.length for s in stretches]))
+    f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
+    P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
+    longest = max(float(s.length.sum()) for s in stretches)
+    white, variance, time = np.transpose([fit_spectrum(f, p, seconds, longest) for p in P.T])
+    return TorqueNoise(
+        white=white,
+        # An offset is an error too.
+        variance=variance + np.concatenate([s.d for s in stretches]).mean(axis=0) ** 2,
+        time=time,
+        dry=dry,
+        seen=(~np.concatenate([s.rests for s in stretches])).mean(axis=0) >= SEEN,
+        at_rest=(CREEP_SHARE * dry) ** 2,
+        pushed=(PUSHED_SHARE * dry) ** 2,
+        free_seconds=float(sum(s.length.sum() for s in stretches)),
+    )
+
+
+def long_stretches(blocks: Blocks) -> list[Blocks]:
+    """The stretches of known blocks that a spectrum can be learned from."""
+    runs = [run for run in runs_of(blocks.known) if run[1] - run[0] >= LEAST_BLOCKS]
+    return [blocks.part(slice(*run)) for run in runs]
+
+
+def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
+    """The blocks with d of the given joints bridged in a straight line where they rest."""
+    d, moves = piece.d.copy(), ~piece.rests
+    for j in np.flatnonzero(joints & moves.any(axis=0)):
+        d[:, j] = np.interp(piece.t, piece.t[moves[:, j]], d[moves[:, j], j])
+    return piece._replace(d=d)
+
+
+def periodogram(d: Array, seconds: float) -> Array:
+    """Two-sided periodogram at the positive frequencies. (N//2, n) [(N·m)²/Hz]"""
+    spectrum = np.fft.rfft(d, axis=0)[1:]
+    return (spectrum.real**2 + spectrum.imag**2) * (seconds / len(d))
+
+
+def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[float, float, float]:
+    """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
+
+    The level follows in closed form, so that two numbers are left to search. No
+    correlation time is longer than the longest stretch. Units are Hz, (N·m)²/Hz and s.
+    """
+    cosine = np.cos(2.0 * np.pi * f * seconds)
+    low, high = np.log([2.0 * seconds, 1e-2]), np.log([max(longest, 4.0 * seconds), 1e6])
+    best, level, count = np.zeros(2), 0.0, 13
+    for _ in range(6):
+        times, ratios = (np.linspace(low[i], high[i], count) for i in range(2))
+        a = np.exp(-seconds / np.exp(times))[:, None]
+        shape = (1.0 - a * a) / (1.0 - 2.0 * a * cosine + a * a)
+        S = 1.0 + np.exp(ratios)[None, :, None] * shape[:, None, :]
+        levels = np.mean(P / S, axis=2) / seconds
+        cost = np.log(S).sum(axis=2) + len(f) * np.log(np.maximum(levels, LEAST_NOISE**2))
+        cost += 0.5 * ((times[:, None] - np.log(USUAL_TIME)) / TIME_SPREAD) ** 2
+        i, j = np.unravel_index(cost.argmin(), cost.shape)
+        best, level = np.array([times[i], ratios[j]]), float(levels[i, j])
+        reach = (high - low) / (count - 1)
+        low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)
+        count = 5
+    time, ratio = np.exp(best)
+    return max(level, LEAST_NOISE), float(level * ratio), float(time)
+
+
+class ErrorProcess(NamedTuple):
+    """State-space model of b: decay, added variance and white noise of every block."""
+
+    decay: Array  #: Share of b that is kept from the block before. (K, n)
+    added: Array  #: Variance that is added. (K, n) [(N·m)²]
+    white: Array  #: R, `UNKNOWN` where the block's disturbance is. (K, n) [(N·m)²]
+    spikes: Array  #: How often an innovation is a spike. (K, n)
+
+    def hiding(self, hidden: Mask) -> "ErrorProcess":
+        """The process where some blocks (K,) say nothing."""
+        return self._replace(white=np.where(hidden[:, None], UNKNOWN, self.white))
+
+
+def steady_process(
+    noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None, starts: Mask | None = None
+) -> ErrorProcess:
+    """B along a log without stops and spikes; joints that start (K, n) let go of it faster.
+
+    In the `touched` blocks (K,) a contact may re-settle stiction at rest.
+    """
+    variance, time = noise.stationary(blocks, touched)
+    if starts is not None:
+        time = np.where(starts, np.minimum(time, START_TIME), time)
+    decay = np.exp(-steps(blocks)[:, None] / time)
+    decay[0] = 0.0
+    white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
+    return ErrorProcess(decay, variance * (1.0 - decay**2), white, np.zeros(decay.shape))
+
+
+def error_process(noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None) -> ErrorProcess:
+    """B along a log; in the `touched` blocks (K,) a contact may re-settle stiction at rest."""
+    rests, length = blocks.rests, float(np.median(blocks.length))
+    # Share of the `RECENT` blocks before each in which a joint moved.
+    count, k = max(round(RECENT / length), 1), np.arange(len(rests))
+    total = np.vstack([np.zeros((1, rests.shape[1])), np.cumsum(~rests, axis=0)])
+    first = np.maximum(k - count, 0)
+    moved = (total[:-1] - total[first]) / np.maximum(k - first, 1)[:, None]
+    process = steady_process(noise, blocks, touched, ~rests & (moved < 1.0))
+    stops = rests & ~np.vstack([np.ones((1, rests.shape[1]), bool), rests[:-1]]) & (moved > 0.5)
+    process.decay[stops] = STOP_DECAY
+    anew = np.broadcast_to((STOP_SHARE * noise.dry) ** 2, rests.shape)
+    process.added[stops] = anew[stops]
+    process.added[0] += np.where(rests[0], anew[0], 0.0)
+    # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
+    reach = max(round(SPIKE_REACH / length - TIE), 1)
+    spikes = np.where(near(~rests, reach), SPIKES_MOVING, SPIKES_RESTING)
+    return process._replace(spikes=spikes)
+
+
+def error_model(d: Array, process: ErrorProcess) -> LinearModel:
+    """The model of b alone, each joint for itself, from mean disturbances d (K, …, n)."""
+    own = (each[..., None] for each in (process.white, process.decay, process.added))
+    return LinearModel(d[..., None], np.ones((*d.shape, 1, 1)), *own)
+
+
+def spike_limit(spikes: Array) -> Array:
+    """ν²/S beyond which an innovation is more likely a spike, for how often it is one. (K, …, n)"""
+    with np.errstate(divide="ignore"):
+        odds = np.log(spikes) - np.log1p(-spikes)
+    return np.asarray((np.log(SPIKE) - 2.0 * odds) / (1.0 - 1.0 / SPIKE))
+
+
+def innovations(model: LinearModel, spikes: Array) -> tuple[Array, Array]:
+    """ν²/S of every joint's own model, and S, by how often each is a spike. (K, …, n) each"""
+    blocks = filtered(model, spike_limit(spikes))
+    each = [(block.square, block.spread[..., 0, 0]) for block in blocks]
+    squares, spreads = (np.array(series) for series in zip(*each, strict=True))
+    return squares, spreads
+
+
+def spiked_white(d: Array, process: ErrorProcess) -> Array:
+    """R of every block with its spikes in it, for d (K, n). (K, n) [(N·m)²]"""
+    squares, spreads = innovations(error_model(d, process), process.spikes)
+    spiked = squares > spike_limit(process.spikes)
+    return process.white + np.where(spiked, (SPIKE - 1.0) * spreads, 0.0)

@@ -1,0 +1,342 @@
+"""From a log, its free motion and the estimates to what the virtual sensor says of it.
+
+The joint torque error that a wrench's band starts from is stated, or measured on the log
+by the one model of every band, `vftcli.observers.spectra`: what the estimator reads while
+nothing touches the arm, at rest and in motion apart, and what its lag leaves out of the
+contacts there are. Where neither a free part nor an unloaded span is known there is no
+band: the observers' own covariance assumes a torque that wanders as fast as Q_τ says and
+a model without error, and differs a hundredfold between filters whose estimates are
+nearly the same.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import chain as chained
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, within, without_load
+from vftcli.observers.observer import Observer
+from vftcli.observers.spectra import error_band, free_error, spectra_of
+from vftcli.robots.chain import link_poses
+from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import disturbance_impulse
+from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
+from vftcli.signals.option import numbers
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.series import resample_columns
+from vftcli.signals.wrench import Wrench
+from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench.frames import from_base
+from vftcli.wrench.sensor import find_mounting, vendor_remarks
+from vftcli.wrench.sensor_reading import (
+    SensorReading,
+    contact_elsewhere,
+    without_drift,
+    zero_drift,
+    zero_moved,
+    zero_spans,
+    zero_warning,
+)
+from vftcli.wrench.smoother import (
+    SmoothedWrench,
+    WrenchPrior,
+    deviations,
+    prior_of,
+    smooth_wrench,
+)
+from vftcli.wrench.solvers import CHUNK, VirtualSensor
+
+HALF = 0.05  #: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
+PAYLOAD_SLACK = 0.05  #: Difference of payloads that is not worth a remark. [kg]
+
+
+class Gate(NamedTuple):
+    """The contacts of a log, outside of which nothing touches the arm."""
+
+    spans: Sequence[tuple[float, float]]  #: From and to of every contact. [s]
+    #: How their wrench moves, as the contacts themselves show it; None to choose it.
+    prior: WrenchPrior | None = None
+
+
+class FreeLog(NamedTuple):
+    """A log as an observer has it, and what nobody touched."""
+
+    run: Run  #: The log.
+    #: Samples that nobody touched, less a load that they carry; none where nothing is
+    #: known.
+    free: tuple[RunSamples, ...]
+    #: A load that the free samples carry, and with them the whole log; None without one.
+    load: FreeLoad | None = None
+
+    def known_free(self, unloaded: Mask) -> tuple[RunSamples, ...]:
+        """The free samples; without any, the samples (T,) that a zero says are unloaded."""
+        if self.free or np.count_nonzero(unloaded) < 2:
+            return self.free
+        return (RunSamples(self.run, unloaded),)
+
+
+def as_modelled(motion: FreeMotion) -> FreeLog:
+    """The log as the robot's model explains it, with the free part that is given or found."""
+    try:
+        return FreeLog(motion.log, motion.known.pieces)
+    except ReferenceTorqueError:
+        return FreeLog(motion.log, ())
+
+
+def sense(
+    motion: FreeMotion,
+    observers: Sequence[Observer],
+    estimates: Sequence[ExternalTorque],
+    choice: WrenchChoice,
+    plain: FreeLog | None = None,
+    own: Mapping[str, FreeLog] | None = None,
+    gate: Gate | None = None,
+) -> SensorReading:
+    """Wrenches of the observers' estimates, in the same order, less their zero, and judged.
+
+    What is asked of the log rather than of an observer (its unloaded start, its sensor's
+    pose, its vendor's convention) is read off the mean disturbance, so that it does not
+    depend on which observers run. The smoother needs the log with its free samples, as
+    the robot's model alone has it (`plain`, found if not given) or as an observer has its
+    own, and a gate where there is one.
+    """
+    log, q, t = motion.log, motion.log.q, motion.log.t
+    chain = log.robot.chain
+    disturbance = mean_disturbance(log.terms)
+    raw = VirtualSensor(frame="base").wrench(disturbance, q, chain)
+    mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
+    # The disturbance was solved in base axes, so that --frame moves no zero.
+    sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
+    spans, unloaded = zero_spans(choice.zero, raw)
+    chosen, free = within(t, spans), within(t, unloaded)
+    sds, on_sds = torque_error(choice.torque_sd, log, observers, estimates, chosen)
+    wrenches = list(sensor.wrenches(estimates, q, chain, sds))
+    names = [wrench.name for wrench in wrenches if choice.smooths(wrench.name)]
+    smoothed = smooth_all(
+        names, plain or as_modelled(motion), own or {}, unloaded=chosen, gate=gate
+    )
+    bands: list[Remark] = []
+    for k, wrench in enumerate(wrenches):
+        if wrench.name in smoothed:
+            wrenches[k] = smoothed_wrench(smoothed[wrench.name], wrench, sensor, log)
+            bands += wrenches[k].remarks
+    # Beside a smoothed wrench, what is said of the torques' error names those that it is
+    # said of.
+    if others := [w.name for w in wrenches if w.name not in smoothed]:
+        where = Where(", ".join(others)) if smoothed else Where()
+        bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in on_sds]
+    # Drifts span by span: the first of each observer is its zero.
+    drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in spans]
+    warnings = [
+        remark
+        for row in drifts
+        for wrench, drift in zip(wrenches, row, strict=True)
+        for remark in zero_warning(wrench, drift)
+    ]
+    moved = [zero_moved(*pair) for row in drifts[1:] for pair in zip(drifts[0], row, strict=True)]
+    # Only now: the band and the warnings are about the wrench as it was read.
+    if drifts:
+        drifts[0] = [replace(drift, removed=True) for drift in drifts[0]]
+        wrenches = [without_drift(w, d) for w, d in zip(wrenches, drifts[0], strict=True)]
+    hides = any(w.hidden.any() for w in wrenches)
+    return SensorReading(
+        sensor=sensor,
+        wrenches=tuple(wrenches),
+        masked=raw.hidden,
+        drifts=tuple(chained.from_iterable(drifts)),
+        free=free,
+        smoothed=smoothed,
+        remarks=(
+            *warnings,
+            *fitted,
+            *(() if drifts else payload_remark(log.recording, log.robot)),
+            *(mask_remark(raw.hidden, raw.sigma_min) if hides else ()),
+            *moved,
+            *bands,
+            *vendor_remarks(log.recording, raw, chain),
+            *(remark for w in wrenches for remark in contact_elsewhere(w, free)),
+        ),
+    )
+
+
+def smoothed_wrench(
+    smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, log: Run
+) -> Wrench:
+    """A wrench with the smoother's values and band in place of its own, nothing of it masked."""
+    t, values, sd = wrench.t, np.empty((len(wrench.t), 6)), np.empty((len(wrench.t), 6))
+    for start in range(0, len(t), CHUNK):
+        span = slice(start, start + CHUNK)
+        flange = link_poses(log.robot.chain, log.q[span]).rotation[:, -1]
+        X = from_base(sensor.frame, flange, sensor.mounting)
+        there, covariance = smoothed.at(t[span])
+        values[span] = np.squeeze(X @ there[:, :, None], axis=2)
+        sd[span] = deviations(X @ covariance @ X.swapaxes(1, 2))
+    return replace(
+        wrench,
+        values=handed_over(values),
+        sd=handed_over(sd),
+        masked=None,
+        remarks=smoothed.remarks(wrench.name),
+    )
+
+
+def smooth_all(
+    names: Sequence[str],
+    plain: FreeLog,
+    own: Mapping[str, FreeLog],
+    *,
+    unloaded: Mask,
+    gate: Gate | None = None,
+) -> dict[str, SmoothedWrench]:
+    """The smoothed wrench of each observer, computed once for all that have the same log."""
+    logs = {name: own.get(name, plain) for name in names}
+    each = {log.run: log for log in reversed(logs.values())}
+    wrenches = {run: smooth_log(log, plain, unloaded, gate) for run, log in each.items()}
+    return {name: wrenches[log.run] for name, log in logs.items()}
+
+
+def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) -> SmoothedWrench:
+    """The smoothed wrench of one log; the arguments as of `smooth_all`.
+
+    A correction of the model's error is used where the wrench comes and goes. Where the
+    uncorrected log calls for one steady load it is left out, since a load and an error of
+    the model look alike.
+    """
+    free = log.known_free(unloaded)
+    if gate is not None:
+        found = smooth_wrench(without_load(log.run, log.load), free, gate.spans, gate.prior)
+        if log.load is None:
+            return found
+        q = resample_columns(found.t, log.run.t, log.run.q)
+        values, covariance = log.load.wrench(log.run.robot.chain, q)
+        values, covariance = found.values + values, found.covariance + covariance
+        return replace(found, values=values, covariance=covariance, load=log.load)
+    if log.run is not plain.run:
+        modelled = plain.known_free(unloaded)
+        prior = prior_of(plain.run, modelled)
+        if prior.is_steady:
+            return replace(smooth_wrench(plain.run, modelled, prior=prior), uncorrected=True)
+    return smooth_wrench(log.run, free)
+
+
+def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
+    """The raw disturbance, its mean over `HALF` before and after each sample. (T, n) [N·m]
+
+    What is asked of a log itself is asked of it: no option touches it and no filter
+    delays it. The mean is a difference of its integral, so an uneven clock weighs by
+    time; at the ends of the log it is over what there is. A log of one sample reads
+    nothing.
+    """
+    t, joints = terms.t, terms.joints
+    if len(t) < 2:
+        return ExternalTorque(name="disturbance", t=t, tau=np.zeros((len(t), joints)))
+    total = disturbance_impulse(terms)
+    before, after = np.maximum(t - HALF, t[0]), np.minimum(t + HALF, t[-1])
+    mean = resample_columns(after, t, total) - resample_columns(before, t, total)
+    mean /= (after - before)[:, None]
+    return ExternalTorque(name="disturbance", t=t, tau=handed_over(mean))
+
+
+def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:
+    """A remark where the controller has another load than the robot's file mounts."""
+    stated = recording.payload_mass
+    mounted = robot.payload.mass if robot.payload is not None else 0.0
+    if stated is None or abs(stated - mounted) < PAYLOAD_SLACK:
+        return ()
+    weight = float(np.linalg.norm(robot.chain.gravity)) * (stated - mounted)
+    return (caution("payload-differs", told_kg=stated, mounted_kg=mounted, weight_N=weight),)
+
+
+def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
+    """Count of the samples (T,) in which the pose hides the wrench, and the smallest σ_min [m]."""
+    count = int(np.count_nonzero(hidden))
+    if not count or sigma is None:
+        return ()
+    values: dict[str, Any] = {"masked": count, "samples": len(hidden), "share": count / len(hidden)}
+    return (caution("pose-hides-wrench", **values, sigma_min_m=float(sigma.min())),)
+
+
+OWN = "own"  #: The word for the observers' own covariance as the torque error.
+#: Observer → standard deviation, (n,) or (T, n), none of those without a band [N·m]; and
+#: where it comes from, or why there is none.
+TorqueError = tuple[dict[str, Array], list[Remark]]
+
+
+def torque_error(
+    stated: str | None,
+    log: Run,
+    observers: Sequence[Observer],
+    torques: Sequence[ExternalTorque],
+    free: Mask,
+) -> TorqueError:
+    """The torque error behind the band: as stated, else of the zero spans (T,)."""
+    if stated is not None:
+        return given_error(stated, torques)
+    known = {torque.name: torque.error_sd for torque in torques if torque.error_sd is not None}
+    if torques and len(known) == len(torques):
+        return known, [fact("band-from-torques")]
+    if np.count_nonzero(free) < 2:
+        return {}, [caution("no-wrench-band")]
+    return from_free_part(log, torques, free, missed_torque(log, observers, free))
+
+
+def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
+    """The torque error that ``virtual-sensor.torque-sd`` states."""
+    if text == OWN:
+        own = {torque.name: torque.sd for torque in torques if torque.sd is not None}
+        codes = {True: "band-of-observer", False: "no-covariance"}
+        order = sorted(torques, key=lambda torque: torque.sd is None)
+        return own, [caution(codes[one.name in own], Where(one.name)) for one in order]
+    joints = torques[0].joints if torques else 0
+    values = np.array(numbers(text) or ())
+    if len(values) not in {1, joints} or not np.all(np.isfinite(values) & (values > 0)):
+        raise ParameterError(
+            f"virtual-sensor.torque-sd {text!r} is not {OWN!r}, one positive number, or one for "
+            f"each of {joints} joints [N·m]"
+        )
+    given = np.array(np.broadcast_to(values, (joints,)))
+    names = [torque.name for torque in torques]
+    return dict.fromkeys(names, given), [fact("band-given", Where(name)) for name in names]
+
+
+def from_free_part(
+    run: Run,
+    torques: Sequence[ExternalTorque],
+    free: Mask,
+    missed: Mapping[str, Array] | None,
+) -> TorqueError:
+    """The error of the free samples (T,) and of what the lag misses, where that is known."""
+    rests, sd, seen = run.rests, {}, True
+    for torque in torques:
+        inside = torque.tau[free]
+        error = free_error(inside - np.nanmean(inside, axis=0), rests[free], run.dry_friction)
+        seen = seen and not np.any(error.unseen & ~rests.all(axis=0))
+        lag = np.zeros(torque.joints) if missed is None else missed[torque.name]
+        sd[torque.name] = error_band(error, lag, rests)
+    remarks = [fact("band-from-free-part")]
+    if missed is None:
+        remarks.append(caution("band-without-lag"))
+    if not seen:
+        remarks.append(caution("band-of-free-rest"))
+    return sd, remarks
+
+
+def missed_torque(
+    log: Run, observers: Sequence[Observer], free: Mask
+) -> Mapping[str, Array] | None:
+    """Observer → mean square that its lag leaves out of the contacts. (n,) [(N·m)²]
+
+    None where the part that is free, or the rest, is too short for a spectrum.
+    """
+    try:
+        spectra = spectra_of(RunSamples(log, ~free), [RunSamples(log, free)])
+    except ParameterError:
+        return None
+    f, step, n = spectra.frequency, spectra.step, log.robot.joints
+    return {o.name: spectra.missed(o.frequency_response(f, step, n)) for o in observers}

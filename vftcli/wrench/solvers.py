@@ -1,0 +1,243 @@
+"""The virtual force/torque sensor: τ = J_Fᵀ w turned round (46), in a named frame.
+
+Everything is solved at the flange point in base axes with lengths in units of 0.3 m, so
+that a newton and a newton-metre weigh alike: J_s = S J, S = diag(1, 1, 1, 0.3, 0.3, 0.3),
+w_s = S⁻¹w.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.chain import Chain, flange_jacobian, link_poses
+from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.errors import RobotError, ShapeError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.parsing import check_known
+from vftcli.signals.shown import Shown
+from vftcli.signals.wrench import Wrench
+from vftcli.wrench.frames import Mounting, check_frame, frame_pose, from_base
+
+LENGTH = 0.3  #: Length by which moments are made comparable with forces. [m]
+SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])  #: Diagonal of S.
+#: Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N.
+#: [m]
+LEAST_SIGMA = 0.05
+#: Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,)
+#: [N]
+PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
+#: Joint torque error against which the MAP solver weighs its prior where none is known: a
+#: weight, no band. [N·m]
+TORQUE_SD = 0.3
+
+
+class Decomposition(NamedTuple):
+    """J_s J_sᵀ = U diag(λ) Uᵀ of every sample."""
+
+    scaled: Array  #: J_s. (T, 6, n) [m]
+    U: Array  #: Eigenvectors, as columns. (T, 6, 6)
+    squares: Array  #: λ, ascending: squares of the singular values of J_s. (T, 6) [m²]
+
+    @property
+    def sigma_min(self) -> Array:
+        """Smallest singular value of J_s. (T,) [m]"""
+        return np.sqrt(np.maximum(self.squares[:, 0], 0.0))
+
+
+def decompose(jacobian: Array) -> Decomposition:
+    """Decompose the flange Jacobian in base axes. (T, 6, n)"""
+    n = jacobian.shape[2]
+    if n < 6:
+        raise RobotError(
+            f"{n} joint torques cannot determine the six components of a wrench; "
+            "leave --wrench and its options out: use the joint torques"
+        )
+    scaled = SCALE[:, None] * jacobian
+    # The 6×6 product is cheaper to decompose than the 6×n factor, and only the squares
+    # are needed.
+    squares, U = np.linalg.eigh(scaled @ scaled.swapaxes(1, 2))
+    return Decomposition(scaled, U, squares)
+
+
+class Solution(NamedTuple):
+    """A linear estimate w = A τ and the square root B of its covariance, cov = B Bᵀ."""
+
+    gain: Array  #: A, from joint torque to wrench. (T, 6, n)
+    root: Array  #: B. (T, 6, k)
+
+
+def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
+    """S U diag(1/λ) Uᵀ J_s; no gain in singular values of at most `left_out` [m]. (T, 6, n)"""
+    # λ is a difference of larger numbers: below its rounding it may even be negative.
+    rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
+    inverse = 1.0 / np.maximum(parts.squares, rounding)
+    if left_out:
+        inverse = np.where(parts.squares > left_out**2, inverse, 0.0)
+    U = parts.U
+    return SCALE[:, None] * ((U * inverse[:, None, :]) @ (U.swapaxes(1, 2) @ parts.scaled))
+
+
+#: Standard deviations of joint torques (T, n) [N·m] → the estimate for them.
+Solver = Callable[[Array], Solution]
+
+
+def pinv(parts: Decomposition, X: Array) -> Solver:
+    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
+
+    Its covariance is that of the torque, seen through it.
+    """
+    gain = X @ least_squares_gain(parts)
+    return lambda sd: Solution(gain, gain * sd[:, None, :])
+
+
+def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
+    """The most probable wrench under a normal prior of 50 N and 10 N·m about zero.
+
+    w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares
+    where the pose is good, and next to the prior where the pose cannot tell.
+    """
+
+    def solve(sd: Array) -> Solution:
+        weighted = parts.scaled / sd[:, None, :]
+        information = weighted @ weighted.swapaxes(1, 2) + np.diag(PRIOR**-2)
+        root = np.linalg.inv(np.linalg.cholesky(information))  # C = rootᵀ root
+        C = root.swapaxes(1, 2) @ root
+        scaled = X * SCALE
+        return Solution(scaled @ (C @ (weighted / sd[:, None, :])), scaled @ root.swapaxes(1, 2))
+
+    return solve
+
+
+#: Name at the command line → what solves for the wrenches of poses, given their Jacobian,
+#: and X (T, 6, 6) that takes a wrench in base axes to the frame asked for.
+SOLVERS: dict[str, Callable[[Decomposition, Array], Solver]] = {
+    "pinv": pinv,
+    "map": maximum_a_posteriori,
+}
+LEAST_SQUARES = "pinv"  #: The solver where none is asked for.
+
+
+def null_space(parts: Decomposition, tau: Array) -> Array:
+    """(I − Jᵀpinv(Jᵀ))τ: the torque of τ (T, n, K) that no wrench at the flange explains. [N·m]
+
+    A wrench at the flange leaves it unchanged; a contact further down the arm, or an
+    error of the model, does not. Singular directions count as explained by nothing.
+    """
+    # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
+    tall = parts.scaled.swapaxes(1, 2) @ parts.U
+    share = np.where(parts.squares > 1e-12, 1.0 / np.maximum(parts.squares, 1e-12), 0.0)
+    return tau - tall @ (share[:, :, None] * (tall.swapaxes(1, 2) @ tau))
+
+
+class FlangeWrench(NamedTuple):
+    """A wrench at the flange."""
+
+    #: Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m]
+    values: Array
+    known: Mask  #: Whether the pose can tell it: σ_min is at least `LEAST_SIGMA`. (T,)
+
+
+def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:
+    """Least squares (46) from torques and given Jacobians, for logs and loops that hold one."""
+    parts = decompose(jacobian)
+    gain = least_squares_gain(parts, left_out)
+    values = np.squeeze(gain @ tau[:, :, None], axis=2)
+    return FlangeWrench(values, parts.sigma_min >= LEAST_SIGMA)
+
+
+CHUNK = 4096  #: Samples that are solved at once: about 10 MB of 6×6 matrices.
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class VirtualSensor(Shown):
+    """How joint torques become a wrench."""
+
+    solver: str = LEAST_SQUARES  #: A key of `vftcli.wrench.solvers.SOLVERS`.
+    frame: str = "flange"  #: A key of `vftcli.wrench.frames.FRAMES`.
+    #: Where tool and sensor sit on the flange.
+    mounting: Mounting = field(default_factory=Mounting)
+    #: σ_min of J with angular rows × 0.3 m below which a sample is masked. [m]
+    least_sigma: float = LEAST_SIGMA
+
+    def __post_init__(self) -> None:
+        check_known(self.solver, SOLVERS, f"no solver {self.solver!r} for a wrench")
+        frame_pose(check_frame(self.frame), self.mounting)
+
+    def wrench(self, torque: ExternalTorque, q: Array, chain: Chain) -> Wrench:
+        """The wrench of one estimate, without a band; see `wrenches`."""
+        return self.wrenches((torque,), q, chain)[0]
+
+    def wrenches(
+        self,
+        torques: Sequence[ExternalTorque],
+        q: Array,
+        chain: Chain,
+        sd: Mapping[str, Array] = MappingProxyType({}),
+    ) -> tuple[Wrench, ...]:
+        """The wrench of every estimate at q (T, n) [rad], about the flange, tool or sensor.
+
+        An estimate without a standard deviation of its torques, (n,) or (T, n) [N·m] by
+        its name, has a wrench without band.
+        """
+        samples, n = q.shape
+        for torque in torques:
+            if torque.tau.shape != q.shape:
+                raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
+        # A view: one row stands for every sample. Zero is raised, so that weights stay
+        # finite.
+        errors = [
+            np.broadcast_to(np.maximum(sd.get(torque.name, TORQUE_SD), 1e-6), q.shape)
+            for torque in torques
+        ]
+        values = np.empty((len(torques), samples, 6))
+        spread = np.empty((len(torques), samples, 6))
+        residual = np.empty((len(torques), samples))
+        sigma = np.empty(samples)
+        # Chunk by chunk, so that memory does not grow with the log.
+        for start in range(0, samples, CHUNK):
+            span = slice(start, min(start + CHUNK, samples))
+            parts = decompose(flange_jacobian(chain, q[span]))
+            flange = link_poses(chain, q[span]).rotation[:, -1]
+            solve = SOLVERS[self.solver](parts, from_base(self.frame, flange, self.mounting))
+            sigma[span] = parts.sigma_min
+            for k, torque in enumerate(torques):
+                gain, root = solve(errors[k][span])
+                values[k, span] = np.squeeze(gain @ torque.tau[span, :, None], axis=2)
+                if torque.name in sd:
+                    spread[k, span] = np.sqrt(np.sum(root**2, axis=2))
+            if n > 6:
+                every = np.stack([torque.tau[span] for torque in torques], axis=2)
+                residual[:, span] = np.linalg.norm(null_space(parts, every), axis=1).T
+        masked = sigma < self.least_sigma
+        return tuple(
+            Wrench(
+                name=torque.name,
+                t=torque.t,
+                values=handed_over(values[k].copy()),
+                frame=self.frame,
+                sd=handed_over(spread[k].copy()) if torque.name in sd else None,
+                sigma_min=sigma,
+                masked=masked,
+                null_space=handed_over(residual[k].copy()) if n > 6 else None,
+            )
+            for k, torque in enumerate(torques)
+        )
+
+    def arrow(self, force: Array, q: Array, chain: Chain) -> "ForceArrow":
+        """Where forces (S, 3) [N] of this sensor act at q (S, n) [rad], and point."""
+        poses = link_poses(chain, q)
+        flange, pose = poses.rotation[:, -1], frame_pose(self.frame, self.mounting)
+        origin = poses.translation[:, -1] + flange @ pose.translation
+        if self.frame == "base":
+            return ForceArrow(origin, force)
+        return ForceArrow(origin, np.einsum("tij,tj->ti", flange @ pose.rotation, force))
+
+
+class ForceArrow(NamedTuple):
+    """A force as an arrow in the base frame."""
+
+    origin: Array  #: The point that the wrench's moment refers to. (S, 3) [m]
+    force: Array  #: Force on the robot in base axes, NaN where it is not known. (S, 3) [N]
