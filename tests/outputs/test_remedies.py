@@ -1,5 +1,6 @@
 """The command that mends a finding, as it is typed."""
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from vftcli.outputs.believability import (
     robot_option,
     subject_of,
 )
+from vftcli.readers import read
 from vftcli.signals.remarks import warning, words
 
 
@@ -44,6 +46,16 @@ def test_a_hostile_name_is_quoted_as_a_shell_wants_it(without_reference: Analysi
     made = without_reference
     assert f"'{made.recording.source.path}'" in command("inspect", made.recording)
     assert "identify" in payload_command(made)
+
+
+def test_a_command_names_the_columns_that_the_log_was_read_by(tmp_path: Path) -> None:
+    """Without them the log may not be read, or its torques for currents."""
+    table = tmp_path / "log.csv"
+    rows = (f"{0.01 * k},{0.1 * k},{0.2 * k},{0.1},{1.0}\n" for k in range(20))
+    table.write_text("t,a1,a2,b1,b2\n" + "".join(rows), encoding="utf-8")
+    log = read(table, columns="t=t,q=a{i},-tau=b{i}")
+    typed = shlex.split(command("inspect", log, "--robot", "ur5"))
+    assert typed[3:] == ["--columns=t=t,q=a{i},-tau=b{i}", "--robot", "ur5"]
 
 
 def test_a_robot_file_is_named_by_its_path(without_reference: Analysis) -> None:

@@ -361,7 +361,8 @@ def payload_command(analysis: Analysis) -> str:
 
 def command(name: str, log: Recording, *words: str) -> str:
     """A command on a log, as it is typed."""
-    return shlex.join(["vftcli", name, path_of(log), *words])
+    columns = [f"--columns={log.source.columns}"] if log.source.columns else []
+    return shlex.join(["vftcli", name, path_of(log), *columns, *words])
 
 
 def path_of(log: Recording) -> str:

@@ -88,6 +88,7 @@ def cleaned(
     format_name: str,
     sha256: str | Callable[[], str] = "",
     label: str = "",
+    columns: str = "",
 ) -> Recording:
     """Make a Recording of what a reader found.
 
@@ -116,6 +117,7 @@ def cleaned(
         label=f"{label or path.name} {raw.part}" if raw.part else label,
         part=raw.part,
         format=format_name,
+        columns=columns,
         sha256=sha256,
         clock=raw.clock,
         t0=float(raw.stamps[0]) * raw.tick + raw.origin,

@@ -78,6 +78,7 @@ class Source(Shown):
     #: that is unique.
     label: str = ""
     format: str = "memory"  #: The reader's name.
+    columns: str = ""  #: What ``--columns`` said of it, "" for nothing.
     #: Hex digest of the file's bytes (of all files of a directory, in name order), by
     #: which a run is known again; reading it waits until it is computed.
     sha256: Awaited = Awaited()

@@ -25,7 +25,7 @@ from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.option import numbers
 from vftcli.signals.pose import IDENTITY, Pose, adjoint, inverse, rpy_matrix
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, caution, fact
+from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.wrench import Wrench, WrenchFrame
 
 #: How far RᵀR may lie from the identity: nine printed digits of a rotation leave 1e-9.
@@ -158,7 +158,7 @@ def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wren
     """A recording's wrench as force on the robot, in base axes about the flange point."""
     values, stated = recording.require("wrench"), recording.wrench_frame
     frame = stated or UNSTATED
-    remarks = [caution("wrench-frame-unstated")] if stated is None else []
+    remarks = [warning("wrench-frame-unstated")] if stated is None else []
     if frame.point == "controller":
         tool = None if mounting.tool is None else np.asarray(mounting.tool.translation)
         point, why = controller_point(recording, chain, tool)
