@@ -189,7 +189,7 @@ ROWS = [
         "estimate", "-o", "out", "--wrench"), "--columns", "tau_ext=pull_{i}"),
     # robots
     Row("only joints that move by themselves", mimicking, "--tip"),
-    Row("which payload the controller", gripping, "--payload", "gripper"),
+    Row("which payload was set", gripping, "--payload", "gripper"),
     Row("joints but robot", on(same, "estimate", "-o", "out", "--robot", "panda"), "--robot",
         "ur5"),
     Row("positions alone carry no force", on(
