@@ -16,7 +16,6 @@ from vftcli.readers.table import Cell, Pick, Picks, Table, listed
 from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import LogError
-from vftcli.signals.external_torque import COVERS
 from vftcli.signals.wrench import AXES
 
 
@@ -30,21 +29,20 @@ class OutsideTable(NamedTuple):
 
 
 def read_outside(path: Path, name: str) -> OutsideTable:
-    """Estimates t, tau_ext/1…, sd/1… or band/1… (half a 95 % band), wrench/fx… of a file.
+    """Estimates of a file: t, tau_ext/1…, band/1… (one standard deviation), wrench/fx….
 
-    One of `vftcli estimate` has them as tau_ext/NAME/1…, its band/NAME/1… one deviation.
+    A file of `vftcli estimate` has them as tau_ext/NAME/1….
     """
     file = open_log(path)
     table: Table = ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)
-    ours = f"{TORQUE}/{name}/1" in table.names
-    inner = f"/{name}/" if ours else "/"
+    inner = f"/{name}/" if f"{TORQUE}/{name}/1" in table.names else "/"
     columns = {column: Cell(k) for k, column in enumerate(table.names)}
 
     def cells(kind: str, ends: Iterable[object]) -> tuple[Cell, ...]:
         wanted = (f"{kind}{inner}{end}" for end in ends)
         return tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
 
-    found = {kind: cells(kind, count(1)) for kind in (TORQUE, "band", "sd")}
+    found = {kind: cells(kind, count(1)) for kind in (TORQUE, "band")}
     found["wrench"] = cells("wrench", AXES)
     if "t" not in columns or not found[TORQUE]:
         raise LogError(
@@ -54,13 +52,10 @@ def read_outside(path: Path, name: str) -> OutsideTable:
     picks = [Pick(kind, each) for kind, each in found.items() if each]
     clock = Pick("t", (columns["t"],), unit="s")
     raw = load_signals(table, Picks(tuple(picks), clock), ReadChoice())
-    sd, band = raw.signals.get("sd"), raw.signals.get("band")
-    if band is not None:
-        sd = band if ours else band / COVERS
     wrench = raw.signals.get("wrench") if len(found["wrench"]) == len(AXES) else None
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
     check_clock(t, str(path))
-    return OutsideTable(t, raw.signals[TORQUE], sd, wrench)
+    return OutsideTable(t, raw.signals[TORQUE], raw.signals.get("band"), wrench)
 
 
 def read_list(path: Path) -> list[dict[str, Any]]:
