@@ -308,6 +308,9 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
     "said as contacts-not-judged, tried in tests/evaluation/test_obvious_contacts.py": (
         "no free part to learn the band",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
+    "tried in tests/reproduction/test_manifest.py": (
+        "--outside … is not NAME=DIR", "is one of our rows; give another name",
+        "--outside …: there is no folder", "is looked for, LOG one of"),
     "tried in tests/test_remedies_of_files.py": (
         "s force drives the replay", "leave --frame away", "holds still over a span",
         "the closed loop runs"),

@@ -1,6 +1,7 @@
 """`vftcli benchmark` as a user sees it: rivals as rows, resume, tables, what is refused."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -54,6 +55,17 @@ def record(manifest: Path) -> dict[str, object]:
     return json.loads((manifest.with_name("out") / "run.json").read_text())
 
 
+def check_colours(page: str) -> None:
+    """A method has one colour in tables, legend and dots; zero, which has no dot, has none."""
+    tables = dict(re.findall(r'\[data-swatch="(.+?)"\]::before{border-top:3px solid (.+?)}', page))
+    dots = set(re.findall(r"<title>UR5, (.+?): .*?<circle [^>]*fill=\"(.+?)\"", page))
+    (legend,) = re.findall(r'<p class="legend">(<span data-swatch=.*?)</p>', page)
+    assert dots == set(tables.items())
+    assert re.findall(r'data-swatch="(.+?)"', legend) == [*tables]
+    assert "zero" not in tables
+    assert len(set(tables.values())) == min(len(tables), 9)  # there are no more colours
+
+
 @pytest.mark.slow
 def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: Path) -> None:
     """A copy of gmo, the truth, nothing, and the truth 50 ms late."""
@@ -63,11 +75,13 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
     assert run("estimate", CIRCLE, "--robot", "ur5", "-o", tmp_path / "e", "-q")[0] == 0
     estimates = pl.read_parquet(tmp_path / "e" / "estimates.parquet")
     gmo = estimates.select(
-        "t", pl.col("^tau_ext/gmo/.*$").name.map(lambda n: n.replace("/gmo", ""))
+        "t", pl.col("^(tau_ext|band)/gmo/.*$").name.map(lambda n: n.replace("/gmo", ""))
     )
+    best = estimates.select("t", pl.col("^(tau_ext|band)/best/.*$"))
     late = pl.DataFrame({x.name: np.interp(t - 0.05, t, x.to_numpy()) for x in tau})
     files = {
         "copy": gmo,
+        "bands": best.rename(lambda name: name.replace("/best", "")),
         "true": tau.with_columns(t=pl.Series(t)),
         "silent": gmo.select("t", pl.exclude("t") * None),
         "late": late.with_columns(t=pl.Series(t)),
@@ -81,15 +95,24 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
     assert code == 0, err
     rows = {(r["method"], r["part"]): r for r in json.loads(out)["rows"]}
     keys = ("rmse_Nm", "l1_Nm", "skill", "rmse_low_Nm", "rmse_high_Nm")
+    banded = (*keys, "coverage_95", "interval_score_Nm")
     for part in ("contact", "all"):
         # CSV keeps every digit of a double.
         assert [rows["copy", part][k] for k in keys] == [rows["gmo", part][k] for k in keys]
+        assert [rows["bands", part][k] for k in banded] == [rows["best", part][k] for k in banded]
+        assert rows["bands", part]["coverage_95"] is not None
         assert [rows["silent", part][k] for k in keys] == [rows["zero", part][k] for k in keys]
         assert rows["silent", part]["missing"] == 1.0
         assert rows["true", part]["skill"] == pytest.approx(1.0, abs=1e-9)
         assert rows["true", part]["l1_Nm"] == pytest.approx(0.0, abs=1e-9)
     assert rows["late", "all"]["lag_s"] == pytest.approx(0.05)
     assert rows["copy", "free"]["skill"] is None
+    code, out, err = run(*asked(manifest, *words))  # on the screen that everybody sees
+    assert code == 0, err
+    assert [line for line in out.splitlines() if "no answer" in line] == [
+        "silent, alone: no answer for 100.0 % of the time, read as 0"
+    ]
+    check_colours((manifest.with_name("out") / "index.html").read_text("utf-8"))
 
 
 @pytest.mark.slow
@@ -101,6 +124,7 @@ def test_a_second_run_does_what_is_left_and_the_same_bytes(run, manifest: Path) 
     folder = manifest.with_name("out")
     names = ("scores.parquet", "index.html")
     before = {name: (folder / name).read_bytes() for name in names}
+    assert "<h1>1 log against the truth</h1>" in (folder / "index.html").read_text("utf-8")
     (row,) = folder.glob("rows/*/*.parquet")
     row.unlink()  # as a run that was killed leaves it
     (folder / "scores.parquet").unlink()
@@ -185,6 +209,46 @@ def test_a_log_that_fails_leaves_the_others(run, manifest: Path) -> None:
     assert code == 3
     assert "best" in out
     assert "error: b, alone: " in err
+
+
+def test_where_every_log_fails_the_code_is_that_of_some(run, manifest: Path) -> None:
+    broken = manifest.with_name("broken.csv")
+    broken.write_text("t,q1\n0,nothing\n")
+    manifest.write_text(
+        f'[[log]]\nname = "b"\narm = "UR5"\nfile = "{broken}"\nrobot = "ur5"\ntruth = "free"\n'
+    )
+    code, out, err = run(*asked(manifest))
+    assert (code, out) == (3, "")
+    assert "error: b, alone: " in err
+
+
+def test_no_log_that_is_there_makes_no_table(run, manifest: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    words = ("benchmark", manifest, "--data", tmp_path / "empty", "-o", tmp_path / "out")
+    code, out, err = run(*words)
+    assert (code, out) == (0, "")
+    *lines, last = err.splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["circle", "gone"]
+    assert lines[1].endswith("source: a page that has it")
+    assert last.startswith(f"Nothing is scored: no log is in {tmp_path / 'empty'}.")
+    assert not (tmp_path / "out").exists()
+    code, out, _ = run(*words, "--json")
+    assert code == 0
+    assert [len(json.loads(out)[key]) for key in ("rows", "left_out")] == [0, 2]
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("sim", "--data", "nodir"), "--data nodir: there is no such folder"),
+        (("sim", "--outside", "zz=nodir"), "--outside zz=nodir: there is no folder nodir"),
+        (("speed", "--data", "."), "benchmark speed takes no --data"),
+    ],
+)
+def test_a_wrong_word_is_one_error(run, words: tuple[str, ...], complaint: str) -> None:
+    code, out, err = run("benchmark", *words)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1] == f"Error: Invalid value: {complaint}"
 
 
 def test_bench_is_a_former_word(run) -> None:

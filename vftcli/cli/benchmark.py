@@ -1,8 +1,9 @@
 """`vftcli benchmark`: methods scored against truth on many logs; the observers' times."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,8 +13,13 @@ from vftcli.cli.batch import SOME_FAILED
 from vftcli.cli.compare import TableOptions
 from vftcli.cli.console import command_line, echo, echo_data, open_made, say, say_json, show, stages
 from vftcli.robots.choice import RobotChoice
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import LOG, Choice, Option, setting
 from vftcli.signals.parsing import printable
+
+if TYPE_CHECKING:
+    from vftcli.outputs.benchmark import Results
+    from vftcli.reproduction.manifest import Manifest, Rival
 
 SPEED = "speed"  #: The benchmark of times.
 
@@ -58,58 +64,93 @@ def benchmark(
     """Score observers against truth on many logs.
 
     Writes PATH/index.html, scores.parquet and run.json; a second run does what is missing.
-    Nothing is downloaded: a log that is not there is named, with where it is had. Exit code 3:
-    some log failed.
+    Nothing is downloaded: a log that is not there is named, with its source. Exit code 3: some
+    log failed.
 
     Example: vftcli benchmark sim
     """
     if what == SPEED:
+        unused = {"--data": data, "--outside": outside, "-o": output, "--anyway": anyway}
+        if given := [name for name, value in unused.items() if value]:
+            raise typer.BadParameter(f"benchmark speed takes no {', '.join(given)}")
         time_observers(robot, length.choice(), table.form)
         return
-    from vftcli.observers.table import DEFAULT
-    from vftcli.outputs import benchmark as shown
     from vftcli.outputs.batch_folder import BatchFolder
     from vftcli.readers.library import absolute
     from vftcli.reproduction.benchmark import BenchmarkRun
-    from vftcli.reproduction.manifest import load_manifest, rival_of
 
-    form = table.form
-    manifest = load_manifest(what, data)
-    rivals = [rival_of(text, ("zero", "vendor", *DEFAULT)) for text in outside or ()]
-    complaints = manifest.complaints(rivals)
-    if complaints:
-        head = "warning" if anyway else "error"
-        for line in (line for lines in complaints.values() for line in lines):
-            echo(printable(f"{head}: {line}"), err=True)
-        if not anyway:
-            raise typer.Exit(1)
-    engine, begin = workers.choice(), stages()
+    manifest, rivals = named(what, data, outside or ())
+    if all(map(manifest.missing, manifest.logs)):
+        say_none(manifest, table.form)
+        return
+    marked, begin = unfair(manifest, rivals, anyway=anyway), stages()
+    engine, output = workers.choice(), output or Path("benchmark.vft")
     engine.check_closed(anyway=anyway)
-    output = output or Path("benchmark.vft")
     run = BenchmarkRun(
         manifest=manifest,
         rivals=rivals,
         folder=BatchFolder(absolute(output), "scores.parquet"),
         workers=engine,
         command=command_line(),
-        marked=frozenset(complaints),
+        marked=marked,
         tell=say,
         progress=lambda stage, share: begin(stage, share, share),
     )
-    results = run.run(force=force)
-    if form == "json":
-        say_json([], rows=results.rows, left_out=run.absent)
-    elif form == "terminal":
-        show(shown.to_terminal(results, every=talk.details))
-    else:
-        echo_data(shown.FORMS[form](results))
+    print_results(run.run(force=force), table.form, manifest.absent(), every=talk.details)
     for name, failure in run.failures:
         echo(printable(f"error: {name}: {failure.line}"), err=True)
-    say("\n".join([*run.absent, f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
+    say("\n".join([*manifest.absent(), f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
     if open_page:
         open_made(output)
     if run.failures:
-        raise typer.Exit(SOME_FAILED if results.arms else 1)
+        raise typer.Exit(SOME_FAILED)
+
+
+def named(what: str, data: Path | None, outside: Sequence[str]) -> "tuple[Manifest, list[Rival]]":
+    """The manifest and the outside estimates that the command line names."""
+    from vftcli.observers.table import DEFAULT
+    from vftcli.reproduction.manifest import load_manifest, rival_of
+
+    if data is not None and not data.is_dir():
+        raise typer.BadParameter(f"--data {data}: there is no such folder")
+    manifest = load_manifest(what, data)
+    try:
+        ours = ("zero", "vendor", *DEFAULT)
+        return manifest, [rival_of(text, ours, manifest.logs) for text in outside]
+    except ParameterError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def say_none(manifest: "Manifest", form: str) -> None:
+    """Print that no log of a manifest is there, and where each is had."""
+    if form == "json":
+        say_json([], rows=[], left_out=manifest.absent())
+    none = f"Nothing is scored: no log is in {manifest.data.absolute()}. Put them there, or name "
+    lines = [*manifest.absent(), f"{none}their folder with --data."]
+    echo("\n".join(map(printable, lines)), err=True)
+
+
+def unfair(manifest: "Manifest", rivals: "list[Rival]", *, anyway: bool) -> frozenset[str]:
+    """Names of the logs whose rows are unfair or another file's; an exit unless `anyway`."""
+    complaints = manifest.complaints(rivals)
+    head = "warning" if anyway else "error"
+    for line in (line for lines in complaints.values() for line in lines):
+        echo(printable(f"{head}: {line}"), err=True)
+    if complaints and not anyway:
+        raise typer.Exit(1)
+    return frozenset(complaints)
+
+
+def print_results(results: "Results", form: str, absent: list[str], *, every: bool) -> None:
+    """Print what a benchmark found in the form that is asked for."""
+    from vftcli.outputs.benchmark import FORMS, to_terminal
+
+    if form == "json":
+        say_json([], rows=results.rows, left_out=absent)
+    elif form != "terminal":
+        echo_data(FORMS[form](results))
+    elif len(results.table):
+        show(to_terminal(results, every=every))
 
 
 def time_observers(robot: str, asked: BenchChoice, form: str) -> None:

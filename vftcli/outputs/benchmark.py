@@ -25,8 +25,9 @@ from vftcli.outputs.grid import (
     words,
 )
 from vftcli.outputs.page.shell import Box, Scales, page
-from vftcli.outputs.quantity import DASH, significant
+from vftcli.outputs.quantity import DASH, percent, significant
 
+SILENT = 0.05  #: Share of time without an answer from which it is said.
 LISTS = {"list": "counted", "list with candidates": "all"}
 COUNTS = ("found", "true_contacts", "false", "free_h")
 #: What lists of several logs are pooled by: sums, all of these, the largest.
@@ -121,6 +122,8 @@ class Results:
         self.methods = table["method"].unique(maintain_order=True).to_list()
         self.protocols = table["protocol"].unique(maintain_order=True).to_list()
         self.arms = list(self._pooled())
+        #: Name → colour of every method but zero, which is grey.
+        self.colours = colours_of_names([name for name in self.methods if name != "zero"])
 
     def _pooled(self) -> Iterator[ArmResult]:
         lags = self.table.drop_nulls("lag_squares")
@@ -190,6 +193,10 @@ class Results:
                 f"{method} lists, {protocol}: {found} of {true} true contacts; {false} false, "
                 f"{false / hours if hours else 0:.0f} an hour ({low:.0f} to {high:.0f})"
             )
+        shown = {row[0] for row in self.headline().rows}
+        if rest := [method for method in self.methods if shown and method not in shown]:
+            yield f"in no mean, as some arm lacks them (-v has their rows): {', '.join(rest)}"
+        yield from self.silences()
         for p in self.protocols:
             if arms := self.counted(p, "contact"):
                 yield f"skill, {p}, is the mean of {'; '.join(arms)}"
@@ -199,6 +206,18 @@ class Results:
             yield f"with the whole log, its future too: {', '.join(future)}"
         if marked := self.table.filter("marked")["log"].unique(maintain_order=True).to_list():
             yield f"in spite of a complaint (--anyway): {', '.join(marked)}"
+
+    def silences(self) -> Iterator[str]:
+        """Of each method and protocol the share of time without an answer, from `SILENT` on."""
+        own: dict[tuple[str, str], list[Score]] = {}
+        for r in self.arms:
+            if r.part != "all" and r.arm in self.counted(r.protocol, r.part):
+                own.setdefault((r.method, r.protocol), []).append(r.score)
+        for (method, protocol), scores in own.items():
+            missing = sum(score.missed * score.seconds.sum() for score in scores)
+            share = missing / sum(score.seconds.sum() for score in scores)
+            if share > SILENT:
+                yield f"{method}, {protocol}: no answer for {percent(share)} of the time, read as 0"
 
     def grids(self) -> Iterator[Grid]:
         """Every table below the headline."""
@@ -211,9 +230,10 @@ class Results:
             error = max(result.truth_error for result in self.arms if result.place == place)
             arm, protocol, part = place
             title = f"{arm}, {protocol}, {part} ({own[0]['seconds']:.0f} s)"
-            notes = (NEAR,) * bool(error)
-            shown = keyed_grid(ARM_COLUMNS, shown_rows(own, error), title, swatches=True)
-            yield replace(shown, notes=notes, marked=bool(error))
+            texts = [*shown_rows(own, error)]
+            marked = any(text["rmse"].mark for text in texts)
+            shown = keyed_grid(ARM_COLUMNS, texts, title, swatches=True)
+            yield replace(shown, notes=(NEAR,) * marked, marked=marked)
         wrench = self.table.filter(part="wrench").group_by(*BY, maintain_order=True)
         squares, second = pl.col("^.*_squares$"), pl.col("wrench_s")
         pooled = wrench.agg(pl.col(*[*WRENCH_COLUMNS][3:], "wrench_s").sum())
@@ -285,23 +305,23 @@ class Dot(NamedTuple):
 def dots(results: Results, protocol: str) -> tuple[Scales, list[tuple[float, str]], list[Dot]]:
     """Skill in contact of every arm, with its interval: scales, names by height, dots."""
     own = [r for r in results.arms if (r.protocol, r.part) == (protocol, "contact")]
-    arms, colours = list(dict.fromkeys(r.arm for r in own)), colours_of_names(results.methods)
+    arms, colours = list(dict.fromkeys(r.arm for r in own)), results.colours
     low = max(min([0.0, *(r.score.skill for r in own)]), -1.0) - 0.05
-    box = Box(width=720.0, height=34.0 * len(arms) + 30.0, left=190.0)
+    box = Box(height=46.0 * len(arms) + 26.0, width=400.0, left=8.0)
     scales = Scales(box, Span(low, 1.05), Span(0.0, float(len(arms))))
     found = []
     for r in own:
-        if r.method == "zero":
+        if r.method not in colours:
             continue
-        place = results.methods.index(r.method) / len(results.methods)
-        y = float(scales.up(len(arms) - arms.index(r.arm) - 0.15 - 0.7 * place))
+        place = [*colours].index(r.method) / len(colours)
+        y = float(scales.up(len(arms) - arms.index(r.arm) - 0.4 - 0.55 * place))
         # Skill falls as RMSE rises: the interval's ends change places.
         level = r.score.rmse.mean() / max(1.0 - r.score.skill, 1e-12)
         high, least = (1.0 - end / level for end in percentiles(r.score.drawn))
         x, left, right = scales.across(np.clip([r.score.skill, least, high], low, 1.05)).tolist()
         text = f"{r.arm}, {r.method}: {r.score.skill:.2f}"
         found.append(Dot(x, left, right, y, paint(colours[r.method]), text))
-    names = [(float(scales.up(len(arms) - k - 0.5)), arm) for k, arm in enumerate(arms)]
+    names = [(float(scales.up(len(arms) - k - 0.2)), arm) for k, arm in enumerate(arms)]
     return scales, names, found
 
 
@@ -310,7 +330,7 @@ def worst_charts(results: Results) -> Iterator[Chart]:
     drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
     for row in drawn.iter_rows(named=True):
         t, *values = (np.array(row[f"worst_{k}"]) for k in ("t", "truth", "estimate"))
-        styles = (("truth", REFERENCE), ("best", colours_of_names(["best"])["best"]))
+        styles = (("truth", REFERENCE), ("best", results.colours["best"]))
         named = zip(styles, values, strict=True)
         lines = [ChartLine(name, x[:, None], colour) for (name, colour), x in named]
         title = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
@@ -319,7 +339,7 @@ def worst_charts(results: Results) -> Iterator[Chart]:
 
 def to_terminal(results: Results, *, every: bool) -> str:
     """The headline, the lists, and which arms they are of; every table where that is asked."""
-    head = terminal(replace(results.headline(), title=""))
+    head = terminal(replace(results.headline(), title="")) if results.arms else ""
     grids = results.grids() if every else ()
     return "\n".join([head + "".join(f"{x}\n" for x in results.lines()), *map(terminal, grids)])
 
@@ -343,11 +363,10 @@ def render_benchmark(results: Results, title: str, record: Mapping[str, Any]) ->
     each = [(p, *dots(results, p)) for p in results.protocols if results.counted(p, "contact")]
     keys = ("recording", "arm", "truth", "truth_error", "licence", "source")
     logs = keyed_grid(dict(zip(keys, words(*keys), strict=True)), record["logs"])
-    colours = colours_of_names(results.methods)
     return page(
         "benchmark.html",
         title,
-        styles={method: (colour, "") for method, colour in colours.items()},
+        styles={method: (colour, "") for method, colour in results.colours.items()},
         results=results,
         plots=each,
         worst=list(worst_charts(results)),

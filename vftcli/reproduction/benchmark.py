@@ -23,6 +23,7 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.benchmark import Results, render_benchmark
 from vftcli.outputs.conversion import companions, convert, save
 from vftcli.outputs.files import put_table
+from vftcli.outputs.quantity import counted
 from vftcli.outputs.run_record import envelope
 from vftcli.pipeline import prepared
 from vftcli.readers.library import Library
@@ -74,7 +75,7 @@ class BenchmarkRun:
             results, record = Results(table), self.record(logs)
             columns = dict.fromkeys(("task", "stage", "error", "line"), String)
             ends = [(name, *why) for name, why in self.failures]
-            title = f"{len(logs)} logs against their truth"
+            title = f"{counted(len(logs), 'log')} against the truth"
             self.folder.put_gathered(
                 [table],
                 pl.DataFrame(ends, columns, orient="row"),
@@ -82,12 +83,6 @@ class BenchmarkRun:
                 record,
             )
             return results
-
-    @property
-    def absent(self) -> list[str]:
-        """A line on each log that is missing."""
-        none = "no log of the manifest is there; --data DIR says where they are"
-        return [*self.manifest.absent(), *[none] * (not self.files and not self.failures)]
 
     def note(self, name: str, outcome: Outcome[Any]) -> None:
         """Keep why a task failed and what it took."""
@@ -219,7 +214,7 @@ class BenchmarkRun:
         found = {
             "manifest": manifest.name,
             "manifest_sha256": digest_of(manifest.path),
-            "left_out": self.absent,
+            "left_out": manifest.absent(),
             "failures": {name: failure.line for name, failure in self.failures},
             "outside": {rival.name: rival.declared for rival in self.rivals},
             "tasks": self.efforts,

@@ -18,6 +18,7 @@ from vftcli.doctor.examination import Examiner
 from vftcli.notebook import OF_ESTIMATE, Asked
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.library import Library, absolute
+from vftcli.readers.table import listed
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import interval
 from vftcli.signals.parsing import check_known, toml_file
@@ -239,7 +240,13 @@ class Manifest:
             if other.name.removesuffix(PUSHED) == log.name.removesuffix(PUSHED):
                 near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.spans)
                 if any(near):
-                    yield f"{what} is known less than {APART:g} s from what is scored of it"
+                    key = (
+                        "free" if protocol == "free" else f"interval of [[robot]] {log.identified}"
+                    )
+                    yield (
+                        f"{log.name.removesuffix(PUSHED)}: {key} ({in_words(spans)}) must stay "
+                        f"{APART:g} s away from score ({in_words(log.spans)}); change one of them"
+                    )
             elif self.missing(other):
                 continue
             elif own and own == list(map(digest_of, self.paths(other))):
@@ -338,11 +345,18 @@ def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
     yield replace(log, name=f"{log.name}{PUSHED}", arm=f"{log.arm} (planted)")
 
 
-def rival_of(text: str, ours: Sequence[str]) -> Rival:
+def in_words(spans: Spans) -> str:
+    """Spans as a complaint names them. [s]"""
+    ends = ((start, "the end" if stop >= ALWAYS[0][1] else f"{stop:g} s") for start, stop in spans)
+    return ", ".join(f"{start:g} s to {end}" for start, end in ends)
+
+
+def rival_of(text: str, ours: Sequence[str], logs: Sequence[BenchmarkLog]) -> Rival:
     """The outside estimates of ``NAME=DIR``.
 
     Raises:
-        ParameterError: If the name is one of `ours`, or the folder or its declaration is wrong.
+        ParameterError: If the name is one of `ours`, the folder has no file of one of `logs`,
+            or its declaration is wrong.
     """
     name, _, place = text.partition("=")
     if not re.fullmatch(r"[\w.+-]+", name) or not place:
@@ -356,4 +370,11 @@ def rival_of(text: str, ours: Sequence[str]) -> Rival:
     table = toml_file(file, "a declaration") if file.is_file() else {}
     declared = section_from(Declaration, table, "rival.toml")
     check_known(declared.protocol, PROTOCOLS, f"{file}: protocol {declared.protocol!r}")
-    return Rival(name, folder, declared)
+    rival = Rival(name, folder, declared)
+    if not any(map(rival.file, logs)):
+        there = sorted(path.name for path in folder.iterdir())
+        raise ParameterError(
+            f"--outside {text}: {folder} has {listed(there) or 'no file'}; LOG.csv or LOG.parquet "
+            f"is looked for, LOG one of {', '.join(log.name for log in logs)}"
+        )
+    return rival

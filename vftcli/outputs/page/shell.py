@@ -64,7 +64,7 @@ def templates() -> "Environment":
     words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
     functions = (*drawing, *words, at_least_shown, asset, Box)
     made.globals |= {each.__name__: each for each in functions}
-    made.globals |= {"is_plain": re.compile(r"[\w.,=× -]+").fullmatch, "QUIET": QUIET}
+    made.globals |= {"is_plain": re.compile(r"[\w.,=×+ -]+").fullmatch, "QUIET": QUIET}
     made.filters |= {each.__name__: each for each in (counted, warnings_of, worst_first)}
     made.filters |= {
         "f1": "{:.1f}".format,
