@@ -115,7 +115,7 @@ def test_every_output_of_a_report_carries_what_was_overridden(
     assert finding["level"] == "warning"
     assert finding["values"]
     page = (out / "index.html").read_text("utf-8")
-    assert page.index("MEANINGLESS") < page.index("Errors against a reference")
+    assert page.index("MEANINGLESS") < page.index("Errors against the reference")
     assert (out / "errors.md").read_text("utf-8").startswith("> **MEANINGLESS")
     assert (out / "errors.tex").read_text("utf-8").startswith("% MEANINGLESS")
     rows = json.loads((out / "errors.json").read_text("utf-8"))
