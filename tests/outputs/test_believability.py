@@ -191,9 +191,55 @@ def test_what_measures_the_force(analysis: Analysis, without_reference: Analysis
     assert own.standing == "unknown"
     assert own.remedy is not None
     assert "--reference vendor" in own.remedy
-    sensor = contact_list(contact(sensor_force=3.0))
-    (measured,) = of(replace(without_reference, contacts=sensor), "force sensor")
-    assert measured.standing == "good"
+
+
+@pytest.mark.parametrize(
+    ("row", "standing"),
+    [
+        ({"sensor_force": 58.0}, "good"),  # 64.8 ± 7.1 N
+        ({"sensor_force": 57.6}, "caution"),
+        ({"sensor_force": 72.0}, "caution"),
+        # The sensor does not feel what touches a link before it, and an unknown size has no band.
+        ({"sensor_force": 3.0, "places": (2, 3)}, "good"),
+        ({"sensor_force": 3.0, "is_load": True}, "good"),
+        ({"sensor_force": 3.0, "peak_band": 65.0}, "good"),
+    ],
+)
+def test_a_row_that_misses_the_sensor_by_more_than_its_band_is_a_caution(
+    without_reference: Analysis, row: dict[str, object], standing: str
+) -> None:
+    listed = contact_list(contact(sensor_force=64.0), contact(number=2, **row), remarks=())
+    made = replace(without_reference, contacts=listed)
+    (ground,) = of(made, "force sensor")
+    assert (ground.standing, ground.of_log) == (standing, standing == "caution")
+    off = f"{abs(64.8 - row['sensor_force']):.1f}"  # type: ignore[operator]
+    words = f"; off by more than the band: row 2 by {off} N" if standing == "caution" else ""
+    reading = f"{row['sensor_force']:.0f}"
+    assert ground.sentence == f"the log's own sensor reads 64, {reading} N at the peaks{words}"
+
+
+def test_few_rows_that_miss_the_sensor_are_named(without_reference: Analysis) -> None:
+    rows = [contact(number=k, sensor_force=20.0) for k in range(1, 7)]
+    (ground,) = of(replace(without_reference, contacts=contact_list(*rows)), "force sensor")
+    assert ground.sentence.endswith("row 3 by 45 N, row 4 by 45 N and 2 more")
+
+
+def test_a_check_and_a_caution_do_not_share_their_name(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
+    """The joints that a free part leaves still, and stamps that repeat between sound ones."""
+    found = contact_list(
+        contact(), remarks=(caution("free-part-misses-joints", Where(joints=(5,))),)
+    )
+    log = without_reference.recording
+    sound = replace(log, t=0.008 * np.arange(600.0), source=replace(log.source, remarks=()))
+    odd = warning("repeated-stamps", repeats=3, rows=603, share_percent=0.5)
+    made = replace(examined(as_if(without_reference, sound), odd), contacts=found)
+    names = {
+        side: {ground.subject for ground in grounds(made) if (ground.standing == "good") == side}
+        for side in (True, False)
+    }
+    assert {"clock", "free motion"} <= names[True]
+    assert {"time stamps", "not moved"} <= names[False]
+    assert not names[True] & names[False]
 
 
 def test_the_references_error_is_the_mean_that_the_table_prints(analysis: Analysis) -> None:

@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import Contact
 from vftcli.doctor.examination import REFUSING, in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
@@ -30,8 +31,8 @@ SUBJECTS = {
              "payload-not-mounted", "payload-differs", "load-changes"),
     "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest",
               "no-profile"),
-    "clock": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps", "clock-gaps",
-              "clock-gap", "repeats-differ", "absurd-clock", "absurd-steps"),
+    "time stamps": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps",
+                    "clock-gaps", "clock-gap", "repeats-differ", "absurd-clock", "absurd-steps"),
     "base": ("upside-down", "tilted-base"),
     "positions": ("degrees", "stuck-position", "coarse-positions", "absurd-values"),
     "velocity": ("no-velocity", "velocity-unit", "velocity-mismatch", "velocity-sign",
@@ -51,13 +52,14 @@ LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | 
 LIST_SUBJECTS = {
     "contact-is-load": "load",
     "arm-stopped-abruptly": "stop",
-    "free-part-rests": "free motion",
-    "free-part-misses-joints": "free motion",
+    "free-part-rests": "not moved",
+    "free-part-misses-joints": "not moved",
     "no-wrench-of-few-joints": "wrench",
 }
 #: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a
 #: sign or the effort is another.
 MOST_UNEXPLAINED = 0.5
+MOST_OFF = 4  #: Rows that miss their sensor reading, at most so many are named.
 FULL_OF_REST = 0.5  #: A joint that rests in more than this share of the log is said to rest.
 
 #: How far an item lets the answer be believed.
@@ -324,12 +326,29 @@ def reference_ground(analysis: Analysis) -> Ground:
                 if contacts
                 else f"the log holds {name}"
             )
-            subject, standing = "force sensor", "good"
-            if kind == "vendor":
-                subject, standing = "vendor", "unknown"
+            subject, standing = "vendor", "unknown"
+            if kind == "sensor":
+                missed = missed_words(contacts)
+                subject, standing = "force sensor", "caution" if missed else "good"
+                words += missed
             options = ("--reference", kind, "--robot", robot_option(analysis))
             remedy = command("compare", analysis.recording, *options)
-    return Ground(standing, subject, words, remedy, of_log=False)
+    # A missed reading is found in this log; a log without a sensor is like any other.
+    return Ground(standing, subject, words, remedy, of_log=standing == "caution")
+
+
+def missed_words(contacts: Sequence[Contact]) -> str:
+    """Rows of known size that miss their sensor reading by more than their band; "" for none."""
+    off = []
+    for row in contacts:
+        force, band, read = row.peak_force, row.peak_band, row.sensor_force
+        # A sensor at the flange does not feel a push on a link before it.
+        if row.is_load or not row.size_known or (row.places and 0 not in row.places):
+            continue
+        if force is not None and band is not None and read is not None and abs(force - read) > band:
+            off.append(f"row {row.number} by {abs(force - read):.2g} N")
+    more = f" and {len(off) - MOST_OFF} more" if len(off) > MOST_OFF else ""
+    return f"; off by more than the band: {', '.join(off[:MOST_OFF])}{more}" if off else ""
 
 
 def subject_of(code: str) -> str:
