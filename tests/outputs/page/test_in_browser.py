@@ -446,6 +446,79 @@ def test_the_arm_docks_follows_and_stays_shut(opened: Callable, html: str) -> No
     assert page.locator("#arm canvas").count() == 1
 
 
+def test_the_docked_arm_covers_no_button(opened: Callable, html: str) -> None:
+    """The file button of the torques while it is where the arm is docked, at 1280 by 900."""
+    page = live(opened(html))
+    button = page.locator("#torques .csv")
+    y = button.bounding_box()["y"]
+    page.evaluate(f"scrollTo(0, {y - 780})")
+    page.wait_for_timeout(150)
+    inner, outer = button.bounding_box(), page.locator("#dock").bounding_box()
+    assert outer["x"] < inner["x"] < outer["x"] + outer["width"]
+    assert outer["y"] < inner["y"] < outer["y"] + outer["height"]
+    at = [inner["x"] + inner["width"] / 2, inner["y"] + inner["height"] / 2]
+    assert page.evaluate("([x, y]) => document.elementFromPoint(x, y).className", at) == "csv"
+
+
+def test_the_arm_is_grabbed_while_it_is_turned(opened: Callable, html: str) -> None:
+    page = live(opened(html))
+    cursor = "getComputedStyle(vftcli.arm.canvas).cursor"
+    box = page.locator("#arm canvas").bounding_box()
+    page.mouse.move(box["x"] + 200, box["y"] + 200)
+    assert page.evaluate(cursor) == "grab"
+    page.mouse.down()
+    page.mouse.move(box["x"] + 220, box["y"] + 200)
+    assert page.evaluate(cursor) == "grabbing"
+    page.mouse.up()
+    assert page.evaluate(cursor) == "grab"
+
+
+def test_a_long_list_is_shaded_below_until_its_end_and_keeps_the_line_of_the_chosen_row(
+    opened: Callable, html: str, pushed: Analysis
+) -> None:
+    page = live(opened(html, reduced_motion="reduce"))
+    box = page.locator("#contacts").bounding_box()
+
+    def piece(y: float) -> bytes:
+        """A few pixels beside the rows."""
+        return page.screenshot(clip={"x": box["x"] + 2, "y": y, "width": 4, "height": 3})
+
+    plain, foot = piece(box["y"] + 4), box["y"] + box["height"] - 5
+    page.locator("#contact-1").click()
+    page.wait_for_timeout(60)
+    assert piece(foot) != plain
+    for contact in (pushed.contacts.contacts[0], pushed.contacts.contacts[-1]):
+        page.locator(f"#contact-{contact.number}").click()
+        page.wait_for_timeout(60)
+        (line,) = (each for each in page.locator(".why p").all() if each.is_visible())
+        assert f"{contact.start:.2f}–{contact.stop:.2f} s" in line.inner_text()
+        place, stage = line.bounding_box(), page.locator("#arm").bounding_box()
+        assert place["y"] + place["height"] <= stage["y"] + stage["height"]
+    page.evaluate("document.querySelector('#contacts').scrollTop = 1e4")
+    page.locator("#contact-6").evaluate("row => vftcli.clock.go(0)")
+    page.wait_for_timeout(60)
+    box = page.locator("#contacts").bounding_box()
+    assert piece(box["y"] + box["height"] - 5) == plain
+
+
+def test_an_option_is_not_broken(opened: Callable, html: str) -> None:
+    """In a heading so narrow that it breaks everywhere else."""
+    page = live(opened(html))
+    rows = page.evaluate(
+        """() => { const h1 = document.querySelector("h1");
+          h1.textContent = "";
+          for (const name of ["option", ""]) {
+            const span = document.createElement("span");
+            Object.assign(span, { className: name, textContent: "--no-contacts" });
+            h1.append(span, " ");
+          }
+          h1.style.width = "4em";
+          return [...h1.children].map((x) => x.getClientRects().length); }"""
+    )
+    assert rows[0] == 1
+    assert rows[1] > 1
+
+
 def test_printed_everything_is_there(opened: Callable, html: str, pushed: Analysis) -> None:
     page = live(opened(html))
     printed = page.pdf(format="A4")

@@ -28,11 +28,17 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.elements.append((tag, dict(attrs)))
+        self.part(tag)
         if tag not in {"meta", "br", "link", "img", "input"}:
             self.open.append(tag)
 
     def handle_endtag(self, tag: str) -> None:
         assert self.open.pop() == tag
+        self.part(tag)
+
+    def part(self, tag: str) -> None:
+        """A span goes on in a word, every other element begins or ends one."""
+        self.words.append("" if tag == "span" else " ")
 
     def handle_data(self, data: str) -> None:
         if not self.open or self.open[-1] not in {"script", "style"}:
@@ -40,7 +46,7 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        return " ".join(" ".join(self.words).split())
+        return " ".join("".join(self.words).split())
 
 
 @pytest.fixture(scope="module")
@@ -167,6 +173,44 @@ def test_the_script_gets_every_chart(html: str) -> None:
 
 def test_the_gap_of_the_log_breaks_the_lines(html: str) -> None:
     assert page_data(html)["clocks"][0]["gaps"] == [400]
+
+
+def test_what_nothing_is_known_of_is_no_caution_and_a_file_keeps_its_letters(
+    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = [
+        Ground(standing, "free motion", words)
+        for standing, words in (
+            ("caution", "free_14harm.csv is short"),
+            ("bad", "--free names nothing"),
+            ("unknown", "the sizes are unchecked"),
+            ("good", "vendor's own, ur5.toml"),
+        )
+    ]
+    monkeypatch.setattr(pages, "grounds", lambda _: found)
+    text = Page(render(analysis)).text
+    assert "2 cautions, 1 check passed" in text
+    for words in (
+        "free_14harm.csv is short",
+        "--free names",
+        "The sizes",
+        "Vendor's own, ur5.toml",
+    ):
+        assert f"Free motion {words}" in text, words
+
+
+def test_every_contact_has_its_span_and_range(pushed: Analysis) -> None:
+    """In the table, which needs no script, and in the line of the chosen contact."""
+    page = render(pushed)
+    text = Page(page).text
+    table = text.partition("Contacts in numbers")[2]
+    assert '<div class="why live">' in page
+    assert pushed.contacts is not None
+    for c in pushed.contacts.contacts:
+        assert c.anywhere is not None
+        low, high = c.anywhere
+        assert f"Contact {c.number}, {c.start:.2f}–{c.stop:.2f} s" in text
+        assert f" {c.number} {c.start:.2f} – {c.stop:.2f} {low:.0f}–{high:.0f} " in table
 
 
 def test_the_files_beside_it_are_named_with_their_sizes(analysis: Analysis) -> None:

@@ -1,4 +1,6 @@
 import json
+import re
+from html import unescape
 
 import numpy as np
 import pytest
@@ -67,6 +69,18 @@ def test_a_remark_shows_its_long_words(monkeypatch: pytest.MonkeyPatch) -> None:
     words = '[test-code]\nshort = "in short {a_s:.1f} s"\nlong = "at length {a_s:.2f} s"\n'
     monkeypatch.setattr(remarks_module, "catalogue", lambda: (words,))
     assert "at length 0.25 s" in part("parts/bullets", [fact("test-code", a_s=0.25)])
+
+
+def test_an_option_is_one_word_and_the_text_stays() -> None:
+    text = "Name it (--free a-b.csv, -o x_-y) or --no-contacts <i>--a</i>."
+    html = part("parts/lead", text)
+    assert re.findall(r'<span class="option">([^<]*)</span>', html) == [
+        "--free",
+        "-o",
+        "--no-contacts",
+        "--a",
+    ]
+    assert unescape(re.sub(r"<[^>]*>", "", html)) == text
 
 
 def test_provenance_without_a_log_names_none() -> None:

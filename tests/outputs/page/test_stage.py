@@ -93,6 +93,17 @@ def test_the_cone_is_that_of_a_force_known_evenly(pushed: Analysis) -> None:
     assert cone_of(replace(even, wrench=None, wrench_sd=None)) == 0.0
 
 
+def test_a_cone_that_would_fill_the_picture_is_left_out_and_said(pushed: Analysis) -> None:
+    """The band across the force is 2 s: at 45° it is as long as the force."""
+    one = replace(listed(pushed).contacts[0], wrench=np.array([50.0, *[0.0] * 5]), peak_force=50.0)
+    for half, words in ((49.0, ""), (51.0, " (± 46°)")):
+        wide = replace(one, wrench_sd=np.full(6, half / 1.96))
+        data = staged(replace(pushed, contacts=replace(listed(pushed), contacts=(wide,))))
+        (row,) = data["contacts"]
+        assert row["words"] == f"contact 1 · wrist · +x{words}"
+        assert row["cone"] == (0 if words else pytest.approx(np.arctan(half / 50.0), abs=1e-3))
+
+
 @pytest.mark.parametrize(("places", "hit"), [((0,), {6}), ((2, 3), {2, 3}), ((), set())])
 def test_the_touched_links_are_marked(
     pushed: Analysis, places: tuple[int, ...], hit: set[int]

@@ -15,12 +15,13 @@ from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.contacts import hardest_rows
 from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, words
 from vftcli.outputs.page.shell import part
-from vftcli.outputs.quantity import DASH, banded, significant, vector
+from vftcli.outputs.quantity import DASH, banded, ranged, significant, vector
 from vftcli.outputs.run_record import observer_record
 from vftcli.signals.arrays import Array
 
 MOST = 40  #: Contacts in numbers at most.
-#: Headings of the tables of contacts: vectors, and what follows them.
+#: Headings of the tables of contacts: what is before the vectors, they, what follows them.
+SPAN = ("from – to [s]", "range [N]")
 VECTORS = (
     "force [N]",
     "± sd",
@@ -59,14 +60,16 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
             vectors = [c.wrench[:3], c.wrench_sd[:3], c.wrench[3:], c.wrench_sd[3:]]
         shown = (None if v is None else vector(v) for v in (*vectors, c.mean_force, c.impulse))
         rest = (c.evidence, c.lead, c.vendor_force, c.sensor_force)
-        wrenches.append((str(c.number), *shown, *rest))
+        row = [str(c.number), f"{c.start:.2f} – {c.stop:.2f}"]
+        row.append(DASH if c.anywhere is None else ranged(*c.anywhere, unit=""))
+        wrenches.append((*row, *shown, *rest))
         each = zip(c.joint_torque, c.joint_torque_sd, strict=True)
         torque = (banded(tau, sd, ".2f", "") for tau, sd in each)
         torques.append((str(c.number), *torque, c.at_rest))
     number, joints = Column("#"), joint_columns(len(found.contacts[0].joint_torque))
     return (
         Grid(
-            (number, *words(*VECTORS), *map(Column, EVIDENCE)),
+            (number, *map(Column, SPAN), *words(*VECTORS), *map(Column, EVIDENCE)),
             wrenches,
             "Wrench at the peak, base axes, the moment about the flange point"
             + (

@@ -195,7 +195,7 @@ class Plot {
 	look() { if (this.head) this.head.textContent = this.reading(); }
 	under() {}
 	over() {}
-		lines() {
+	lines() {
 		const { top, wide, tall, chart: { spans, weak, band, lines, ends }, panel } = this, room = [LEFT, top, wide, tall];
 		c.clearRect(0, 0, this.width, this.height);
 		within(room, () => {
@@ -413,14 +413,14 @@ class Arm {
 		const along = strong > 1e-9 ? (wrench.flange ? turn(R, force) : force).map((x) => x / strong) : contact.along, tip = add(a, add(b, a, -1), .5);
 		const reach = (newtons) => this.reach * (.14 + .6 * clamp(newtons / most, 0, 1)), end = (newtons) => this.seen(add(tip, along, -reach(newtons)));
 		const [x, y, ahead] = this.seen(tip), [u, v, behind, near] = end(size), long = hypot(x - u, y - v) || 1, dx = (x - u) / long, dy = (y - v) / long;
-		// The cone: a triangle and an ellipse.
+		// The cone, if any.
 		const wide = Math.tan(contact.cone) * reach(size) * near;
 		area([[x, y], [u - wide * dy, v + wide * dx], [u + wide * dy, v - wide * dx]], css.band);
 		c.beginPath();
 		c.ellipse(u, v, wide * abs(ahead - behind) / reach(size), wide, Math.atan2(dy, dx), 0, 7);
 		c.fill();
 		path([end(max(size - half, 0)), end(size + half)], css.pale, 9);
-		path([[u, v], [x - 9 * dx, y - 9 * dy]], css.force, 3.2, contact.sure ? [] : [7, 6]);
+		path([[u, v], [x - 9 * dx, y - 9 * dy]], css.force, 3.2, contact.sure && contact.cone ? [] : [7, 6]);
 		area([[x - 13 * dx - 5.5 * dy, y - 13 * dy + 5.5 * dx], [x, y], [x - 13 * dx + 5.5 * dy, y - 13 * dy - 5.5 * dx]], css.force);
 		write(contact.sized ? `${round(size)} N` : contact.force, clamp(u - 24 * dx, 30, this.width - 30), clamp(v - 18 * dy, 14, this.height - 14), css.force, 14, "center", css.card);
 	}

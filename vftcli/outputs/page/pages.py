@@ -23,7 +23,7 @@ from vftcli.outputs.grid import Grid, GridCell, words
 from vftcli.outputs.grids import contact_grids, drift_grid
 from vftcli.outputs.page import details, log_charts
 from vftcli.outputs.page.shell import Box, page, part, scales_of
-from vftcli.outputs.page.stage import free_spans, stage_data, still_arm, view_of
+from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, still_arm, view_of
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
 from vftcli.outputs.run_record import run_record
 from vftcli.signals.parsing import printable
@@ -87,6 +87,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         "the robot · ± is the half width of the 95 % band",
         analysis=analysis,
         found=found,
+        contact_words=contact_words,
         headline=answer,
         eyebrow=eyebrow(analysis),
         sentences=lead_sentences(analysis),

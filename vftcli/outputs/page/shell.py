@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 LEVELS = ("warning", "caution", "fact")  #: Levels of a remark, the most serious first.
 TICKS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
+PLAIN = re.compile(r"[a-z]+([-’'][a-z]+)*[,:;]?").fullmatch  #: A word that may have a capital.
 TICK_ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
 
 
@@ -46,6 +47,16 @@ def templates() -> "Environment":
     def asset(name: str) -> Markup:
         """The text of a style sheet or script that comes with the package."""
         return Markup((HERE / name).read_text(encoding="utf-8"))
+
+    def options(text: str) -> Markup:
+        """A text that does not break within an option."""
+        whole = r'<span class="option">\g<0></span>'
+        return Markup(re.sub(r"(?<![\w-])--?[a-z][\w-]*", whole, str(shown(text))))
+
+    def capital(text: str) -> str:
+        """A text with a capital first, unless it begins with the name of a file or an option."""
+        first, space, rest = text.partition(" ")
+        return f"{first.capitalize()}{space}{rest}" if PLAIN(first) else text
 
     def worst_first(remarks: Iterable[Remark]) -> list[str]:
         """The words of every remark once, the most serious first."""
@@ -65,7 +76,8 @@ def templates() -> "Environment":
     functions = (*drawing, *words, at_least_shown, asset, Box)
     made.globals |= {each.__name__: each for each in functions}
     made.globals |= {"is_plain": re.compile(r"[\w.,=×+ -]+").fullmatch, "QUIET": QUIET}
-    made.filters |= {each.__name__: each for each in (counted, warnings_of, worst_first)}
+    filters = (counted, warnings_of, worst_first, options, capital)
+    made.filters |= {each.__name__: each for each in filters}
     made.filters |= {
         "f1": "{:.1f}".format,
         # A number stays on one line with its band and its unit.

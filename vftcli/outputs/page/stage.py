@@ -25,6 +25,7 @@ from vftcli.signals.series import resample_columns, runs_of
 ASIDE, PITCH = 0.45, 0.3  #: Turn of the view from the arm's side, and downwards. [rad]
 AWAY = 4.2  #: Distance of the camera, in reaches.
 POSES = 600  #: Poses of the log that the view is fitted to.
+WIDEST = np.pi / 4  #: Half the angle of the widest cone that is drawn. [rad]
 SHARES = 0.14, 0.6  #: Length of an arrow of no force, and what the largest adds, in reaches.
 WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92  #: Size of the still drawing, and the part it fills.
 
@@ -223,11 +224,21 @@ def peak_index(contact: Contact, t: Array, clock: PageClock) -> int:
     return clock.index(int(np.argmin(np.abs(t - contact.peak))))
 
 
+def contact_words(contact: Contact) -> str:
+    """A contact's name, place and direction, and how unsure the last is where no cone is drawn."""
+    said = [contact_name(contact), place_words(contact)]
+    if contact.wrench is not None:
+        cone = cone_of(contact)
+        unsure = f" (± {np.degrees(cone):.0f}°)" if cone > WIDEST else ""
+        said.append(direction(contact.wrench[:3]) + unsure)
+    return " · ".join(said)
+
+
 def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> dict[str, Any]:
     """A contact for the script: its moment, its words, its place."""
     sized = contact.peak_force is not None and not contact.place_unknown
+    cone = cone_of(contact)
     size, _, band = force_size(contact).partition(" ") if contact.wrench is not None else ("",) * 3
-    towards = [] if contact.wrench is None else [direction(contact.wrench[:3])]
     return {
         "number": contact.number,
         "name": contact_name(contact),
@@ -238,7 +249,7 @@ def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> d
         "sized": sized,
         "force": size,
         "band": band,
-        "words": " · ".join([contact_name(contact), place_words(contact), *towards]),
+        "words": contact_words(contact),
         "weak": contact.trust == "weak",
         "load": contact.is_load,
         "sure": contact.where != "cannot tell",
@@ -247,5 +258,6 @@ def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> d
         "flange": not contact.places or 0 in contact.places,
         "spot": spot_of(contact, joints),
         "along": np.round(along(contact), 3).tolist(),
-        "cone": round(cone_of(contact), 3),
+        # A wider one would fill the picture: it is 0 then, and the arrow dashed.
+        "cone": round(cone, 3) if cone <= WIDEST else 0,
     }
