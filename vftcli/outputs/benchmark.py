@@ -11,6 +11,7 @@ import polars as pl
 
 from vftcli.evaluation.detection import rate_interval, share_interval
 from vftcli.evaluation.scores import LAGS, Score, percentiles
+from vftcli.observers.table import BEST
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine, Span, colours_of_names, paint
 from vftcli.outputs.grid import (
     Column,
@@ -71,49 +72,6 @@ WEIGHT_COLUMNS = dict(zip(("log", *BY[1:]), words("log", *BY[1:]), strict=True))
 }
 
 
-class ArmResult(NamedTuple):
-    """One method on one part of the logs of an arm, by one protocol."""
-
-    arm: str
-    protocol: str
-    part: str
-    method: str
-    score: Score
-    exact_model: bool
-    truth_error: float  #: [N·m]
-    lag_s: float  #: Shift of the estimate with the least error, NaN where none is looked for. [s]
-    rmse_at_lag: float  #: The RMSE there over that at 0.
-
-    @property
-    def place(self) -> tuple[str, ...]:
-        """Arm, protocol and part: what results are compared within."""
-        return self[:3]
-
-    def record(self, best: "ArmResult | None") -> dict[str, Any]:
-        """The row for machines and tables; `best` is what it is compared with draw by draw."""
-        score, drawn = self.score, self.score.drawn
-        other = None if best is None else best.score.drawn
-        less = None
-        if drawn is not None and other is not None and best is not self:
-            less = drawn - other
-        ends = {"rmse": percentiles(drawn), "over_best": percentiles(less)}
-        return {
-            **{name: getattr(self, name) for name in (*BY, "part", "exact_model")},
-            "seconds": float(score.seconds.sum()),
-            "rmse_Nm": float(score.rmse.mean()),
-            **{f"{name}_low_Nm": low for name, (low, _) in ends.items()},
-            **{f"{name}_high_Nm": high for name, (_, high) in ends.items()},
-            "l1_Nm": float(score.l1.mean()),
-            # Zero is perfect in free motion: there L1 and false rows speak.
-            "skill": np.nan if self.part == "free" else score.skill,
-            "coverage_95": score.coverage,
-            "interval_score_Nm": score.interval_score,
-            "missing": score.missed,
-            "lag_s": self.lag_s,
-            "rmse_at_lag": self.rmse_at_lag,
-        }
-
-
 class Results:
     """Everything that a benchmark found, pooled by arm and never across arms."""
 
@@ -121,47 +79,54 @@ class Results:
         self.table = table
         self.methods = table["method"].unique(maintain_order=True).to_list()
         self.protocols = table["protocol"].unique(maintain_order=True).to_list()
-        self.arms = list(self._pooled())
         #: Name → colour of every method but zero, which is grey.
         self.colours = colours_of_names([name for name in self.methods if name != "zero"])
 
-    def _pooled(self) -> Iterator[ArmResult]:
-        lags = self.table.drop_nulls("lag_squares")
-        joints = self.table.drop_nulls("joint")
-        for rows in joints.partition_by(*BY, "part", maintain_order=True):
-            logs = rows.partition_by("log", maintain_order=True)
-            score = reduce(add, (Score.joined(log.to_dicts()) for log in logs))
-            one = rows.row(0, named=True)
-            own = lags.filter(**{key: one[key] for key in BY})["lag_squares"].to_list()
-            lag, share = np.nan, np.nan
-            if own and one["part"] == "all":
-                sums = np.sum(own, axis=0)
-                lag, least = float(LAGS[sums.argmin()]), sums.min()
-                share = float(np.sqrt(least / sums[abs(LAGS).argmin()]))
-            about = one["exact_model"], one["truth_error_Nm"]
-            place = one["arm"], one["protocol"], one["part"], one["method"]
-            yield ArmResult(*place, score, *about, lag, share)
-
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
-        """One row an arm, protocol, method and part."""
-        best = {result.place: result for result in self.arms if result.method == "best"}
-        return [result.record(best.get(result.place)) for result in self.arms]
+        """One row an arm, protocol, method and part, for machines and tables."""
+        joints, places = self.table.drop_nulls("joint"), (*BY, "part")
+        found = joints.partition_by(*places, maintain_order=True, as_dict=True)
+        scores = {}
+        for place, rows in found.items():
+            logs = rows.partition_by("log", maintain_order=True)
+            scores[place] = reduce(add, (Score.joined(log.to_dicts()) for log in logs))
+        return [
+            {
+                **dict(zip(places, place, strict=True)),
+                "exact_model": found[place]["exact_model"][0],
+                **numbers_of(score, scores.get((*place[:2], BEST, place[3]))),
+                # Zero is perfect in free motion: there L1 and false rows speak.
+                **({"skill": np.nan} if place[3] == "free" else {}),
+                **self.lag(place),
+            }
+            for place, score in scores.items()
+        ]
+
+    def lag(self, place: Sequence[object]) -> dict[str, float]:
+        """Shift of an estimate with the least error [s], and its RMSE over that at 0."""
+        own = self.table.drop_nulls("lag_squares").filter(**dict(zip(BY, place, strict=False)))
+        if place[3] != "all" or own.is_empty():
+            return {"lag_s": np.nan, "rmse_at_lag": np.nan}
+        sums = np.sum(own["lag_squares"].to_list(), axis=0)
+        share = np.sqrt(sums.min() / sums[abs(LAGS).argmin()])
+        return {"lag_s": float(LAGS[sums.argmin()]), "rmse_at_lag": float(share)}
+
+    def of(self, protocol: str, part: str) -> list[dict[str, Any]]:
+        """The rows of a protocol and part."""
+        return [row for row in self.rows if (row["protocol"], row["part"]) == (protocol, part)]
 
     def counted(self, protocol: str, part: str) -> list[str]:
         """The arms in the headline of a part: those of an exact model only if all are."""
-        own = [r for r in self.arms if (r.protocol, r.part) == (protocol, part)]
-        real = [r.arm for r in own if not r.exact_model]
-        return list(dict.fromkeys(real or [r.arm for r in own]))
+        own = self.of(protocol, part)
+        real = [row["arm"] for row in own if not row["exact_model"]]
+        return list(dict.fromkeys(real or [row["arm"] for row in own]))
 
     def mean(self, protocol: str, method: str, part: str) -> float | None:
         """Mean over the arms of skill in contact, of L1 elsewhere; None unless it has all."""
-        arms = self.counted(protocol, part)
-        found = {
-            r.arm: r.score.skill if part == "contact" else float(r.score.l1.mean())
-            for r in self.arms
-            if (r.protocol, r.method, r.part) == (protocol, method, part)
-        }
+        arms, key = self.counted(protocol, part), "skill" if part == "contact" else "l1_Nm"
+        own = self.of(protocol, part)
+        found = {row["arm"]: row[key] for row in own if row["method"] == method}
         return float(np.mean([found[arm] for arm in arms])) if found.keys() >= {*arms} else None
 
     def headline(self) -> Grid:
@@ -208,16 +173,16 @@ class Results:
             yield f"in spite of a complaint (--anyway): {', '.join(marked)}"
 
     def silences(self) -> Iterator[str]:
-        """Of each method and protocol the share of time without an answer, from `SILENT` on."""
-        own: dict[tuple[str, str], list[Score]] = {}
-        for r in self.arms:
-            if r.part != "all" and r.arm in self.counted(r.protocol, r.part):
-                own.setdefault((r.method, r.protocol), []).append(r.score)
-        for (method, protocol), scores in own.items():
-            missing = sum(score.missed * score.seconds.sum() for score in scores)
-            share = missing / sum(score.seconds.sum() for score in scores)
-            if share > SILENT:
-                yield f"{method}, {protocol}: no answer for {percent(share)} of the time, read as 0"
+        """Of each protocol and method the share of time without an answer, from `SILENT` on."""
+        own: dict[tuple[str, str], list[tuple[float, float]]] = {}
+        for p in self.protocols:
+            for row in (*self.of(p, "contact"), *self.of(p, "free")):
+                if row["arm"] in self.counted(p, row["part"]):
+                    own.setdefault((row["method"], p), []).append((row["missing"], row["seconds"]))
+        for (method, p), pairs in own.items():
+            shares, seconds = zip(*pairs, strict=True)
+            if (share := float(np.average(shares, weights=seconds))) > SILENT:
+                yield f"{method}, {p}: no answer for {percent(share)} of the time, read as 0"
 
     def grids(self) -> Iterator[Grid]:
         """Every table below the headline."""
@@ -225,10 +190,11 @@ class Results:
             each = rows.to_dicts()
             title = "Contacts listed by {method}, {protocol}; onset: median (90 %)"
             yield Grid(LIST_COLUMNS, list(map(list_row, each)), title.format(**each[0]))
-        for place in dict.fromkeys(result.place for result in self.arms):
-            own = [r for r, of in zip(self.rows, self.arms, strict=True) if of.place == place]
-            error = max(result.truth_error for result in self.arms if result.place == place)
+        for place in dict.fromkeys((r["arm"], r["protocol"], r["part"]) for r in self.rows):
             arm, protocol, part = place
+            own = [row for row in self.of(protocol, part) if row["arm"] == arm]
+            logs = self.table.filter(arm=arm, protocol=protocol, part=part)
+            error = max(logs["truth_error_Nm"])
             title = f"{arm}, {protocol}, {part} ({own[0]['seconds']:.0f} s)"
             texts = [*shown_rows(own, error)]
             marked = any(text["rmse"].mark for text in texts)
@@ -247,6 +213,25 @@ class Results:
 
 #: What a mark behind an RMSE means.
 NEAR = "~: nearer to the least RMSE than the truth's own error"
+
+
+def numbers_of(score: Score, best: Score | None) -> dict[str, float]:
+    """Numbers of a score, compared with that of `best` draw by draw."""
+    drawn, less = score.drawn, None
+    if best is not None and best is not score and drawn is not None and best.drawn is not None:
+        less = drawn - best.drawn
+    ends = {"rmse": percentiles(drawn), "over_best": percentiles(less)}
+    return {
+        "seconds": float(score.seconds.sum()),
+        "rmse_Nm": float(score.rmse.mean()),
+        **{f"{name}_low_Nm": low for name, (low, _) in ends.items()},
+        **{f"{name}_high_Nm": high for name, (_, high) in ends.items()},
+        "l1_Nm": float(score.l1.mean()),
+        "skill": score.skill,
+        "coverage_95": score.coverage,
+        "interval_score_Nm": score.interval_score,
+        "missing": score.missed,
+    }
 
 
 def shown_rows(rows: Sequence[dict[str, Any]], error: float) -> Iterator[dict[str, Any]]:
@@ -304,23 +289,25 @@ class Dot(NamedTuple):
 
 def dots(results: Results, protocol: str) -> tuple[Scales, list[tuple[float, str]], list[Dot]]:
     """Skill in contact of every arm, with its interval: scales, names by height, dots."""
-    own = [r for r in results.arms if (r.protocol, r.part) == (protocol, "contact")]
-    arms, colours = list(dict.fromkeys(r.arm for r in own)), results.colours
-    low = max(min([0.0, *(r.score.skill for r in own)]), -1.0) - 0.05
+    own, colours = results.of(protocol, "contact"), results.colours
+    arms = list(dict.fromkeys(row["arm"] for row in own))
+    low = max(min([0.0, *(row["skill"] for row in own)]), -1.0) - 0.05
     box = Box(height=46.0 * len(arms) + 26.0, width=400.0, left=8.0)
     scales = Scales(box, Span(low, 1.05), Span(0.0, float(len(arms))))
     found = []
     for r in own:
-        if r.method not in colours:
+        arm, method, skill = r["arm"], r["method"], r["skill"]
+        if method not in colours:
             continue
-        place = [*colours].index(r.method) / len(colours)
-        y = float(scales.up(len(arms) - arms.index(r.arm) - 0.4 - 0.55 * place))
+        place = [*colours].index(method) / len(colours)
+        y = float(scales.up(len(arms) - arms.index(arm) - 0.4 - 0.55 * place))
         # Skill falls as RMSE rises: the interval's ends change places.
-        level = r.score.rmse.mean() / max(1.0 - r.score.skill, 1e-12)
-        high, least = (1.0 - end / level for end in percentiles(r.score.drawn))
-        x, left, right = scales.across(np.clip([r.score.skill, least, high], low, 1.05)).tolist()
-        text = f"{r.arm}, {r.method}: {r.score.skill:.2f}"
-        found.append(Dot(x, left, right, y, paint(colours[r.method]), text))
+        level = r["rmse_Nm"] / max(1.0 - skill, 1e-12)
+        high, least = (1.0 - r[f"rmse_{end}_Nm"] / level for end in ("low", "high"))
+        x, left, right = scales.inside([skill, least, high]).tolist()
+        found.append(
+            Dot(x, left, right, y, paint(colours[method]), f"{arm}, {method}: {skill:.2f}")
+        )
     names = [(float(scales.up(len(arms) - k - 0.2)), arm) for k, arm in enumerate(arms)]
     return scales, names, found
 
@@ -339,7 +326,7 @@ def worst_charts(results: Results) -> Iterator[Chart]:
 
 def to_terminal(results: Results, *, every: bool) -> str:
     """The headline, the lists, and which arms they are of; every table where that is asked."""
-    head = terminal(replace(results.headline(), title="")) if results.arms else ""
+    head = terminal(replace(results.headline(), title="")) if results.rows else ""
     grids = results.grids() if every else ()
     return "\n".join([head + "".join(f"{x}\n" for x in results.lines()), *map(terminal, grids)])
 

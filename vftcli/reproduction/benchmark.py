@@ -212,7 +212,7 @@ class BenchmarkRun:
             for log in logs
         ]
         found = {
-            "manifest": manifest.name,
+            "manifest": manifest.path.stem,
             "manifest_sha256": digest_of(manifest.path),
             "left_out": manifest.absent(),
             "failures": {name: failure.line for name, failure in self.failures},

@@ -167,7 +167,6 @@ class Rival(NamedTuple):
 class Manifest:
     """Logs, trained robots, and the folder that the logs lie in."""
 
-    name: str
     path: Path
     data: Path
     logs: tuple[BenchmarkLog, ...]
@@ -202,14 +201,9 @@ class Manifest:
         robot: Path | None = None,
         logs: Mapping[str, Path] = MappingProxyType({}),
     ) -> AnalysisChoice:
-        """What is asked of a log by a protocol.
+        """What a protocol asks of a log in `file`, `robot` the robot file of protocol 3.
 
-        Args:
-            log: The log.
-            protocol: One of `PROTOCOLS`.
-            file: Where it is.
-            robot: The robot file of protocol 3.
-            logs: Name → where each log is, for free motion.
+        `logs` is where each log is by name, for free motion.
         """
         words = {w: OPTIONS[w].keyword(v) for w, v in log.options if w != "robot"}
         if file not in self.paths(log):
@@ -302,9 +296,7 @@ def load_manifest(name: str, data: Path | None) -> Manifest:
     logs = tuple(each for table in tables.get("log", ()) for each in logs_of(table))
     robots = [section_from(TrainedRobot, table, "robot") for table in tables.get("robot", ())]
     default = Path() if name in BUILT_IN else path.parent
-    found = Manifest(
-        name=path.stem, path=path, data=data or default, logs=logs, robots=tuple(robots)
-    )
+    found = Manifest(path=path, data=data or default, logs=logs, robots=tuple(robots))
     check_names(found)
     return found
 

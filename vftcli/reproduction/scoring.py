@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 import polars as pl
@@ -11,7 +11,7 @@ from polars import Boolean, Float64, Int64, String
 
 from vftcli.batch.cluster import begin
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation.detection import ListedRow, TrueContact, score_list, wrench_sums
+from vftcli.evaluation.detection import ListedRow, ListScore, TrueContact, score_list, wrench_sums
 from vftcli.evaluation.references import on_the_logs_clock, since_start, table_reference
 from vftcli.evaluation.scores import Score, episodes, lag_sums, parts_of, weights
 from vftcli.free_motion.free_motion import within
@@ -36,6 +36,7 @@ from vftcli.wrench.frames import NOTHING
 TOUCHED, UNTOUCHED = 0.05, 0.025
 WORST = 10.0  #: Length of the span that is drawn. [s]
 NO_WRENCH = np.zeros((0, 6))
+KINDS = {int: Int64, float: Float64, list[float]: pl.List(Float64)}
 #: Rows of a log × protocol × method: of a part and joint; of lists; of wrench, weight and lag.
 SCHEMA: dict[str, Any] = {
     **dict.fromkeys(("log", "arm", "protocol", "method", "part"), String),
@@ -44,11 +45,7 @@ SCHEMA: dict[str, Any] = {
     **dict.fromkeys(("truth_error_Nm", "rmse_Nm", "l1_Nm"), Float64),
     # Sums over each cell of 2 s, as `Score` has them.
     **dict.fromkeys(Score.__annotations__, pl.List(Float64)),
-    **dict.fromkeys(("true_contacts", "found", "found_as_load", "split", "false"), Int64),
-    "free_h": Float64,
-    **dict.fromkeys(("onset_s", "peak_error_N", "true_peak_N"), pl.List(Float64)),
-    "peaks_held": Int64,
-    "hardest_false_N": Float64,
+    **{name: KINDS[kind] for name, kind in get_type_hints(ListScore).items()},
     **dict.fromkeys(wrench_sums(NO_WRENCH, NO_WRENCH, np.zeros(0)), Float64),
     **dict.fromkeys(("weight_N", "mean_N", "rms_error_N", "answered"), Float64),
     "lag_squares": pl.List(Float64),
