@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import count, takewhile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,17 +58,24 @@ def read_outside(path: Path, name: str) -> OutsideTable:
     return OutsideTable(t, raw.signals[TORQUE], raw.signals.get("band"), wrench)
 
 
-def read_list(path: Path) -> list[dict[str, Any]]:
-    """Rows of a list of contacts, by the columns of `vftcli contacts --csv`."""
+def read_list(path: Path) -> list[tuple[float, float, float, float, bool]]:
+    """Start, stop [s], peak, its band [N] and whether it is a load, of contacts as CSV."""
     import polars as pl
 
     try:
         rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
-        for row in rows:
-            row["start_s"], row["stop_s"] = float(row["start_s"]), float(row["stop_s"])
+        return [
+            (
+                float(row["start_s"]),
+                float(row["stop_s"]),
+                float(row.get("peak_force_N") or 0.0),
+                float(row.get("peak_force_band_N") or 0.0),
+                row.get("kind") == "load",
+            )
+            for row in rows
+        ]
     except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
         raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
-    return rows
 
 
 def read_parts(files: Mapping[str, Path], order: Sequence[str]) -> dict[str, Array]:

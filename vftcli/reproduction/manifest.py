@@ -152,15 +152,13 @@ class Rival(NamedTuple):
 
     def file(self, log: BenchmarkLog) -> Path | None:
         """Its estimates of a log, None where it has none."""
-        return self._first(f"{log.name}.parquet", f"{log.name}.csv")
+        tries = (self.folder / f"{log.name}.{ending}" for ending in ("parquet", "csv"))
+        return next(filter(Path.is_file, tries), None)
 
     def list(self, log: BenchmarkLog) -> Path | None:
         """Its list of a log's contacts, None where it has none."""
-        return self._first(f"{log.name}.contacts.csv")
-
-    def _first(self, *names: str) -> Path | None:
-        tries = (self.folder / name for name in names)
-        return next((path for path in tries if path.is_file()), None)
+        path = self.folder / f"{log.name}.contacts.csv"
+        return path if path.is_file() else None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -207,16 +207,7 @@ def outside_answer(task: ScoreTask, recording: Recording) -> Answer:
     assert task.rival is not None, "it has a folder"
     name, _, declared = task.rival
     path, listed = task.rival.file(task.log), task.rival.list(task.log)
-    rows = [
-        ListedRow(
-            row["start_s"],
-            row["stop_s"],
-            float(row.get("peak_force_N") or 0.0),
-            float(row.get("peak_force_band_N") or 0.0),
-            row.get("kind") == "load",
-        )
-        for row in (read_list(listed) if listed else ())
-    ]
+    rows = {} if listed is None else {LIST: [ListedRow(*row) for row in read_list(listed)]}
     # Without estimates of a log of an arm that it has it answers nothing there.
     tau = np.full(recording.q.shape, np.nan)
     sd: Array | None = None
@@ -236,7 +227,7 @@ def outside_answer(task: ScoreTask, recording: Recording) -> Answer:
         tau = at_stamps(table.tau)
         sd, wrench = (None if x is None else at_stamps(x) for x in (table.sd, table.wrench))
     torque = ExternalTorque(name=name, t=recording.t, tau=tau, error_sd=sd)
-    return Answer(torque, wrench, not declared.causal, {LIST: rows} if listed else {})
+    return Answer(torque, wrench, not declared.causal, rows)
 
 
 def rows_of(
