@@ -192,6 +192,25 @@ def test_what_is_unfair_or_another_file_ends_with_one_line(run, manifest: Path) 
 
 
 @pytest.mark.slow
+def test_a_method_that_lacks_an_arm_is_named(run, manifest: Path, tmp_path: Path) -> None:
+    """Estimates of the first second of one of two arms."""
+    one = MANIFEST.partition('[[log]]\nname = "gone"')[0]
+    manifest.write_text(one + one.replace('"circle"', '"again"').replace('"UR5"', '"UR5 b"'))
+    (tmp_path / "zz").mkdir()
+    t = np.arange(0.0, 1.0, 0.01)
+    part = pl.DataFrame({"t": t, **{f"tau_ext/{j}": 0.0 * t for j in range(1, 7)}})
+    part.write_csv(tmp_path / "zz" / "circle.csv")
+    code, out, err = run(*asked(manifest, "--outside", f"zz={tmp_path / 'zz'}"))
+    assert code == 0, err
+    rows = [line.split()[0] for line in out.splitlines()]
+    assert "best" in rows
+    assert "zz" not in rows
+    assert "in no mean, as some arm lacks them (-v and page have their rows): zz" in out
+    # What is scored begins at 1 s, where these estimates end.
+    assert "zz, alone: no answer for 100.0 % of the time, read as 0" in out
+
+
+@pytest.mark.slow
 def test_anyway_marks_the_rows(run, manifest: Path) -> None:
     manifest.write_text(MANIFEST.replace('file = "ur5', f'sha256 = "{"1" * 64}"\nfile = "ur5', 1))
     code, out, err = run(*asked(manifest, "--anyway"))
@@ -230,7 +249,7 @@ def test_no_log_that_is_there_makes_no_table(run, manifest: Path, tmp_path: Path
     *lines, last = err.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["circle", "gone"]
     assert lines[1].endswith("source: a page that has it")
-    assert last.startswith(f"Nothing is scored: no log is in {tmp_path / 'empty'}.")
+    assert last.startswith(f"Nothing is scored: {tmp_path / 'empty'} has none of the logs.")
     assert not (tmp_path / "out").exists()
     code, out, _ = run(*words, "--json")
     assert code == 0

@@ -125,8 +125,8 @@ def say_none(manifest: "Manifest", form: str) -> None:
     """Print that no log of a manifest is there, and where each is had."""
     if form == "json":
         say_json([], rows=[], left_out=manifest.absent())
-    none = f"Nothing is scored: no log is in {manifest.data.absolute()}. Put them there, or name "
-    lines = [*manifest.absent(), f"{none}their folder with --data."]
+    none = f"Nothing is scored: {manifest.data.absolute()} has none of the logs. Put them there, "
+    lines = [*manifest.absent(), f"{none}or name their folder with --data."]
     echo("\n".join(map(printable, lines)), err=True)
 
 

@@ -160,7 +160,8 @@ class Results:
             )
         shown = {row[0] for row in self.headline().rows}
         if rest := [method for method in self.methods if shown and method not in shown]:
-            yield f"in no mean, as some arm lacks them (-v has their rows): {', '.join(rest)}"
+            why = "in no mean, as some arm lacks them (-v and page have their rows)"
+            yield f"{why}: {', '.join(rest)}"
         yield from self.silences()
         for p in self.protocols:
             if arms := self.counted(p, "contact"):
