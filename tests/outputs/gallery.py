@@ -136,7 +136,7 @@ def photograph(page_path: Path, height: int, path: Path) -> None:
     program = shutil.which("chromium") or shutil.which("google-chrome")
     with sync_playwright() as running:
         browser = running.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        tab = browser.new_page(viewport={"width": 1180, "height": height})
+        tab = browser.new_page(viewport={"width": 1280, "height": height})
         tab.goto(page_path.as_uri())
         tab.wait_for_timeout(1000)
         tab.screenshot(path=path)
@@ -165,7 +165,7 @@ def shrink(path: Path) -> None:
     if picture.width > WINDOW[0]:
         picture = picture.resize((WINDOW[0], picture.height * WINDOW[0] // picture.width))
     for colours in (256, 128, 64, 32, 16):
-        few = picture.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        few = picture.quantize(colours, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
         few.save(path, optimize=True)
         if path.stat().st_size <= LARGEST:
             return
