@@ -280,37 +280,31 @@ def list_row(row: Mapping[str, Any]) -> Sequence[Any]:
 class Dot(NamedTuple):
     """A method's skill on one arm, in the drawing."""
 
-    x: float
-    low: float
-    high: float
+    places: list[float]  #: Of the skill and of the ends of its interval, NaN without one.
     y: float
     colour: str
     words: str
 
 
-def dots(results: Results, protocol: str) -> tuple[Scales, list[tuple[float, str]], list[Dot]]:
-    """Skill in contact of every arm, with its interval: scales, names by height, dots."""
+def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[Dot]]:
+    """Skill in contact of every arm, with its interval: scales, names from above, dots."""
     own, colours = results.of(protocol, "contact"), results.colours
-    arms = list(dict.fromkeys(row["arm"] for row in own))
+    arms, methods = list(dict.fromkeys(row["arm"] for row in own)), [*colours]
     low = max(min([0.0, *(row["skill"] for row in own)]), -1.0) - 0.05
     box = Box(height=46.0 * len(arms) + 26.0, width=400.0, left=8.0)
-    scales = Scales(box, Span(low, 1.05), Span(0.0, float(len(arms))))
+    scales = Scales(box, Span(low, 1.05), Span(-float(len(arms)), 0.0))
     found = []
-    for r in own:
-        arm, method, skill = r["arm"], r["method"], r["skill"]
-        if method not in colours:
-            continue
-        place = [*colours].index(method) / len(colours)
-        y = float(scales.up(len(arms) - arms.index(arm) - 0.4 - 0.55 * place))
-        # Skill falls as RMSE rises: the interval's ends change places.
-        level = r["rmse_Nm"] / max(1.0 - skill, 1e-12)
-        high, least = (1.0 - r[f"rmse_{end}_Nm"] / level for end in ("low", "high"))
-        x, left, right = scales.inside([skill, least, high]).tolist()
-        found.append(
-            Dot(x, left, right, y, paint(colours[method]), f"{arm}, {method}: {skill:.2f}")
-        )
-    names = [(float(scales.up(len(arms) - k - 0.2)), arm) for k, arm in enumerate(arms)]
-    return scales, names, found
+    for row in own:
+        arm, method, skill = row["arm"], row["method"], row["skill"]
+        if method in colours:
+            # Skill falls as RMSE rises: the interval's ends change places.
+            level = row["rmse_Nm"] / max(1.0 - skill, 1e-12)
+            ends = (1.0 - row[f"rmse_{end}_Nm"] / level for end in ("high", "low"))
+            places = scales.inside([skill, *ends]).tolist()
+            y = -arms.index(arm) - 0.4 - 0.55 * methods.index(method) / len(methods)
+            text = f"{arm}, {method}: {skill:.2f}"
+            found.append(Dot(places, float(scales.up(y)), paint(colours[method]), text))
+    return scales, arms, found
 
 
 def worst_charts(results: Results) -> Iterator[Chart]:

@@ -1,6 +1,6 @@
 """What other programs write: their estimates, their lists of contacts, a log in several files."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from itertools import count, takewhile
 from pathlib import Path
 from typing import NamedTuple
@@ -78,17 +78,17 @@ def read_list(path: Path) -> list[tuple[float, float, float, float, bool]]:
         raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
 
 
-def read_parts(files: Mapping[str, Path], order: Sequence[str]) -> dict[str, Array]:
-    """Columns t, q1… of a log in a text file a signal, all its numbers row after row."""
+def read_parts(files: Mapping[str, Path]) -> dict[str, Array]:
+    """Columns t, q1… of a log in a text file a signal, t first, its numbers row after row."""
     columns: dict[str, Array] = {}
     samples = 0
-    for signal in order:
+    for signal, path in files.items():
         try:
-            values = np.loadtxt(files[signal], ndmin=1).ravel()
+            values = np.loadtxt(path, ndmin=1).ravel()
             rows = values.reshape(samples or len(values), -1)
         except (OSError, UnicodeDecodeError, ValueError):
             raise LogError(
-                f"{files[signal]}: not numbers, as many for each of {samples or 'its'} samples"
+                f"{path}: not numbers, as many for each of {samples or 'its'} samples"
             ) from None
         samples = len(rows)
         names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]

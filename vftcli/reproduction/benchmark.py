@@ -120,9 +120,8 @@ class BenchmarkRun:
             convert(recording, path, force=True)
 
         def assemble(path: Path) -> None:
-            signals = [part.partition("=")[0] for part in log.parts]
-            files = dict(zip(signals, sources, strict=True))
-            put_table(path, pl.DataFrame(read_parts(files, signals)))
+            signals = (part.partition("=")[0] for part in log.parts)
+            put_table(path, pl.DataFrame(read_parts(dict(zip(signals, sources, strict=True)))))
 
         def run(path: Path) -> None:
             check_installed("pinocchio", "a simulated log")
