@@ -137,6 +137,13 @@ def test_a_wrong_hash_and_a_missing_log(tmp_path: Path) -> None:
     assert manifest.absent() == [f"z: no {tmp_path / 'z.csv'}; source: a page"]
 
 
+def test_a_log_with_pushes_has_every_line_once(tmp_path: Path) -> None:
+    text = ENTRY + f'sha256 = "{"0" * 64}"\nfree = ["0:9.5"]\npushes = [[4, 0.5, [10, 0, 0]]]\n'
+    near, sha = lines(made(tmp_path, text))
+    assert near.startswith("a: free (0 s to 9.5 s) must stay 1 s away from score (1 s to the end)")
+    assert "sha256" in sha
+
+
 def test_a_rival_says_what_it_was_trained_on(tmp_path: Path) -> None:
     manifest = made(tmp_path, ENTRY)
     (tmp_path / "est").mkdir()

@@ -226,18 +226,17 @@ class Manifest:
 
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
         """Why a log's rows of a protocol are unfair: a line for each training log that is."""
-        own = list(map(digest_of, self.paths(log)))
+        name, own = log.name.removesuffix(PUSHED), list(map(digest_of, self.paths(log)))
         for other, spans in self.trains_on(log, protocol):
-            what = f"{log.name}, {protocol}: {other.name}"
-            if other.name.removesuffix(PUSHED) == log.name.removesuffix(PUSHED):
+            what = f"{name}, {protocol}: {other.name}"
+            if other.name.removesuffix(PUSHED) == name:
                 near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.spans)
                 if any(near):
-                    key = (
-                        "free" if protocol == "free" else f"interval of [[robot]] {log.identified}"
-                    )
+                    fit = f"interval of [[robot]] {log.identified}"
+                    key = "free" if protocol == "free" else fit
                     yield (
-                        f"{log.name.removesuffix(PUSHED)}: {key} ({in_words(spans)}) must stay "
-                        f"{APART:g} s away from score ({in_words(log.spans)}); change one of them"
+                        f"{name}: {key} ({in_words(spans)}) must stay {APART:g} s away from score "
+                        f"({in_words(log.spans)}); change one of them"
                     )
             elif self.missing(other):
                 continue
@@ -265,7 +264,8 @@ class Manifest:
                 if sha in rival.declared.training and rival.file(log)
             ]
             if lines:
-                found[log.name.removesuffix(PUSHED)] = lines
+                own = found.setdefault(log.name.removesuffix(PUSHED), [])
+                own += [line for line in lines if line not in own]
         return found
 
     def absent(self) -> list[str]:
