@@ -199,6 +199,14 @@ def test_what_nothing_is_known_of_is_no_caution_and_a_file_keeps_its_letters(
         assert f"Free motion {words}" in text, words
 
 
+def test_no_command_of_the_page_breaks_in_an_option(without_reference: Analysis) -> None:
+    made = replace(without_reference, run=run_record(without_reference, "vftcli report a --free b"))
+    commands = re.findall(r"(?s)<(code|pre)[^>]*>(.*?)</\1>", render(made))
+    texts = [re.sub(r'<span class="option">--?[a-z-]+</span>', "", text) for _, text in commands]
+    assert "vftcli report a  b" in texts
+    assert not [text for text in texts if re.search(r"(?<!\w)-", text)]
+
+
 def test_every_contact_has_its_span_and_range(pushed: Analysis) -> None:
     """In the table, which needs no script, and in the line of the chosen contact."""
     page = render(pushed)
