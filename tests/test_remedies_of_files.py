@@ -347,6 +347,9 @@ WITHOUT_ROW = {
         "has no worker; start some",
     ),
     "tried in tests/test_remedies_of_analysis.py": ("or take it all with --anyway",),
+    "tried in tests/cli/test_benchmark.py": (
+        "--data …: there is no such folder", "benchmark speed has --json",
+    ),
 }  # fmt: skip
 """Why a text has no row, and words that only it has."""
 

@@ -230,14 +230,14 @@ def test_a_log_that_fails_leaves_the_others(run, manifest: Path) -> None:
     assert "error: b, alone: " in err
 
 
-def test_where_every_log_fails_the_code_is_that_of_some(run, manifest: Path) -> None:
+def test_where_every_log_fails_the_code_is_that_of_an_error(run, manifest: Path) -> None:
     broken = manifest.with_name("broken.csv")
     broken.write_text("t,q1\n0,nothing\n")
     manifest.write_text(
         f'[[log]]\nname = "b"\narm = "UR5"\nfile = "{broken}"\nrobot = "ur5"\ntruth = "free"\n'
     )
     code, out, err = run(*asked(manifest))
-    assert (code, out) == (3, "")
+    assert (code, out) == (1, "")
     assert "error: b, alone: " in err
 
 
@@ -262,6 +262,7 @@ def test_no_log_that_is_there_makes_no_table(run, manifest: Path, tmp_path: Path
         (("sim", "--data", "nodir"), "--data nodir: there is no such folder"),
         (("sim", "--outside", "zz=nodir"), "--outside zz=nodir: there is no folder nodir"),
         (("speed", "--data", "."), "benchmark speed takes no --data"),
+        (("speed", "--csv"), "benchmark speed has --json, --markdown and --latex"),
     ],
 )
 def test_a_wrong_word_is_one_error(run, words: tuple[str, ...], complaint: str) -> None:

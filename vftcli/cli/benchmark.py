@@ -65,7 +65,7 @@ def benchmark(
 
     Writes PATH/index.html, scores.parquet and run.json; a second run does what is missing.
     Nothing is downloaded: a log that is not there is named, with its source. Exit code 3: some
-    log failed.
+    logs failed; 1: all.
 
     Example: vftcli benchmark sim
     """
@@ -96,14 +96,15 @@ def benchmark(
         tell=say,
         progress=lambda stage, share: begin(stage, share, share),
     )
-    print_results(run.run(force=force), table.form, manifest.absent(), every=talk.details)
+    results = run.run(force=force)
+    print_results(results, table.form, manifest.absent(), every=talk.details)
     for name, failure in run.failures:
         echo(printable(f"error: {name}: {failure.line}"), err=True)
     say("\n".join([*manifest.absent(), f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
     if open_page:
         open_made(output)
     if run.failures:
-        raise typer.Exit(SOME_FAILED)
+        raise typer.Exit(SOME_FAILED if results.rows else 1)
 
 
 def named(what: str, data: Path | None, outside: Sequence[str]) -> "tuple[Manifest, list[Rival]]":
