@@ -108,6 +108,7 @@ def test_instantaneous_torque_aliases(loop: ClosedLoop) -> None:
     mean, last = (
         np.abs(each.estimate - each.truth)[each.t > 0.3] for each in (loop, pushed("instant"))
     )
+    assert loop.stable
     # science of the issue: about 100 N of false force; the mean stays within lag and model error
     assert np.max(last[:, :3]) > 100.0
     assert np.max(mean[:, :3]) < 10.0
@@ -133,6 +134,16 @@ def test_the_zero_is_the_mean_of_its_span_and_goes_off_what_follows(loop: Closed
     np.testing.assert_allclose(loop.zero, read[(t >= 0.05) & (t <= 0.1)].mean(axis=0), rtol=1e-9)
     later = t > 0.1
     np.testing.assert_allclose(loop.estimate[: len(t)][later], read[later] - loop.zero, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_controller_rests_until_the_zero_is_known() -> None:
+    loop = run("ur5-drag", "density", duration=4.0)
+    np.testing.assert_array_equal(loop.commanded[loop.t <= 3.0], 0.0)
+    assert np.all(np.isnan(loop.estimate[loop.t < 0.5]))
+    rest = loop.estimate[(loop.t > 1.5) & (loop.t < 3.0)]
+    # noise of 0.06 A · 12.6 N·m/A through a 10 rad/s filter and 1/0.2 m of lever
+    assert np.max(np.abs(np.mean(rest, axis=0))[:3]) < 0.5
 
 
 def test_the_arm_goes_where_it_is_pushed_once_the_zero_is_known(loop: ClosedLoop) -> None:
