@@ -47,7 +47,7 @@ OVERRIDDEN = "overridden"  #: Column of the codes with which results were wanted
 RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
 
 #: What the page writes behind a number where the terminal has a star.
-ON_PAGE = '<span class="mark">at the floor</span>'
+ON_PAGE = ' <span class="mark">at the floor</span>'
 
 
 class Block(NamedTuple):
