@@ -157,7 +157,7 @@ def test_the_table_is_that_of_ten_lines(run, manifest: Path) -> None:
 
 @pytest.mark.slow
 def test_planted_pushes_are_found_in_drive_torque_and_truth(run, tmp_path: Path) -> None:
-    """What is taken out of a current is Jᵀ F/K: beside the tool's own reading of it."""
+    """What a current lacks is Jᵀ F/K: beside the tool's own reading of it."""
     shutil.copy(CIRCLE, tmp_path / "log.csv")
     (tmp_path / "my.toml").write_text(
         '[[log]]\nname = "a"\narm = "UR5"\nfile = "log.csv"\nrobot = "ur5"\ntruth = "free"\n'
@@ -176,8 +176,8 @@ def test_planted_pushes_are_found_in_drive_torque_and_truth(run, tmp_path: Path)
     # K of the UR5 profile's two sizes of joints, N·m/A.
     constant = np.repeat([12.625, 9.3122], 3)
     tau = truth.select(pl.col("^tau_ext/.*$")).to_numpy()
-    taken = (before.require("current") - after.require("current")) * constant
-    assert taken == pytest.approx(tau, abs=1e-9)
+    missing = (before.require("current") - after.require("current")) * constant
+    assert missing == pytest.approx(tau, abs=1e-9)
     assert abs(tau[:, 1]).max() > 5.0
 
 

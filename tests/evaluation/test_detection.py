@@ -21,7 +21,7 @@ def test_found_split_false_onset_and_peak() -> None:
     assert (found.split, found.false, found.hardest_false_N) == (1, 1, 30.0)
     assert found.free_h == pytest.approx((11.0 - 3.0) / 3600.0)
     assert found.onset_s == pytest.approx([0.1, 1.08])
-    # Of the rows on a contact the hardest counts: 18 N of 20, whose band is 1 N.
+    # Of the rows on a contact the hardest counts: 18 N of 20, with a band of 1 N.
     assert found.peak_error_N == pytest.approx([-2.0])
     assert found.peaks_held == 0
 

@@ -95,7 +95,7 @@ def test_a_joint_that_never_reverses_gets_no_offset(prepared):
     [
         (0.05, True, 100.0, ("offset",)),  # a fit's rest and no friction
         (0.05, False, 100.0, ()),
-        (3.0, True, 100.0, PLAIN),  # the velocity has the other sign: who reads it is told
+        (3.0, True, 100.0, PLAIN),  # the velocity has the other sign: the reader is warned
         (3.0, True, 1000.0, ("offset",)),  # as much of a strong joint may be a model's error
     ],
 )

@@ -80,10 +80,10 @@ def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_entry_is_refused_in_one_line(tmp_path: Path, text: str, complaint: str) -> None:
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError) as error:
         made(tmp_path, text)
-    assert complaint in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert complaint in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 def test_a_manifest_that_is_not_there_names_the_nearest(tmp_path: Path) -> None:

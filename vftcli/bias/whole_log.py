@@ -74,8 +74,8 @@ class WholeLogBias:
     #: clearly predicts what it had not seen. (n,)
     weight: Array
     bias: Array  #: Subtracted torque, zero on joints left alone. (T, n) [N·m]
-    #: Standard deviation of the model's error as it was fitted, and of what is taken off
-    #: where that is a part of it: taken off or left alone, by chance. (T, n) [N·m]
+    #: Standard deviation of the model's error as it was fitted, and of what is subtracted
+    #: where that is a part of it: all or nothing, by chance. (T, n) [N·m]
     sd: Array
     free: Mask  #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
     #: External torque of the slow loads that the fit believes in, which stays in the

@@ -132,7 +132,7 @@ def say_none(manifest: "Manifest", form: str) -> None:
 
 
 def unfair(manifest: "Manifest", rivals: "list[Rival]", *, anyway: bool) -> frozenset[str]:
-    """Names of the logs whose rows are unfair or another file's; an exit unless `anyway`."""
+    """Names of logs with rows that are unfair or of another file; an exit unless `anyway`."""
     complaints = manifest.complaints(rivals)
     head = "warning" if anyway else "error"
     for line in (line for lines in complaints.values() for line in lines):

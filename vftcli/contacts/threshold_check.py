@@ -1,8 +1,8 @@
 """Logs beside thresholds: what a robot compares with them, false alarms, contacts detected.
 
-A robot compares its own estimate with the thresholds it is given, so that one is taken
-where the log has it. Where it has none, a momentum observer of 10 1/s runs: causal, as a
-robot needs it.
+A robot compares its own estimate with the thresholds it is given, so the check reads
+that estimate where the log has it. Else a momentum observer of 10 1/s runs: causal, as
+a robot needs it.
 """
 
 from collections.abc import Sequence

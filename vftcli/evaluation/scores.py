@@ -68,7 +68,7 @@ class Score:
 
     @classmethod
     def of(cls, estimate: ExternalTorque, truth: Array, inside: Mask) -> Self:
-        """Sums of an estimate, whose bands are ±1.96 `error_sd`, over some samples.
+        """Sums of an estimate with bands of ±1.96 `error_sd` over some samples.
 
         Args:
             estimate: The estimate on the truth's clock.

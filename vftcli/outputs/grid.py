@@ -2,7 +2,7 @@
 
 Whoever has a table to show makes a Grid of it; how a table looks is decided here and, for
 HTML, in the pages' templates, and so is what must be escaped: names and words come from
-files, and may hold any letter. Rows for machines, whose values are not rounded, are
+files, and may hold any letter. Rows for machines, not rounded, are
 written by `csv_rows` and `json_rows`: what is not known is null or empty.
 """
 

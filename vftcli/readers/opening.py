@@ -76,8 +76,7 @@ class LogFile:
     """A file or folder as the readers see it: its first bytes already unwrapped."""
 
     path: Path  #: The file or folder.
-    #: The first bytes of the content, after gzip or zstd were taken off; empty for a
-    #: folder.
+    #: The first bytes of the content, unpacked from gzip or zstd; empty for a folder.
     head: bytes = b""
     entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
     wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.

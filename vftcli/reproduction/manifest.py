@@ -278,7 +278,7 @@ class Manifest:
 
 
 def load_manifest(name: str, data: Path | None) -> Manifest:
-    """A built-in manifest, or a user's file, whose logs lie beside it unless `data` is given.
+    """A built-in manifest, or a user's file with its logs beside it unless `data` is given.
 
     Raises:
         ParameterError: If there is none, or an entry is wrong.

@@ -66,7 +66,7 @@ def felt_bodies(chain: Chain) -> tuple[Array, Array]:
     Joint j cannot feel a body of link j that is symmetric about its axis and has no
     moment of inertia there: turning it changes neither energy nor momentum. Each link
     therefore hands the body with J = diag(a, a, 0), a = J_yy, h = (0, 0, h_z) and all its
-    mass to the link before, whose motion is the same but for the turn, and keeps
+    mass to the link before, which moves alike but for the turn, and keeps
     J_yy = 0, h_z = 0, m = 0. What reaches the base never moves. p, Cᵀq̇ and g stay
     exactly what they were; the links' own energies do not.
 

@@ -45,8 +45,8 @@ def check_joints(recording: Recording, robot: Robot) -> None:
 def effort_name(recording: Recording, robot: Robot) -> str:
     """The signal of `EFFORTS` that the drive torque comes from.
 
-    A robot described by currents whose log has only torques uses the torques, and the
-    other way round if its file has torque constants.
+    A robot described by currents uses the torques of a log that has nothing else, and
+    the other way round if its file has torque constants.
     """
     ranked = EFFORTS if robot.torque_source == "current" else (*EFFORTS[1:], EFFORTS[0])
     return next((name for name in ranked if getattr(recording, name) is not None), ranked[0])

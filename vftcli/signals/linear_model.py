@@ -23,8 +23,7 @@ import numpy as np
 from vftcli.signals.arrays import Array
 
 SPIKE = 40.0  #: Variance of a spike, in variances of the innovation.
-#: A state whose predicted variance is no larger is certain: nothing is carried back to
-#: it.
+#: A state of no larger predicted variance is certain: nothing is carried back to it.
 LEAST_VARIANCE = 1e-14
 STRETCH = 512  #: Blocks whose innovations and gains back are worked on at once.
 

@@ -2,8 +2,8 @@
 
 Rotation vectors and quaternions are for many orientations at once. The deviation of an
 orientation is the rotation vector x̃ = log(R R_dᵀ), updated by R ← exp(ω Ts) R. A
-quaternion that is only ever multiplied changes continuously, and so does the logarithm
-taken of it: it grows through π without a jump, up to a full turn. Quaternions are
+quaternion that is only ever multiplied changes continuously, and so does its
+logarithm: it grows through π without a jump, up to a full turn. Quaternions are
 (w, x, y, z).
 """
 

@@ -41,11 +41,11 @@ Sign = Literal["on-robot", "by-robot"]
 class WrenchFrame:
     """What a log states of its own wrench."""
 
-    #: Whose axes: base, flange, tool or sensor; or the log's own name of a frame, of
-    #: which nothing is known here.
+    #: Axes of base, flange, tool or sensor; or the log's own name of a frame, of which
+    #: nothing is known here.
     axes: str
     point: str  #: What its moment refers to: a key of `POINTS`, or again the log's own name.
-    sign: Sign = "on-robot"  #: Whose force it is.
+    sign: Sign = "on-robot"  #: On or by the robot.
 
     @classmethod
     def parsed(cls, text: str) -> "WrenchFrame":
@@ -85,8 +85,8 @@ class WrenchFrame:
     def __str__(self) -> str:
         """The frame in words."""
         point = POINTS.get(self.point, self.point)
-        whose = "BY the robot ON the environment" if self.sign == "by-robot" else "on the robot"
-        return f"{self.axes} axes at {point}, as force {whose}"
+        sense = "BY the robot ON the environment" if self.sign == "by-robot" else "on the robot"
+        return f"{self.axes} axes at {point}, as force {sense}"
 
 
 #: O_F_ext_hat_K of libfranka and what is built on it.

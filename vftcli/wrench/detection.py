@@ -257,8 +257,8 @@ def judge_contacts(
 ) -> tuple[ContactScore, ...]:
     """Every observer's contacts against those of a reference torque.
 
-    An observer whose contacts are listed is judged by its list. The others' are found in
-    their wrenches where they were asked for, else in their joint torques, by a free band:
+    An observer with a list of contacts is judged by it. The others' are found in their
+    wrenches where they were asked for, else in their joint torques, by a free band:
     learned in the zero spans, else in the log's own free part, else in free runs, else
     before the first true contact.
     """

@@ -5,8 +5,8 @@ by the one model of every band, `vftcli.observers.spectra`: what the estimator r
 nothing touches the arm, at rest and in motion apart, and what its lag leaves out of the
 contacts there are. Where neither a free part nor an unloaded span is known there is no
 band: the observers' own covariance assumes a torque that wanders as fast as Q_τ says and
-a model without error, and differs a hundredfold between filters whose estimates are
-nearly the same.
+a model without error, and differs a hundredfold between filters that estimate nearly
+the same.
 """
 
 from collections.abc import Mapping, Sequence

@@ -33,7 +33,7 @@ from vftcli.wrench.frames import FRAMES
 if TYPE_CHECKING:
     import polars as pl
 
-MOST_NAMED = 6  #: Uncertain contacts whose numbers the lead names; of more it says how many.
+MOST_NAMED = 6  #: Uncertain contacts that the lead names by number; of more it says how many.
 FORCE_BOX = Box(width=1120, height=250, left=44, bottom=22, top=34, right=10)  #: That of |F|.
 #: File beside the page → what it is.
 FILES = {

@@ -253,7 +253,7 @@ def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> d
         "weak": contact.trust == "weak",
         "load": contact.is_load,
         "sure": contact.where != "cannot tell",
-        # The frames whose links are touched, and the two between which the force acts.
+        # The frames of touched links, and the two between which the force acts.
         "frames": [place or joints for place in contact.places],
         "flange": not contact.places or 0 in contact.places,
         "spot": spot_of(contact, joints),

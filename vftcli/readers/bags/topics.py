@@ -27,8 +27,7 @@ TARGETS = re.compile(r"(?i)desired|command|target|goal|reference")
 VENDOR_WRENCH = re.compile(r"(?i)franka|F_ext$|external_wrench")
 #: Topics and types that may hold a wrench: left out, they are named.
 FORCES = re.compile(r"(?i)wrench|force|\bft\b|F_ext")
-#: A wrench further than this many of its own sample times from a pose is not taken for
-#: it.
+#: A wrench belongs to no pose that is more than this many of its sample times away.
 NEAR = 3.0
 OWN = "/vftcli/"  #: Topics that vftcli itself writes.
 
