@@ -9,13 +9,13 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import (
     SUBJECTS,
-    command,
     is_profile,
     payload_command,
     remedy_of,
     robot_option,
     subject_of,
 )
+from vftcli.outputs.examination import command
 from vftcli.readers import read
 from vftcli.signals.remarks import warning, words
 

@@ -17,6 +17,7 @@ from vftcli.doctor.examination import REFUSING, in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
 from vftcli.outputs.contacts import answer, free_words, hardest_words
+from vftcli.outputs.examination import command, path_of
 from vftcli.outputs.quantity import DASH, counted, percent
 from vftcli.robots import PROFILES
 from vftcli.robots.friction import dry_friction
@@ -376,17 +377,6 @@ def payload_command(analysis: Analysis) -> str:
     free = ["--free", path_of(runs[0])] if runs else []
     found = ("--method", "payload", "--robot", robot_option(analysis), "-o", "loaded.toml")
     return command("identify", analysis.recording, *free, *found)
-
-
-def command(name: str, log: Recording, *words: str) -> str:
-    """A command on a log, as it is typed."""
-    columns = [f"--columns={log.source.columns}"] if log.source.columns else []
-    return shlex.join(["vftcli", name, path_of(log), *columns, *words])
-
-
-def path_of(log: Recording) -> str:
-    """A log's path as it was given, a stand-in for one made in memory."""
-    return str(log.source.path or "LOG")
 
 
 def robot_option(analysis: Analysis) -> str:

@@ -1,5 +1,6 @@
 """Findings of the log doctor, for people and for machines."""
 
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -116,7 +117,18 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
     names = list(dict.fromkeys(in_words(other).name for other in others))
     more = f"; also {', '.join(names)}" if names else ""
     text = f"{head}: {counted(len(found), 'warning')}: {in_words(first).name}: {first}{more}"
-    return printable(f"{text}; vftcli inspect {recording.source.path or 'LOG'} says more")
+    return printable(f"{text}; {command('inspect', recording)} says more")
+
+
+def command(name: str, log: Recording, *words: str) -> str:
+    """A command on a log, as it is typed."""
+    columns = [f"--columns={log.source.columns}"] if log.source.columns else []
+    return shlex.join(["vftcli", name, path_of(log), *columns, *words])
+
+
+def path_of(log: Recording) -> str:
+    """A log's path as it was given, a stand-in for one made in memory."""
+    return str(log.source.path or "LOG")
 
 
 def health_record(
