@@ -1,6 +1,7 @@
 """What supports an answer and what limits it: from the analysis' data, each with its remedy."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -10,6 +11,7 @@ from contact_rows import contact, contact_list
 from vftcli.analysis import Analysis
 from vftcli.doctor.examination import in_words
 from vftcli.doctor.fit import RobotMatch
+from vftcli.free_motion.free_motion import FreeRun
 from vftcli.outputs.believability import Ground, grounds, headline, health, joint_words, resting
 from vftcli.outputs.contacts import otherwise
 from vftcli.outputs.screen import facts
@@ -103,9 +105,10 @@ def test_one_remedy_is_given_once(without_reference: Analysis) -> None:
         examined(without_reference, load),
         contacts=contact_list(contact(is_load=True), remarks=(caution("contact-is-load"),)),
     )
-    loads = of(made, "load")
-    assert [ground.standing for ground in loads] == ["bad", "bad"]
-    assert loads[1].remedy is None
+    (load_of_log,), (row,) = of(made, "load"), of(made, "lasting contact")
+    assert load_of_log.standing == row.standing == "bad"
+    assert "--method payload" in (load_of_log.remedy or "")
+    assert row.remedy is None
 
 
 def test_a_finding_that_makes_results_meaningless_is_bad(without_reference: Analysis) -> None:
@@ -149,6 +152,18 @@ def test_friction_of_a_profile_names_the_command_for_ones_own(without_reference:
     (ground,) = of(without_reference, "friction")
     assert ground.standing == "caution"
     assert ground.remedy == "vftcli identify free.csv --robot ur5 -o my_ur5.toml"
+
+
+def test_friction_is_measured_from_the_free_log_with_its_columns(
+    without_reference: Analysis,
+) -> None:
+    log = without_reference.motion.log
+    source = replace(log.recording.source, path=Path("f.csv"), columns="t,q:6", sha256="f")
+    run = replace(log, recording=replace(log.recording, source=source))
+    motion = replace(without_reference.motion, runs=(FreeRun(run=run, log=log),))
+    (ground,) = of(replace(without_reference, motion=motion), "friction")
+    typed = "vftcli identify f.csv --columns=t,q:6 --robot ur5 -o my_ur5.toml"
+    assert ground.remedy == typed
 
 
 def test_without_free_motion_the_list_says_so(without_reference: Analysis) -> None:

@@ -141,7 +141,13 @@ def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
     own = {line.name: line.values[:, 0] for line in plots[4].series}
     for wrench in with_wrench.wrenches:
         np.testing.assert_array_equal(own[wrench.name], wrench.known[:, 4])
-    assert {line.name for line in plots[6].series} == {"σ_min of J", "masked below"}
+    sigma, masked = plots[6].series
+    assert (sigma.name, masked.name, plots[6].units) == ("σ_min of J", "masked below", ("m",))
+    assert with_wrench.virtual_sensor is not None
+    np.testing.assert_array_equal(
+        sigma.values[:, 0], with_wrench.virtual_sensor.wrenches[0].sigma_min
+    )
+    assert np.all(masked.values == with_wrench.virtual_sensor.sensor.least_sigma)
 
 
 def test_odd_names_do_no_harm(analysis: Analysis, as_if: Callable, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ friction, the clock, which joints rest, and whether anything measures the force
 independently. The terminal, the page and ``run.json`` show the same items.
 """
 
-import shlex
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
@@ -51,7 +50,7 @@ LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | 
 
 #: What the remarks of a list of contacts are about.
 LIST_SUBJECTS = {
-    "contact-is-load": "load",
+    "contact-is-load": "lasting contact",
     "arm-stopped-abruptly": "stop",
     "free-part-rests": "not moved",
     "free-part-misses-joints": "not moved",
@@ -274,12 +273,12 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
             words = f"{joint_words(joints)}: pushes below {sizes} N·m do not show"
         subject = "the arm is still" if rests.all() else "joints at rest"
         yield Ground("caution", subject, words, of_log=False)
-    name, own = robot_option(analysis), f"my_{robot.name}.toml"
+    name = robot_option(analysis)
     if not robot.friction or is_profile(analysis):
-        free = next((path_of(run.recording) for run in analysis.motion.runs), "free.csv")
         where = "a typical arm's" if robot.friction else "none is modelled"
-        remedy = shlex.join(["vftcli", "identify", free, "--robot", name, "-o", own])
         words = f"{where}. Measure yours (1 min contact-free):"
+        free = next((run.recording for run in analysis.motion.runs), None)
+        remedy = command("identify", free, "--robot", name, "-o", f"my_{robot.name}.toml")
         yield Ground("caution", "friction", words, remedy, of_log=False)
     else:
         yield Ground("good", "friction", f"from {name}", of_log=False)
@@ -367,7 +366,8 @@ def remedy_of(finding: Remark, log: Recording, analysis: Analysis) -> str:
     if finding.code == "other-robot":
         return command("contacts", log, "--robot", str(finding.values["robot"]))
     if finding.code.startswith("no-robot-fits"):
-        return f"vftcli identify free.csv --robot {robot} --method base -o my_robot.toml"
+        base = ("--robot", robot, "--method", "base", "-o", "my_robot.toml")
+        return command("identify", None, *base)
     return command("inspect", log, "--robot", robot)
 
 

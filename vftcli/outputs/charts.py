@@ -6,7 +6,6 @@ log the lowest and the highest sample of every stretch stay.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -165,8 +164,7 @@ def drawn_line(
     Each of these two is NaN where the ribbon is the other; none without a ribbon.
     """
     x = chart.x if line.x is None else line.x
-    thin = thinned_log if chart.log else thinned
-    t, y = thin(x, line.values[:, panel], stretches)
+    t, y = thinned(x, line.values[:, panel], stretches, log=chart.log)
     if line.half is None:
         return t, y, []
     half = line.half[:, panel]
@@ -175,38 +173,26 @@ def drawn_line(
     return t, y, [np.interp(t, x, each) for each in halves]
 
 
-def thinned(t: Array, values: Array, stretches: int) -> tuple[Array, Array]:
+def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tuple[Array, Array]:
     """A series with at most two samples a stretch, and the first and last of the log.
 
     The lowest and highest sample of every stretch keep their own time and value, so that
     no spike is lost and none is made. A log of at most twice as many samples is kept
     whole. The line breaks, by a NaN, where a stretch holds no known value and where the
-    clock has a gap.
+    clock has a gap; over a logarithmic axis, where stretches are equal, there is no clock.
     """
-    gaps, index = gaps_of(t, GAP_STEPS), np.arange(len(t))
+    gaps = np.empty(0, dtype=np.intp) if log else gaps_of(t, GAP_STEPS)
+    x, y = t, values
     if len(t) > 2 * stretches:
-        extreme = [each.ravel() for each in extremes(values[:, None], stretches)]
+        starts = even_starts(len(t), stretches)
+        if log:
+            starts = np.unique(np.searchsorted(t, np.geomspace(t[0], t[-1], stretches)))
         # Samples beside a gap stay, or a line would be drawn up to the wrong place.
-        index = np.unique(np.concatenate([index[[0, -1]], *extreme, gaps, gaps + 1]))
-    x, y = t[index], values[index]
-    if gaps.size:
-        after = np.searchsorted(index, gaps, side="right")
-        x = np.insert(x, after, 0.5 * (t[gaps] + t[gaps + 1]))
-        y = np.insert(y, after, np.nan)
-    return x, y
-
-
-def thinned_log(x: Array, values: Array, stretches: int) -> tuple[Array, Array]:
-    """One series as drawn over a logarithmic axis: stretches of equal width there."""
-    if len(x) <= 2 * stretches:
-        return x, values
-    starts = np.unique(np.searchsorted(x, np.geomspace(x[0], x[-1], stretches)))
-    index = [0, len(x) - 1]
-    for start, stop in pairwise(starts):
-        part = values[start:stop]
-        index += [start + int(np.argmin(part)), start + int(np.argmax(part))]
-    chosen = np.unique(index)
-    return x[chosen], values[chosen]
+        ends = [0, len(t) - 1]
+        index = np.unique(np.concatenate([ends, extremes(values[:, None], starts), gaps, gaps + 1]))
+        x, y = t[index], values[index]
+    after = np.searchsorted(x, t[gaps], side="right")
+    return np.insert(x, after, 0.5 * (t[gaps] + t[gaps + 1])), np.insert(y, after, np.nan)
 
 
 def level_rows(
@@ -220,36 +206,31 @@ def level_rows(
     """
     if len(t) <= 2 * values.shape[1] * stretches:
         return None
-    kept = np.zeros(len(t), dtype=bool)
+    kept, starts = np.zeros(len(t), dtype=bool), even_starts(len(t), stretches)
     gaps = gaps_of(t, GAP_STEPS)
-    for rows in ([0, -1], gaps, gaps + 1, *extremes(values, stretches)):
+    for rows in ([0, -1], gaps, gaps + 1, extremes(values, starts)):
         kept[rows] = True
     for column in values.T:
         unknown = np.flatnonzero(np.isnan(column))
-        stretch = unknown // -(-len(t) // stretches)
-        kept[unknown[np.unique(stretch, return_index=True)[1]]] = True
+        _, first = np.unique(np.searchsorted(starts, unknown, "right"), return_index=True)
+        kept[unknown[first]] = True
     for begin, end in whole:
         kept[(t >= begin) & (t <= end)] = True
     return np.flatnonzero(kept)
 
 
-def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
-    """Sample numbers of the lowest and highest known value of every stretch. (stretches, n)"""
-    samples, n = values.shape
-    # Samples a stretch, rounded up, so that no sample is left over.
-    width = -(-samples // stretches)
-    count = -(-samples // width)
-    start = np.arange(count) * width
-    low, high = np.zeros((2, count, n), dtype=np.intp)
-    # The last stretch is filled with unknowns. One column at once: of a long log all have
-    # no room.
-    padded = np.full(count * width, np.nan)
-    for j, column in enumerate(values.T):
-        padded[:samples] = column
-        cut = padded.reshape(count, width)
-        unknown = np.isnan(cut)
-        # argmin of a stretch without a known value is its first sample, which is NaN: a
-        # break.
-        low[:, j] = np.where(unknown, np.inf, cut).argmin(axis=1) + start
-        high[:, j] = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
-    return low, high
+def even_starts(samples: int, stretches: int) -> Index:
+    """First sample of so many stretches of equal length, rounded up. (stretches,)"""
+    return np.arange(0, samples, -(-samples // stretches))
+
+
+def extremes(values: Array, starts: Index) -> Index:
+    """The first lowest and highest known sample of every stretch, of an unknown one its first."""
+    width, kept = np.diff(starts, append=len(values)), list[Index]()
+    # One column at once: of a long log all have no room.
+    for column in values.T:
+        for ends in (each.reduceat(column, starts) for each in (np.fmin, np.fmax)):
+            rows = np.flatnonzero(column == np.repeat(ends, width))
+            _, first = np.unique(np.searchsorted(starts, rows, "right"), return_index=True)
+            kept += [rows[first], starts[np.isnan(ends)]]
+    return np.concatenate(kept)

@@ -120,8 +120,10 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
     return printable(f"{text}; {command('inspect', recording)} says more")
 
 
-def command(name: str, log: Recording, *words: str) -> str:
-    """A command on a log, as it is typed."""
+def command(name: str, log: Recording | None, *words: str) -> str:
+    """A command on a log, as it is typed; on a contact-free one that is to be recorded by None."""
+    if log is None:
+        return shlex.join(["vftcli", name, "free.csv", *words])
     columns = [f"--columns={log.source.columns}"] if log.source.columns else []
     return shlex.join(["vftcli", name, path_of(log), *columns, *words])
 

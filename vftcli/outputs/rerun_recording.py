@@ -23,8 +23,8 @@ from vftcli.outputs.contacts import answer, beginning
 from vftcli.outputs.error_tables import DAGGER, to_markdown
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.page.log_charts import (
-    condition_charts,
     estimate_lines,
+    observer_styles,
     reference_name,
     torque_chart,
     wrench_chart,
@@ -154,16 +154,23 @@ def wrench_plots(analysis: Analysis, wrench: Chart) -> Iterator[Chart]:
     """Every axis, what the pose can tell, and the torque that no wrench explains."""
     for k, axis in enumerate(wrench.panels):
         yield plot_of(wrench, k, f"/wrench/{axis}")
-    sensed = analysis.virtual_sensor
-    for chart in condition_charts(analysis):
-        plot = plot_of(chart, 0, f"/wrench/{chart.key}")
-        if chart.key == "null_space":
-            yield plot
-        # The smoother asks no pose: its band grows where the pose tells little.
-        elif chart.key == "sigma_min" and sensed is not None and sensed.solver != SMOOTHER:
-            least = np.full((len(plot.x), 1), sensed.sensor.least_sigma)
-            masked = ChartLine(chart.band_label, least, SPARE[0])
-            yield plot._replace(series=(*plot.series, masked))
+    if (sensed := analysis.virtual_sensor) is None or not sensed.wrenches:
+        return
+    t, styles = analysis.t, observer_styles(analysis)
+    # σ_min follows from the pose: all observers share it. The smoother asks no pose: its
+    # band grows where the pose tells little.
+    sigma = sensed.wrenches[0].sigma_min
+    if sigma is not None and sensed.solver != SMOOTHER:
+        least = np.full((len(t), 1), sensed.sensor.least_sigma)
+        lines = [ChartLine("σ_min of J", sigma[:, None])]
+        lines.append(ChartLine("masked below", least, SPARE[0]))
+        title = "What the pose can tell: σ_min"
+        yield Chart.of_one("/wrench/sigma_min", title, "m", t, lines)
+    left = {w.name: w.null_space for w in sensed.wrenches if w.null_space is not None}
+    if left:
+        lines = [ChartLine(name, x[:, None], *styles[name]) for name, x in left.items()]
+        title = "Torque that no wrench at the flange explains"
+        yield Chart.of_one("/wrench/null_space", title, "N·m", t, lines)
 
 
 def best_wrench(analysis: Analysis) -> Wrench | None:

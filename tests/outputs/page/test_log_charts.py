@@ -9,7 +9,6 @@ from vftcli.contacts.contact_list import OF_FORCES
 from vftcli.outputs.charts import REFERENCE
 from vftcli.outputs.page.log_charts import (
     LOWEST,
-    condition_charts,
     force_chart,
     highest,
     response_charts,
@@ -62,23 +61,10 @@ def test_a_first_order_response_is_3_db_down_at_its_cutoff(analysis: Analysis) -
     assert slow == pytest.approx(100.0, rel=0.01)  # 1/ω at frequencies far below it
 
 
-def test_the_pose_has_a_chart_with_its_threshold(with_wrench: Analysis) -> None:
-    reading = with_wrench.virtual_sensor
-    assert reading is not None
-    first = next(condition_charts(with_wrench))
-    assert (first.key, first.units) == ("sigma_min", ("m",))
-    assert first.band is not None
-    assert first.band.tolist() == [reading.sensor.least_sigma]
-    sigma = reading.wrenches[0].sigma_min
-    assert sigma is not None
-    np.testing.assert_array_equal(first.series[0].values[:, 0], sigma)
-
-
 def test_without_wrenches_there_is_no_section(without_reference: Analysis) -> None:
     bare = replace(without_reference, virtual_sensor=None)
     assert wrench_chart(bare) is None
     assert "Wrench axes" not in render(bare)
-    assert list(condition_charts(bare)) == []
 
 
 def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:

@@ -1,6 +1,6 @@
 """The charts of one log: torques, wrenches, what the pose tells, responses, spectra and tuning."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -215,42 +215,6 @@ def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
             peak = contact.peak_force + min(contact.peak_band, contact.peak_force)
             top = max(top, 1.12 * peak)
     return top or 1.0
-
-
-def condition_charts(analysis: Analysis) -> Iterator[Chart]:
-    """σ_min with the masked zone, what the solver says there, and the null-space channel."""
-    sensed = analysis.virtual_sensor
-    if sensed is None or not sensed.wrenches:
-        return
-    # σ_min and the mask follow from the pose: all observers share them.
-    first, t, styles = sensed.wrenches[0], analysis.t, observer_styles(analysis)
-    if first.sigma_min is not None:
-        lines = [ChartLine("σ_min of J", first.sigma_min[:, None])]
-        title = "What the pose can tell: σ_min"
-        least = np.array([sensed.sensor.least_sigma])
-        yield Chart.of_one("sigma_min", title, "m", t, lines)._replace(
-            band=least, band_label="masked below", lowest=0.0
-        )
-    if sensed.hides:
-        title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
-        sizes = ((w, np.linalg.norm(w.values[:, :3], axis=1)) for w in sensed.wrenches)
-        lines = [
-            ChartLine(w.name, np.where(w.hidden, size, np.nan)[:, None], *styles[w.name])
-            for w, size in sizes
-            if w.hidden.any()
-        ]
-        yield Chart.of_one("blow-up", title, "N", t, lines)
-    if first.null_space is not None:
-        lines = [
-            ChartLine(w.name, w.null_space[:, None], *styles[w.name])
-            for w in sensed.wrenches
-            if w.null_space is not None
-        ]
-        limit = sensed.null_space_limit
-        title = "Torque that no wrench at the flange explains"
-        yield Chart.of_one("null_space", title, "N·m", t, lines)._replace(
-            band=None if limit is None else np.array([limit]), band_label="free part"
-        )
 
 
 def spectra_chart(found: Spectra) -> Chart:
