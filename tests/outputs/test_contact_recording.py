@@ -10,8 +10,9 @@ from rerun_rows import rows_of, times_of
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Unexplained
+from vftcli.outputs.capsules import touched_point
 from vftcli.outputs.charts import PLACES
-from vftcli.outputs.rerun_arm import painted_links, touched_point
+from vftcli.outputs.rerun_arm import painted_links
 from vftcli.outputs.rerun_recording import (
     best_wrench,
     contact_log,

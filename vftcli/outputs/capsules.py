@@ -1,9 +1,10 @@
-"""The shape of an arm without meshes: capsules from the chain's own geometry."""
+"""The arm as it is drawn without meshes, capsules from its chain, and where a force acts on it."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.contacts.contact_list import Contact
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 
@@ -38,3 +39,16 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
         if np.linalg.norm(offsets[j]) > SHORTEST * length:
             shapes[j].append(Capsule(np.zeros(3), offsets[j], radii[j], joint=False))
     return shapes
+
+
+def spot_of(contact: Contact, joints: int) -> tuple[int, int]:
+    """Frames between which a force acts: the flange's twice, or both ends of a link."""
+    if 0 in contact.places or not contact.places:
+        return joints + 1, joints + 1
+    return contact.places[-1], contact.places[-1] + 1
+
+
+def touched_point(contact: Contact, origins: Array) -> Array:
+    """Where a force acts, by the origins of links and flange. (S, 3), (S, n+1, 3) [m]"""
+    first, last = spot_of(contact, origins.shape[1] - 1)
+    return np.asarray(0.5 * (origins[:, first - 1] + origins[:, last - 1]))

@@ -14,8 +14,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.outputs.capsules import capsules
+from vftcli.contacts.contact_list import ContactList
+from vftcli.outputs.capsules import capsules, touched_point
 from vftcli.outputs.charts import PLACES
 from vftcli.robots.chain import Chain, link_poses
 from vftcli.robots.meshes import COLOURED, FORMATS
@@ -217,16 +217,3 @@ def send_contacts(
         arrows[t > contact.stop] = np.nan
         path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
         send_force(stream, path, t, origin, arrows, scale=scale, colour=colour)
-
-
-def touched_point(contact: Contact, origins: Array) -> Array:
-    """The flange where it fits, else the middle of the last link that does. (S, 3) [m]
-
-    Given are the origins of the links and of the flange in the base frame. (S, n+1, 3) [m]
-    """
-    if 0 in contact.places or not contact.places:
-        flange: Array = origins[:, -1]
-        return flange
-    last = contact.places[-1]
-    middle: Array = 0.5 * (origins[:, last - 1] + origins[:, last])
-    return middle

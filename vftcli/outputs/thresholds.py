@@ -62,19 +62,12 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
 
 def check_grid(check: ThresholdDetection) -> Grid:
     """The contacts of a log, and their evidence."""
-    missed = {True: "on already", False: "missed"}
     times = (Column(head, "s", ".2f") for head in ("from", "to"))
-    columns = (
-        Column("#"),
-        *times,
-        Column("|F|", "N"),
-        Column("delay", "ms", ".0f"),
-        *words("by"),
-    )
-    rows = [
-        (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, c.by or missed[c.already_above])
-        for k, c in enumerate(check.contacts, start=1)
-    ]
+    columns = Column("#"), *times, Column("|F|", "N"), Column("delay", "ms", ".0f"), *words("by")
+    rows: Rows = []
+    for k, c in enumerate(check.contacts, start=1):
+        by = c.by or ("on already" if c.already_above else "missed")
+        rows.append((str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, by))
     return Grid(columns, rows, f"{check.log}: what they would have detected")
 
 

@@ -20,30 +20,12 @@ from vftcli.outputs.run_record import observer_record
 from vftcli.signals.arrays import Array
 
 MOST = 40  #: Contacts in numbers at most.
-#: Headings of the tables of contacts: what is before the vectors, they, what follows them.
-SPAN = ("from – to [s]", "range [N]")
-VECTORS = (
-    "force [N]",
-    "± sd",
-    "moment [N·m]",
-    "± sd",
-    "mean force [N]",
-    "impulse [N·s]",
-)
-EVIDENCE = (
-    "log-likelihood ratio [nats]",
-    "margin of the place [nats]",
-    "vendor |F| [N]",
-    "sensor |F| [N]",
-)
-#: Headings of the table of what was computed on the log.
-COMPUTED = (
-    "90 % of a step [ms]",
-    "delay [ms]",
-    "noise [N·m]",
-    "noise > 5 Hz passed",
-    "mean RMSE [N·m]",
-    "to tune",
+#: Columns of the table of contacts.
+WRENCHES = (
+    *map(Column, ("#", "from – to [s]", "range [N]")),
+    *words("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]"),
+    *map(Column, ("log-likelihood ratio [nats]", "margin of the place [nats]")),
+    *map(Column, ("vendor |F| [N]", "sensor |F| [N]")),
 )
 
 
@@ -51,7 +33,10 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     """Moments, impulses, evidence and joint torques of the contacts, `MOST` at most."""
     if not found.contacts:
         return ()
-    contacts = hardest_rows(found.contacts, MOST)
+    contacts, title = hardest_rows(found.contacts, MOST), "Wrench at the peak, base axes, "
+    title += "the moment about the flange point"
+    if len(contacts) < len(found.contacts):
+        title += f"; the {MOST} hardest, contacts.csv has all"
     wrenches: Rows = []
     torques: Rows = []
     for c in contacts:
@@ -66,24 +51,9 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
         each = zip(c.joint_torque, c.joint_torque_sd, strict=True)
         torque = (banded(tau, sd, ".2f", "") for tau, sd in each)
         torques.append((str(c.number), *torque, c.at_rest))
-    number, joints = Column("#"), joint_columns(len(found.contacts[0].joint_torque))
-    return (
-        Grid(
-            (number, *map(Column, SPAN), *words(*VECTORS), *map(Column, EVIDENCE)),
-            wrenches,
-            "Wrench at the peak, base axes, the moment about the flange point"
-            + (
-                f"; the {MOST} hardest, contacts.csv has all"
-                if len(contacts) < len(found.contacts)
-                else ""
-            ),
-        ),
-        Grid(
-            (number, *joints, Column("at rest")),
-            torques,
-            "Joint torque at the peak in N·m, ± its standard deviation",
-        ),
-    )
+    columns = Column("#"), *joint_columns(len(contacts[0].joint_torque)), Column("at rest")
+    below = "Joint torque at the peak in N·m, ± its standard deviation"
+    return Grid(WRENCHES, wrenches, title), Grid(columns, torques, below)
 
 
 def model_pairs(found: ContactList) -> dict[str, str]:
@@ -114,7 +84,6 @@ def model_pairs(found: ContactList) -> dict[str, str]:
 def observers_view(analysis: Analysis) -> dict[str, Any]:
     """What each observer's parameters are and mean."""
     rows: Rows = []
-    used = {}
     for observer in analysis.observers:
         name, tuning = observer.name, analysis.tunings.get(observer.name)
         what = OBSERVERS[name].title if name in OBSERVERS else ""
@@ -124,13 +93,11 @@ def observers_view(analysis: Analysis) -> dict[str, Any]:
             meant = [GridCell("", html=joint_values(column)) for column in columns]
             meant.append(tuning.parameter_count)
         rows.append((name, what, *meant))
-        # The record has parameters as JSON can hold them, also those of a wrapped
-        # observer.
-        used[name] = observer_record(observer, None)["parameters"]
     heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
-    title = (
-        "What the parameters mean at this log's sample time; one value a joint where they differ"
-    )
+    title = "What the parameters mean at this log's sample time; one value a joint where they "
+    title += "differ"
+    # Parameters as JSON can hold them, also those of a wrapped observer.
+    used = {o.name: observer_record(o, None)["parameters"] for o in analysis.observers}
     grid = Grid((*words("observer", "What"), *map(Column, heads)), rows, title, swatches=True)
     return {"grid": grid, "names": ", ".join(used), "parameters": used}
 
@@ -154,7 +121,9 @@ def selection_guide(analysis: Analysis) -> tuple[Grid, ...]:
     for f in found:
         numbers = map(float, (1e3 * f.response, 1e3 * f.delay, f.noise, f.passed, f.rmse))
         rows.append((f.name, *numbers, f.parameter_count))
-    columns = *words("observer"), *map(Column, COMPUTED)
+    computed = ("90 % of a step [ms]", "delay [ms]", "noise [N·m]", "noise > 5 Hz passed")
+    computed += ("mean RMSE [N·m]", "to tune")
+    columns = *words("observer"), *map(Column, computed)
     return (
         Grid(heads, advised, "Which observer for what (Sec. IV-A)"),
         Grid(columns, rows, "Computed on this log", swatches=True),

@@ -196,11 +196,11 @@ class Plot {
 	under() {}
 	over() {}
 	lines() {
-		const { top, wide, tall, chart: { spans, weak, band, lines, ends }, panel } = this, room = [LEFT, top, wide, tall];
+		const { top, wide, tall, chart: { spans, felt, band, lines, ends }, panel } = this, room = [LEFT, top, wide, tall];
 		c.clearRect(0, 0, this.width, this.height);
 		within(room, () => {
 			this.under();
-			spans.forEach(([start, stop], k) => fill(css[weak?.[k] ? "weak" : "stripe"], this.x(start), top, max(this.x(stop) - this.x(start), 1), tall));
+			spans.forEach(([start, stop], k) => fill(css[felt?.[k].weak ? "weak" : "stripe"], this.x(start), top, max(this.x(stop) - this.x(start), 1), tall));
 			if (band?.[panel]) fill(css.unseen, LEFT, this.y(band[panel]), wide, this.y(-band[panel]) - this.y(band[panel]));
 		});
 		const up = ticks(...ends[panel], max(2, tall / 34)), across = ticks(...this.clock.view, max(2, wide / 90));
@@ -409,7 +409,7 @@ class Arm {
 	arrow(contact, frames, t) {
 		const { size, half } = forceAt(contact, t), { wrench, most } = stage, at = this.clock.index(t), [R] = frames.at(-1), [a, b] = contact.spot.map((k) => frames[k][1]);
 		if (!size) return;
-		const force = wrench && contact.flange && at !== contact.i ? wrench.rows.map((row) => rows[row][at]) : [], strong = hypot(...force);
+		const force = wrench && a === b && at !== contact.i ? wrench.rows.map((row) => rows[row][at]) : [], strong = hypot(...force);
 		const along = strong > 1e-9 ? (wrench.flange ? turn(R, force) : force).map((x) => x / strong) : contact.along, tip = add(a, add(b, a, -1), .5);
 		const reach = (newtons) => this.reach * (.14 + .6 * clamp(newtons / most, 0, 1)), end = (newtons) => this.seen(add(tip, along, -reach(newtons)));
 		const [x, y, ahead] = this.seen(tip), [u, v, behind, near] = end(size), long = hypot(x - u, y - v) || 1, dx = (x - u) / long, dy = (y - v) / long;
@@ -593,7 +593,7 @@ const open = async () => {
 		const plots = $$("figure", place).map((figure, k) => new (onStage ? ForcePlot : Plot)(figure, chart, k));
 		openTools(chart, plots, place);
 		if (onStage) {
-			chart.weak = stage.weak;
+			chart.felt = stage.contacts;
 			forceLine = Object.assign(chart.lines.find((line) => line.leads), { plot: plots[0] });
 		}
 		if (chart.key === "wrench" && stage) stage.wrench &&= { ...stage.wrench, rows: chart.lines.find((line) => line.leads).low };

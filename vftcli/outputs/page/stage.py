@@ -10,7 +10,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.outputs.capsules import capsules
+from vftcli.outputs.capsules import capsules, spot_of, touched_point
 from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
 from vftcli.outputs.page.packing import PageClock
 from vftcli.outputs.page.shell import polyline
@@ -99,19 +99,10 @@ def pose_at(analysis: Analysis, t: float) -> Pose:
 
 def arrow_of(analysis: Analysis, contact: Contact, reach: float) -> Array:
     """Tail and tip of a contact's force at its peak; the tip is where it acts. (2, 3) [m]"""
-    points = pose_at(analysis, contact.peak).translation[0]
-    first, last = spot_of(contact, analysis.robot.joints)
-    tip = 0.5 * (points[first - 1] + points[last - 1])
+    (tip,) = touched_point(contact, pose_at(analysis, contact.peak).translation)
     share = (contact.peak_force or 0.0) / most_force(analysis.contacts)
     length = reach * (SHARES[0] + SHARES[1] * min(share, 1.0))
     return np.vstack([tip - length * along(contact), tip])
-
-
-def spot_of(contact: Contact, joints: int) -> tuple[int, int]:
-    """Frames between which a force acts: the flange's twice, or both ends of a link."""
-    if 0 in contact.places or not contact.places:
-        return joints + 1, joints + 1
-    return contact.places[-1], contact.places[-1] + 1
 
 
 def along(contact: Contact) -> Array:
@@ -188,20 +179,17 @@ def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, An
     turns = sensed is not None and sensed.sensor.frame in {"base", "flange"}
     # A load lasts: what touches the arm meanwhile comes before it.
     ordered = sorted(contacts, key=lambda contact: contact.is_load)
-    keys = ("rotation", "flange_rotation", "translation", "flange_translation")
-    matrices = {key: np.round(getattr(chain, key), 9) for key in keys}
-    matrices["rotation"] = matrices["rotation"].reshape(-1, 9)
-    matrices["flange_rotation"] = matrices["flange_rotation"].ravel()
+    geometry = {
+        "rotation": chain.rotation.reshape(-1, 9),
+        "flange_rotation": chain.flange_rotation.ravel(),
+        "translation": chain.translation,
+        "flange_translation": chain.flange_translation,
+    }
     return {
-        "chain": {key: matrix.tolist() for key, matrix in matrices.items()},
+        "chain": {key: np.round(values, 9).tolist() for key, values in geometry.items()},
         "q": [clock.pose(column) for column in analysis.recording.q.T],
         "shapes": [
-            (
-                frame,
-                *(np.round(end, 4).tolist() for end in (s.start, s.start + s.direction)),
-                s.radius,
-                s.joint,
-            )
+            (frame, *np.round([s.start, s.start + s.direction], 4).tolist(), s.radius, s.joint)
             for frame, shapes in enumerate(capsules(chain))
             for s in shapes
         ],
@@ -215,7 +203,6 @@ def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, An
         "none": "no contact" if sure else "no contact listed" if found is not None else "",
         "free": free_spans(analysis),
         "stops": () if found is None else found.stops,
-        "weak": [c.trust == "weak" for c in contacts if not c.is_load],
     }
 
 
@@ -255,7 +242,6 @@ def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> d
         "sure": contact.where != "cannot tell",
         # The frames of touched links, and the two between which the force acts.
         "frames": [place or joints for place in contact.places],
-        "flange": not contact.places or 0 in contact.places,
         "spot": spot_of(contact, joints),
         "along": np.round(along(contact), 3).tolist(),
         # A wider one would fill the picture: it is 0 then, and the arrow dashed.
