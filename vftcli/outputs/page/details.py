@@ -121,9 +121,8 @@ def selection_guide(analysis: Analysis) -> tuple[Grid, ...]:
     for f in found:
         numbers = map(float, (1e3 * f.response, 1e3 * f.delay, f.noise, f.passed, f.rmse))
         rows.append((f.name, *numbers, f.parameter_count))
-    computed = ("90 % of a step [ms]", "delay [ms]", "noise [N·m]", "noise > 5 Hz passed")
-    computed += ("mean RMSE [N·m]", "to tune")
-    columns = *words("observer"), *map(Column, computed)
+    computed = "90 % of a step [ms]", "delay [ms]", "noise [N·m]", "noise > 5 Hz passed"
+    columns = *words("observer"), *map(Column, (*computed, "mean RMSE [N·m]", "to tune"))
     return (
         Grid(heads, advised, "Which observer for what (Sec. IV-A)"),
         Grid(columns, rows, "Computed on this log", swatches=True),
