@@ -259,9 +259,12 @@ def test_no_log_that_is_there_makes_no_table(run, manifest: Path, tmp_path: Path
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("sim", "--data", "nodir"), "--data nodir: there is no such folder"),
+        (("field", "--data", "nodir"), "--data nodir: there is no such folder"),
+        (("sim", "--data", ".", "--robot", "ur5"), "benchmark sim takes no --robot, --data"),
+        (("field", "--set", "bench.rounds=1"), "benchmark field takes no --set bench"),
         (("sim", "--outside", "zz=nodir"), "--outside zz=nodir: there is no folder nodir"),
         (("speed", "--data", "."), "benchmark speed takes no --data"),
+        (("speed", "--jobs", "0", "--open"), "benchmark speed takes no --open, --jobs"),
         (("speed", "--csv"), "benchmark speed has --json, --markdown and --latex"),
     ],
 )

@@ -80,7 +80,10 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     ),
     "contacts": (["contacts/*.py"], ["tests/contacts", "tests/cli/test_contacts.py"]),
     "simulation": (["simulation/*.py"], ["tests/simulation", "tests/cli/test_simulate.py"]),
-    "reproduction": (["reproduction/*.py"], ["tests/reproduction", "tests/cli/test_reproduce.py"]),
+    "reproduction": (
+        ["reproduction/*.py"],
+        ["tests/reproduction", "tests/cli/test_benchmark.py", "tests/cli/test_reproduce.py"],
+    ),
     "outputs": (["outputs/**/*.py"], ["tests/outputs", "tests/cli/test_parts.py"]),
     "batch": (["batch/**/*.py"], ["tests/batch", "tests/cli/test_batch.py"]),
     "cli": (["cli/*.py", "*.py"], ["tests/cli", "tests/test_pipeline.py"]),

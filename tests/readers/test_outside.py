@@ -13,9 +13,10 @@ from vftcli.signals.errors import LogError
 def test_a_band_is_one_deviation_of_the_error(tmp_path: Path, inner: str) -> None:
     path = tmp_path / "a.csv"
     path.write_text(f"t,tau_ext/{inner}1,band/{inner}1\n0.0,1.0,0.5\n0.1,2.0,0.25\n")
-    read = read_outside(path, "mine")
-    assert read.sd is not None
-    assert np.array_equal(read.sd[:, 0], [0.5, 0.25])
+    torque, wrench = read_outside(path, "mine")
+    assert wrench is None
+    assert torque.error_sd is not None
+    assert np.array_equal(torque.error_sd[:, 0], [0.5, 0.25])
 
 
 def test_a_list_needs_no_forces(tmp_path: Path) -> None:

@@ -48,7 +48,6 @@ def test_an_entry_with_pushes_is_two_logs(tmp_path: Path) -> None:
 def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
     manifest = load_manifest(name, tmp_path)
     for log in manifest.logs:
-        assert log.protocols == () or log.asked
         assert log.source or log.scenario
         assert log.licence or log.scenario
         assert len(log.sha256) == 64 or log.scenario or log.parts
@@ -75,6 +74,8 @@ def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
         (ENTRY.replace("free", "weight"), "weight_N is missing"),
         (ENTRY + 'protocols = ["identified"]\n', "identified is missing"),
         (ENTRY + 'protocols = ["both"]\n', "protocol 'both'"),
+        (ENTRY + "score = [[20, 10]]\n", "spans end after their start"),
+        (ENTRY + "contacts = [[1]]\n", "a contact is [start, end] or [start, end, peak]"),
         (ENTRY + "pushes = [[1, 0, [1, 0, 0]]]\n", "longer than 0 s"),
         (ENTRY.replace('file = "a.csv"', 'parts = ["t"]'), "t=time.txt"),
     ],

@@ -1,6 +1,5 @@
 """`vftcli benchmark`: methods scored against truth on many logs; the observers' times."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -32,6 +31,18 @@ class BenchChoice(Choice):
     rounds: Annotated[int, setting("bench.rounds", "N", "Interleaved runs.", least=1)] = 7
 
 
+class Sources(opt.Bundle):
+    """What is scored."""
+
+    data: Annotated[
+        Path | None, Option("--data", "DIR", "Look here for the manifest's logs.", group=LOG)
+    ]
+    outside: Annotated[
+        list[str] | None,
+        Option("--outside", "NAME=DIR", "Score these estimates too. Repeatable."),
+    ]
+
+
 @opt.command
 def benchmark(
     what: Annotated[
@@ -44,14 +55,8 @@ def benchmark(
         ),
     ] = "sim",
     *,
-    data: Annotated[
-        Path | None, Option("--data", "DIR", "Look here for the manifest's logs.", group=LOG)
-    ],
-    outside: Annotated[
-        list[str] | None,
-        Option("--outside", "NAME=DIR", "Score these estimates too. Repeatable."),
-    ],
-    robot: Annotated[str, RobotChoice.option("robot")] = "ur5",
+    source: Sources,
+    robot: Annotated[str | None, RobotChoice.option("robot")],
     length: opt.Typed[BenchChoice],
     output: Annotated[Path | None, opt.OUT._replace(help="Write here; default: benchmark.vft.")],
     table: TableOptions,
@@ -69,33 +74,27 @@ def benchmark(
 
     Example: vftcli benchmark sim
     """
+    engine = workers.choice()
+    unfit: dict[str, object] = {"--robot": robot, "--set bench": length.is_asked}
     if what == SPEED:
-        unused = {"--data": data, "--outside": outside, "-o": output, "--anyway": anyway}
-        if given := [name for name, value in unused.items() if value]:
-            raise typer.BadParameter(f"benchmark speed takes no {', '.join(given)}")
-        time_observers(robot, length.choice(), table.form)
+        unfit = {"--outside": source.outside, "-o": output, "--anyway": anyway, "--force": force}
+        unfit |= {"--open": open_page, "--jobs": engine != WorkersChoice()}
+    if what in {SPEED, "sim"}:
+        unfit["--data"] = source.data
+    if given := [name for name, value in unfit.items() if value]:
+        raise typer.BadParameter(f"benchmark {what} takes no {', '.join(given)}")
+    if what == SPEED:
+        time_observers(robot or "ur5", length.choice(), table.form)
         return
-    from vftcli.outputs.batch_folder import BatchFolder
-    from vftcli.readers.library import absolute
     from vftcli.reproduction.benchmark import BenchmarkRun
 
-    manifest, rivals = named(what, data, outside or ())
+    manifest, rivals = named(what, source)
     if all(map(manifest.missing, manifest.logs)):
         say_none(manifest, table.form)
         return
-    marked, begin = unfair(manifest, rivals, anyway=anyway), stages()
-    engine, output = workers.choice(), output or Path("benchmark.vft")
+    marked, output = unfair(manifest, rivals, anyway=anyway), output or Path("benchmark.vft")
     engine.check_closed(anyway=anyway)
-    run = BenchmarkRun(
-        manifest=manifest,
-        rivals=rivals,
-        folder=BatchFolder(absolute(output), "scores.parquet"),
-        workers=engine,
-        command=command_line(),
-        marked=marked,
-        tell=say,
-        progress=lambda stage, share: begin(stage, share, share),
-    )
+    run = BenchmarkRun(manifest, rivals, output, engine, command_line(), marked, say, stages())
     results = run.run(force=force)
     print_results(results, table.form, manifest.absent(), every=talk.details)
     for name, failure in run.failures:
@@ -107,17 +106,16 @@ def benchmark(
         raise typer.Exit(SOME_FAILED if results.rows else 1)
 
 
-def named(what: str, data: Path | None, outside: Sequence[str]) -> "tuple[Manifest, list[Rival]]":
+def named(what: str, source: Sources) -> "tuple[Manifest, list[Rival]]":
     """The manifest and the outside estimates that the command line names."""
     from vftcli.observers.table import DEFAULT
     from vftcli.reproduction.manifest import load_manifest, rival_of
 
-    if data is not None and not data.is_dir():
-        raise typer.BadParameter(f"--data {data}: there is no such folder")
-    manifest = load_manifest(what, data)
+    if source.data is not None and not source.data.is_dir():
+        raise typer.BadParameter(f"--data {source.data}: there is no such folder")
+    manifest, ours = load_manifest(what, source.data), ("zero", "vendor", *DEFAULT)
     try:
-        ours = ("zero", "vendor", *DEFAULT)
-        return manifest, [rival_of(text, ours, manifest.logs) for text in outside]
+        return manifest, [rival_of(text, ours, manifest.logs) for text in source.outside or ()]
     except ParameterError as error:
         raise typer.BadParameter(str(error)) from None
 
@@ -127,16 +125,15 @@ def say_none(manifest: "Manifest", form: str) -> None:
     if form == "json":
         say_json([], rows=[], left_out=manifest.absent())
     none = f"Nothing is scored: {manifest.data.absolute()} has none of the logs. Put them there, "
-    lines = [*manifest.absent(), f"{none}or name their folder with --data."]
-    echo("\n".join(map(printable, lines)), err=True)
+    for line in (*manifest.absent(), f"{none}or name their folder with --data."):
+        echo(printable(line), err=True)
 
 
 def unfair(manifest: "Manifest", rivals: "list[Rival]", *, anyway: bool) -> frozenset[str]:
     """Names of logs with rows that are unfair or of another file; an exit unless `anyway`."""
     complaints = manifest.complaints(rivals)
-    head = "warning" if anyway else "error"
     for line in (line for lines in complaints.values() for line in lines):
-        echo(printable(f"{head}: {line}"), err=True)
+        echo(printable(f"{'warning' if anyway else 'error'}: {line}"), err=True)
     if complaints and not anyway:
         raise typer.Exit(1)
     return frozenset(complaints)
@@ -144,14 +141,14 @@ def unfair(manifest: "Manifest", rivals: "list[Rival]", *, anyway: bool) -> froz
 
 def print_results(results: "Results", form: str, absent: list[str], *, every: bool) -> None:
     """Print what a benchmark found in the form that is asked for."""
-    from vftcli.outputs.benchmark import FORMS, to_terminal
+    from vftcli.outputs.benchmark import text_of
 
     if form == "json":
         say_json([], rows=results.rows, left_out=absent)
     elif form != "terminal":
-        echo_data(FORMS[form](results))
+        echo_data(text_of(results, form, every=every))
     elif len(results.table):
-        show(to_terminal(results, every=every))
+        show(text_of(results, form, every=every))
 
 
 def time_observers(robot: str, asked: BenchChoice, form: str) -> None:
@@ -166,17 +163,14 @@ def time_observers(robot: str, asked: BenchChoice, form: str) -> None:
     if form == "json":
         say_json([], **result)
         return
-    title = (
-        f"{result['robot']}, {asked.samples} samples, median of {asked.rounds} rounds, "
-        f"NumPy with {result['simd']}"
-    )
-    table = replace(bench_grid(result), title=f"Computing time: {title}")
+    length = f"{asked.samples} samples, median of {asked.rounds} rounds"
+    title = f"{result['robot']}, {length}, NumPy with {result['simd']}"
+    times = bench_grid(result)
     if form != "terminal":
         write = grid.latex if form == "latex" else grid.markdown
-        echo_data(write(table))
+        echo_data(write(replace(times, title=f"Computing time: {title}")))
         return
-    echo(title)
-    echo(grid.terminal(bench_grid(result)))
+    echo(f"{title}\n{grid.terminal(times)}")
     if ratios := [f"{ratio:.2f}" for ratio in result["ratios"].values()]:
         echo(f"Dynamics with four observers take {ratios[0]} of the time of a loop of pin.rnea,")
         echo(f"{ratios[1]} on a clock that jitters by 5 %.")

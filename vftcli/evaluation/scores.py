@@ -4,10 +4,8 @@ With e = τ̂ − τ, a missing τ̂ counting as 0, and weights w by the clock, 
 Σ w x / Σ w. Sums of cells of 2 s are kept: a block bootstrap draws whole cells.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import cached_property
-from typing import Self
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -53,11 +51,10 @@ def episodes(t: Array, size: Array, on: float, off: float) -> list[tuple[float, 
     return [(float(t[a]), float(t[b - 1]), float(size[a:b].max())) for a, b in runs]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Score:
-    """Sums over the samples of each cell; those of several logs are joined by `+`."""
+class Score(NamedTuple):
+    """Sums over the samples of each cell and joint; to pool logs is to join their cells."""
 
-    seconds: Array  #: Σ w. (C,) [s]
+    seconds: Array  #: Σ w, the same of every joint. (C, n) [s]
     missing: Array  #: Σ w where there is no answer. (C, n) [s]
     squares: Array  #: Σ w e². (C, n) [(N·m)² s]
     sizes: Array  #: Σ w |e|. (C, n) [N·m s]
@@ -68,107 +65,77 @@ class Score:
 
     @classmethod
     def of(cls, estimate: ExternalTorque, truth: Array, inside: Mask) -> Self:
-        """Sums of an estimate with bands of ±1.96 `error_sd` over some samples.
+        """Sums of an estimate with bands of ±1.96 `error_sd` over some samples, one at least.
 
         Args:
             estimate: The estimate on the truth's clock.
             truth: External torque on the robot. (T, n) [N·m]
             inside: The samples that count. (T,)
         """
-        t, tau = estimate.t, estimate.tau[inside]
-        w, cell = weights(t)[inside], ((t - t[0]) // CELL).astype(int)[inside]
-        answered, y = np.isfinite(tau), truth[inside]
-        size = abs(np.where(answered, tau, 0.0) - y)
-        band = np.full(tau.shape, np.nan)
-        if estimate.error_sd is not None:
-            band = COVERS * estimate.error_sd[inside]
+        t, tau, sd = estimate.t, estimate.tau[inside], estimate.error_sd
+        known, y = np.isfinite(tau), truth[inside]
+        size = abs(np.where(known, tau, 0.0) - y)
+        band = np.full(tau.shape, np.nan) if sd is None else COVERS * sd[inside]
         has = np.isfinite(band)
-        penalty = 2.0 * band + PENALTY * np.maximum(0.0, size - band)
-        numbers, start = np.unique(cell, return_index=True)
+        penalty = np.where(has, 2.0 * band + PENALTY * np.maximum(0.0, size - band), 0.0)
+        values = (np.ones(tau.shape), ~known, size**2, size, y**2, has, size <= band, penalty)
+        start = np.unique((t[inside] - t[0]) // CELL, return_index=True)[1]
+        w = weights(t)[inside, None]
+        return cls(*(np.add.reduceat(w * x, start) for x in values))
 
-        def sums(values: Array) -> Array:
-            added = w[:, None] * values
-            return np.add.reduceat(added, start) if len(numbers) else added[:0]
-
-        return cls(
-            seconds=sums(np.ones((len(w), 1)))[:, 0],
-            missing=sums(~answered),
-            squares=sums(size**2),
-            sizes=sums(size),
-            truth=sums(y**2),
-            banded=sums(has),
-            covered=sums(has & (size <= np.where(has, band, 0.0))),
-            penalties=sums(np.where(has, penalty, 0.0)),
-        )
-
-    def by_joint(self) -> Iterator[dict[str, list[float]]]:
+    def by_joint(self) -> list[dict[str, list[float]]]:
         """Of each joint the sums of all cells, by name."""
-        columns = {f.name: np.atleast_2d(getattr(self, f.name).T) for f in fields(self)}
-        for j in range(self.squares.shape[1]):
-            yield {name: rows[j % len(rows)].tolist() for name, rows in columns.items()}
+        joints = zip(*(sums.T.tolist() for sums in self), strict=True)
+        return [dict(zip(self._fields, joint, strict=True)) for joint in joints]
 
     @classmethod
-    def joined(cls, joints: Sequence[Mapping[str, Sequence[float]]]) -> Self:
-        """The score of what `by_joint` gives."""
-        names = [f.name for f in fields(cls)]
-        sums = {name: np.array([joint[name] for joint in joints], float).T for name in names}
-        return cls(**{**sums, "seconds": sums["seconds"][:, 0]})
+    def pooled(cls, logs: Iterable[Sequence[Mapping[str, Sequence[float]]]]) -> Self:
+        """The score of what `by_joint` gives of each log."""
+        sums = [
+            [np.array([joint[name] for joint in log], float).T for name in cls._fields]
+            for log in logs
+        ]
+        return cls(*map(np.concatenate, zip(*sums, strict=True)))
 
-    def __add__(self, other: Self) -> Self:
-        """Both logs' cells, one after the other's."""
-        pairs = {f.name: [getattr(self, f.name), getattr(other, f.name)] for f in fields(self)}
-        return type(self)(**{name: np.concatenate(pair) for name, pair in pairs.items()})
+    def mean(self, sums: Array) -> Array:
+        """Σ w x / Σ w of each joint. (n,)"""
+        return np.asarray(sums.sum(axis=0) / self.seconds[:, 0].sum())
 
-    def _mean(self, sums: Array) -> Array:
-        return np.asarray(sums.sum(axis=0) / self.seconds.sum())
-
-    @cached_property
+    @property
     def rmse(self) -> Array:
         """Root mean square error of each joint. (n,) [N·m]"""
-        return np.sqrt(self._mean(self.squares))
-
-    @cached_property
-    def l1(self) -> Array:
-        """Mean absolute error of each joint. (n,) [N·m]"""
-        return self._mean(self.sizes)
+        return np.sqrt(self.mean(self.squares))
 
     @property
-    def skill(self) -> float:
-        """1 less the mean RMSE over the truth's mean rms; NaN where the truth is 0."""
-        return skill(self.rmse, np.sqrt(self._mean(self.truth)))
-
-    @property
-    def missed(self) -> float:
-        """Share of time and joints without an answer."""
-        return float(self._mean(self.missing).mean())
-
-    @property
-    def coverage(self) -> float:
-        """Share of what has a band in which the band holds the truth, NaN without any."""
-        return ratio(self.covered.sum(), self.banded.sum())
-
-    @property
-    def interval_score(self) -> float:
-        """Mean interval score of the 95 % bands, NaN without any. [N·m]"""
-        return ratio(self.penalties.sum(), self.banded.sum())
-
-    @cached_property
-    def drawn(self) -> Array | None:
-        """Mean RMSE over the joints in every draw of cells, None of too few. (1000,) [N·m]"""
+    def drawn(self) -> Array:
+        """Mean RMSE over the joints in every draw of cells, NaN of too few. (1000,) [N·m]"""
         count = len(self.seconds)
         if count < FEWEST:
-            return None
+            return np.full(DRAWS, np.nan)
         cells = np.random.default_rng(0).integers(0, count, (DRAWS, count))
-        mean = self.squares[cells].sum(axis=1) / self.seconds[cells].sum(axis=1)[:, None]
+        mean = self.squares[cells].sum(axis=1) / self.seconds[cells].sum(axis=1)
         return np.asarray(np.sqrt(mean).mean(axis=1))
 
+    def numbers(self, over: Array | float = np.nan) -> dict[str, float]:
+        """Means over the joints, with 95 % intervals of the RMSE and of it less `over`'s draws.
 
-def percentiles(draws: Array | None) -> tuple[float, float]:
-    """95 % interval of a number by its draws, NaN without any."""
-    if draws is None:
-        return float("nan"), float("nan")
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return float(low), float(high)
+        Skill is NaN where the truth is 0, numbers of bands are without any.
+        """
+        drawn, rmse, banded = self.drawn, self.rmse, float(self.banded.sum())
+        low, high = np.quantile([drawn, drawn - over], [0.025, 0.975], axis=1).tolist()
+        return {
+            "seconds": float(self.seconds[:, 0].sum()),
+            "rmse_Nm": float(rmse.mean()),
+            "rmse_low_Nm": low[0],
+            "over_best_low_Nm": low[1],
+            "rmse_high_Nm": high[0],
+            "over_best_high_Nm": high[1],
+            "l1_Nm": float(self.mean(self.sizes).mean()),
+            "skill": skill(rmse, np.sqrt(self.mean(self.truth))),
+            "coverage_95": ratio(float(self.covered.sum()), banded),
+            "interval_score_Nm": ratio(float(self.penalties.sum()), banded),
+            "missing": float(self.mean(self.missing).mean()),
+        }
 
 
 def skill(rmse: Array | float, level: Array | float) -> float:
@@ -178,12 +145,12 @@ def skill(rmse: Array | float, level: Array | float) -> float:
 
 def ratio(part: float, whole: float) -> float:
     """A quotient, NaN over 0."""
-    return float(part / whole) if whole > 0.0 else float("nan")
+    return part / whole if whole > 0.0 else float("nan")
 
 
-def lag_sums(estimate: ExternalTorque, truth: Array, inside: Mask) -> Array:
+def lag_sums(estimate: ExternalTorque, truth: Array, inside: Mask) -> list[float]:
     """Σ w e² over joints and samples with the estimate read later by each of `LAGS`. (61,)"""
     t, w = estimate.t, weights(estimate.t)[inside, None]
     known = np.where(estimate.known, estimate.tau, 0.0)
     shifted = (resample_columns(t[inside] + lag, t, known) for lag in LAGS)
-    return np.array([(w * (tau - truth[inside]) ** 2).sum() for tau in shifted])
+    return [float((w * (tau - truth[inside]) ** 2).sum()) for tau in shifted]

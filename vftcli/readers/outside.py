@@ -16,22 +16,16 @@ from vftcli.readers.table import Cell, Pick, Picks, Table, listed
 from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import LogError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.wrench import AXES
 
 
-class OutsideTable(NamedTuple):
-    """Estimates that another program made of a log; NaN where it has no answer."""
+def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
+    """Torque and wrench (T, 6) or None of another program's file, at its own stamps.
 
-    t: Array  #: Its stamps. (T,) [s]
-    tau: Array  #: External torque on the robot. (T, n) [N·m]
-    sd: Array | None  #: Standard deviation of its error, or None. (T, n) [N·m]
-    wrench: Array | None  #: Force and moment on the robot, base axes, or None. (T, 6)
-
-
-def read_outside(path: Path, name: str) -> OutsideTable:
-    """Estimates of a file: t, tau_ext/1…, band/1… (one standard deviation), wrench/fx….
-
-    A file of `vftcli estimate` has them as tau_ext/NAME/1….
+    Its columns are t, tau_ext/1…, band/1… (one standard deviation), wrench/fx… (force and
+    moment on the robot, base axes); a file of `vftcli estimate` has them as tau_ext/NAME/1….
+    NaN is no answer.
     """
     file = open_log(path)
     table: Table = ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)
@@ -55,22 +49,33 @@ def read_outside(path: Path, name: str) -> OutsideTable:
     wrench = raw.signals.get("wrench") if len(found["wrench"]) == len(AXES) else None
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
     check_clock(t, str(path))
-    return OutsideTable(t, raw.signals[TORQUE], raw.signals.get("band"), wrench)
+    tau, sd = raw.signals[TORQUE], raw.signals.get("band")
+    return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), wrench
 
 
-def read_list(path: Path) -> list[tuple[float, float, float, float, bool]]:
-    """Start, stop [s], peak, its band [N] and whether it is a load, of contacts as CSV."""
+class ListedRow(NamedTuple):
+    """One row of a list of contacts."""
+
+    start: float  #: [s]
+    stop: float  #: [s]
+    peak: float = 0.0  #: Its largest force, 0 where it has none. [N]
+    band: float = 0.0  #: Half width of its 95 % band. [N]
+    is_load: bool = False  #: Whether it is called a load.
+
+
+def read_list(path: Path) -> list[ListedRow]:
+    """A list of contacts from CSV."""
     import polars as pl
 
     try:
         rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
         return [
-            (
-                float(row["start_s"]),
-                float(row["stop_s"]),
-                float(row.get("peak_force_N") or 0.0),
-                float(row.get("peak_force_band_N") or 0.0),
-                row.get("kind") == "load",
+            ListedRow(
+                start=float(row["start_s"]),
+                stop=float(row["stop_s"]),
+                peak=float(row.get("peak_force_N") or 0.0),
+                band=float(row.get("peak_force_band_N") or 0.0),
+                is_load=row.get("kind") == "load",
             )
             for row in rows
         ]

@@ -26,7 +26,7 @@ from vftcli.outputs.files import put_table
 from vftcli.outputs.quantity import counted
 from vftcli.outputs.run_record import envelope
 from vftcli.pipeline import prepared
-from vftcli.readers.library import Library
+from vftcli.readers.library import Library, absolute
 from vftcli.readers.outside import read_parts
 from vftcli.reproduction.manifest import PUSHED, BenchmarkLog, Manifest, Rival, TrainedRobot
 from vftcli.reproduction.scoring import SCHEMA, ScoreTask, planted, score_log
@@ -37,22 +37,26 @@ from vftcli.signals.wrench import per_axis
 from vftcli.simulation import load_scenario, simulate
 
 
-@dataclass(kw_only=True)
+@dataclass
 class BenchmarkRun:
     """A benchmark and one run of it: what is done, what failed, what each task took."""
 
     manifest: Manifest
     rivals: Sequence[Rival]
-    folder: BatchFolder
+    output: Path  #: The folder that it writes.
     workers: WorkersChoice
     command: str  #: The command line, for the records.
     marked: frozenset[str]  #: Names of logs that are scored in spite of a complaint.
     tell: Tell = field(repr=False)
-    progress: Callable[[str, float], None] = field(repr=False)  #: Hears what is done, and how far.
+    #: Hears what is done, how far that is, and how far all is.
+    progress: Callable[[str, float, float], None] = field(repr=False)
     failures: list[tuple[str, Failure]] = field(default_factory=list)
     efforts: list[dict[str, Any]] = field(default_factory=list)
     files: dict[str, Path] = field(default_factory=dict)  #: Name → file of each log that is there.
     robots: dict[str, Path] = field(default_factory=dict)  #: Name → file of each trained robot.
+
+    def __post_init__(self) -> None:
+        self.folder = BatchFolder(absolute(self.output), "scores.parquet")
 
     def run(self, *, force: bool) -> Results:
         """What every method scores, once all is done and written."""
@@ -94,7 +98,7 @@ class BenchmarkRun:
     def make(self, name: str, path: Path, work: Callable[[Path], object]) -> bool:
         """Whether a file is there, made now unless it was."""
         if not path.exists():
-            self.progress(f"making {name}", 0.0)
+            self.progress(f"making {name}", 0.0, 0.0)
             self.note(name, perform(work, path))
         return path.exists()
 
@@ -164,19 +168,19 @@ class BenchmarkRun:
         with closing(ended):  # type: ignore[type-var]
             for done, outcome in enumerate(ended, 1):
                 self.note(outcome.task.label, outcome)
-                self.progress(f"{done} of {len(left)} scored", done / len(left))
+                self.progress(f"{done} of {len(left)} scored", done / len(left), done / len(left))
 
     def tasks(self, logs: Sequence[BenchmarkLog]) -> Iterator[ScoreTask]:
         """One a log and protocol, and one a log of an arm that outside estimates have."""
         for log in logs:
-            for protocol in log.asked:
+            for protocol in log.protocols:
                 is_fit = protocol == "identified"
                 free = {word for word in log.free if ":" not in word}
                 if log.identified in self.robots if is_fit else free <= self.files.keys():
                     yield self.task(log, protocol, None)
         for rival in self.rivals:
             arms = {log.arm for log in logs if rival.file(log) is not None}
-            asked = [log for log in logs if log.arm in arms and log.asked]
+            asked = [log for log in logs if log.arm in arms and log.protocols]
             yield from (self.task(log, rival.declared.protocol, rival) for log in asked)
 
     def task(self, log: BenchmarkLog, protocol: str, rival: Rival | None) -> ScoreTask:
@@ -190,7 +194,7 @@ class BenchmarkRun:
         elif log.truth in {"sensor", "torque"}:
             truth = self.manifest.data / log.truth_file if log.truth_file else file
         if rival is not None:
-            own = [path for path in (rival.file(log), rival.list(log)) if path is not None]
+            own = rival.file(log), rival.file(log, "contacts.csv")
             outside = [rival.name, rival.declared, *own]
         marked = log.name.removesuffix(PUSHED) in self.marked
         options = options_digest([log, protocol, choice, truth, outside, marked])

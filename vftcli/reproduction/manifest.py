@@ -46,8 +46,7 @@ ALWAYS: Spans = ((0.0, 1e9),)  #: All of a log. [s]
 class TruthError:
     """How far the truth itself may be off."""
 
-    tau_Nm: float = 0.0  # noqa: N815 - a key of the manifest, with its unit
-    wrench_N: float = 0.0  # noqa: N815
+    tau_Nm: float = 0.0
     note: str = ""
 
 
@@ -70,16 +69,16 @@ class BenchmarkLog:
     truth_file: str = ""  #: Where the truth is, "" for the log's own file.
     truth_columns: str = ""  #: Its columns, as of ``--reference-columns``.
     vendor: str = ""  #: Columns of the controller's own estimate, "" for none.
-    score: Spans = ()  #: What is scored, from the first sample; () for all but the start. [s]
-    vouched: Spans | None = None  #: Where a row is false if nothing touched; None: as `score`. [s]
+    score: Spans = ((SETTLED, 1e9),)  #: What is scored, from the first sample. [s]
+    vouched: Spans = ALWAYS  #: Where a row is false if nothing touched; `score` if it is given. [s]
     #: True contacts, where the truth does not show them: start, end [s], peak [N] if known.
     contacts: tuple[tuple[float, ...], ...] = ()
-    contact_N: float = 1.0  # noqa: N815  #: Force from which the truth is a contact. [N]
+    contact_N: float = 1.0  #: Force from which the truth is a contact. [N]
     #: Planted: start [s], length [s], peak force on the flange in base axes [N].
     pushes: tuple[tuple[float, float, Vector], ...] = ()
-    weight_N: float = 0.0  # noqa: N815  #: What is carried over `score`. [N]
-    #: The protocols that it is scored by, none of what is only trained on; None: all it can be.
-    protocols: tuple[str, ...] | None = None
+    weight_N: float = 0.0  #: What is carried over `score`. [N]
+    #: What it is scored by, none of what is only trained on; all that it can be if not given.
+    protocols: tuple[str, ...] = ("alone",)
     free: tuple[str, ...] = ()  #: Motion that nobody touched: names of logs, or A:B.
     identified: str = ""  #: Name of the ``[[robot]]`` of protocol 3.
     truth_error: TruthError = field(default_factory=TruthError)
@@ -88,38 +87,25 @@ class BenchmarkLog:
 
     def __post_init__(self) -> None:
         check_known(self.truth, TRUTHS, f"log {self.name}: truth {self.truth!r}")
-        if not re.fullmatch(r"[\w.+-]+", self.name):
-            raise ParameterError(f"log {self.name!r}: a name has letters, digits, . + - and _")
-        if bool(self.file) + bool(self.parts) + bool(self.scenario) != 1:
-            raise ParameterError(f"log {self.name}: give one of file, parts, scenario")
-        needs = {"weight": "weight_N", "contacts": "contacts", "simulated": "scenario"}
-        wanted = [needs[self.truth]] if self.truth in needs else []
-        wanted += [protocol for protocol in self.asked if protocol != "alone"]
-        for key in wanted:
-            check_known(key, (*needs.values(), *PROTOCOLS), f"log {self.name}: protocol {key!r}")
-            if not getattr(self, key):
-                raise ParameterError(f"log {self.name}: {key} is missing")
-        if any(length <= 0.0 for _, length, _ in self.pushes):
-            raise ParameterError(f"log {self.name}: a push lasts longer than 0 s")
-        if any("=" not in part for part in self.parts):
-            raise ParameterError(f"log {self.name}: parts are as t=time.txt, q=positions.txt")
-
-    @property
-    def asked(self) -> tuple[str, ...]:
-        """The protocols that it is scored by."""
-        if self.protocols is not None:
-            return self.protocols
-        return tuple(p for p in PROTOCOLS if p == "alone" or getattr(self, p))
-
-    @property
-    def trusted(self) -> Spans:
-        """Where the truth says that nothing else touched. [s]"""
-        return self.vouched if self.vouched is not None else self.score or ALWAYS
-
-    @property
-    def spans(self) -> Spans:
-        """What is scored. [s]"""
-        return self.score or ((SETTLED, 1e9),)
+        for protocol in self.protocols:
+            check_known(protocol, PROTOCOLS, f"log {self.name}: protocol {protocol!r}")
+        needs = {"weight": ["weight_N"], "contacts": ["contacts"], "simulated": ["scenario"]}
+        wanted = [*needs.get(self.truth, ()), *(p for p in self.protocols if p != "alone")]
+        rules = {
+            "a name has letters, digits, . + - and _": re.fullmatch(r"[\w.+-]+", self.name),
+            "give one of file, parts, scenario": (
+                bool(self.file) + bool(self.parts) + bool(self.scenario) == 1
+            ),
+            **{f"{key} is missing": getattr(self, key) for key in wanted},
+            "spans end after their start": all(a < b for a, b in (*self.score, *self.vouched)),
+            "a contact is [start, end] or [start, end, peak]": all(
+                len(each) in {2, 3} and each[0] < each[1] for each in self.contacts
+            ),
+            "a push lasts longer than 0 s": all(length > 0.0 for _, length, _ in self.pushes),
+            "parts are as t=time.txt, q=positions.txt": all("=" in each for each in self.parts),
+        }
+        if broken := [rule for rule, holds in rules.items() if not holds]:
+            raise ParameterError(f"log {self.name!r}: {broken[0]}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,15 +136,10 @@ class Rival(NamedTuple):
     folder: Path
     declared: Declaration
 
-    def file(self, log: BenchmarkLog) -> Path | None:
-        """Its estimates of a log, None where it has none."""
-        tries = (self.folder / f"{log.name}.{ending}" for ending in ("parquet", "csv"))
+    def file(self, log: BenchmarkLog, *endings: str) -> Path | None:
+        """The file of a log with one of some endings, by default its estimates; None without."""
+        tries = (self.folder / f"{log.name}.{end}" for end in endings or ("parquet", "csv"))
         return next(filter(Path.is_file, tries), None)
-
-    def list(self, log: BenchmarkLog) -> Path | None:
-        """Its list of a log's contacts, None where it has none."""
-        path = self.folder / f"{log.name}.contacts.csv"
-        return path if path.is_file() else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,8 +169,9 @@ class Manifest:
     def missing(self, log: BenchmarkLog) -> list[Path]:
         """The files of its entry that are not there."""
         robot = self.robot(log) or ""
-        also = [self.data / log.truth_file] * bool(log.truth_file) + [Path(robot)] * ("." in robot)
-        return [path for path in (*self.paths(log), *also) if not path.exists()]
+        also = [log.truth_file] * bool(log.truth_file) + [robot] * ("." in robot)
+        paths = (*self.paths(log), *(self.data / name for name in also))
+        return [path for path in paths if not path.exists()]
 
     def choice(
         self,
@@ -230,13 +212,13 @@ class Manifest:
         for other, spans in self.trains_on(log, protocol):
             what = f"{name}, {protocol}: {other.name}"
             if other.name.removesuffix(PUSHED) == name:
-                near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.spans)
+                near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.score)
                 if any(near):
                     fit = f"interval of [[robot]] {log.identified}"
                     key = "free" if protocol == "free" else fit
                     yield (
                         f"{name}: {key} ({in_words(spans)}) must stay {APART:g} s away from score "
-                        f"({in_words(log.spans)}); change one of them"
+                        f"({in_words(log.score)}); change one of them"
                     )
             elif self.missing(other):
                 continue
@@ -253,7 +235,7 @@ class Manifest:
                 continue
             paths = self.paths(log)
             sha = content_digest(paths) if paths else ""
-            lines = [line for protocol in log.asked for line in self.leaks(log, protocol)]
+            lines = [line for protocol in log.protocols for line in self.leaks(log, protocol)]
             if log.sha256 and sha != log.sha256 and not log.pushes:
                 lines.append(
                     f"{log.name}: {paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
@@ -324,6 +306,9 @@ def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
     rest = {key: value for key, value in table.items() if key not in OPTIONS}
     for word, value in words.items():
         OPTIONS[word].keyword(value)  # refused now rather than in a worker
+    if "score" in table:
+        rest.setdefault("vouched", table["score"])
+    rest.setdefault("protocols", [p for p in PROTOCOLS if p == "alone" or table.get(p)])
     log = section_from(BenchmarkLog, rest, f"log {table.get('name', '')}".strip())
     log = replace(log, options=tuple(words.items()))
     if not log.pushes:

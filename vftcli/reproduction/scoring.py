@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -11,7 +11,7 @@ from polars import Boolean, Float64, Int64, String
 
 from vftcli.batch.cluster import begin
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation.detection import ListedRow, ListScore, TrueContact, score_list, wrench_sums
+from vftcli.evaluation.detection import TrueContact, score_list
 from vftcli.evaluation.references import on_the_logs_clock, since_start, table_reference
 from vftcli.evaluation.scores import Score, episodes, lag_sums, parts_of, weights
 from vftcli.free_motion.free_motion import within
@@ -19,7 +19,7 @@ from vftcli.observers.table import BEST, OBSERVERS
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.library import Library
-from vftcli.readers.outside import read_list, read_outside
+from vftcli.readers.outside import ListedRow, read_list, read_outside
 from vftcli.readers.references import read_reference
 from vftcli.reproduction.manifest import BenchmarkLog, Rival
 from vftcli.robots.chain import flange_jacobian
@@ -34,26 +34,29 @@ from vftcli.wrench.frames import NOTHING
 
 #: Torque from which a joint's truth is a contact where no force is known, and its end. [N·m]
 TOUCHED, UNTOUCHED = 0.05, 0.025
+SAME = 1e-6  #: Stamps nearer than this are the log's own. [s]
 WORST = 10.0  #: Length of the span that is drawn. [s]
-NO_WRENCH = np.zeros((0, 6))
-KINDS = {int: Int64, float: Float64, list[float]: pl.List(Float64)}
-#: Rows of a log × protocol × method: of a part and joint; of lists; of wrench, weight and lag.
-SCHEMA: dict[str, Any] = {
-    **dict.fromkeys(("log", "arm", "protocol", "method", "part"), String),
-    "joint": Int64,
-    **dict.fromkeys(("future", "exact_model", "marked"), Boolean),
-    **dict.fromkeys(("truth_error_Nm", "rmse_Nm", "l1_Nm"), Float64),
-    # Sums over each cell of 2 s, as `Score` has them.
-    **dict.fromkeys(Score.__annotations__, pl.List(Float64)),
-    **{name: KINDS[kind] for name, kind in get_type_hints(ListScore).items()},
-    **dict.fromkeys(wrench_sums(NO_WRENCH, NO_WRENCH, np.zeros(0)), Float64),
-    **dict.fromkeys(("weight_N", "mean_N", "rms_error_N", "answered"), Float64),
-    "lag_squares": pl.List(Float64),
-    # The worst 10 s of `best`, on the joint that errs most in them.
-    "worst_joint": Int64,
-    **dict.fromkeys(("worst_t", "worst_truth", "worst_estimate"), pl.List(Float64)),
-}
-LIST, WITH_CANDIDATES = "list", "list with candidates"  #: Parts of rows of lists.
+LISTS = ("list", "list with candidates")  #: Parts of rows of lists.
+#: Columns of a log × protocol × method: of a part and joint with the sums over its cells; of
+#: lists; of wrench and weight; of shifts; of the worst 10 s of `best` on its worst joint.
+COLUMNS: tuple[tuple[Any, str], ...] = (
+    (String, "log arm protocol method part"),
+    (Int64, "joint"),
+    (Boolean, "future exact_model marked"),
+    (Float64, "truth_error_Nm rmse_Nm l1_Nm"),
+    (pl.List(Float64), " ".join(Score._fields)),
+    (Int64, "true_contacts found found_as_load split false"),
+    (Float64, "free_h"),
+    (pl.List(Float64), "onset_s peak_error_N true_peak_N"),
+    (Int64, "peaks_held"),
+    (Float64, "hardest_false_N"),
+    (Float64, "force_squares moment_squares true_force_squares true_moment_squares"),
+    (Float64, "wrench_missing_s wrench_s weight_N mean_N rms_error_N answered"),
+    (pl.List(Float64), "lag_squares"),
+    (Int64, "worst_joint"),
+    (pl.List(Float64), "worst_t worst_truth worst_estimate"),
+)
+SCHEMA = {name: kind for kind, names in COLUMNS for name in names.split()}
 
 
 class ScoreTask(NamedTuple):
@@ -96,32 +99,30 @@ def planted(
 
 
 class KnownTruth(NamedTuple):
-    """What really touched a log's arm, on the log's clock."""
+    """What really touched a log's arm, on the log's clock; None of what is not known."""
 
-    tau: Array | None = None  #: External torque on the robot; None where it is not known. (T, n)
-    wrench: Array | None = None  #: On the flange, base axes; None where not known. (T, 6)
-    contacts: Sequence[TrueContact] | None = None  #: None where they are not known.
+    tau: Array | None  #: External torque on the robot. (T, n)
+    wrench: Array | None  #: On the flange, base axes. (T, 6)
+    contacts: Sequence[TrueContact] | None
 
 
-def truth_of(
-    log: BenchmarkLog, recording: Recording, robot: Robot, file: Path | None
-) -> KnownTruth:
+def truth_of(task: ScoreTask, recording: Recording, robot: Robot) -> KnownTruth:
     """The truth that a manifest states of a log, or that a file holds."""
-    listed: list[TrueContact] | None = None
-    if log.contacts:
-        listed = [(c[0], c[1], c[2] if len(c) > 2 else np.nan) for c in log.contacts]
-    if file is None:
-        zero = np.zeros(recording.q.shape) if log.truth == "free" else None
-        return KnownTruth(zero, None, [] if log.truth == "free" else listed)
-    table = read_reference(file, log.truth_columns or None)
+    log, t = task.log, recording.t
+    listed: list[Any] | None = [(*c, np.nan)[:3] for c in log.contacts] or None
+    if task.truth is None:
+        if log.truth == "free":
+            return KnownTruth(np.zeros(recording.q.shape), None, [])
+        return KnownTruth(None, None, listed)
+    table = read_reference(task.truth, log.truth_columns or None)
     table = table._replace(t=since_start(table.t, recording))
-    load = table_reference(table, file, recording, robot, NOTHING)
+    load = table_reference(table, task.truth, recording, robot, NOTHING)
     tau, wrench = load.torque.tau, None if load.wrench is None else load.wrench.values
     if listed is None and wrench is not None:
         size = np.linalg.norm(wrench[:, :3], axis=1)
-        listed = episodes(recording.t, size, log.contact_N, 0.5 * log.contact_N)
+        listed = episodes(t, size, log.contact_N, 0.5 * log.contact_N)
     elif listed is None:
-        found = episodes(recording.t, abs(tau).max(axis=1), TOUCHED, UNTOUCHED)
+        found = episodes(t, abs(tau).max(axis=1), TOUCHED, UNTOUCHED)
         listed = [(start, stop, np.nan) for start, stop, _ in found]
     return KnownTruth(tau, wrench, listed)
 
@@ -132,111 +133,96 @@ class Answer(NamedTuple):
     torque: ExternalTorque
     wrench: Array | None = None
     future: bool = False  #: Whether it uses what comes later.
-    rows: Mapping[str, Sequence[ListedRow]] = {}  #: Part → its list of contacts.
+    lists: Mapping[str, Sequence[ListedRow]] = {}  #: Its contacts by part, one of `LISTS`.
 
 
 def score_log(task: ScoreTask) -> None:
     """Score a log by a protocol and write its rows, unless they are there."""
-    folder = BatchFolder(task.folder)
+    folder, log = BatchFolder(task.folder), task.log
     if folder.row_file(task.key).exists():
         return
     begin("reading")
     choice = replace(task.choice, library=Library([task.file]), examiner=Examiner(anyway=True))
+    task = task._replace(choice=choice)
     recording, robot = prepared(choice.library.open(task.file, choice.read), choice)
     begin("estimating")
-    answers: dict[str, Answer]
-    if task.rival is not None:
-        answers = {task.rival.name: outside_answer(task, recording)}
-    else:
-        answers = own_answers(task, recording, robot, choice)
+    answers = [*(own_answers if task.rival is None else outside_answer)(task, recording, robot)]
     begin("scoring")
-    truth = truth_of(task.log, recording, robot, task.truth)
-    scored = within(recording.t, task.log.spans)
+    truth = truth_of(task, recording, robot)
+    shared = {
+        "key": task.key,
+        "log": log.name,
+        "arm": log.arm,
+        "protocol": task.protocol,
+        "exact_model": log.exact_model,
+        "marked": task.marked,
+        "truth_error_Nm": log.truth_error.tau_Nm,
+    }
     rows = [
-        {
-            "key": task.key,
-            "log": task.log.name,
-            "arm": task.log.arm,
-            "protocol": task.protocol,
-            "method": name,
-            "exact_model": task.log.exact_model,
-            "future": answer.future,
-            "marked": task.marked,
-            "truth_error_Nm": task.log.truth_error.tau_Nm,
-            **row,
-        }
-        for name, answer in answers.items()
-        for row in rows_of(answer, truth, task.log, recording.t, scored)
+        {**shared, "method": answer.torque.name, "future": answer.future, **row}
+        for answer in answers
+        for row in rows_of(answer, truth, log)
     ]
     folder.put_rows(task.key, pl.DataFrame(rows, schema={"key": String, **SCHEMA}))
 
 
-def own_answers(
-    task: ScoreTask, recording: Recording, robot: Robot, choice: AnalysisChoice
-) -> dict[str, Answer]:
-    """Our observers' estimates, with the list of contacts, and those of zero and the vendor."""
-    made = analyse(recording, robot, choice, Runs())
+def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator[Answer]:
+    """What zero, the vendor and our observers say, `best` with its list of contacts."""
+    t, made = recording.t, analyse(recording, robot, task.choice, Runs())
     wrenches = {wrench.name: wrench.known for wrench in made.wrenches}
-    rows: dict[str, Sequence[ListedRow]] = {}
+    nothing = np.zeros((recording.samples, 6))
+    yield Answer(ExternalTorque(name="zero", t=t, tau=np.zeros(recording.q.shape)), nothing)
+    if task.log.vendor:
+        table = read_reference(task.file, task.log.vendor)
+        assert table.tau is not None, "the vendor's columns are torques"
+        tau = on_the_logs_clock(since_start(table.t, recording), table.tau, recording, task.file)
+        yield Answer(ExternalTorque(name="vendor", t=t, tau=tau))
+    lists: dict[str, Sequence[ListedRow]] = {}
     if made.contacts is not None:
-        listed, weak = (
+        counted, weak = (
             [
                 ListedRow(c.start, c.stop, c.peak_force or 0.0, c.peak_band or 0.0, c.is_load)
                 for c in each
             ]
             for each in (made.contacts.contacts, made.contacts.candidates)
         )
-        rows = {LIST: listed, WITH_CANDIDATES: sorted((*listed, *weak))}
-    zero = ExternalTorque(name="zero", t=recording.t, tau=np.zeros(recording.q.shape))
-    answers = {"zero": Answer(zero, np.zeros((recording.samples, 6)))}
-    if task.log.vendor:
-        table = read_reference(task.file, task.log.vendor)
-        t = since_start(table.t, recording)
-        assert table.tau is not None, "the vendor's columns are torques"
-        tau = on_the_logs_clock(t, table.tau, recording, task.file)
-        answers["vendor"] = Answer(ExternalTorque(name="vendor", t=recording.t, tau=tau))
-    for estimate in made.estimates:
-        name = estimate.name
-        own = rows if name == BEST else {}
-        answers[name] = Answer(estimate, wrenches.get(name), not OBSERVERS[name].online, own)
-    return answers
+        lists = dict(zip(LISTS, (counted, sorted((*counted, *weak))), strict=True))
+    for torque in made.estimates:
+        name = torque.name
+        own = lists if name == BEST else {}
+        yield Answer(torque, wrenches.get(name), not OBSERVERS[name].online, own)
 
 
-def outside_answer(task: ScoreTask, recording: Recording) -> Answer:
+def outside_answer(task: ScoreTask, recording: Recording, _: Robot) -> Iterator[Answer]:
     """What another program says of a log, at the log's stamps."""
-    assert task.rival is not None, "it has a folder"
-    name, _, declared = task.rival
-    path, listed = task.rival.file(task.log), task.rival.list(task.log)
-    rows = {} if listed is None else {LIST: [ListedRow(*row) for row in read_list(listed)]}
+    rival = task.rival
+    assert rival is not None, "it has a folder"
+    path, listed = rival.file(task.log), rival.file(task.log, "contacts.csv")
+    lists = {} if listed is None else {LISTS[0]: read_list(listed)}
     # Without estimates of a log of an arm that it has it answers nothing there.
-    tau = np.full(recording.q.shape, np.nan)
-    sd: Array | None = None
-    wrench: Array | None = None
+    t = recording.t
+    columns: list[Any] = [np.full(recording.q.shape, np.nan), None, None]
     if path is not None:
-        table = read_outside(path, name)
-        if table.tau.shape[1] != recording.joints:
-            raise LogError(
-                f"{path}: torques of {table.tau.shape[1]} joints for a log of {recording.joints}"
+        read, wrench = read_outside(path, rival.name)
+        if read.joints != recording.joints:
+            joints = f"{read.joints} joints for a log of {recording.joints}"
+            raise LogError(f"{path}: torques of {joints}")
+        own, columns = since_start(read.t, recording), [read.tau, read.error_sd, wrench]
+        if len(own) != len(t) or abs(own - t).max() >= SAME:
+            there = (
+                x if x is None else on_the_logs_clock(own, x, recording, path) for x in columns
             )
-        t = since_start(table.t, recording)
-        same = len(t) == recording.samples and abs(t - recording.t).max() < 1e-6
-
-        def at_stamps(values: Array) -> Array:
-            return values if same else on_the_logs_clock(t, values, recording, path)
-
-        tau = at_stamps(table.tau)
-        sd, wrench = (None if x is None else at_stamps(x) for x in (table.sd, table.wrench))
-    torque = ExternalTorque(name=name, t=recording.t, tau=tau, error_sd=sd)
-    return Answer(torque, wrench, not declared.causal, rows)
+            columns = [*there]
+    tau, sd, wrench = columns
+    torque = ExternalTorque(name=rival.name, t=t, tau=tau, error_sd=sd)
+    yield Answer(torque, wrench, not rival.declared.causal, lists)
 
 
-def rows_of(
-    answer: Answer, truth: KnownTruth, log: BenchmarkLog, t: Array, scored: Mask
-) -> Iterator[dict[str, Any]]:
+def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[dict[str, Any]]:
     """Every row of one method on one log."""
-    w, known = weights(t), scored
-    if truth.tau is not None:
-        known = scored & np.isfinite(truth.tau).all(axis=1)
+    t, wrench = answer.torque.t, answer.wrench
+    w, scored = weights(t), within(t, log.score)
+    known = scored if truth.tau is None else scored & np.isfinite(truth.tau).all(axis=1)
     parts = parts_of(t, known, truth.contacts or ())
     touch = parts["contact"]
     if truth.tau is not None and known.any():
@@ -245,15 +231,13 @@ def rows_of(
         if log.pushes:
             del parts["free"]  # it is scored of the log without them
         yield from torque_rows(answer.torque, truth.tau, parts)
-    if answer.wrench is not None and truth.wrench is not None and touch.any():
-        samples = answer.wrench[touch], truth.wrench[touch], w[touch]
-        yield {"part": "wrench", **wrench_sums(*samples)}
-    if answer.wrench is not None and log.weight_N:
-        yield {"part": "weight", **weighed(-answer.wrench[scored, 2], log.weight_N, w[scored])}
+    if wrench is not None and truth.wrench is not None and touch.any():
+        yield {"part": "wrench", **wrench_sums(wrench[touch], truth.wrench[touch], w[touch])}
+    if wrench is not None and log.weight_N:
+        yield {"part": "weight", **weighed(-wrench[scored, 2], log.weight_N, w[scored])}
     if truth.contacts is not None:
-        for part, rows in answer.rows.items():
-            counts = score_list(rows, truth.contacts, log.trusted, float(t[-1]))
-            yield {"part": part, **counts._asdict()}
+        for part, rows in answer.lists.items():
+            yield {"part": part, **score_list(rows, truth.contacts, log.vouched, float(t[-1]))}
 
 
 def torque_rows(
@@ -261,16 +245,15 @@ def torque_rows(
 ) -> Iterator[dict[str, Any]]:
     """The rows of a torque: sums of each part and joint, of shifts, and where `best` is worst."""
     for part, inside in parts.items():
-        if not inside.any():
-            continue
-        score = Score.of(torque, truth, inside)
-        for j, sums in enumerate(score.by_joint()):
-            means = {"rmse_Nm": float(score.rmse[j]), "l1_Nm": float(score.l1[j])}
-            yield {"part": part, "joint": j + 1, **means, **sums}
+        if inside.any():
+            score = Score.of(torque, truth, inside)
+            means = zip(score.rmse.tolist(), score.mean(score.sizes).tolist(), strict=True)
+            for j, ((rmse, l1), sums) in enumerate(zip(means, score.by_joint(), strict=True), 1):
+                yield {"part": part, "joint": j, "rmse_Nm": rmse, "l1_Nm": l1, **sums}
     if torque.name == BEST:
         yield {"part": "worst", **worst_of(torque, truth, np.any([*parts.values()], axis=0))}
     if "all" in parts and torque.name != "zero":
-        yield {"part": "all", "lag_squares": lag_sums(torque, truth, parts["all"]).tolist()}
+        yield {"part": "all", "lag_squares": lag_sums(torque, truth, parts["all"])}
 
 
 def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, Any]:
@@ -282,9 +265,19 @@ def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, An
     first = int(np.argmax(total[ends] - total[:-1]))
     part = slice(first, int(ends[first]))
     joint = int(squares[part].sum(axis=0).argmax())
-    seen = [np.where(scored, x[:, joint], np.nan) for x in (truth, answer)]
-    lists = dict(zip(("t", "truth", "estimate"), (t, *seen), strict=True))
-    return {"worst_joint": joint + 1, **{f"worst_{k}": v[part].tolist() for k, v in lists.items()}}
+    seen = [np.where(scored, x[:, joint], np.nan)[part].tolist() for x in (truth, answer)]
+    names = ("worst_joint", "worst_t", "worst_truth", "worst_estimate")
+    return dict(zip(names, (joint + 1, t[part].tolist(), *seen), strict=True))
+
+
+def wrench_sums(values: Array, truth: Array, w: Array) -> dict[str, float]:
+    """Σ w |f̂ − f|² and its like over some samples; a missing wrench counts as 0."""
+    error, sums = np.where(np.isfinite(values), values, 0.0) - truth, {}
+    for head, wrench in (("", error), ("true_", truth)):
+        for kind, part in (("force", wrench[:, :3]), ("moment", wrench[:, 3:])):
+            sums[f"{head}{kind}_squares"] = float((w * (part**2).sum(axis=1)).sum())
+    missing = float((w * ~np.isfinite(values[:, 0])).sum())
+    return {**sums, "wrench_missing_s": missing, "wrench_s": float(w.sum())}
 
 
 def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
