@@ -29,6 +29,8 @@ def test_found_split_false_onset_and_peak() -> None:
 
 def test_a_vouched_span_ends_with_the_log() -> None:
     assert score_list([], [], [(0.0, 1e9)], duration=36.0)["free_h"] == pytest.approx(0.01)
+    # A true contact that is longer than what is vouched for leaves no time, not less than none.
+    assert score_list([], [(0.0, 9.0, NAN)], [(1.0, 2.0)], duration=36.0)["free_h"] == 0.0
 
 
 @pytest.mark.parametrize(

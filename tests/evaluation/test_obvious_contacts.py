@@ -1,5 +1,6 @@
 """Where a log shows contact by itself: planted pushes, free logs, and what cannot be told."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,35 @@ def test_the_span_that_is_offered_is_free() -> None:
     (warned,) = touched_remarks(Run(recording=FIXTURE, robot=UR5))
     span = (float(warned.values[name]) for name in ("begin_s", "end_s"))  # type: ignore[arg-type]
     assert touches(Run(recording=FIXTURE.between(*span), robot=UR5)) == ()
+
+
+def test_two_planted_torques_are_where_they_were_planted() -> None:
+    """30 N·m on J3 and 12 N·m on J5 of a free motion, as the current that they need.
+
+    A first-order flank of the 2 Hz low-pass spreads a pulse by .1 s or so. The excess is over
+    the largest of 8 times the quiet level, 1.5 times the dry friction and 2 N·m, by definition.
+    """
+    free = FIXTURE.between(0.0, 4.0)
+    pulses = ((0.5, 1.0, 2, 30.0), (3.3, 3.6, 4, 12.0))
+    current = free.require("current").copy()
+    for start, stop, j, torque in pulses:
+        on = (free.t > start) & (free.t < stop)
+        current[on, j] -= torque / UR5.torque_constant[j]
+    log = Run(recording=replace(free, current=current), robot=UR5)
+    found = touches(log)
+    for touch, (start, stop, j, torque) in zip(found, pulses, strict=True):
+        assert touch.joint == j
+        assert (touch.start, touch.stop) == pytest.approx((start, stop), abs=0.12)
+        assert touch.torque == pytest.approx(torque, rel=0.15)
+        limit = max(8.0 * touch.quiet, 1.5 * log.dry_friction[j], 2.0)
+        assert touch.excess == pytest.approx(touch.torque / limit)
+    (warned,) = touched_remarks(log)
+    assert (warned.where.joints, warned.where.span) == ((3,), (found[0].start, found[0].stop))
+    assert warned.values["spans"] == 2
+    begin, end = warned.values["begin_s"], warned.values["end_s"]
+    assert 0.0 <= begin - found[0].stop < 0.1
+    assert 0.0 <= found[1].start - end < 0.1
+    assert [round(float(x), 1) for x in (begin, end)] == [begin, end]
 
 
 def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -> None:

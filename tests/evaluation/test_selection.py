@@ -39,6 +39,13 @@ def test_a_first_order_filter_reaches_nine_tenths_at_its_time(gain: float) -> No
     assert found == pytest.approx(np.full(2, np.log(10.0) / gain), abs=1.5 * STEP)
 
 
+def test_a_response_is_read_within_three_seconds() -> None:
+    """ln(10)/K is 2.88 s and 3.29 s; of the slower one nothing is known."""
+    seen, late = (step_response(MomentumObserver(gain=gain), STEP, 1)[0] for gain in (0.8, 0.7))
+    assert seen == pytest.approx(2.878, abs=1.5 * STEP)
+    assert np.isnan(late)
+
+
 def test_noise_is_that_of_the_estimate() -> None:
     """The computed noise floor against what the observer really makes of white noise in μ."""
     log, observer = terms(), MomentumObserver(gain=20.0)

@@ -1,30 +1,120 @@
-"""What is scored of one log: the clock of a file, the worst span, a carried weight."""
+"""What is scored of one log: every row beside plain NumPy, the worst span, a carried weight."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from vftcli.evaluation.references import since_start
-from vftcli.reproduction.scoring import weighed, worst_of
+from vftcli.evaluation.scores import LAGS
+from vftcli.readers.outside import ListedRow
+from vftcli.reproduction.manifest import BenchmarkLog
+from vftcli.reproduction.scoring import Answer, KnownTruth, rows_of, weighed, worst_of
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording, Source
+
+LOG = BenchmarkLog(
+    name="a",
+    arm="A",
+    truth="sensor",
+    file="a.csv",
+    score=((1.0, 18.0),),
+    vouched=((0.0, 15.0),),
+    weight_N=10.0,
+)
+TOUCHED = ((5.0, 7.0, 20.0), (12.0, 13.0, np.nan))
 
 
-@pytest.mark.parametrize("zero", [0.0, 0.02, 798.467])
-@pytest.mark.parametrize("every", [1, 3])
-def test_a_file_may_count_from_the_first_sample_or_be_on_the_logs_clock(
-    zero: float, every: int
-) -> None:
-    t = np.arange(0.0, 5.0, 0.0137)
-    source = Source(format="x", clock="x", rows=len(t), duplicates=0, t0=zero)
-    log = Recording(t=t, q=np.zeros((len(t), 6)), source=source)
-    for stamps in (t[::every], t[::every] + zero):
-        assert since_start(stamps, log) == pytest.approx(t[::every])
-    # A sensor's clock of its own has none of the log's stamps: where it overlaps, it is the log's.
-    own = np.arange(zero - 0.01, zero + 4.0, 0.003)
-    expected = own - zero
-    assert since_start(own, replace(log)) == pytest.approx(expected)
+def answered() -> tuple[Answer, KnownTruth]:
+    """Torque of two joints and wrench, both with gaps, .03 s behind a truth that ends early."""
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.choice([0.01, 0.015], 1600))
+    truth, late = (np.stack([np.sin(3.0 * x), 0.5 * np.cos(5.0 * x)], 1) for x in (t, t - 0.03))
+    truth[t > 17.0] = np.nan
+    late[(t > 6.0) & (t < 6.5), 0] = np.nan
+    wrench, held = (rng.normal(size=(len(t), 6)) for _ in range(2))
+    held[(t > 12.0) & (t < 12.2)] = np.nan
+    rows = [ListedRow(5.2, 6.0, 17.0, 4.0), ListedRow(9.0, 10.0, 6.0), ListedRow(16.0, 17.0, 8.0)]
+    torque = ExternalTorque(name="best", t=t, tau=late)
+    return Answer(torque, held, lists={"list": rows}), KnownTruth(truth, wrench, TOUCHED)
+
+
+def by_part(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> dict[Any, dict[str, Any]]:
+    """The rows by part, and joint where they have one; that of shifts as "lag"."""
+    rows = list(rows_of(answer, truth, log))
+    named = {
+        "lag" if "lag_squares" in r else (r["part"], r["joint"]) if "joint" in r else r["part"]: r
+        for r in rows
+    }
+    assert len(named) == len(rows)
+    return named
+
+
+def test_every_row_is_that_of_plain_numpy() -> None:
+    answer, truth = answered()
+    found = by_part(answer, truth, LOG)
+    t, w = answer.torque.t, np.gradient(answer.torque.t)  # no step is over 5 medians
+    scored = (t >= 1.0) & (t <= 17.0)  # where the truth ends
+    touch, near = (
+        np.any([(t >= a - far) & (t <= b + far) for a, b, _ in TOUCHED], axis=0)
+        for far in (0.0, 0.5)
+    )
+    parts = {"contact": scored & touch, "free": scored & ~near, "all": scored}
+    error = np.nan_to_num(answer.torque.tau) - truth.tau
+    for part, inside in parts.items():
+        for j in (0, 1):
+            row, e, mine = found[part, j + 1], error[inside, j], w[inside]
+            assert row["rmse_Nm"] == pytest.approx(np.sqrt((mine * e**2).sum() / mine.sum()))
+            assert row["l1_Nm"] == pytest.approx((mine * abs(e)).sum() / mine.sum())
+            assert sum(row["seconds"]) == pytest.approx(mine.sum())
+            silent = np.isnan(answer.torque.tau[inside, j])
+            assert sum(row["missing"]) == pytest.approx(mine[silent].sum())
+    # What is late by .03 s fits best .03 s later, but for the noiseless gap of .5 s.
+    assert LAGS[np.argmin(found["lag"]["lag_squares"])] == pytest.approx(0.03)
+    assert found["lag"]["lag_squares"][10] == pytest.approx(
+        (w[scored, None] * error[scored] ** 2).sum()
+    )
+    f, known = np.nan_to_num(answer.wrench)[touch], np.isfinite(answer.wrench[touch, 0])
+    for kind, part in (("force", slice(3)), ("moment", slice(3, 6))):
+        gap, own = f[:, part] - truth.wrench[touch, part], truth.wrench[touch, part]
+        square = found["wrench"][f"{kind}_squares"]
+        assert square == pytest.approx((w[touch] * (gap**2).sum(axis=1)).sum())
+        square = found["wrench"][f"true_{kind}_squares"]
+        assert square == pytest.approx((w[touch] * (own**2).sum(axis=1)).sum())
+    assert found["wrench"]["wrench_missing_s"] == pytest.approx(w[touch][~known].sum())
+    assert found["wrench"]["wrench_s"] == pytest.approx(w[touch].sum())
+    up, asked = -answer.wrench[:, 2], (t >= 1.0) & (t <= 18.0)
+    here = asked & np.isfinite(up)
+    assert found["weight"]["mean_N"] == pytest.approx((w * up)[here].sum() / w[here].sum())
+    assert found["weight"]["answered"] == pytest.approx(w[here].sum() / w[asked].sum())
+    # A row finds the first contact, one is false, one lies where nobody vouches.
+    keys = ("true_contacts", "found", "false", "hardest_false_N", "peaks_held")
+    assert [found["list"][key] for key in keys] == [2, 1, 1, 6.0, 1]
+    assert found["list"]["free_h"] == pytest.approx((15.0 - 3.0) / 3600.0)
+    assert found["worst"]["worst_t"][-1] <= 17.0
+
+
+def test_parts_that_are_empty_or_scored_elsewhere_have_no_row() -> None:
+    answer, truth = answered()
+    whole = truth._replace(contacts=[(0.0, 30.0, np.nan)])
+    assert {key[0] for key in by_part(answer, whole, LOG) if isinstance(key, tuple)} == {
+        "contact",
+        "all",
+    }
+    pushed = replace(LOG, pushes=((5.0, 2.0, (1.0, 0.0, 0.0)),))
+    assert {key[0] for key in by_part(answer, truth, pushed) if isinstance(key, tuple)} == {
+        "contact",
+        "all",
+    }
+    free = KnownTruth(np.zeros_like(truth.tau), None, [])
+    kept = by_part(answer, free, replace(LOG, truth="free", weight_N=0.0))
+    assert set(kept) == {("free", 1), ("free", 2), "worst", "list"}
+    # Times alone: of a torque nothing is known, and its list is counted.
+    times = by_part(answer, KnownTruth(None, None, TOUCHED), replace(LOG, weight_N=0.0))
+    assert set(times) == {"list"}
+    # Without a list, without a wrench, zero: the torque alone, which no shift makes better.
+    zero = ExternalTorque(name="zero", t=answer.torque.t, tau=0.0 * np.nan_to_num(truth.tau))
+    kept = by_part(Answer(zero), truth, LOG)
+    assert set(kept) == {(part, j) for part in ("contact", "free", "all") for j in (1, 2)}
 
 
 def test_the_worst_span_is_where_the_error_is() -> None:
