@@ -51,13 +51,6 @@ def test_a_force_within_its_band_is_the_hardest_only_among_its_like() -> None:
     assert (wide.size_known, sized.size_known) == (False, True)
 
 
-def test_a_row_without_a_size_needs_sure_evidence() -> None:
-    assert contact(peak_force=2.0, peak_band=3.0).is_told
-    assert not contact(peak_force=2.0, peak_band=3.0, evidence=49.0).is_told
-    assert not contact(peak_force=2.0, peak_band=3.0, evidence=None).is_told
-    assert contact(peak_force=None, peak_band=None, evidence=None).is_told
-
-
 def test_a_size_that_depends_on_an_unknown_place_is_unknown() -> None:
     by_place = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
     unknown = contact(remarks=(by_place,), peak_force=70.0)

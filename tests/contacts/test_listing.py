@@ -346,6 +346,25 @@ def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs: Path, name: s
     assert not row.is_load
 
 
+@pytest.mark.slow
+def test_an_arm_whose_friction_is_unknown_lists_pushes_and_nothing_below_what_shows(
+    logs: Path,
+) -> None:
+    """Three pushes of 15 to 25 N by a joint friction of 1.1 N·m that `fr3` does not have."""
+    log = read(logs / "libfranka_sim" / "pushes.csv.gz")
+    found = list_contacts(motion(log, "fr3"))
+    assert found.smallest_force is not None
+    assert len(found.candidates) > len(found.contacts)
+    pushes = (6.0, 10.0), (13.0, 17.0), (20.0, 24.0)
+    overlapped = [[a < row.stop and row.start < b for a, b in pushes] for row in found]
+    assert np.sum(overlapped, axis=1).min() == 1
+    assert np.any(overlapped, axis=0).all()
+    for row in found:
+        assert row.peak_force is not None
+        assert row.place_band is not None
+        assert row.peak_force >= min(found.smallest_force, row.place_band)
+
+
 def test_a_row_without_a_size_belongs_to_the_one_that_it_adjoins() -> None:
     """The tail of a push reads 13 ± 29 N; two pushes of different directions both have a size."""
     hard, tail = contact(), contact(peak_force=13.0, peak_band=29.0)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
+from contact_rows import contact
 from test_error_process import blocks, drawn, noise
 
 from vftcli.contacts.contact_list import ContactList
@@ -13,6 +14,7 @@ from vftcli.contacts.rows import (
     force_course,
     quiet_error,
     sensor_force,
+    shows_force,
     vendor_force,
 )
 from vftcli.contacts.windows import PointFit
@@ -24,6 +26,24 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.wrench.model_error import error_process
 from vftcli.wrench.smoother import hidden_by_blocks
+
+
+@pytest.mark.parametrize(
+    ("force", "evidence", "smallest", "shows"),
+    [
+        (31.0, 13.0, 40.0, True),  # beyond its band
+        (29.0, 119.0, 2.0, False),
+        (29.0, None, 2.0, False),
+        (29.0, 121.0, 28.0, True),  # sure, and more than free motion reads
+        (29.0, 9e5, 30.0, False),
+        (29.0, 121.0, np.nan, True),  # nothing says what free motion reads
+    ],
+)
+def test_a_force_within_its_band_needs_sure_evidence_and_what_shows(
+    force: float, evidence: float | None, smallest: float, shows: bool
+) -> None:
+    row = contact(peak_force=force, peak_band=90.0, place_band=30.0, evidence=evidence)
+    assert shows_force(row, smallest) == shows
 
 
 def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
@@ -117,11 +137,11 @@ def test_a_course_bears_the_band_along_its_force() -> None:
 
 @pytest.mark.slow
 def test_every_row_has_its_course(listed: Callable[..., ContactList]) -> None:
-    for contact in listed("ur5_circle.csv", "ur5", "0.3:4").contacts:
-        course = contact.course
+    for row in listed("ur5_circle.csv", "ur5", "0.3:4").contacts:
+        course = row.course
         assert course is not None
-        assert contact.start <= course.t[0] < course.t[-1] <= contact.stop
+        assert row.start <= course.t[0] < course.t[-1] <= row.stop
         k = int(np.argmax(course.force))
-        assert course.t[k] == pytest.approx(contact.peak)
-        assert course.force[k] == pytest.approx(contact.peak_force)
-        assert course.band[k] == pytest.approx(contact.place_band)
+        assert course.t[k] == pytest.approx(row.peak)
+        assert course.force[k] == pytest.approx(row.peak_force)
+        assert course.band[k] == pytest.approx(row.place_band)

@@ -163,13 +163,6 @@ class Contact(Shown):
         return any(remark.code == "size-goes-with-place" for remark in self.remarks)
 
     @property
-    def is_told(self) -> bool:
-        """Whether it says more than that something may be there: a force, or sure evidence."""
-        if self.peak_force is None or self.place_band is None:
-            return True
-        return self.peak_force > self.place_band or (self.evidence or 0.0) >= SURE_NATS
-
-    @property
     def trust(self) -> Trust:
         """How far the size of the row may be believed: by its evidence, band and remarks."""
         if self.remarks or self.is_load or self.evidence is None or self.evidence < SURE_NATS:

@@ -33,6 +33,7 @@ from vftcli.contacts.rows import (
     SHORT,
     ContactMeasurement,
     force_course,
+    shows_force,
 )
 from vftcli.contacts.search import Candidates, search
 from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places
@@ -140,18 +141,20 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
     if len(groups) < len(rows):
         measurement = ContactMeasurement.of(measurement.found.joined(groups), free)
         rows = measured_rows(free, measurement)
-    weak = [row for row in rows if not row.is_told]
-    if others:
-        beside = ContactMeasurement.of(found.kept(others), free, measurement)
-        weak = [*measured_rows(free, beside), *weak]
     smallest = measurement.test.smallest_force
     if not np.isfinite(smallest) and not named and run.robot.joints >= 6:
         smallest = felt_by(run, free.level)
+    told, weak = (
+        [row for row in rows if shows_force(row, smallest) == wanted] for wanted in (True, False)
+    )
+    if others:
+        beside = ContactMeasurement.of(found.kept(others), free, measurement)
+        weak = [*measured_rows(free, beside), *weak]
     false = int(np.count_nonzero(own > LEAST_EVIDENCE))
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
-        contacts=numbered([row for row in rows if row.is_told], inferred=not proven),
+        contacts=numbered(told, inferred=not proven),
         candidates=numbered(weak, inferred=True),
         basis=free.basis,
         free=free.remarks,

@@ -11,6 +11,7 @@ from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact, ForceCourse
 from vftcli.contacts.free_statistics import FreeStatistics, PseudoContactTest, self_test
 from vftcli.contacts.search import Candidates
 from vftcli.contacts.windows import (
+    LEAST_IN_MOTION,
     MORE_THAN_A_FORCE,
     ArmPart,
     PointFit,
@@ -267,6 +268,12 @@ class ContactMeasurement:
         where = fitting[0] if len(fitting) == 1 else "cannot tell"
         named = where if where in best else max(best, key=lambda part: best[part])
         return where, named, best[named] - max(v for part, v in best.items() if part != named)
+
+
+def shows_force(row: Contact, smallest: float) -> bool:
+    """Whether a force is beyond its band, or sure and not below what free motion reads. [N]"""
+    force, sure = row.peak_force or 0.0, (row.evidence or 0.0) >= LEAST_IN_MOTION
+    return force > (row.place_band or 0.0) or (sure and not force < smallest)
 
 
 def quiet_error(d: Array, process: ErrorProcess, hidden: Mask) -> tuple[Array, Array]:

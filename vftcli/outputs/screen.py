@@ -187,7 +187,7 @@ def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str
     if len(shown) < len(contacts):
         lines.append(f"the {len(shown)} hardest of {len(contacts)}; --details shows all")
     if most is None and found.candidates:
-        lines += ["", "Candidates, too little evidence to list:"]
+        lines += ["", "Candidates, too little evidence or force to list:"]
         lines += terminal(contact_grid(found.candidates), canvas.shown).splitlines()
     lines += [rest] * bool(rest) + [f"({LEGEND})"] * (found.hardest is not None)
     return [f"  {line}" if line else "" for line in lines]
