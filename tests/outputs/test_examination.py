@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import Examination
+from vftcli.doctor.fit import RobotMatch
 from vftcli.outputs.examination import (
     examination_record,
+    examination_text,
     health_line,
     health_record,
     overridden_lines,
@@ -45,6 +47,16 @@ def test_a_reader_s_warning_is_one_of_the_log() -> None:
     line = health_line(examination(NONE, read=(cut, fact("short", duration_s=1.0))))
     assert line.startswith("log health: 2 warnings: effort-taken: the a of the log")
     assert "also no-velocity" in line
+
+
+def test_how_arms_miss_an_effort_that_is_misread_is_not_said_before_what_it_is() -> None:
+    miss = RobotMatch(robot="ur10e", misfit=0.624, fits=False, evidence="effort", load=0.0)
+    found = [replace(examination(f), robots=(miss,)) for f in (SLOW, WRONG)]
+    slow, wrong = map(examination_text, found)
+    assert "fit       ur10e 62.4 % (effort): does not fit" in slow
+    assert "does not fit" not in wrong
+    held = examination_text(replace(found[1], robots=(replace(miss, fits=True),)))
+    assert "fit       ur10e 62.4 % (effort)" in held
 
 
 def test_the_record_is_strict_json_with_codes_and_values() -> None:

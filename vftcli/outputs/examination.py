@@ -86,10 +86,12 @@ def examination_text(examination: Examination) -> str:
     source = recording.source
     lines = [*holdings(recording)]
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
+    # How arms miss an effort that is another than it is read as says nothing of them.
+    misread = examination.refusals(fitting=False)
     lines += [
         f"  fit       {fit}{'' if fit.fits else ': does not fit'}"
         for k, fit in enumerate(examination.robots)
-        if fit.fits or k < MOST_FITS
+        if fit.fits or (k < MOST_FITS and not misread)
     ]
     lines += [f"  repair    {repair}" for repair in source.repairs]
     lines += [f"  suspect   {warning}" for warning in source.warnings]
