@@ -141,6 +141,14 @@ def test_each_log_has_the_robot_that_it_settles_itself(run: Run) -> None:
     assert out.startswith("2 logs · ur5 and panda")
 
 
+def test_of_several_logs_each_health_line_names_its_own(run: Run) -> None:
+    logs = (TAPS, FIXTURES / "ur5_circle.csv")
+    words = ("--robot", "ur5", "--observer", "gmo", "--reference", "zero")
+    lines = run("compare", *logs, *words)[2].splitlines()
+    assert lines[:2] == [f"{log.name}: log health: sound" for log in logs]
+    assert run("compare", TAPS, *words)[2].startswith("log health: sound\n")
+
+
 def test_quiet_prints_errors_only_and_tables_that_are_asked_for(tmp_path: Path, run: Run) -> None:
     words = ("--robot", "ur5", "--observer", "gmo", "-q")
     assert run("estimate", TAPS, *words, "-o", tmp_path / "out") == (0, "", "")

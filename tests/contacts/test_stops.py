@@ -10,8 +10,8 @@ T = 0.01 * np.arange(400)
 
 
 def log(speed: Array) -> Recording:
-    """One joint with this speed, and one at rest."""
-    dq = np.column_stack([speed, np.zeros(len(speed))])
+    """One joint with this speed, and two at rest."""
+    dq = speed[:, None] * [1.0, 0.0, 0.0]
     return Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, torque=np.zeros_like(dq))
 
 

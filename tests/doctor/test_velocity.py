@@ -295,6 +295,16 @@ def test_noise_of_the_positions_hides_no_lag() -> None:
     assert np.max(fit.lag_error) < 2e-3
 
 
+def test_the_standard_errors_are_the_scatter() -> None:
+    """Of 200 noises on a quarter turn to one and a half: 1/√400 = 5 % (one sigma)."""
+    chance, short = np.random.default_rng(0), {"t": T[:250], "q": Q[:250]}
+    fits = [fit_of(**short, dq=2 * DQ[:250] + chance.normal(0, 0.02, (250, 6))) for _ in range(200)]
+    for values, errors in (("gain", "gain_error"), ("lag", "lag_error")):
+        scatter = np.std([getattr(fit, values) for fit in fits], axis=0)
+        stated = np.mean([getattr(fit, errors) for fit in fits], axis=0)
+        np.testing.assert_allclose(stated, scatter, rtol=0.2)
+
+
 def test_a_velocity_that_was_written_for_a_joint_at_rest() -> None:
     """J6 stands; J5's velocity is its own, J6's that of J5: both are told, neither as a size."""
     still = np.array([1.0, 1, 1, 1, 1, 0])

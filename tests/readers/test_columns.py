@@ -222,6 +222,7 @@ EFFORTS = ",".join(f"e{j}" for j in range(6))
         ("-tau=effort_{i}", "torque", -5.0),
         ("-tau", "torque", -5.0),
         ("t[ms],tau[mNm]", "torque", 5e-3),
+        *((f"tau[{unit}]", "torque", 5 * one) for unit, one in (("Nm", 1), ("N·m", 1), ("Ncm", 0.01))),
         ("current[mA]=EFFORT", "current", 5e-3),
         ("t[ms]=time", "torque", 5.0),
     ],
@@ -234,7 +235,7 @@ def test_a_text_without_positions_says_something_of_its_signals_alone(
     recording = read(path, columns=columns)
     assert recording.signals == tuple(sorted({"q", "dq", signal}, key=["q", "dq", signal].index))
     assert getattr(recording, signal)[0, 0] == pytest.approx(value)
-    assert recording.median_step == pytest.approx(1e-4 if columns.startswith("t") else 0.1)
+    assert recording.median_step == pytest.approx(1e-4 if columns.startswith("t[") else 0.1)
 
 
 def test_a_name_that_stands_for_no_columns_is_refused(tmp_path: Path) -> None:

@@ -87,7 +87,11 @@ def test_a_bent_line_is_the_models_and_bends_where_it_does():
     """The share of the plant's friction by velocity and load, against the model's function."""
     robot = load_robot("ur5").without_friction()
     short = JointFriction(model="points", speeds=(0.1, 1.0), torques=(1.0, 3.0))
-    robot = replace(robot, friction=(LINE, short, LINE, short, LINE, JointFriction()))
+    flat = JointFriction(
+        model="coulomb-logarithmic",
+        parameters={"coulomb": 2.0, "logarithmic": 3.0, "logarithmic_velocity": 1.2},
+    )
+    robot = replace(robot, friction=(LINE, short, flat, short, LINE, JointFriction()))
     friction = true_friction(robot, FrictionSpec())
     load = np.array([-30.0, 20.0, 5.0, 0.0, 1.0, 2.0])
     for speed in (-4.0, -1.0, -0.3, -0.05, 0.05, 0.3, 1.0, 4.0):
@@ -100,7 +104,7 @@ def test_a_bent_line_is_the_models_and_bends_where_it_does():
         rise = (friction.smooth(dq + h)[0] - friction.smooth(dq - h)[0]) / (2 * h)
         # differences of 20 N·m over 2e-6 rad/s: rounding
         np.testing.assert_allclose(friction.smooth(dq)[1], rise, atol=1e-8)
-    np.testing.assert_array_equal(friction.presliding, [0.5, 0, 0.5, 0, 0.5, 0])
+    np.testing.assert_array_equal(friction.presliding, [0.5, 0, 0, 0, 0.5, 0])
 
 
 def test_a_share_of_the_coulomb_torque_gives_before_it_slides():

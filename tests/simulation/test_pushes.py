@@ -37,6 +37,8 @@ def test_profile_rises_holds_and_falls() -> None:
     contact = started(spec, rng(), 5.0)
     sizes = [wrench(contact, t)[2] for t in (0.5, 1.1, 2.0, 2.9, 3.5)]
     np.testing.assert_allclose(sizes, [0.0, 5.0, 10.0, 5.0, 0.0], atol=1e-12)
+    at_once = started(replace(spec, rise=0.0, fall=0.0), rng(), 5.0)
+    assert [wrench(at_once, t)[2] for t in (0.99, 1.0, 2.99, 3.0)] == [0.0, 10.0, 10.0, 0.0]
 
 
 def test_profile_in_link_axes_turns_with_the_link() -> None:

@@ -8,7 +8,7 @@ from made_runs import samples_of
 from scipy.optimize import minimize
 
 from vftcli.robots import load_robot
-from vftcli.robots.friction import REST_SHARE, dry_torques
+from vftcli.robots.friction import PUSHED_SHARE, REST_SHARE, dry_torques
 from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import Blocks
 from vftcli.signals.external_torque import DynamicsTerms
@@ -132,8 +132,12 @@ def test_without_free_motion_the_dry_friction_is_taken_and_said() -> None:
         assert found.free_seconds == 0.0
         dry = dry_torques(UR5)
         np.testing.assert_allclose(found.moving, np.maximum(ASSUMED_SHARE * dry, 0.3) ** 2)
-        resting = found.stationary(blocks(np.zeros((1, 6))))[0][0]
+        still = blocks(np.zeros((1, 6)))
+        resting = found.stationary(still)[0][0]
         np.testing.assert_allclose(resting, np.maximum(REST_SHARE * dry, 0.3) ** 2)
+        held = found.stationary(still, np.ones(1, bool))[0][0]
+        settled = np.maximum(REST_SHARE * dry, 0.3) * PUSHED_SHARE / REST_SHARE
+        np.testing.assert_allclose(held, found.moving + settled**2)
         # a median over 48 bends of three blocks each
         np.testing.assert_allclose(found.white, 0.04, rtol=0.7)
 

@@ -151,7 +151,10 @@ def test_features_without_names_are_one_line(tmp_path: Path) -> None:
 def test_metadata_of_other_kinds_is_left_alone() -> None:
     assert with_features({}, COLUMNS) == {}
     assert with_features({b"huggingface": b"[]"}, COLUMNS) == {b"huggingface": b"[]"}
-    new = {"a": {"feature": {"dtype": "float32"}, "length": 3, "_type": "List"}}
+    new = {
+        "n": {"dtype": "int64", "_type": "Value"},
+        "a": {"feature": {"dtype": "float32"}, "length": 3, "_type": "List"},
+    }
     told = with_features(
         {b"huggingface": json.dumps({"info": {"features": new}}).encode()}, COLUMNS
     )
