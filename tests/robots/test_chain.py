@@ -159,6 +159,7 @@ def test_modified_dh_moves_first() -> None:
         pose = pose @ Pose(rotation_about("z", angle + j["theta"]), np.zeros(3)) @ along(j["d"])
     same(flange(found, ANGLES), pose @ tip())
     same(found[1][1], IDENTITY)
+    same(kinematics("modified-dh", TABLE, {})[2], IDENTITY)  # no tip is stated
 
 
 @pytest.mark.parametrize("name", ["standard-dh", "modified-dh"])
