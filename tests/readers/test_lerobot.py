@@ -48,13 +48,14 @@ def dataset(
     columns = {name: list(numbers) for name, (numbers, _) in features.items()}
     columns |= {"timestamp": (frame / FPS).astype(np.float32), "frame_index": frame}
     table = pa.table(columns | {"episode_index": episode, "index": index})
-    place = {k: f"file-{files[k]:03d}" if version == 3 else f"episode_{k:06d}" for k in range(3)}
-    data = folder / "data" / "chunk-000"
+    numbered = [f"chunk-{k // 2:03d}/episode_{k:06d}" for k in range(3)]
+    place = [f"chunk-000/file-{k:03d}" for k in files] if version == 3 else numbered
     (folder / "meta" / "episodes" / "chunk-000").mkdir(parents=True)
-    data.mkdir(parents=True)
-    for name in set(place.values()):
+    for name in set(place):
         rows = np.flatnonzero([place[k] == name for k in episode])
-        write_table(table.take(rows), data / f"{name}.parquet")
+        path = folder / "data" / f"{name}.parquet"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_table(table.take(rows), path)
     if version == 3:
         told = {
             "episode_index": range(3), "length": ROWS, "dataset_from_index": first,
@@ -70,7 +71,7 @@ def dataset(
         (folder / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n")
     info = {
         "codebase_version": f"v{version}.0", "robot_type": "fr3", "fps": FPS, "total_episodes": 3,
-        "features": {name: {"names": names} for name, (_, names) in features.items()},
+        "chunks_size": 2, "features": {name: {"names": names} for name, (_, names) in features.items()},
     }  # fmt: skip
     (folder / "meta" / "info.json").write_text(json.dumps(info))
     return folder

@@ -20,6 +20,9 @@ from vftcli.simulation.trajectories import (
 def test_a_pose_nearby_is_reached(name):
     robot = load_robot(name)
     home = np.array(HOMES[robot.joints])
+    # the flange looks down, to the four digits of the angles
+    down = flange_pose(robot.model, home).rotation[:, 2]
+    np.testing.assert_allclose(down, [0.0, 0.0, -1.0], atol=2e-4)
     goal = flange_pose(robot.model, home + 0.1)
     found = reach(robot.model, goal, home)
     pose = flange_pose(robot.model, found)

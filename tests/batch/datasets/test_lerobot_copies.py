@@ -108,6 +108,9 @@ def test_the_descriptions_tell_the_columns(tmp_path: Path) -> None:
     assert after.select(before.column_names).equals(before)
     added = [name for name in after.column_names if name not in before.column_names]
     assert len(added) == 2 * 10
+    for name in added:
+        counts = name.endswith("/count")
+        assert str(after.schema.field(name).type.value_type) == ("int64" if counts else "double")
     assert after.column("stats/observation.external_torque/count").to_pylist() == [
         [200], [160], [180]
     ]  # fmt: skip
