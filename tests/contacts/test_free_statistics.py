@@ -26,6 +26,7 @@ from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import Blocks
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
@@ -121,6 +122,16 @@ def test_contacts_that_are_none_read_little() -> None:
     # Simulations told 4 to 9 N.
     assert 1.0 < found.smallest_force < 15.0
     assert len(pseudo_contacts(free.pieces[0], 3)) == 3
+
+
+@pytest.mark.parametrize(("known", "runs"), [(23, []), (24, [(6, 18)]), (36, [(6, 18), (18, 30)])])
+def test_a_contact_that_is_made_up_has_free_blocks_on_either_side(
+    known: int, runs: list[tuple[int, int]]
+) -> None:
+    """.6 s in blocks of .05 s, with .3 s before and after it."""
+    there, nothing = np.arange(40) < known, np.zeros((40, 6))
+    blocks = Blocks(0.05 * np.arange(40), np.full(40, 0.05), nothing, nothing, nothing, there)
+    assert pseudo_contacts(blocks, 5) == runs
 
 
 def test_a_load_in_the_free_part_is_no_noise() -> None:

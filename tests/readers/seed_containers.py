@@ -94,14 +94,18 @@ def hdf5(path: Path, layout: Layout, **attributes: dict[str, Any]) -> Path:
 
 
 def matlab_73(path: Path) -> Path:
-    """A file of version 7.3: HDF5 behind a block of 512 bytes, every matrix column by column."""
+    """A file of version 7.3: HDF5 behind a block of 512 bytes, every matrix column by column.
+
+    Each joint's positions are a vector of their own.
+    """
     import h5py
 
     log = motion()
+    apart = {f"q{j}": q for j, q in enumerate(log["q"].T, start=1)}
+    log = {"t": log["t"], **apart, "dq": log["dq"], "current": log["current"]}
     with h5py.File(path, "w", userblock_size=512) as file:
-        for name in ("t", "q", "dq", "current"):
-            matrix = log[name] if log[name].ndim == 2 else log[name][:, None]
-            dataset = file.create_dataset(name, data=matrix.T)
+        for name, signal in log.items():
+            dataset = file.create_dataset(name, data=np.atleast_2d(signal.T))
             dataset.attrs["MATLAB_class"] = np.bytes_("double")
     with path.open("r+b") as raw:
         raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))

@@ -143,18 +143,18 @@ def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contac
 
 
 def test_stiction_at_rest_deafens_no_reference() -> None:
-    """The floor in motion is 1 N·m, over all samples √((1 + 25)/2)."""
+    """1 N·m in motion, of half the samples or of one; a joint at rest has its floor."""
     t = np.arange(200) * 0.01
-    moving = np.arange(200)[:, None] < 100
+    moving = np.arange(200)[:, None] < [100, 1, 0]
     one = ExternalTorque(
         name="two-cycle",
         t=t,
-        tau=np.zeros((200, 1)),
+        tau=np.zeros((200, 3)),
         sd=np.where(moving, 1.0, 5.0),
-        floor=np.array([np.sqrt(13.0)]),
+        floor=np.array([np.sqrt(13.0), 5.0, 5.0]),
         moving=moving,
     )
-    np.testing.assert_allclose(floor_in_motion(one), [1.0])
+    np.testing.assert_allclose(floor_in_motion(one), [1.0, 1.0, 5.0])
 
 
 def test_a_free_band_of_torques_is_never_narrower_than_half_a_newton_metre() -> None:

@@ -273,7 +273,7 @@ def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: floa
     if size < 8 or count < LEAST_PIECES:
         return found
     left = off_line(x, size)
-    moves = moving[: count * size].reshape(count, size, -1).mean(axis=1) > 0.5
+    moves = moving[: count * size].reshape(count, size, *x.shape[1:]).mean(axis=1) > 0.5
     whole = t[size - 1 : count * size : size] - t[: count * size : size] < 1.5 * PIECE
     for j in range(x.shape[1]):
         pieces = left[whole & moves[:, j], j]
