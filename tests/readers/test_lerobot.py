@@ -71,7 +71,8 @@ def dataset(
         (folder / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n")
     info = {
         "codebase_version": f"v{version}.0", "robot_type": "fr3", "fps": FPS, "total_episodes": 3,
-        "chunks_size": 2, "features": {name: {"names": names} for name, (_, names) in features.items()},
+        "chunks_size": 2,
+        "features": {name: {"names": names} for name, (_, names) in features.items()},
     }  # fmt: skip
     (folder / "meta" / "info.json").write_text(json.dumps(info))
     return folder
