@@ -147,16 +147,17 @@ def test_neighbours_are_joined_and_the_larger_one_names_them(prepared):
 
 def test_the_worst_explained_heavy_joint_is_named(data):
     """Shares of the torque's mean square that the fit leaves; its variance is what counts."""
-    (log,), residuals = data.logs, [0.9, 0.2, 0.04, 0.9, 0.9, 0.9]
+    (log,) = data.logs
     tau = log.tau
+    most = 0.8 * np.var(tau[:, 1]) / np.mean(tau[:, 1] ** 2)
+    residuals = [0.9, most, 0.01, 0.9, 0.9, 0.9]
     fits = [
         SimpleNamespace(fit=SimpleNamespace(residual=np.sqrt(share) * tau[:, j]))
         for j, share in enumerate(residuals)
     ]
     (remark,) = model_doubts(data, fits)
     assert (remark.code, remark.where.joints) == ("unexplained-torque", (2,))
-    left = 0.2 * np.mean(tau[:, 1] ** 2) / np.var(tau[:, 1])
-    assert remark.values["share_percent"] == pytest.approx(100 * max(1 - left, 0.0), abs=1e-9)
+    assert remark.values["share_percent"] == pytest.approx(20.0, rel=1e-9)
     assert not list(model_doubts(replace(data, moves=np.zeros(6, dtype=bool)), fits))
 
 

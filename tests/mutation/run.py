@@ -39,11 +39,16 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     ),
     "free_motion": (
         ["free_motion/*.py"],
-        ["tests/free_motion", "tests/bias/test_reference_runs.py", "tests/test_pipeline.py"],
+        [
+            "tests/free_motion",
+            "tests/bias/test_reference_runs.py",
+            "tests/evaluation/test_reference_choice.py",
+            "tests/test_pipeline.py",
+        ],
     ),
     "wrench": (
         ["wrench/**/*.py"],
-        ["tests/wrench", "tests/evaluation", "tests/outputs"],
+        ["tests/wrench", "tests/contacts", "tests/evaluation", "tests/outputs"],
     ),
     "evaluation": (
         ["evaluation/*.py"],
@@ -78,14 +83,17 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["signals/*.py"],
         ["tests/signals", "tests/free_motion", "tests/observers", "tests/wrench"],
     ),
-    "contacts": (["contacts/*.py"], ["tests/contacts", "tests/cli/test_contacts.py"]),
+    "contacts": (
+        ["contacts/*.py"],
+        ["tests/contacts", "tests/outputs/test_thresholds.py", "tests/cli/test_contacts.py"],
+    ),
     "simulation": (["simulation/*.py"], ["tests/simulation", "tests/cli/test_simulate.py"]),
     "reproduction": (
         ["reproduction/*.py"],
         ["tests/reproduction", "tests/cli/test_benchmark.py", "tests/cli/test_reproduce.py"],
     ),
-    "outputs": (["outputs/**/*.py"], ["tests/outputs", "tests/cli/test_parts.py"]),
-    "batch": (["batch/**/*.py"], ["tests/batch", "tests/cli/test_batch.py"]),
+    "outputs": (["outputs/**/*.py"], ["tests/outputs", "tests/bias/test_outputs.py", "tests/cli/test_parts.py"]),
+    "batch": (["batch/**/*.py"], ["tests/batch", "tests/cli/test_batch.py", "tests/cli/test_annotate.py"]),
     "cli": (["cli/*.py", "*.py"], ["tests/cli", "tests/test_pipeline.py"]),
 }
 """Room → files that are mutated, and tests that should notice, nearest first.

@@ -110,7 +110,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     # The filter spreads an event at standstill over a period of its cutoff.
     reach = max(1, round(1.0 / (motion.cutoff * median_step(motion.t))))
     sticks = near(slower(motion.dq, SLIDES), reach)
-    excess = np.maximum(abs(residual) - abs(dry) * sticks, 0.0)
+    excess = abs(residual) - abs(dry) * sticks
     z = excess * usable / np.maximum(sd, 1e-9)
     found = list[ContactSpan]()
     for start, stop in intervals(motion.t, z.max(axis=1) > TOUCH, least=TOUCH_TIME):
