@@ -92,8 +92,14 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["reproduction/*.py"],
         ["tests/reproduction", "tests/cli/test_benchmark.py", "tests/cli/test_reproduce.py"],
     ),
-    "outputs": (["outputs/**/*.py"], ["tests/outputs", "tests/bias/test_outputs.py", "tests/cli/test_parts.py"]),
-    "batch": (["batch/**/*.py"], ["tests/batch", "tests/cli/test_batch.py", "tests/cli/test_annotate.py"]),
+    "outputs": (
+        ["outputs/**/*.py"],
+        ["tests/outputs", "tests/bias/test_outputs.py", "tests/cli/test_parts.py"],
+    ),
+    "batch": (
+        ["batch/**/*.py"],
+        ["tests/batch", "tests/cli/test_batch.py", "tests/cli/test_annotate.py"],
+    ),
     "cli": (["cli/*.py", "*.py"], ["tests/cli", "tests/test_pipeline.py"]),
 }
 """Room → files that are mutated, and tests that should notice, nearest first.

@@ -90,6 +90,7 @@ def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
     strong = infer_noise(log, np.array([10.0]), noise())  # its friction says more than the quietest
     assert strong is not None
     assert strong.variance[0] == pytest.approx((0.2 * 10.0) ** 2)
+    assert (strong.at_rest[0], strong.pushed[0]) == (noise().at_rest[0], noise().pushed[0])
     assert infer_noise(blocks(np.zeros((2, 1)), np.zeros((2, 1))), dry, None) is None
 
 
