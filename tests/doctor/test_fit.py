@@ -1,6 +1,7 @@
 """Which robot a log is from: known misfits and loads, inside and outside the limits."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -136,6 +137,29 @@ def test_a_profile_that_fits_goes_before_a_better_one_that_does_not(
 ) -> None:
     found = ranked(monkeypatch, better=fake(0.15, fits=False), fitting=fake(0.19))
     assert found == [("fitting", True), ("better", False)]
+
+
+@pytest.mark.parametrize(
+    ("share", "more", "cause", "rather"),
+    [
+        (0.59, 0.0, None, True),
+        (0.61, 1.4, None, False),
+        (0.79, 1.6, None, True),  # 1/1.25: own needs a load that the other does not
+        (0.81, 1.6, None, False),
+        (1.24, 0.0, "drive-scale", True),
+        (1.26, 0.0, "drive-scale", False),
+        (0.61, 0.0, "effort-sign", False),
+    ],
+)
+def test_how_much_better_another_profile_is_where_a_log_is_its_own(
+    share: float, more: float, cause: str | None, *, rather: bool
+) -> None:
+    healed = SimpleNamespace(misfit=0.2)
+    diagnosis = SimpleNamespace(cause=cause and SimpleNamespace(code=cause), healed=healed)
+    own, other = replace(fake(0.3), load=more), fake(0.2 * share)
+    assert doctor_fit.is_rather(other, own, diagnosis) is rather  # type: ignore[arg-type]
+    misfit = replace(other, fits=False)
+    assert not doctor_fit.is_rather(misfit, own, diagnosis)  # type: ignore[arg-type]
 
 
 def test_what_cannot_be_ranked() -> None:
