@@ -209,7 +209,7 @@ def test_only_readers_outputs_and_loaders_touch_files() -> None:
     for file, tree in modules().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.Call) and not file.startswith(FILES):
-                # A method `open` may open anything; Path.open is told by the others beside it.
+                # A method `open` may open anything; the others beside it show a Path.open.
                 bare = getattr(node.func, "id", None)
                 name = bare or getattr(node.func, "attr", None)
                 if name in TOUCHES and (bare or name != "open"):

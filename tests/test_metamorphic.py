@@ -223,7 +223,7 @@ def of_one_name(ask: Ask, logs: Logs) -> None:
         copied(x, folder, "log.parquet") for x, folder in ((logs.free, "a"), (logs.other, "b"))
     )
     named, alike = ask(logs.free, logs.other), ask(one, two)
-    # Labels differ, so rows are told apart by place: the order of the logs is the same.
+    # Labels differ, so rows differ by place: the order of the logs is the same.
     assert len(alike) == len(named)
     assert list(alike.values()) == pytest.approx(list(named.values()), nan_ok=True, rel=SAME)
 

@@ -110,8 +110,8 @@ def test_thresholds_are_those_of_the_command(tmp_path: Path) -> None:
     from vftcli.cli import app
 
     free = tmp_path / "free.parquet"
-    told = ["simulate", "ur5-circle", "--set", "contacts=[]", "--set", "trajectory.cycles=9"]
-    assert CliRunner().invoke(app, [*told, "-o", str(free)]).exit_code == 0
+    reported = ["simulate", "ur5-circle", "--set", "contacts=[]", "--set", "trajectory.cycles=9"]
+    assert CliRunner().invoke(app, [*reported, "-o", str(free)]).exit_code == 0
     ran = CliRunner().invoke(app, ["thresholds", str(free), "--robot", "ur5", "--json"])
     record = json.loads(ran.stdout)
     found = vft.thresholds(free, "ur5")

@@ -75,11 +75,11 @@ def test_a_fixture_goes_all_the_way_to_a_table() -> None:
 
 
 @pytest.mark.slow
-def test_the_log_must_settle_its_robot_or_be_told() -> None:
+def test_the_log_must_settle_its_robot_or_be_reported() -> None:
     """The controller's own torques tell a UR5; currents alone settle nothing."""
-    told = analyse_log(FIXTURE, AnalysisChoice())
-    assert told.robot.name == "ur5"
-    assert "robot-guessed" in [remark.code for remark in told.robot.remarks]
+    reported = analyse_log(FIXTURE, AnalysisChoice())
+    assert reported.robot.name == "ur5"
+    assert "robot-guessed" in [remark.code for remark in reported.robot.remarks]
     measured = ReadChoice(signals=frozenset({"dq", "current"}))
     with pytest.raises(RobotError, match=r"^Which arm\? .*Add --robot ur"):
         analyse_log(FIXTURE, AnalysisChoice(read=measured))
@@ -180,7 +180,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
 
 
 @pytest.mark.slow
-def test_a_free_run_as_long_as_the_log_is_told_from_it(runs: list[Path]) -> None:
+def test_a_free_run_as_long_as_the_log_is_reported_from_it(runs: list[Path]) -> None:
     """Its raw disturbance was taken for the log's: the tuned gains collapsed."""
     load, free, more = runs
     one = more.with_name("as_long.csv")

@@ -9,13 +9,13 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
 
 
-def test_the_text_holds_what_is_taken_and_shows_the_rest() -> None:
+def test_the_text_holds_what_holds_and_shows_the_rest() -> None:
     text = config_text(
         [
             ProposedOption("why\nso", "robot", "ur5"),
             ProposedOption('a \\ and a " in it', "columns", 'a"b\\c'),
             ProposedOption("two of them", "free", ["a.csv", "b.csv"]),
-            ProposedOption("or this " * 40, "reference", "zero", taken=False),
+            ProposedOption("or this " * 40, "reference", "zero", holds=False),
             ProposedOption("a remark\x07"),
         ]
     )

@@ -62,64 +62,64 @@ def expected(samples: Path) -> dict[str, Any]:
     return found
 
 
-def readings(path: Path, told: dict[str, Any]) -> Iterator[tuple[Recording, dict[str, Any]]]:
+def readings(path: Path, reported: dict[str, Any]) -> Iterator[tuple[Recording, dict[str, Any]]]:
     """A sample as it has to be read, and what its entry tells of that; each arm and episode."""
-    if "arms" in told:
+    if "arms" in reported:
         for side in ("left", "right"):
-            yield read(path, arm=side), told | told[side]
-    elif "joints" in told and isinstance(told["joints"], list):
+            yield read(path, arm=side), reported | reported[side]
+    elif "joints" in reported and isinstance(reported["joints"], list):
         log = read(path)
-        assert list(log.joint_names) == told["file_order"]
-        laid = paired(log, load_robot(path.parent / told["robot"]))
+        assert list(log.joint_names) == reported["file_order"]
+        laid = paired(log, load_robot(path.parent / reported["robot"]))
         assert "joints-left-out" in {remark.code for remark in laid.source.remarks}
-        yield laid, told
+        yield laid, reported
     else:
-        yield read(path, columns=told.get("right_columns")), told
+        yield read(path, columns=reported.get("right_columns")), reported
 
 
-def check_log(name: str, log: Recording, told: dict[str, Any]) -> None:
+def check_log(name: str, log: Recording, reported: dict[str, Any]) -> None:
     """Check the joints, the count, the clock, the signals, and their first and last values."""
-    joints = told["joints"] if isinstance(told["joints"], int) else len(told["joints"])
-    assert (log.joints, log.samples) == (joints, told["samples"]), name
-    assert 1 / log.median_step == pytest.approx(told["rate_hz"], rel=1e-3), name
-    np.testing.assert_allclose(log.t[[0, -1]], told["t"], atol=2e-9, err_msg=name)
+    joints = reported["joints"] if isinstance(reported["joints"], int) else len(reported["joints"])
+    assert (log.joints, log.samples) == (joints, reported["samples"]), name
+    assert 1 / log.median_step == pytest.approx(reported["rate_hz"], rel=1e-3), name
+    np.testing.assert_allclose(log.t[[0, -1]], reported["t"], atol=2e-9, err_msg=name)
     assert log.source.format == FORMATS.get(Path(name).suffix, log.source.format)
-    for signal in (key for key in (*SIGNALS, "effort") if key in told):
+    for signal in (key for key in (*SIGNALS, "effort") if key in reported):
         # Names of UR say current, and so does what a driver calls effort: what it is the model
         # finds.
         called = signal
         if signal == "effort" or (signal == "torque" and log.torque is None):
             called = "current"
         values = log.require(called)[[0, -1]]
-        if "arms" in told and signal == "effort":
+        if "arms" in reported and signal == "effort":
             values = 1e3 * values  # read as mA
         digits = DIGITS.get(name, 2e-9)
         if name == "ur5_degrees_turned.csv" and signal == "torque":
             digits = 4e-6
-        ends = [told[signal]["first"], told[signal]["last"]]
+        ends = [reported[signal]["first"], reported[signal]["last"]]
         np.testing.assert_allclose(
             values, ends, rtol=1e-12, atol=digits, err_msg=f"{name} {signal}"
         )
 
 
-def check_robot(path: Path, told: dict[str, Any]) -> None:
+def check_robot(path: Path, reported: dict[str, Any]) -> None:
     """Check a robot's joints and flange, its masses, and its torques to 1e-6 N·m."""
     robot = load_robot(path)
     taken = next(r.values for r in robot.remarks if "flange" in r.values)
-    assert taken["flange"] == told["flange"]
-    if (motion := told.get("inverse_dynamics")) is not None:
+    assert taken["flange"] == reported["flange"]
+    if (motion := reported.get("inverse_dynamics")) is not None:
         pin = pytest.importorskip("pinocchio", reason="an MJCF is read by pin, which is missing")
         model = robot.chain.to_pinocchio()
         moving = (np.array(motion[key]) for key in ("q", "v", "a"))
         torque = pin.rnea(model, model.createData(), *moving)
         np.testing.assert_allclose(torque, motion["N·m"], atol=1e-6)
         return
-    assert list(robot.chain.names) == told["joints"]
-    assert sorted(taken["locked"]) == sorted(told["locked"])
-    np.testing.assert_allclose(robot.chain.mass, told["link_masses"], rtol=1e-12)
-    q = np.array([told["gravity_torque"]["q"]])
+    assert list(robot.chain.names) == reported["joints"]
+    assert sorted(taken["locked"]) == sorted(reported["locked"])
+    np.testing.assert_allclose(robot.chain.mass, reported["link_masses"], rtol=1e-12)
+    q = np.array([reported["gravity_torque"]["q"]])
     gravity = momentum_terms(robot.chain, q, np.zeros((1, 6))).gravity[0]
-    np.testing.assert_allclose(gravity, told["gravity_torque"]["N·m"], atol=1e-6)
+    np.testing.assert_allclose(gravity, reported["gravity_torque"]["N·m"], atol=1e-6)
 
 
 @pytest.mark.slow
@@ -127,15 +127,15 @@ def test_every_entry_is_read_as_expected_or_refused_as_stated(
     samples: Path, expected: dict[str, Any]
 ) -> None:
     pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
-    for name, told in expected.items():
+    for name, reported in expected.items():
         path = samples / "reach" / name
         if (words := REFUSED.get(name)) is not None:
             with pytest.raises(LogError, match=words):
                 read(path)
         if path.suffix in {".urdf", ".xml"}:
-            check_robot(path, told)
+            check_robot(path, reported)
         elif path.suffix != ".xlsx" and not name.startswith("robomimic"):
-            for log, of_log in readings(path, told):
+            for log, of_log in readings(path, reported):
                 check_log(name, log, of_log)
         if (code := SAID.get(name)) is not None:
             assert code in {remark.code for remark in read(path).source.remarks}, name
@@ -231,7 +231,7 @@ READINGS = {
 
 @pytest.mark.statistical
 @pytest.mark.parametrize("name", LOGS)
-def test_an_effort_is_told_from_four_others_on_real_logs(logs: Path, name: str) -> None:
+def test_an_effort_is_reported_from_four_others_on_real_logs(logs: Path, name: str) -> None:
     """Each is explained best as what it is; what explains it less than 1.5 × better is said."""
     from vftcli.doctor.causes import readings
     from vftcli.doctor.windows import windows_of
@@ -247,13 +247,13 @@ def test_an_effort_is_told_from_four_others_on_real_logs(logs: Path, name: str) 
         for effort, code in zip((current, torque, torque - load, -torque, -current), codes,
                                 strict=True):  # fmt: skip
             tried = replace(plain, **{called: effort})
-            told = [
+            reported = [
                 reading
                 for reading in readings(replace(windows, recording=tried), robot)
                 # Currents without gravity are none of the five.
                 if reading.code != "current-without-gravity"
             ]
-            assert min(told, key=lambda reading: reading.case.misfit).code == code
+            assert min(reported, key=lambda reading: reading.case.misfit).code == code
 
 
 def test_derived_velocities_are_said_and_near_the_logged(samples: Path) -> None:

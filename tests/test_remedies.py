@@ -74,7 +74,7 @@ def planted(name: str, *words: str, robot: str = "ur5") -> Command:
 
 
 def unnamed(plant: Callable[[Table], Table], robot: str = "ur5") -> Command:
-    """An examination that is not told which arm it is."""
+    """An examination that does not know which arm it is."""
     return lambda folder: of(plant, robot=robot)(folder)[:2]
 
 
@@ -320,7 +320,7 @@ def printed(words: list[Any]) -> tuple[int, str]:
     return code, " ".join(f"{out} {err}".replace('\\"', '"').split())
 
 
-def told(code: str, text: str) -> str | None:
+def reported(code: str, text: str) -> str | None:
     """What a text says of a code, with its remedy; None where it says nothing of it."""
     entry = words_of(code)
     rest = [entry[key] for key in ("consequence", "remedy") if key in entry]
@@ -354,11 +354,11 @@ def test_the_remedy_heals(row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.chdir(tmp_path)
     words = row.command(tmp_path)
     before = printed(words)[1]
-    said = told(row.code, before)
+    said = reported(row.code, before)
     assert said is not None, before
     code, after = printed(with_option(words, said, row))
     assert code == 0, after
-    assert told(row.code, after) is None
+    assert reported(row.code, after) is None
 
 
 def with_option(words: list[Any], said: str, row: Row) -> list[Any]:
@@ -451,12 +451,12 @@ def test_a_load_that_a_log_shows_is_found_and_mounted(tmp_path: Path) -> None:
     log = moving("ur5", load=2.8, seconds=12.0)
     table = replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current"))
     path, own = table.write(tmp_path / "log.csv"), tmp_path / "loaded.toml"
-    said = told("unmodelled-load", printed(["inspect", path, "--robot", "ur5"])[1])
+    said = reported("unmodelled-load", printed(["inspect", path, "--robot", "ur5"])[1])
     assert said is not None
     name, *how = re.search(r"(identify) (--method) (payload)", said).groups()  # type: ignore[union-attr]
     code, text = printed([name, path, *how, "--robot", "ur5", "-o", own])
     assert code == 0, text
-    assert told("unmodelled-load", printed(["inspect", path, "--robot", own])[1]) is None
+    assert reported("unmodelled-load", printed(["inspect", path, "--robot", own])[1]) is None
 
 
 @pytest.mark.slow
@@ -465,7 +465,7 @@ def test_an_offset_is_taken_out_with_the_remedy(
 ) -> None:
     """J3's, after 4 s, by the friction that is identified on the free cycle before."""
     monkeypatch.chdir(tmp_path)
-    said = told("effort-offset", printed(planted("offset_J3_20pct")(tmp_path))[1])
+    said = reported("effort-offset", printed(planted("offset_J3_20pct")(tmp_path))[1])
     assert said is not None
     (shift,) = re.findall(r"has an offset of (\S+) ", said)
     (how,) = re.findall("identify --interval A:B --method (friction) -o FILE.toml", said)
@@ -510,7 +510,7 @@ REFUSALS = [
     Row("which looks like degrees", of(positions_in_degrees), "columns", "q[deg]=q{i}"),
     Row("Nothing is filled in", of(unknown_estimate, robot="panda"), "columns",
         "t=t,q=q{i},dq=dq{i},tau=tau{i}"),
-    Row("stands still: all", of(lambda t: replace(t, t=0.0 * t.t)), "columns", "t@125Hz"),
+    Row("never moves: all", of(lambda t: replace(t, t=0.0 * t.t)), "columns", "t@125Hz"),
     Row("no joint positions (q)", lambda f: renamed(sound(), "q", "zz", f), "columns",
         "q=zz{i},dq=dzz{i}"),
     Row("no repetition found", of(lambda t: t.between(4.5, 9.0), *TWO_CYCLE), "free", free_log),

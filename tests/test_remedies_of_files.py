@@ -334,7 +334,7 @@ WITHOUT_ROW = {
     ),
     ELSEWHERE: (
         "a load is found from one pair of logs", "--reference says where a log was touched",
-        "the clock stands still", "which looks like degrees", "no joint positions (q) among",
+        "the clock never moves", "which looks like degrees", "no joint positions (q) among",
     ),
     DATASET: (
         "no joint positions among", "the positions are of", "arm alone; leave --arm out",

@@ -126,7 +126,7 @@ def identified(
     every: list[list[Recording]] = []
     for paths, how in ((logs, choice.read), (check, held_out), (choice.free.logs, unloaded)):
         opened = library.open_each(paths, how, whole=paths is logs and task.method == "payload")
-        every.append([examiner.taken(log, profile, how) for log in opened])
+        every.append([examiner.read_as(log, profile, how) for log in opened])
     for recording in (one for some in every for one in some):
         if tell is not None:
             tell(recording)
@@ -136,7 +136,7 @@ def identified(
     return identify(train, profile, task, tried, free[0] if free else None)
 
 
-#: Observers from whose spectra gains are found.
+#: Observers that give the spectra from which gains are found.
 TUNED = ObserverChoice(gains=LOG_GAINS, causal=True)
 
 

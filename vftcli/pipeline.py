@@ -148,7 +148,7 @@ def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, R
     robot = choice.examiner.robot(recording, choice.robot)
     if choice.observers.causal:
         check_logged(recording, "--causal leaves out what looks ahead")
-    return choice.examiner.taken(recording, robot, choice.read), robot
+    return choice.examiner.read_as(recording, robot, choice.read), robot
 
 
 def check_logged(recording: Recording, why: str) -> None:
@@ -190,7 +190,7 @@ def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Run
     runs = []
     for path in choice.free.logs:
         free = choice.library.open(path, choice.read.whole)
-        free = choice.examiner.taken(free, robot, choice.read)
+        free = choice.examiner.read_as(free, robot, choice.read)
         runs.append(FreeRun(run=models.of(free, robot, literal=literal), log=log))
     return FreeMotion(log=log, choice=choice.free, runs=tuple(runs))
 

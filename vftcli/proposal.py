@@ -36,7 +36,7 @@ class ProposedOption(NamedTuple):
     why: str  #: Its reason.
     key: str = ""  #: The option without its dashes, or a setting; "" of a remark.
     value: str | list[str] = ""  #: Its value: a text or several.
-    taken: bool = True  #: Whether it holds, or is only there to be taken.
+    holds: bool = True  #: Whether it holds, or is only a choice that you have.
 
 
 def propose(
@@ -61,7 +61,7 @@ def propose(
     if "log.effort" not in given:
         effort = effort_of(recording, robot, choice)
         yield effort
-        if effort.taken:
+        if effort.holds:
             choice = replace(choice, read=replace(choice.read, effort=str(effort.value)))
     yield from of_known_arm(logs, choice)
 
@@ -78,7 +78,7 @@ def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[Propo
     for log in logs[1:]:
         option = free_log(log, choice, models)
         yield option
-        free += [log] if option.taken else []
+        free += [log] if option.holds else []
     if free:
         yield ProposedOption("nothing touches the arm in them", "free", [str(log) for log in free])
     choice = replace(choice, free=FreeChoice(logs=tuple(free)))
@@ -98,7 +98,7 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
         f"{source.label} is recognised by its content; a file that is not needs this",
         "log.format",
         source.format,
-        taken=False,
+        holds=False,
     )
     for remark in source.remarks:
         if remark.code == "columns-by-value":
@@ -107,7 +107,7 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
         yield ProposedOption("the log has no velocities", "log.derive", "dq")
     if recording.payload_mass:
         words = f"the controller assumes {recording.payload_mass:.3g} kg"
-        yield ProposedOption(words, "payload", "log", taken=False)
+        yield ProposedOption(words, "payload", "log", holds=False)
 
 
 def possible_robots(recording: Recording, error: RobotError) -> Iterator[ProposedOption]:
@@ -121,12 +121,12 @@ def possible_robots(recording: Recording, error: RobotError) -> Iterator[Propose
             "What each leaves unexplained:"
         )
     for fit in fits:
-        yield ProposedOption(str(fit), "robot", fit.robot, taken=False)
+        yield ProposedOption(str(fit), "robot", fit.robot, holds=False)
 
 
 def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> ProposedOption:
     """What the effort of a log is, by its robot's model."""
-    as_called = choice.examiner.taken(recording, robot, replace(choice.read, effort=None))
+    as_called = choice.examiner.read_as(recording, robot, replace(choice.read, effort=None))
     for finding in examine(as_called, robot).findings:
         if (right := CORRECTIONS.get(finding.code)) is not None:
             # A sign or a unit has no name of its own.
@@ -134,7 +134,7 @@ def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Pro
             return ProposedOption(in_words(finding).evidence, "log.effort", named)
     called = effort_name(recording, robot).replace("_", "-")
     words = "as the log calls it; the robot's model explains no other reading clearly better"
-    return ProposedOption(words, "log.effort", called, taken=False)
+    return ProposedOption(words, "log.effort", called, holds=False)
 
 
 def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
@@ -144,13 +144,13 @@ def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
         recording, robot = prepared(choice.library.open(log, choice.read.whole), choice)
         contacts = list_touches(recording, robot, choice, models).contacts
     except VftError as error:
-        return ProposedOption(f"{label} is left out: {error}", taken=False)
+        return ProposedOption(f"{label} is left out: {error}", holds=False)
     count = len(contacts.contacts) if contacts is not None else 0
     if count:
         words = (
             f"{label}: {count} contacts by this robot's model; take it if nobody touched the arm"
         )
-        return ProposedOption(words, "free", [str(log)], taken=False)
+        return ProposedOption(words, "free", [str(log)], holds=False)
     return ProposedOption(f"{label}: no contact in {recording.duration:.3g} s")
 
 
@@ -164,9 +164,9 @@ ONE_CYCLE = (
 def references(
     recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
 ) -> Iterator[ProposedOption]:
-    """What estimates can be compared with: each is tried, and the first that does is taken."""
+    """What estimates can be compared with: each is tried, and the first that works holds."""
     plain = replace(choice, observers=ObserverChoice(names=("gmo",)), contacts=False)
-    taken = False
+    found = False
     for name, why in reasons(recording).items():
         asked = replace(plain, reference=ReferenceChoice(name=name))
         try:
@@ -178,8 +178,8 @@ def references(
         except VftError as error:
             yield ProposedOption(f"no reference {name}: {error}")
         else:
-            yield ProposedOption(doubt or why, "reference", name, taken=not (taken or doubt))
-            taken = taken or not doubt
+            yield ProposedOption(doubt or why, "reference", name, holds=not (found or doubt))
+            found = found or not doubt
 
 
 def reasons(recording: Recording) -> dict[str, str]:
@@ -187,7 +187,7 @@ def reasons(recording: Recording) -> dict[str, str]:
     frame, others = recording.wrench_frame, dict(REFERENCES)
     if frame is None or frame.axes != "base":
         return others
-    # A sensor measures in axes of its own; what stands in base axes is its controller's.
+    # A sensor measures in axes of its own; what is in base axes is its controller's.
     del others["sensor"]
     words = "the log holds a wrench of its controller: an estimate as well where no sensor is"
     return {"two-cycle": others.pop("two-cycle"), "sensor": words, **others}
@@ -203,7 +203,7 @@ WIDTH = 98  #: Letters of a reason's line.
 
 
 def config_text(options: Iterable[ProposedOption]) -> str:
-    """A file of options, each under its reason, those to be taken behind a ``#``.
+    """A file of options, each under its reason, a mere choice behind a ``#``.
 
     Settings stand last, in the table of their group.
     """
@@ -217,6 +217,6 @@ def config_text(options: Iterable[ProposedOption]) -> str:
         part = "".join(f"# {line}\n" for line in textwrap.wrap(why, WIDTH))
         if option.key:
             line = "".join(lines_of({key: option.value}))
-            part += line if option.taken else f"# {line}"
+            part += line if option.holds else f"# {line}"
         parts.append(part)
     return "\n".join(parts)

@@ -48,7 +48,7 @@ def analysed_in_blocks(
     in all of it.
     """
     robot = choice.examiner.robot(stretches(recording), choice.robot)
-    log = choice.examiner.taken(recording, robot, choice.read, in_stretches=True)
+    log = choice.examiner.read_as(recording, robot, choice.read, in_stretches=True)
     examined = choice.examiner.examine(log, robot, in_stretches=True)
     whole, part = (read(each, robot, choice, Runs()) for each in (log, stretches(log)))
     made = observe(whole, None, choice, running=False)

@@ -172,7 +172,7 @@ def test_quiet_log_moves_nothing_and_says_so() -> None:
 
 
 @pytest.mark.slow
-def test_force_at_rest_for_long_is_told() -> None:
+def test_force_at_rest_for_long_is_reported() -> None:
     record, q = push(length=10.0)
     wrench = record.values.copy()
     wrench[record.t > 4.0, 0] = 21.0
@@ -209,7 +209,7 @@ def test_release_needs_a_deviation() -> None:
         replay_release(np.zeros(6), UR5, controllers(p), start=START)
 
 
-def test_a_force_that_is_not_known_counts_as_none_and_is_told() -> None:
+def test_a_force_that_is_not_known_counts_as_none_and_is_reported() -> None:
     wrench, q = push()
     hidden = (wrench.t > 1.5) & (wrench.t < 1.7)
     found = run((replace(wrench, masked=hidden), q), "threshold_mode=soft")

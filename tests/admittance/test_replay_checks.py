@@ -63,7 +63,7 @@ def test_nothing_is_said_of_a_replay_without_trouble() -> None:
     assert not [*trouble(replayed(logged=np.full((5, 6), 0.005)))]
 
 
-def test_each_limit_is_told_with_its_number_and_its_controller() -> None:
+def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
     x, clipped, reached = (
         np.zeros((ROWS, 2, 6)),
         np.zeros((ROWS, 2, 6), bool),
@@ -75,10 +75,10 @@ def test_each_limit_is_told_with_its_number_and_its_controller() -> None:
     rises = np.array([0, 7])
     found = [*trouble(replayed(motion(x, clipped), path(reached, 1.5), rises=rises))]
     assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
-    told = {(r.code, r.where.about): dict(r.values) for r in found}
+    reported = {(r.code, r.where.about): dict(r.values) for r in found}
     first, second = (controller.name for controller in TWO)
-    assert told.pop(("travel-implausible-hard", ""))["travel_m"] > 1e300  # it escaped
-    assert told == {
+    assert reported.pop(("travel-implausible-hard", ""))["travel_m"] > 1e300  # it escaped
+    assert reported == {
         ("speed-limit-acted", first): {"periods": 3},
         ("joint-too-fast", first): {"share": 1.5},
         ("motion-escaped", second): {"time_s": pytest.approx(2.0)},
@@ -116,7 +116,7 @@ def drag(begin: int, release: int, axis: int = 2) -> Drag:
     return Drag(axis=axis, number=1, begin=begin, release=release, end=release)
 
 
-def test_a_long_drag_of_an_arm_at_rest_is_told_once_an_axis() -> None:
+def test_a_long_drag_of_an_arm_at_rest_is_reported_once_an_axis() -> None:
     logged = np.zeros((100, 6))
     drags = [drag(0, 30), drag(40, 90), drag(10, 25, axis=0)]
     found = drag_remarks(replayed(parameters=SLOW, drags=drags, logged=logged))
@@ -150,7 +150,7 @@ def test_unknown_samples_are_counted() -> None:
     assert counted(replace(wrench, masked=np.zeros(10, dtype=bool))) == []
 
 
-def test_a_log_that_moves_is_told_how_far() -> None:
+def test_a_log_that_moves_is_reported_how_far() -> None:
     logged = np.zeros((5, 6))
     logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
     (remark,) = trouble(replayed(logged=logged))

@@ -302,9 +302,9 @@ def test_the_datasets_library_loads_it_by_its_own_description(
     made(FIXTURE, tmp_path / "copy", asked)
     info = json.loads((tmp_path / "copy" / "meta" / "info.json").read_text())
     features = {}
-    for name, told in info["features"].items():
-        value = datasets.Value(told["dtype"])
-        width = told["shape"][0]
+    for name, reported in info["features"].items():
+        value = datasets.Value(reported["dtype"])
+        width = reported["shape"][0]
         features[name] = value if width == 1 else datasets.Sequence(value, length=width)
     datasets.disable_progress_bars()
     loaded = datasets.load_dataset(

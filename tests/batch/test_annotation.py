@@ -40,10 +40,12 @@ def test_one_observer_over_whole_episodes() -> None:
 )
 def test_what_looks_ahead_is_not_causal(asked: ForceChoice) -> None:
     assert not asked.is_online
-    assert not any(c.told["causal"] for c in force_columns(asked, ["a"], derived=False, valid=True))
+    assert not any(
+        c.about["causal"] for c in force_columns(asked, ["a"], derived=False, valid=True)
+    )
 
 
-def test_the_columns_and_what_is_told_of_them() -> None:
+def test_the_columns_and_what_is_reported_of_them() -> None:
     asked = ForceChoice(wrench=WrenchChoice(frame="base"), sd=True, contact=True)
     found = force_columns(asked, ["j1", "j2"], derived=False, valid=True)
     assert [(c.name, c.width) for c in found] == [
@@ -52,11 +54,11 @@ def test_the_columns_and_what_is_told_of_them() -> None:
     ]  # fmt: skip
     assert found[0].elements == ("j1.external_torque", "j2.external_torque")
     assert found[3].elements == ("fx", "fy", "fz", "mx", "my", "mz")
-    assert found[3].told["frame"] == "base axes, moment about the flange point"
+    assert found[3].about["frame"] == "base axes, moment about the flange point"
     # the list of contacts sees the complete episode
-    assert [c.told["causal"] for c in found] == [True] * 5 + [False]
+    assert [c.about["causal"] for c in found] == [True] * 5 + [False]
     derived = force_columns(asked, ["j1", "j2"], derived=True, valid=False)
-    assert (len(derived), derived[0].told["causal"]) == (4, False)
+    assert (len(derived), derived[0].about["causal"]) == (4, False)
     left = replace(asked, read=ReadChoice(arm="left"))
     assert force_columns(left, ["j"], derived=False, valid=False)[0].name == "external_torque_left"
 

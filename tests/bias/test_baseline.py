@@ -1,4 +1,4 @@
-"""A log's free part and spectra: pieces told apart as objects, and what is believed to be free."""
+"""A log's free part and spectra: pieces are apart as objects, and what counts as free."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -62,11 +62,11 @@ def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) ->
 
 def test_run_json_records_what_was_chosen(worked_up: Analysis) -> None:
     record = json.loads(to_json(run_record(worked_up, "vftcli report")))
-    told = record["complete_log"]
-    assert told["bias_removed"] == "auto"
-    assert told["best"] is None  # it was not asked for
-    assert len(told["tuned"]["rts-auto"]["omega_n_rad_s"]) == 6
-    assert set(told["error_budget_Nm"]) == {e.name for e in worked_up.estimates}
+    reported = record["complete_log"]
+    assert reported["bias_removed"] == "auto"
+    assert reported["best"] is None  # it was not asked for
+    assert len(reported["tuned"]["rts-auto"]["omega_n_rad_s"]) == 6
+    assert set(reported["error_budget_Nm"]) == {e.name for e in worked_up.estimates}
     assert "filter" in next(o["parameters"] for o in record["observers"] if o["name"] == "rts-auto")
 
 

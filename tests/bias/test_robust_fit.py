@@ -1,4 +1,4 @@
-"""Contacts told from free motion while the model's error is fitted."""
+"""Contacts are kept apart from free motion while the model's error is fitted."""
 
 import numpy as np
 import pytest

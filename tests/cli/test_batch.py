@@ -145,7 +145,7 @@ def test_an_episode_is_a_log(run, samples: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (("nothing/*.csv", "--do", "estimate"), "no log"),
         ((CIRCLE, "--do", "compare"), "--reference"),
@@ -154,10 +154,10 @@ def test_an_episode_is_a_log(run, samples: Path, tmp_path: Path) -> None:
         ((CIRCLE, "--do", "estimate", "--robot", "ur5", "--payload", "cup"), "cup"),
     ],
 )
-def test_what_cannot_be_done_is_one_line(run, tmp_path: Path, words, told: str) -> None:
+def test_what_cannot_be_done_is_one_line(run, tmp_path: Path, words, reported: str) -> None:
     code, _, err = run("batch", *words, "-o", tmp_path / "out")
     assert code == 1
-    assert told in err
+    assert reported in err
     assert err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
@@ -171,8 +171,8 @@ def test_what_describes_logs_is_passed_over_and_said_once(
     (folder / "a" / "log.csv.scenario.toml").write_text("seed = 1\n")
     code, _, err = run("batch", folder, *HERE, "-o", tmp_path / "out")
     assert code == 0
-    told = "note: 3 files are not logs: log.csv.scenario.toml, meta.json, meta.json\n"
-    assert err.count("not logs") == err.count(told) == 1
+    reported = "note: 3 files are not logs: log.csv.scenario.toml, meta.json, meta.json\n"
+    assert err.count("not logs") == err.count(reported) == 1
     code, _, err = run("batch", described, *HERE, "-o", tmp_path / "named")
     assert code == 1
     assert "error: meta.json: no joint positions (q) among gains" in err

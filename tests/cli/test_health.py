@@ -138,7 +138,7 @@ def test_an_open_effort_heals_the_log(turned: str, run: Run, tmp_path: Path) -> 
     assert healed.equals(plain)
 
 
-def test_free_runs_are_examined_too_and_told_by_name(turned: str, run: Run) -> None:
+def test_free_runs_are_examined_too_and_reported_by_name(turned: str, run: Run) -> None:
     words = ("--observer", "gmo", "--free", turned, "-o", "out")
     code, _, err = run("estimate", FIXTURE, *UR5, *words)
     assert code == 1

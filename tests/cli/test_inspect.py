@@ -33,16 +33,16 @@ def run(*words: object) -> tuple[int, str]:
 
 def test_inspect_as_json(table: Path) -> None:
     code, out = run("inspect", table, "--json")
-    told = json.loads(out)
+    reported = json.loads(out)
     assert code == 0
-    assert set(told) >= KEYS
-    assert told["format"] == "table"
-    assert (told["joints"], told["samples"], told["duplicates"]) == (1, 400, 1)
-    assert told["duration_s"] == pytest.approx(3.99)
-    assert told["rate_hz"] == pytest.approx(100)
-    assert told["max_gap_s"] == pytest.approx(0.01)
-    assert isinstance(told["repairs"], list)
-    assert isinstance(told["warnings"], list)
+    assert set(reported) >= KEYS
+    assert reported["format"] == "table"
+    assert (reported["joints"], reported["samples"], reported["duplicates"]) == (1, 400, 1)
+    assert reported["duration_s"] == pytest.approx(3.99)
+    assert reported["rate_hz"] == pytest.approx(100)
+    assert reported["max_gap_s"] == pytest.approx(0.01)
+    assert isinstance(reported["repairs"], list)
+    assert isinstance(reported["warnings"], list)
 
 
 def test_inspect_in_words(table: Path) -> None:
@@ -71,9 +71,9 @@ def test_names_with_control_characters_are_shown_harmlessly(tmp_path: Path) -> N
 
 def test_inspect_of_what_is_no_log(tmp_path: Path) -> None:
     (tmp_path / "x").write_bytes(b"")
-    code, told = run("inspect", tmp_path / "x")
+    code, reported = run("inspect", tmp_path / "x")
     assert code == 1
-    assert "empty" in told
+    assert "empty" in reported
 
 
 def test_formats_lists_every_reader() -> None:
@@ -88,8 +88,8 @@ def test_formats_lists_every_reader() -> None:
 def test_convert(table: Path, tmp_path: Path, ending: str) -> None:
     out = tmp_path / f"x.{ending}"
     assert run("convert", table, "-o", out)[0] == 0
-    told = json.loads(run("inspect", out, "--json")[1])
-    assert told["samples"] == 400
+    reported = json.loads(run("inspect", out, "--json")[1])
+    assert reported["samples"] == 400
     code, message = run("convert", table, "-o", out)
     assert code == 1
     assert "--force" in message

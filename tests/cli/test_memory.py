@@ -1,4 +1,4 @@
-"""Freed memory goes back: told to the C library, and harmless where there is another."""
+"""Freed memory goes back through the C library; another library does no harm."""
 
 import ctypes
 
@@ -7,16 +7,16 @@ import pytest
 from vftcli.cli.analysis import LARGE, MMAP_THRESHOLD, give_back
 
 
-def test_the_c_library_is_told_once_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[tuple[int, int]] = []
+def test_the_c_library_is_reported_once_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    reported: list[tuple[int, int]] = []
 
     class Library:
         def mallopt(self, what: int, size: int) -> None:
-            told.append((what, size))
+            reported.append((what, size))
 
     monkeypatch.setenv("ARROW_DEFAULT_MEMORY_POOL", "mimalloc")
     monkeypatch.setattr(ctypes, "CDLL", lambda _: Library())
     give_back()
-    assert told == [(MMAP_THRESHOLD, LARGE)]
+    assert reported == [(MMAP_THRESHOLD, LARGE)]
     monkeypatch.setattr(ctypes, "CDLL", lambda _: object())  # one without mallopt
     give_back()

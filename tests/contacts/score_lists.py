@@ -53,7 +53,7 @@ class LogScore(NamedTuple):
     Attributes:
         list: Rows and the true contacts they are credited to.
         held: Samples in contact and in a row in which each axis' 95 % band held. (S, 6)
-        smallest: The smallest force that is told. [N]
+        smallest: The smallest force that the list shows. [N]
         seconds: What the list took, for 60 s of log. [s]
         agree: Of each credited row whether |F| of `best` at the peak lies in the row's band.
     """
@@ -166,8 +166,8 @@ class Figures(NamedTuple):
         anywhere: Share of the peaks within the range over every place that fits.
         axes: Share of the samples in contact whose band of `best` holds, per axis. (6,)
         right: Rows placed on the part of the arm that was touched.
-        unsure: Rows whose place cannot be told.
-        smallest: Mean of the smallest force that is told. [N]
+        unsure: Rows without a place.
+        smallest: Mean of the smallest force that the list shows. [N]
         agree: Share of the rows whose band holds |F| of `best` at the peak.
         seconds: What the list took for 60 s of log, on average. [s]
     """
@@ -262,7 +262,7 @@ def line(of: Figures) -> str:
 
 def details(found: Score) -> list[str]:
     """A line a row, and one a missed contact."""
-    told = [
+    reported = [
         f"  {row.start:6.2f}-{row.stop:6.2f} (true {met.start:6.2f}-{met.stop:6.2f}) "
         f"{row.peak_force:5.1f} ± {row.peak_band:4.1f} (true {met.size:5.1f}) N "
         f"{row.evidence:7.1f} nats {row.where} {row.lead:.0f} {row.places}"
@@ -270,7 +270,7 @@ def details(found: Score) -> list[str]:
     ]
     credited = {id(row) for row, _ in found.pairs}
     return [
-        *told,
+        *reported,
         *(f"  missed {met.start:6.2f}-{met.stop:6.2f} {met.size:5.1f} N" for met in found.missed),
         *(f"  false {row.start:.2f}-{row.stop:.2f}" for row in found.false),
         *(() if credited else ("  nothing credited",)),

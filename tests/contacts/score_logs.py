@@ -51,9 +51,9 @@ def ur10e(*names: str, free: str | None = None) -> list[ContactList]:
 
 def shown(found: ContactList) -> None:
     """One line a row."""
-    told = found.smallest_force
+    reported = found.smallest_force
     print(f"{found.recording}: {len(found.contacts)} rows in {found.duration:.1f} s, "
-          f"{found.method}, smallest {told if told is None else round(told, 1)} N, "
+          f"{found.method}, smallest {reported if reported is None else round(reported, 1)} N, "
           f"stops {[round(at, 2) for at in found.stops]}, "
           f"{[remark.code for remark in found.remarks]}")  # fmt: skip
     for row in found.contacts:
@@ -74,7 +74,7 @@ def push() -> None:
 
 
 def load() -> None:
-    """2.805 kg nobody told: (0, 0, −27.52) N."""
+    """2.805 kg that nobody named: (0, 0, −27.52) N."""
     (found,) = ur10e("load_14harm.csv", free="free_14harm.csv")
     shown(found)
 

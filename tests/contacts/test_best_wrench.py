@@ -94,7 +94,7 @@ def test_the_band_of_best_holds_the_true_wrench_of_every_sample(name: str) -> No
 
 
 @pytest.mark.slow
-def test_a_load_nobody_told_is_in_the_wrench_of_best() -> None:
+def test_a_load_nobody_reported_is_in_the_wrench_of_best() -> None:
     """2 kg at 5 cm in the drives of 14 s of the circle: 19.6 N, of which best had none.
 
     Measured 1.2 N rms along z, .97 to 1.00 of the samples in the band; without the load in it

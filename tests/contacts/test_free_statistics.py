@@ -119,7 +119,7 @@ def test_contacts_that_are_none_read_little() -> None:
     assert free is not None
     found = self_test(free, START)
     assert np.all(found.widening >= 1.0)
-    # Simulations told 4 to 9 N.
+    # Simulations gave 4 to 9 N.
     assert 1.0 < found.smallest_force < 15.0
     assert len(pseudo_contacts(free.pieces[0], 3)) == 3
 
@@ -163,7 +163,7 @@ def test_free_cycles_with_a_contact_in_every_one_are_not_believed() -> None:
     rng = np.random.default_rng(5)
     torque = 0.2 * rng.standard_normal(q.shape)
     torque[(t % 4.0) > 2.0] += 20.0
-    # d = torque exactly, less friction: the log is told by its terms alone.
+    # d = torque exactly, less friction: the terms alone describe the log.
     p = np.cumsum(0.008 * torque, axis=0)
     log = still.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
     own = (t >= 4.5) & (t < 8.0)

@@ -92,7 +92,7 @@ def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks(listed: Lister)
     assert max(near) < 0.1
 
 
-def test_at_15_hz_the_pushes_are_still_told() -> None:
+def test_at_15_hz_the_pushes_are_still_reported() -> None:
     whole = read(FIXTURES / "ur5_circle.csv")
     rows = list_contacts(motion(part(whole, np.arange(0, whole.samples, 8)), "ur5", "0.3:4"))
     true = true_contacts(*true_wrench("ur5_circle.csv"))
@@ -170,7 +170,7 @@ def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
 
 
 @pytest.mark.slow
-def test_a_payload_nobody_told_is_one_load(logs: Path) -> None:
+def test_a_payload_nobody_reported_is_one_load(logs: Path) -> None:
     free = ur10e(logs, "free_14harm.csv")
     found = list_contacts(motion(ur10e(logs, "load_14harm.csv"), "ur10e", run=free))
     (row,) = found.contacts

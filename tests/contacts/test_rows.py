@@ -73,15 +73,15 @@ def test_the_vendors_torque_is_a_force_at_the_flange() -> None:
     plain = still()
     J = flange_jacobian(plain.robot.chain, plain.recording.q)[0]
     torque = np.tile(J.T @ [3.0, 4.0, 12.0, 0.0, 0.0, 0.0], (100, 1))
-    told = still(tau_ext=torque)
-    assert vendor_force(told, J, 0.5) == pytest.approx(13.0)
+    reported = still(tau_ext=torque)
+    assert vendor_force(reported, J, 0.5) == pytest.approx(13.0)
     assert vendor_force(plain, J, 0.5) is None
 
 
 def test_a_sensors_force_needs_no_frame() -> None:
     wrench = np.tile([3.0, 4.0, 12.0, 1.0, 1.0, 1.0], (100, 1))
-    told = still(wrench=wrench, wrench_frame=WrenchFrame("sensor", "sensor"))
-    assert sensor_force(told, 0.5) == pytest.approx(13.0)
+    reported = still(wrench=wrench, wrench_frame=WrenchFrame("sensor", "sensor"))
+    assert sensor_force(reported, 0.5) == pytest.approx(13.0)
     assert sensor_force(still(), 0.5) is None
     # A field that the log's writer left at zero measures nothing.
     assert sensor_force(still(wrench=0.0 * wrench), 0.5) is None

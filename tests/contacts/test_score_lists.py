@@ -60,7 +60,7 @@ def test_wrist_contacts_are_hardly_ever_placed_elsewhere() -> None:
         ("ur5-table1", "width", 10.5),  # 10.0 likewise; 8 and 9 held .76 and .90 of the peaks
         ("taps", "width", 10.5),
         ("ur5-sensor", "false", 1),
-        short("ur5-drag", "false", 1, "2: a rest after motion is told as a contact"),
+        short("ur5-drag", "false", 1, "2: a rest after motion is listed as a contact"),
     ],
 )
 def test_a_list_errs_by_no_more_than_its_bar(name: str, figure: str, bar: float) -> None:

@@ -35,14 +35,14 @@ from itertools import count
 from pathlib import Path
 places = os.environ["CRASH_COPIES"]
 numbers, busy = count(), False
-def told(event, words):
+def watch(event, words):
     global busy
     here = event in ("os.rename", "os.remove", "os.rmdir", "os.mkdir") and not busy
     if here and places and Path("out").absolute() in Path(os.fsdecode(words[0])).absolute().parents:
         busy = True
         shutil.copytree("out", Path(places) / str(next(numbers)))
         busy = False
-sys.addaudithook(told)
+sys.addaudithook(watch)
 sys.argv[0] = "vftcli"
 from vftcli.cli import launch
 launch()
@@ -207,7 +207,7 @@ def leftovers(folder: Path) -> list[Path]:
     return [path for path in folder.rglob("*") if path.name.startswith(".")]
 
 
-def told(name: str, kind: str, outcomes: list[Outcome]) -> bool:
+def reported(name: str, kind: str, outcomes: list[Outcome]) -> bool:
     """Print a line on what the kills of one command left; return whether all is well."""
     states: Mapping[str, int] = Counter(outcome.state for outcome in outcomes)
     wrong = len(outcomes) - sum(states.get(s, 0) for s in ("old", "new", "incomplete"))
@@ -240,8 +240,8 @@ def main() -> None:
             spans = [(0.0, 1.0), (0.75, 1.0)]
             shares = [draw.uniform(*spans[k % 2]) for k in range(asked.moments)]
             outcomes = [trial.after_moment(share) for share in shares]
-            fine &= told(name, "at random", outcomes) if outcomes else True
-            fine &= told(name, "at each change", list(trial.after_changes(draw)))
+            fine &= reported(name, "at random", outcomes) if outcomes else True
+            fine &= reported(name, "at each change", list(trial.after_changes(draw)))
     sys.exit(not fine)
 
 

@@ -37,7 +37,7 @@ class Said(NamedTuple):
     Attributes:
         code: How it ended.
         error: Its last line where it refused.
-        tokens: Codes of findings with their level where it is told, and names of findings.
+        tokens: Codes of findings with their level where it is given, and names of findings.
     """
 
     code: int

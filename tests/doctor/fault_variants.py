@@ -191,7 +191,7 @@ def robot_word(log: SoundLog, folder: Path) -> str:
 
 def thinned(table: Table, rate: float = 250.0) -> Table:
     step = max(1, round(1 / (rate * float(np.median(np.diff(table.t))))))
-    return table.taken(np.arange(0, len(table.t), step))
+    return table.selected(np.arange(0, len(table.t), step))
 
 
 def estimate(table: Table, path: Path) -> Array | None:

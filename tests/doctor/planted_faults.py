@@ -73,7 +73,7 @@ class Table:
             return np.asarray(self.arm.torque_constant)
         return np.ones(self.joints)
 
-    def taken(self, rows: Array) -> "Table":
+    def selected(self, rows: Array) -> "Table":
         """The table with these rows, in this order."""
         signals = {name: value[rows] for name, value in self.series()}
         sound_t = None if self.sound_t is None else self.sound_t[rows]
@@ -82,7 +82,7 @@ class Table:
     def between(self, start: float, stop: float) -> "Table":
         """The rows from `start` to before `stop`, counted from the first. [s]"""
         seconds = self.t - self.t[0]
-        return self.taken(np.flatnonzero((seconds >= start) & (seconds < stop)))
+        return self.selected(np.flatnonzero((seconds >= start) & (seconds < stop)))
 
     def series(self) -> list[tuple[str, Array]]:
         """Name and values of the signals that are there. (T, n) each"""
@@ -324,17 +324,17 @@ def clock_skew(table: Table, share: float = 0.05) -> Table:
 
 def dropped(table: Table, share: float = 0.05, seed: int = 0) -> Table:
     keep = np.random.default_rng(seed).random(len(table.t)) >= share
-    return table.taken(np.flatnonzero(keep))
+    return table.selected(np.flatnonzero(keep))
 
 
 def dropped_span(table: Table, start: float = 0.5, seconds: float = 1.0) -> Table:
     first = table.t[0] + start * (table.t[-1] - table.t[0])
-    return table.taken(np.flatnonzero((table.t < first) | (table.t >= first + seconds)))
+    return table.selected(np.flatnonzero((table.t < first) | (table.t >= first + seconds)))
 
 
 def duplicate_rows(table: Table, share: float = 0.1, seed: int = 0) -> Table:
     twice = np.random.default_rng(seed).random(len(table.t)) < share
-    return table.taken(np.repeat(np.arange(len(table.t)), 1 + twice))
+    return table.selected(np.repeat(np.arange(len(table.t)), 1 + twice))
 
 
 def stale_rows(table: Table, share: float = 0.1, seed: int = 0) -> Table:
@@ -343,7 +343,7 @@ def stale_rows(table: Table, share: float = 0.1, seed: int = 0) -> Table:
     again = np.random.default_rng(seed).random(len(rows)) < share
     again[0] = False
     fresh = np.maximum.accumulate(np.where(again, 0, rows))
-    return replace(table.taken(fresh), t=table.t)
+    return replace(table.selected(fresh), t=table.t)
 
 
 def time_reset(table: Table, start: float = 0.5) -> Table:

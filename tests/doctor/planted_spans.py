@@ -92,7 +92,7 @@ def brakes(table: Table, seconds: float) -> Table:
     count = round(seconds / float(np.median(np.diff(table.t))))
     at = np.concatenate([np.arange(row), np.full(count, row), np.arange(row, len(table.t))])
     still = slice(row, row + count)
-    held = table.taken(at)
+    held = table.selected(at)
     idle = 0.3 * np.random.default_rng(0).standard_normal((count, table.joints)) / table.constant
     effort, dq, t = np.array(held.effort), np.array(held.dq), np.array(held.t)
     effort[still], dq[still] = idle, 0.0
@@ -121,7 +121,7 @@ def frozen(table: Table, seconds: float) -> Table:
 
 def table_with_rows(table: Table, rows: Array) -> Table:
     """The values of other rows under the stamps that are there."""
-    return replace(table.taken(rows), t=table.t, sound_t=table.sound_t)
+    return replace(table.selected(rows), t=table.t, sound_t=table.sound_t)
 
 
 # Sessions, turns and clocks

@@ -181,7 +181,7 @@ def unexpected(
     log: SoundLog, recording: Recording, findings: Sequence[Remark]
 ) -> tuple[Remark, ...]:
     """The warnings that nothing known of a log explains."""
-    slow = ("slow-rate",) if recording.median_step > 1 / 50 else ()  # thinned below what is told
+    slow = ("slow-rate",) if recording.median_step > 1 / 50 else ()  # thinned below the limit
     # In a part that rests long enough a load shows in the controller's own currents too.
     load = ("payload-mismatch",) if "unmodelled-load" in log.known else ()
     known = (*log.known, *slow, *load)
@@ -191,7 +191,7 @@ def unexpected(
 def rows_cut(recording: Recording, robot: Robot) -> int:
     """Rows of a whole log that a command leaves out before it uses it."""
     examiner = Examiner(anyway=True)
-    used = examiner.taken(paired(recording, robot), robot, ReadChoice())
+    used = examiner.read_as(paired(recording, robot), robot, ReadChoice())
     return recording.samples - examiner.examine(used, robot).recording.samples
 
 

@@ -34,7 +34,7 @@ def test_nothing_is_said_of_a_sound_log(name: str) -> None:
         assert found.robots[0].fits
 
 
-def test_the_log_of_another_arm_is_told_with_its_name() -> None:
+def test_the_log_of_another_arm_is_reported_with_its_name() -> None:
     for log, robot, right in ((moving(), UR5, "ur10e"), (moving("ur5"), UR10E, "ur5")):
         finding = only(log, robot)
         assert (finding.code, finding.level) == ("other-robot", "warning")
@@ -110,7 +110,7 @@ def test_an_effort_is_put_right_where_nobody_says_the_arm() -> None:
     assert codes(found) == ["effort-sign"]
 
 
-def test_loads_are_told_with_their_mass_and_mounted_ones_are_not() -> None:
+def test_loads_are_reported_with_their_mass_and_mounted_ones_are_not() -> None:
     log = moving(load=2.8)
     finding = only(log, UR10E)
     assert (finding.code, finding.level) == ("unmodelled-load", "warning")
@@ -122,13 +122,13 @@ def test_loads_are_told_with_their_mass_and_mounted_ones_are_not() -> None:
 
 
 @pytest.mark.slow
-def test_a_declared_payload_that_is_not_mounted_is_told_once() -> None:
+def test_a_declared_payload_that_is_not_mounted_is_reported_once() -> None:
     log = replace(moving(load=2.8), payload_mass=2.8)
     finding = only(log, UR10E)
     assert (finding.code, finding.level) == ("payload-not-mounted", "warning")
     assert dict(finding.values) == {"declared_kg": 2.8, "mounted_kg": 0.0}
     assert codes(arm_findings(log, carrying(UR10E, 2.8))) == []
-    # one that the drives do not carry is told, and a load beside a small declared one as well
+    # one that the drives do not carry is reported, and a load beside a small declared one as well
     assert codes(arm_findings(replace(moving(), payload_mass=1.0), UR10E)) == [
         "payload-not-mounted"
     ]
@@ -146,7 +146,7 @@ def test_a_still_arm_is_not_checked_and_that_is_said() -> None:
 
 
 @pytest.mark.slow
-def test_a_vendor_torque_of_the_other_sign_is_told() -> None:
+def test_a_vendor_torque_of_the_other_sign_is_reported() -> None:
     """Pushes of 5 N·m on every joint, which the drives carry and the vendor sees."""
     log = moving("panda")
     push = 5.0 * np.sin(np.outer(log.t, 0.5 + 0.1 * np.arange(7)))
@@ -165,7 +165,7 @@ def test_what_cannot_be_compared_is_not_judged() -> None:
     assert arm_findings(replace(log, torque=None), None) == ArmFindings()
 
 
-def test_a_cause_has_its_numbers_and_no_consequence_is_told_beside_it() -> None:
+def test_a_cause_has_its_numbers_and_no_consequence_is_reported_beside_it() -> None:
     log = moving()
     swapped = replace(log, current=exchanged(log.require("current"), 2, 3))
     finding = only(swapped, UR10E)

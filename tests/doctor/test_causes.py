@@ -34,7 +34,7 @@ def test_a_sound_log_has_no_cause(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_an_effort_is_told_from_what_it_may_be() -> None:
+def test_an_effort_is_reported_from_what_it_may_be() -> None:
     log = moving()
     current = log.require("current")
     constant = np.asarray(UR10E.torque_constant)
@@ -73,7 +73,7 @@ def test_two_exchanged_joints_are_named(pair: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("degrees", [15.0, 30.0, 90.0, 180.0])
-def test_a_mount_is_told_with_its_angle(degrees: float) -> None:
+def test_a_mount_is_reported_with_its_angle(degrees: float) -> None:
     angle = np.deg2rad(degrees)
     up = np.array([0.0, np.sin(angle), np.cos(angle)])
     found = diagnosis(moving(up=up)).cause
@@ -99,7 +99,7 @@ def test_a_load_is_no_cause_and_is_fitted() -> None:
     assert found.case.misfit < 0.05
 
 
-def test_an_offset_is_told_with_its_size() -> None:
+def test_an_offset_is_reported_with_its_size() -> None:
     log = moving()
     current = log.require("current").copy()
     current[:, 2] += 12.0 / np.asarray(UR10E.torque_constant)[2]

@@ -43,27 +43,27 @@ def test_three_samples_are_short() -> None:
     assert set(found(log_of(np.full(2, STEP)))) == {"short"}
 
 
-@pytest.mark.parametrize(("samples", "told"), [(126, True), (129, False), (131, False)])
-def test_below_two_seconds_a_log_is_short(samples: int, told: bool) -> None:
+@pytest.mark.parametrize(("samples", "reported"), [(126, True), (129, False), (131, False)])
+def test_below_two_seconds_a_log_is_short(samples: int, reported: bool) -> None:
     """Steps of 1/64 s are exact, so 129 samples last 2 s to the bit and are long enough."""
     findings = found(log_of(np.full(samples - 1, 1 / 64)))
-    assert ("short" in findings) == told
-    if told:
+    assert ("short" in findings) == reported
+    if reported:
         assert findings["short"].values["duration_s"] == pytest.approx((samples - 1) / 64)
         assert findings["short"].level == "fact"
 
 
-@pytest.mark.parametrize(("rate", "told"), [(49.0, True), (51.0, False)])
-def test_below_fifty_samples_a_second_the_rate_is_slow(rate: float, told: bool) -> None:
+@pytest.mark.parametrize(("rate", "reported"), [(49.0, True), (51.0, False)])
+def test_below_fifty_samples_a_second_the_rate_is_slow(rate: float, reported: bool) -> None:
     findings = found(log_of(np.full(1000, 1 / rate)))
-    assert set(findings) == ({"slow-rate"} if told else set())
-    if told:
+    assert set(findings) == ({"slow-rate"} if reported else set())
+    if reported:
         assert findings["slow-rate"].values["rate_Hz"] == pytest.approx(rate)
         assert findings["slow-rate"].level == "warning"
 
 
 @pytest.mark.parametrize(
-    ("count", "factor", "told"),
+    ("count", "factor", "reported"),
     [
         (1, 2.0, False),  # one in a thousand is nothing to tell
         (2, 2.0, True),
@@ -74,23 +74,23 @@ def test_below_fifty_samples_a_second_the_rate_is_slow(rate: float, told: bool) 
     ],
 )
 def test_steps_of_two_or_three_sample_times_are_missed_samples(
-    count: int, factor: float, told: bool
+    count: int, factor: float, reported: bool
 ) -> None:
     findings = found(log_of(steps_with(count, factor)))
-    assert set(findings) == ({"missing-samples"} if told else set())
-    if told:
+    assert set(findings) == ({"missing-samples"} if reported else set())
+    if reported:
         assert dict(findings["missing-samples"].values) == {"missed": count, "steps": 1000}
 
 
-@pytest.mark.parametrize(("half", "told"), [(0.02, False), (0.03, True)])
-def test_steps_that_vary_by_a_twentieth_are_jitter(half: float, told: bool) -> None:
+@pytest.mark.parametrize(("half", "reported"), [(0.02, False), (0.03, True)])
+def test_steps_that_vary_by_a_twentieth_are_jitter(half: float, reported: bool) -> None:
     """A tenth of the steps is shorter, a tenth longer: the spread of nine in ten is twice that."""
     steps = np.full(1000, STEP)
     steps[5::10] *= 1 - half
     steps[::10] *= 1 + half
     findings = found(log_of(steps))
-    assert set(findings) == ({"jitter"} if told else set())
-    if told:
+    assert set(findings) == ({"jitter"} if reported else set())
+    if reported:
         values = findings["jitter"].values
         assert values["spread_percent"] == pytest.approx(200 * half)
         assert values["low_ms"] == pytest.approx(10 * (1 - half))
@@ -98,7 +98,7 @@ def test_steps_that_vary_by_a_twentieth_are_jitter(half: float, told: bool) -> N
         assert values["clock"] == "as given"
 
 
-def test_rare_jitter_is_not_told() -> None:
+def test_rare_jitter_is_not_reported() -> None:
     """Four in a hundred steps at either end lie outside the nine in ten, seven do not."""
     steps = np.full(1000, STEP)
     steps[100:140] *= 0.5
@@ -108,12 +108,12 @@ def test_rare_jitter_is_not_told() -> None:
     assert "jitter" in found(log_of(steps))
 
 
-@pytest.mark.parametrize(("factor", "told"), [(3.9, False), (4.1, True)])
-def test_four_sample_times_are_a_gap_and_no_jitter(factor: float, told: bool) -> None:
-    """A tenth of the steps are that long: as jitter they would be told at once."""
+@pytest.mark.parametrize(("factor", "reported"), [(3.9, False), (4.1, True)])
+def test_four_sample_times_are_a_gap_and_no_jitter(factor: float, reported: bool) -> None:
+    """A tenth of the steps are that long: as jitter they would be reported at once."""
     findings = found(log_of(steps_with(100, factor)))
-    assert set(findings) == ({"gaps"} if told else {"jitter"})
-    if told:
+    assert set(findings) == ({"gaps"} if reported else {"jitter"})
+    if reported:
         assert findings["gaps"].values["gaps"] == 100
         assert findings["gaps"].values["steps"] == 4.0
 
@@ -154,19 +154,19 @@ def with_stale(count: int, scale: float = 1.0) -> Recording:
     return Recording(t=t, q=q, dq=dq, torque=t[source][:, None] * [1.0, 2.0])
 
 
-@pytest.mark.parametrize(("count", "told"), [(2, False), (3, True), (10, True)])
-def test_three_rows_in_a_thousand_that_repeat_are_told(count: int, told: bool) -> None:
+@pytest.mark.parametrize(("count", "reported"), [(2, False), (3, True), (10, True)])
+def test_three_rows_in_a_thousand_that_repeat_are_reported(count: int, reported: bool) -> None:
     findings = found(with_stale(count))
-    assert set(findings) == ({"stale-rows"} if told else set())
-    if told:
+    assert set(findings) == ({"stale-rows"} if reported else set())
+    if reported:
         assert findings["stale-rows"].level == "fact"
         assert findings["stale-rows"].values["stale"] == count
         assert findings["stale-rows"].values["share_percent"] == pytest.approx(count / 10)
 
 
-@pytest.mark.parametrize(("count", "told"), [(880, True), (920, False)])
-def test_an_arm_at_rest_repeats_nearly_all_its_rows(count: int, told: bool) -> None:
-    assert ("stale-rows" in found(with_stale(count))) == told
+@pytest.mark.parametrize(("count", "reported"), [(880, True), (920, False)])
+def test_an_arm_at_rest_repeats_nearly_all_its_rows(count: int, reported: bool) -> None:
+    assert ("stale-rows" in found(with_stale(count))) == reported
 
 
 def test_rows_that_repeat_while_nothing_moves_are_no_fault() -> None:

@@ -76,7 +76,7 @@ def planted(recording: Recording, *plants: Callable[[Signals], None]) -> Recordi
 
 def examined(recording: Recording) -> tuple[Recording, dict[str, Any]]:
     """The log as every command gets it, and the warnings of its examination."""
-    sound = Examiner().taken(recording, ROBOT, ReadChoice())
+    sound = Examiner().read_as(recording, ROBOT, ReadChoice())
     return sound, {f.code: f for f in examine(sound, ROBOT).warnings}
 
 
@@ -143,9 +143,9 @@ def test_brakes_are_cut_out_with_the_half_second_beside() -> None:
     noise = np.random.default_rng(7).normal(0, 0.02, q.shape)
     current = momentum_terms(ROBOT.loaded_chain, q, dq).gravity / ROBOT.torque_constant + noise
     log = Recording(t=t, q=q, dq=dq, current=current)
-    assert Examiner().taken(log, ROBOT, ReadChoice()).samples == log.samples
+    assert Examiner().read_as(log, ROBOT, ReadChoice()).samples == log.samples
     off = (t >= 33) & (t < 38)
-    sound = Examiner().taken(
+    sound = Examiner().read_as(
         replace(log, current=np.where(off[:, None], noise, current)), ROBOT, ReadChoice()
     )
     (cut,) = sound.source.cuts
@@ -182,7 +182,7 @@ def test_nothing_is_cut_out_of_a_sound_log(logs: Path, log: Any) -> None:
     middle = 0.5 * float(recording.t[0] + recording.t[-1])
     halves = recording.between(0.0, middle), recording.between(middle, float(recording.t[-1]))
     for part in (recording, *halves):
-        assert Examiner().taken(part, robot, ReadChoice()).source.cuts == ()
+        assert Examiner().read_as(part, robot, ReadChoice()).source.cuts == ()
 
 
 @pytest.mark.slow

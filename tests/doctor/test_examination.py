@@ -38,7 +38,7 @@ def test_one_cause_is_said_once() -> None:
     assert {finding.code for finding in large.warnings} == {"milliamperes"}
 
 
-def test_the_constants_of_another_joint_size_are_told() -> None:
+def test_the_constants_of_another_joint_size_are_reported() -> None:
     """A controller whose wrists have the constants of a smaller joint, 7.7 for 10.763 N·m/A."""
     log = moving()
     assert UR10E.torque_constant is not None
@@ -56,7 +56,7 @@ def test_the_constants_of_another_joint_size_are_told() -> None:
     assert not [f for f in examine(odd, UR10E).findings if f.code == "drive-constants"]
 
 
-def test_too_short_a_log_is_told_and_not_judged() -> None:
+def test_too_short_a_log_is_reported_and_not_judged() -> None:
     log = moving().between(0.0, 0.01)
     assert [finding.code for finding in examine(log, UR10E).findings] == ["too-short"]
 

@@ -67,8 +67,8 @@ def test_several_refusals_are_one_line() -> None:
 def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it() -> None:
     """No other profile comes near a log whose target torques are one's own."""
     examiner, log = Examiner(), excited()
-    told = RobotChoice(name="ur5e")
-    assert examiner.robot(log, told) is examiner.robot(log, told)
+    reported = RobotChoice(name="ur5e")
+    assert examiner.robot(log, reported) is examiner.robot(log, reported)
     known = replace(log, target_torque=log.require("torque") - 6.0 * np.tanh(log.dq / 0.01))
     guessed = examiner.robot(known, RobotChoice())
     assert guessed.name == "ur5e"
@@ -93,11 +93,11 @@ def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
     """The sign that was turned is turned back; a log that says the truth stays as it is."""
     examiner, log = Examiner(), excited()
     auto = ReadChoice(effort="auto")
-    assert examiner.taken(log, UR5E, auto) is log
-    healed = examiner.taken(turned(log), UR5E, auto)
+    assert examiner.read_as(log, UR5E, auto) is log
+    healed = examiner.read_as(turned(log), UR5E, auto)
     assert healed.torque == pytest.approx(log.torque)
     assert [remark.code for remark in healed.source.remarks] == ["effort-taken"]
-    assert examiner.taken(turned(log), UR5E, ReadChoice()).source.remarks == ()
+    assert examiner.read_as(turned(log), UR5E, ReadChoice()).source.remarks == ()
     assert not Examiner().examine(healed, UR5E).refusals()
 
 
@@ -120,5 +120,5 @@ def test_the_unit_of_the_effort_is_what_the_last_tenth_of_a_long_log_says(
         current=np.concatenate([noise.normal(0, 1.0, still.shape), current]),
     )
     auto = ReadChoice(effort="auto")
-    read = Examiner().taken(log, UR5E, auto, in_stretches=True)
+    read = Examiner().read_as(log, UR5E, auto, in_stretches=True)
     assert read.require("current")[-1] == pytest.approx(1e-3 * current[-1])

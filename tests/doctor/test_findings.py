@@ -43,10 +43,10 @@ def moving(robot: str, *, load: float = 0.0, seconds: float = 10.0, seed: int = 
 
 
 def names(examination: Examination) -> set[str]:
-    return {finding.name for finding in told(examination)}
+    return {finding.name for finding in reported(examination)}
 
 
-def told(examination: Examination) -> list[FindingWords]:
+def reported(examination: Examination) -> list[FindingWords]:
     return [in_words(finding) for finding in examination.findings]
 
 
@@ -72,26 +72,26 @@ def altered(recording: Recording, **changes: Array | None) -> Examination:
 
 
 @pytest.mark.slow
-def test_inverted_effort_is_told_and_what_to_do() -> None:
+def test_inverted_effort_is_reported_and_what_to_do() -> None:
     log = moving("ur10e")
     assert log.current is not None
     examination = altered(log, current=-log.current)
-    finding = next(f for f in told(examination) if f.name == "effort-sign")
+    finding = next(f for f in reported(examination) if f.name == "effort-sign")
     assert "leading minus" in finding.remedy
     assert "twice" in finding.consequence
     assert not examination.robots[0].fits
 
 
 @pytest.mark.slow
-def test_effort_that_is_current_is_told() -> None:
+def test_effort_that_is_current_is_reported() -> None:
     log = moving("ur5e")
     examination = altered(log, torque=log.current, current=None)
-    (said,) = [f for f in told(examination) if f.name == "torque-as-current"]
+    (said,) = [f for f in reported(examination) if f.name == "torque-as-current"]
     assert "--set log.effort=current" in said.remedy
 
 
 @pytest.mark.slow
-def test_milliamperes_are_told() -> None:
+def test_milliamperes_are_reported() -> None:
     log = moving("ur5e")
     assert log.current is not None
     assert "milliamperes" in names(altered(log, current=1000 * log.current))
@@ -108,7 +108,7 @@ def test_units_and_signs_of_velocity() -> None:
 
 @pytest.mark.slow
 def test_velocity_in_radians_beside_positions_in_degrees_is_another_unit() -> None:
-    """The slope is then 1/57.3: told as a unit, not as a velocity that is wrong on every joint."""
+    """The slope is then 1/57.3: reported as a unit, not as a wrong velocity of every joint."""
     log = moving("panda")
     found = names(altered(log, q=np.rad2deg(log.q)))
     assert "velocity-unit" in found
@@ -166,7 +166,7 @@ def test_an_arm_without_profile() -> None:
 def test_every_finding_has_evidence_consequence_and_remedy() -> None:
     log = moving("ur10e", seconds=3.0)
     assert log.current is not None
-    for finding in told(altered(log, current=-log.current, dq=None)):
+    for finding in reported(altered(log, current=-log.current, dq=None)):
         assert finding.evidence
         assert finding.consequence
         assert finding.remedy
@@ -227,7 +227,7 @@ def test_panda_exciting_is_a_panda(logs: Path) -> None:
 @pytest.mark.parametrize("name", ["identification", "repeat_a", "repeat_b"])
 def test_ur3_effort_is_inverted(logs: Path, name: str) -> None:
     examination = examine(read(logs / "ur3" / f"{name}.bag"))
-    finding = next(f for f in told(examination) if f.name == "effort-sign")
+    finding = next(f for f in reported(examination) if f.name == "effort-sign")
     assert "J1, J2, J3, J4, J5, J6" in finding.evidence
     assert "--columns -tau" in finding.remedy
     turned = examine(read(logs / "ur3" / f"{name}.bag", columns="-tau=effort"))
@@ -236,14 +236,14 @@ def test_ur3_effort_is_inverted(logs: Path, name: str) -> None:
 
 def test_payload_mismatch_of_the_static_log(logs: Path) -> None:
     examination = examine(read(logs / "rtde" / "static_cb3.csv"))
-    finding = next(f for f in told(examination) if f.name == "payload-mismatch")
+    finding = next(f for f in reported(examination) if f.name == "payload-mismatch")
     assert "J2" in finding.evidence
     assert "J3" in finding.evidence
 
 
 def test_load_of_the_loaded_log(logs: Path) -> None:
     examination = examine(read(logs / "ur10e" / "load_14harm.csv", columns=TABLE_31))
-    finding = next(f for f in told(examination) if f.name == "unmodelled-load")
+    finding = next(f for f in reported(examination) if f.name == "unmodelled-load")
     assert "2.88 ±" in finding.evidence  # 2.805 kg were mounted; the currents say 2.88
     assert finding.severity == "warning"
 

@@ -125,7 +125,7 @@ def ranked(monkeypatch: pytest.MonkeyPatch, **fits: RobotMatch) -> list[tuple[st
     return [(fit.robot, fit.fits) for fit in found]
 
 
-def test_profiles_within_three_tenths_of_the_best_are_not_told_apart(
+def test_profiles_within_three_tenths_of_the_best_are_not_reported_apart(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found = ranked(monkeypatch, far=fake(0.0131), near=fake(0.0129), best=fake(0.01))

@@ -1,4 +1,4 @@
-"""An effort that is late by a known time is told by it, and by nothing else that may be odd."""
+"""An effort that is late by a known time is found by that alone, not by what else may be odd."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def log_of(
     return Recording(t=clock, q=q, dq=dq, torque=scale * torque)
 
 
-def told(log: Recording) -> Remark | None:
+def reported(log: Recording) -> Remark | None:
     """The finding, None without one."""
     found = list(effort_lag(log, ARM))
     assert len(found) <= 1
@@ -52,9 +52,9 @@ def told(log: Recording) -> Remark | None:
 
 
 @pytest.mark.parametrize("late", [0.05, 0.1, 0.2, -0.06])
-def test_the_lag_is_told(late: float) -> None:
+def test_the_lag_is_reported(late: float) -> None:
     """To a hundredth of a second: lags are tried that far apart."""
-    finding = told(log_of(late))
+    finding = reported(log_of(late))
     assert finding is not None
     assert (finding.code, finding.level) == ("effort-lag", "warning")
     assert finding.values["lag_ms"] == pytest.approx(1e3 * abs(late), abs=10.1)
@@ -64,53 +64,53 @@ def test_the_lag_is_told(late: float) -> None:
 
 
 @pytest.mark.parametrize("late", [0.0, 0.01, 0.03, -0.03])
-def test_a_lag_as_real_friction_and_drivers_have_it_is_not_told(late: float) -> None:
-    assert told(log_of(late)) is None
+def test_a_lag_as_real_friction_and_drivers_have_it_is_not_reported(late: float) -> None:
+    assert reported(log_of(late)) is None
 
 
 def test_pushes_hide_no_lag_and_are_none() -> None:
     """5 N·m on every joint for a fifth of the time, the wrists move by as much."""
-    assert told(log_of(push=5.0)) is None
-    finding = told(log_of(0.06, push=5.0))
+    assert reported(log_of(push=5.0)) is None
+    finding = reported(log_of(0.06, push=5.0))
     assert finding is not None
     assert finding.values["lag_ms"] == pytest.approx(60.0, abs=10.1)
 
 
 @pytest.mark.parametrize("push", [0.0, 5.0])
 @pytest.mark.parametrize(("rate", "pace"), [(0.005, "slow"), (-0.01, "fast")])
-def test_a_clock_of_the_effort_is_told_by_its_rate(rate: float, pace: str, push: float) -> None:
+def test_a_clock_of_the_effort_is_reported_by_its_rate(rate: float, pace: str, push: float) -> None:
     """To half of the .05 s by which tried growths of the lag lie apart within 19.5 s: .13 %."""
-    finding = told(log_of(rate=rate, push=push))
+    finding = reported(log_of(rate=rate, push=push))
     assert finding is not None
     assert (finding.code, finding.level) == ("effort-drift", "warning")
     assert finding.values["drift_percent"] == pytest.approx(100 * abs(rate), abs=0.13)
     assert finding.values["pace"] == pace
 
 
-def test_a_drift_in_a_long_log_is_told_by_its_first_minute() -> None:
+def test_a_drift_in_a_long_log_is_reported_by_its_first_minute() -> None:
     """.5 % of 200 s is a second, more than any lag that is tried."""
-    finding = told(log_of(rate=0.005, clock=STEP * np.arange(20000)))
+    finding = reported(log_of(rate=0.005, clock=STEP * np.arange(20000)))
     assert finding is not None
     assert finding.code == "effort-drift"
     assert finding.values["drift_percent"] == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_drift_within_what_real_drivers_lag_is_not_told() -> None:
-    assert told(log_of(rate=0.001)) is None
+def test_a_drift_within_what_real_drivers_lag_is_not_reported() -> None:
+    assert reported(log_of(rate=0.001)) is None
 
 
 def test_a_wrong_unit_sign_offset_or_load_is_no_lag() -> None:
     for scale in (-1.0, 0.1, 100.0):
-        assert told(log_of(scale=scale)) is None
+        assert reported(log_of(scale=scale)) is None
     offset = log_of()
     offset = replace(offset, torque=offset.require("torque") + 10.0)
-    assert told(offset) is None
+    assert reported(offset) is None
 
 
 def test_a_current_is_judged_as_a_torque_is() -> None:
     log = log_of(0.06, scale=0.1)
-    assert told(replace(log, torque=None, current=log.torque)) is not None
-    assert told(replace(log, torque=None)) is None
+    assert reported(replace(log, torque=None, current=log.torque)) is not None
+    assert reported(replace(log, torque=None)) is None
 
 
 @pytest.mark.parametrize(("joints", "agreed"), [(2, False), (3, True)])
@@ -118,16 +118,16 @@ def test_two_joints_tell_no_lag(joints: int, agreed: bool) -> None:
     """Three have to agree: noise and contact on two may look like a lag."""
     log = log_of(0.06)
     moving = np.arange(6) < joints
-    finding = told(replace(log, dq=log.require("dq") * moving))
+    finding = reported(replace(log, dq=log.require("dq") * moving))
     assert (finding is not None) == agreed
 
 
-@pytest.mark.parametrize(("thinned", "told_by"), [(3, True), (4, False)])
-def test_below_thirty_samples_a_second_no_lag_is_told(thinned: int, told_by: bool) -> None:
+@pytest.mark.parametrize(("thinned", "reported_by"), [(3, True), (4, False)])
+def test_below_thirty_samples_a_second_no_lag_is_reported(thinned: int, reported_by: bool) -> None:
     log = log_of(0.12)
     rows = slice(None, None, thinned)
     signals = {name: getattr(log, name)[rows] for name in ("t", *log.signals)}
-    assert (told(replace(log, **signals)) is not None) == told_by
+    assert (reported(replace(log, **signals)) is not None) == reported_by
 
 
 def test_an_arm_of_other_joints_tells_nothing() -> None:
@@ -146,7 +146,7 @@ def test_windows_lie_on_an_even_clock_at_every_lag() -> None:
 
 
 def test_an_effort_beside_late_velocities_is_not_called_early() -> None:
-    """Whichever is late, it is told once: by the velocity, which the position judges."""
+    """Whichever is late, it is reported once: by the velocity, which the position judges."""
     log = log_of()
     late = log.require("dq")[np.maximum(np.arange(2000) - 6, 0)]
     codes = {finding.code for finding in examine(replace(log, dq=late), ARM).findings}
@@ -164,4 +164,4 @@ def columns(width: int) -> Array:
 def test_a_short_log_tells_nothing() -> None:
     t = STEP * np.arange(30)
     log = Recording(t=t, q=columns(6), dq=columns(6), torque=columns(6))
-    assert told(log) is None
+    assert reported(log) is None

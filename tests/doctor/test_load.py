@@ -38,11 +38,11 @@ def test_two_heavy_joints_tell_a_load(torques: tuple, joints: tuple | None) -> N
     assert [remark.where.joints for remark in found] == ([] if joints is None else [joints])
 
 
-@pytest.mark.parametrize(("current", "told"), [(0.39, False), (0.41, True)])
-def test_an_unknown_constant_is_taken_for_a_large_drive_s(current: float, told: bool) -> None:
+@pytest.mark.parametrize(("current", "reported"), [(0.39, False), (0.41, True)])
+def test_an_unknown_constant_is_taken_for_a_large_drive_s(current: float, reported: bool) -> None:
     """Ten newton metres an ampere, so 0.4 A are the 4 N·m that tell."""
     nowhere = np.full(6, np.nan)
-    assert len(list(payload_mismatch(log(0, current, current, 0, 0, 0), nowhere))) == told
+    assert len(list(payload_mismatch(log(0, current, current, 0, 0, 0), nowhere))) == reported
     weak = np.full(6, 5.0)
     assert not list(payload_mismatch(log(0, current, current, 0, 0, 0), weak))
 
@@ -61,15 +61,15 @@ def test_the_numbers_of_a_mismatch() -> None:
         "extra_Nm": pytest.approx([10.0, -20.0]),
         "payload_kg": None,
     }
-    (told,) = payload_mismatch(replace(still, payload_mass=0.0), TEN)
-    assert (told.code, told.values["payload_kg"]) == ("payload-mismatch", 0.0)
+    (reported,) = payload_mismatch(replace(still, payload_mass=0.0), TEN)
+    assert (reported.code, reported.values["payload_kg"]) == ("payload-mismatch", 0.0)
 
 
-@pytest.mark.parametrize(("samples", "told"), [(19, False), (20, True)])
-def test_a_mismatch_needs_twenty_samples_at_rest(samples: int, told: bool) -> None:
+@pytest.mark.parametrize(("samples", "reported"), [(19, False), (20, True)])
+def test_a_mismatch_needs_twenty_samples_at_rest(samples: int, reported: bool) -> None:
     still = log(0, 1, 1, 0, 0, 0)
     dq = np.where(np.arange(400) < samples, 0.0, 1.0)[:, None] * np.ones(6)
-    assert len(list(payload_mismatch(replace(still, dq=dq), TEN))) == told
+    assert len(list(payload_mismatch(replace(still, dq=dq), TEN))) == reported
 
 
 def test_a_mismatch_needs_both_currents() -> None:
@@ -158,22 +158,24 @@ def test_constants_come_from_resting_samples_only() -> None:
     assert found == pytest.approx(TEN)
 
 
-def constants_told(factors: Array) -> list[Remark]:
-    """What is told of a controller whose constants are the UR10e profile's times these."""
+def reported_constants(factors: Array) -> list[Remark]:
+    """What is reported of a controller that has the UR10e profile's times these."""
     robot = load_robot("ur10e")
     assert robot.torque_constant is not None
     found = controller_findings(controlled(robot.torque_constant * factors), robot)
     return [remark for remark in found if remark.code == "drive-constants"]
 
 
-@pytest.mark.parametrize(("wrist", "told"), [(10.9, False), (7.7, True), (7.6, True), (8.5, False)])
-def test_constants_of_another_joint_size_are_told(wrist: float, told: bool) -> None:
+@pytest.mark.parametrize(
+    ("wrist", "reported"), [(10.9, False), (7.7, True), (7.6, True), (8.5, False)]
+)
+def test_constants_of_another_joint_size_are_reported(wrist: float, reported: bool) -> None:
     """Of UR's sizes 7.7 N·m/A is one, 10.9 the UR10e's own to 2 %, and 8.5 is none."""
     profile = np.asarray(load_robot("ur10e").torque_constant)
     factors = np.ones(6)
     factors[4] = wrist / profile[4]
-    found = constants_told(factors)
-    assert len(found) == told
+    found = reported_constants(factors)
+    assert len(found) == reported
     for remark in found:
         assert (remark.level, remark.where.joints) == ("warning", (5,))
         assert dict(remark.values) == {

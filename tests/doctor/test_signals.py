@@ -69,30 +69,30 @@ def test_a_log_without_velocity_or_effort() -> None:
     assert {finding.level for finding in found(dq=None, torque=None).values()} == {"warning"}
 
 
-@pytest.mark.parametrize(("peak", "told"), [(12.9, False), (13.1, True), (-13.1, True)])
-def test_positions_beyond_two_turns_may_be_degrees(peak: float, told: bool) -> None:
+@pytest.mark.parametrize(("peak", "reported"), [(12.9, False), (13.1, True), (-13.1, True)])
+def test_positions_beyond_two_turns_may_be_degrees(peak: float, reported: bool) -> None:
     q = Q.copy()
     q[7, 2] = peak
     findings = found(q=q)
-    assert ("degrees" in findings) == told
-    if told:
+    assert ("degrees" in findings) == reported
+    if reported:
         assert findings["degrees"].values["largest_rad"] == pytest.approx(13.1)
 
 
-@pytest.mark.parametrize(("size", "told"), [(59.0, False), (61.0, True)])
-def test_currents_beyond_sixty_ampere_may_be_milliamperes(size: float, told: bool) -> None:
+@pytest.mark.parametrize(("size", "reported"), [(59.0, False), (61.0, True)])
+def test_currents_beyond_sixty_ampere_may_be_milliamperes(size: float, reported: bool) -> None:
     findings = found(current=size * FRICTION, torque=None)
-    assert set(findings) == ({"milliamperes"} if told else set())
-    if told:
+    assert set(findings) == ({"milliamperes"} if reported else set())
+    if reported:
         assert findings["milliamperes"].values["typical_A"] == pytest.approx(61.0, rel=2e-3)
 
 
-@pytest.mark.parametrize(("joint", "told"), [(6, False), (5, True)])
-def test_the_last_joint_of_an_arm_may_turn_without_end(joint: int, told: bool) -> None:
+@pytest.mark.parametrize(("joint", "reported"), [(6, False), (5, True)])
+def test_the_last_joint_of_an_arm_may_turn_without_end(joint: int, reported: bool) -> None:
     """Wrist 3 of a UR3 has no limit: ten turns of it are 63 rad."""
     q = Q.copy()
     q[:, joint - 1] += 63.0
-    assert ("degrees" in found(q=q)) == told
+    assert ("degrees" in found(q=q)) == reported
 
 
 def test_numbers_that_no_clock_and_no_robot_gives() -> None:
@@ -113,20 +113,20 @@ def test_numbers_that_no_clock_and_no_robot_gives() -> None:
     assert codes(tau_ext=1e300 * DQ, q=1e300 * Q) == ["absurd-values"] * 2
 
 
-@pytest.mark.parametrize(("samples", "told"), [(1, True), (2, True), (3, False)])
-def test_two_samples_are_too_short(samples: int, told: bool) -> None:
+@pytest.mark.parametrize(("samples", "reported"), [(1, True), (2, True), (3, False)])
+def test_two_samples_are_too_short(samples: int, reported: bool) -> None:
     log = Recording(t=T[:samples], q=Q[:samples], dq=DQ[:samples])
     findings = list(unusable_findings(log))
-    assert [(f.code, f.level) for f in findings] == [("too-short", "warning")] * told
-    assert [f.values["samples"] for f in findings] == [samples] * told
+    assert [(f.code, f.level) for f in findings] == [("too-short", "warning")] * reported
+    assert [f.values["samples"] for f in findings] == [samples] * reported
 
 
 def test_a_few_currents_of_any_size_are_outliers() -> None:
     """Nine in a thousand are fewer than one in a hundred, eleven are more."""
-    for per_thousand, told in ((9, False), (11, True)):
+    for per_thousand, reported in ((9, False), (11, True)):
         current = FRICTION.copy()
         current.flat[: current.size * per_thousand // 1000] = 500.0
-        assert ("milliamperes" in found(current=current, torque=None)) == told
+        assert ("milliamperes" in found(current=current, torque=None)) == reported
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5, 0.0, -0.3, -1.0])
@@ -151,20 +151,24 @@ def test_shares_of_joints_that_tell_nothing_are_not_known() -> None:
     assert np.isnan(work_shares(replace(log, dq=None), np.ones_like(Q))).all()
 
 
-@pytest.mark.parametrize(("share", "told"), [(-0.35, False), (-0.45, True)])
-def test_most_joints_are_inverted_from_two_fifths_of_their_work(share: float, told: bool) -> None:
+@pytest.mark.parametrize(("share", "reported"), [(-0.35, False), (-0.45, True)])
+def test_most_joints_are_inverted_from_two_fifths_of_their_work(
+    share: float, reported: bool
+) -> None:
     findings = found(torque=effort_of_share(share, 1, 2, 3, 4))
-    assert set(findings) == ({"effort-sign-by-work"} if told else set())
-    if told:
+    assert set(findings) == ({"effort-sign-by-work"} if reported else set())
+    if reported:
         assert findings["effort-sign-by-work"].where.joints == (1, 2, 3, 4)
 
 
-@pytest.mark.parametrize(("share", "told"), [(-0.8, False), (-0.9, True)])
-def test_a_joint_alone_is_inverted_only_by_nearly_all_its_work(share: float, told: bool) -> None:
+@pytest.mark.parametrize(("share", "reported"), [(-0.8, False), (-0.9, True)])
+def test_a_joint_alone_is_inverted_only_by_nearly_all_its_work(
+    share: float, reported: bool
+) -> None:
     for joints in ((5,), (2, 3, 5)):
         findings = found(torque=effort_of_share(share, *joints))
-        assert set(findings) == ({"effort-sign-of-some"} if told else set())
-        if told:
+        assert set(findings) == ({"effort-sign-of-some"} if reported else set())
+        if reported:
             assert findings["effort-sign-of-some"].where.joints == joints
 
 

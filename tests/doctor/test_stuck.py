@@ -49,25 +49,25 @@ def test_a_sound_log_has_no_finding() -> None:
     assert found(torque=None, dq=None) == {}
 
 
-@pytest.mark.parametrize(("seconds", "told"), [(0.45, False), (0.55, True), (20.0, True)])
+@pytest.mark.parametrize(("seconds", "reported"), [(0.45, False), (0.55, True), (20.0, True)])
 @pytest.mark.parametrize(
     ("name", "code"),
     [("q", "stuck-position"), ("dq", "stuck-velocity"), ("torque", "stuck-effort")],
 )
 def test_a_signal_that_stands_still_for_half_a_second(
-    name: str, code: str, seconds: float, told: bool
+    name: str, code: str, seconds: float, reported: bool
 ) -> None:
     signal = {"q": Q, "dq": DQ, "torque": TORQUE}[name]
     findings = found(**{name: standing(signal, 4, 11.0, seconds)})
-    assert set(findings) == ({code} if told else set())
-    if told:
+    assert set(findings) == ({code} if reported else set())
+    if reported:
         finding = findings[code]
         assert (finding.where.joints, finding.level) == ((4,), "warning")
         assert finding.values["longest_s"] == pytest.approx(seconds, abs=STEP)
         assert finding.values["at_s"] == pytest.approx(11.0, abs=STEP)
 
 
-def test_a_current_that_stands_still_is_told_as_one() -> None:
+def test_a_current_that_stands_still_is_reported_as_one() -> None:
     still = standing(standing(TORQUE, 4, 11.0, 3.0), 2, 30.0, 5.0)
     finding = found(torque=None, current=still)["stuck-effort"]
     assert finding.where.joints == (2, 4)
@@ -137,16 +137,16 @@ def wave(peak: float = 1.0, low: float = -1.0, run: int = 0) -> Array:
 
 
 def clipped(value: Array, position: Array | None = None) -> bool:
-    """Whether an effort is clipped on a joint that goes 0.1 mrad a sample, or as told."""
+    """Whether an effort is clipped on a joint that goes 0.1 mrad a sample, or as given."""
     moving = 1e-4 * np.arange(len(value))
     return is_clipped(value, moving if position is None else position, least=10)
 
 
-@pytest.mark.parametrize(("run", "told"), [(1, False), (9, False), (10, True), (30, True)])
-def test_ten_samples_in_a_row_at_the_extreme_are_clipped(run: int, told: bool) -> None:
+@pytest.mark.parametrize(("run", "reported"), [(1, False), (9, False), (10, True), (30, True)])
+def test_ten_samples_in_a_row_at_the_extreme_are_clipped(run: int, reported: bool) -> None:
     moving = 2e-4 * np.arange(200)  # 1.8 mrad in ten samples
-    assert clipped(wave(run=run), moving) == told
-    assert clipped(-wave(run=run), moving) == told
+    assert clipped(wave(run=run), moving) == reported
+    assert clipped(-wave(run=run), moving) == reported
 
 
 def test_what_is_not_clipped() -> None:
@@ -186,11 +186,11 @@ def test_at_a_kilohertz_ten_samples_are_no_time() -> None:
     """A tenth of a second at the extreme is: 99 samples are not, 101 are."""
     t = 1e-3 * np.arange(4000)
     q = np.sin(t)[:, None]
-    for samples, told in ((98, False), (101, True)):
+    for samples, reported in ((98, False), (101, True)):
         torque = np.cos(3 * t)[:, None]
         torque[1000 : 1000 + samples] = 2.0
         log = Recording(t=t, q=q, dq=np.cos(t)[:, None], torque=torque)
-        assert ("saturation" in {f.code for f in stuck_findings(log)}) == told
+        assert ("saturation" in {f.code for f in stuck_findings(log)}) == reported
 
 
 def test_clipped_joints_are_named_with_their_signal() -> None:
@@ -246,13 +246,13 @@ def test_a_zero_wrench_says_whether_the_torques_beside_it_are_zero() -> None:
     assert "zero-wrench" not in beside
 
 
-@pytest.mark.parametrize(("step", "told"), [(1e-4, False), (1e-3, True)])
-def test_positions_in_coarse_steps_are_told(step: float, told: bool) -> None:
+@pytest.mark.parametrize(("step", "reported"), [(1e-4, False), (1e-3, True)])
+def test_positions_in_coarse_steps_are_reported(step: float, reported: bool) -> None:
     q = Q + 0.01 * T[:, None]  # no two swings alike
     q[:, [1, 4]] = np.round(q[:, [1, 4]] / step) * step
     findings = found(q=q)
-    assert set(findings) == ({"coarse-positions"} if told else set())
-    if told:
+    assert set(findings) == ({"coarse-positions"} if reported else set())
+    if reported:
         finding = findings["coarse-positions"]
         assert (finding.where.joints, finding.level) == ((2, 5), "fact")
         assert finding.values["steps_mrad"] == pytest.approx([1e3 * step] * 2)

@@ -1,4 +1,4 @@
-"""What the doctor says of joint temperatures: far from the model's, beyond the law, or not told."""
+"""What the doctor says of joint temperatures: far from the model's, beyond the law, or missing."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def test_where_the_law_holds_there_is_nothing_to_say(temperature: float) -> None
     assert found(log(temperature)) == []
 
 
-def test_a_log_without_temperatures_is_told_what_is_taken() -> None:
+def test_a_log_without_temperatures_is_reported_what_is_taken() -> None:
     (remark,) = found(log(None))
     assert (remark.code, remark.level) == ("no-temperature", "fact")
     # s(25)/s(35) worked by hand: size 3 2.9177/2.5366, size 1 .64593/.52003
@@ -45,7 +45,7 @@ def test_a_log_without_temperatures_is_told_what_is_taken() -> None:
     assert same == remark
 
 
-def test_gaps_are_told_with_their_share() -> None:
+def test_gaps_are_reported_with_their_share() -> None:
     recording = log(30.0)
     assert recording.temperature is not None
     gaps = recording.temperature.copy()
@@ -55,7 +55,7 @@ def test_gaps_are_told_with_their_share() -> None:
     assert remark.values["share_percent"] == 25.0
 
 
-def test_without_a_law_a_cold_log_is_told_with_what_it_means() -> None:
+def test_without_a_law_a_cold_log_is_reported_with_what_it_means() -> None:
     (remark,) = found(log(25.0), LAWLESS)
     assert (remark.code, remark.level) == ("far-temperature", "warning")
     assert remark.where.joints == (1, 2, 3, 4, 5)  # the sixth rests

@@ -106,17 +106,17 @@ def test_motion_in_a_gap_is_not_held_against_the_velocity() -> None:
     np.testing.assert_allclose(fit.gain, 1.0, atol=2e-4)
 
 
-@pytest.mark.parametrize(("factor", "told"), [(0.97, True), (0.99, False), (1.01, False)])
-def test_velocities_of_another_size_are_told(factor: float, told: bool) -> None:
+@pytest.mark.parametrize(("factor", "reported"), [(0.97, True), (0.99, False), (1.01, False)])
+def test_velocities_of_another_size_are_reported(factor: float, reported: bool) -> None:
     findings = found(dq=scaled(DQ, factor, 3, 5))
-    assert set(findings) == ({"velocity-mismatch"} if told else set())
-    if told:
+    assert set(findings) == ({"velocity-mismatch"} if reported else set())
+    if reported:
         assert findings["velocity-mismatch"].where.joints == (3, 5)
         slopes = findings["velocity-mismatch"].values["slopes"]
         assert slopes == pytest.approx([factor, factor], rel=2e-4)
 
 
-def test_velocities_of_the_other_sign_are_told() -> None:
+def test_velocities_of_the_other_sign_are_reported() -> None:
     findings = found(dq=scaled(DQ, -1.0, 2))
     assert set(findings) == {"velocity-sign"}
     assert findings["velocity-sign"].where.joints == (2,)
@@ -166,7 +166,7 @@ def test_accelerations_in_the_place_of_velocities_are_named() -> None:
 @pytest.mark.parametrize(
     ("factor", "pace"), [(0.9, "slow"), (0.975, "slow"), (0.985, ""), (1.015, ""), (1.05, "fast")]
 )
-def test_a_clock_of_another_rate_is_told(factor: float, pace: str) -> None:
+def test_a_clock_of_another_rate_is_reported(factor: float, pace: str) -> None:
     findings = found(t=factor * T)
     assert set(findings) == ({"clock-rate"} if pace else set())
     if pace:
@@ -179,7 +179,7 @@ def test_a_clock_of_another_rate_is_told(factor: float, pace: str) -> None:
 @pytest.mark.parametrize(
     ("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns"), (1e-3, "s"), (950.0, "ms")]
 )
-def test_stamps_of_another_unit_are_told_alone(factor: float, unit: str) -> None:
+def test_stamps_of_another_unit_are_reported_alone(factor: float, unit: str) -> None:
     """Milliseconds read as seconds also look like a tenth of a sample a second."""
     findings = found(t=factor * T)
     assert set(findings) == {"time-unit"}
@@ -196,28 +196,32 @@ def test_noise_on_both_hides_no_unit(seed: int) -> None:
     assert set(found(t=1e3 * t, q=q, dq=dq)) == {"time-unit"}
 
 
-@pytest.mark.parametrize(("samples", "told"), [(0.9, False), (1.2, True), (3, True), (-3, True)])
-def test_a_velocity_that_is_late_by_more_than_a_sample_is_told(samples: float, told: bool) -> None:
+@pytest.mark.parametrize(
+    ("samples", "reported"), [(0.9, False), (1.2, True), (3, True), (-3, True)]
+)
+def test_a_velocity_that_is_late_by_more_than_a_sample_is_reported(
+    samples: float, reported: bool
+) -> None:
     dq = DQ.copy()
     dq[:, [0, 3]] = speed_at(T - samples * STEP)[:, [0, 3]]
     findings = found(dq=dq)
-    assert set(findings) == ({"velocity-lag"} if told else set())
-    if told:
+    assert set(findings) == ({"velocity-lag"} if reported else set())
+    if reported:
         assert findings["velocity-lag"].where.joints == (1, 4)
         lags = findings["velocity-lag"].values["lags_ms"]
         assert lags == pytest.approx([10 * samples] * 2, rel=0.01)
 
 
-@pytest.mark.parametrize(("late_ms", "told"), [(7.0, False), (9.0, True)])
-def test_at_a_kilohertz_eight_milliseconds_are_late(late_ms: float, told: bool) -> None:
+@pytest.mark.parametrize(("late_ms", "reported"), [(7.0, False), (9.0, True)])
+def test_at_a_kilohertz_eight_milliseconds_are_late(late_ms: float, reported: bool) -> None:
     """A real FR3's velocities are 2.9 ms late, those of a host's stamps up to 5.7."""
     t = 1e-3 * np.arange(8000)
     findings = found(t=t, q=np.sin(np.outer(t, RATES)), dq=speed_at(t - 1e-3 * late_ms))
-    assert set(findings) == ({"velocity-lag"} if told else set())
+    assert set(findings) == ({"velocity-lag"} if reported else set())
 
 
 @pytest.mark.parametrize("cut_off", [0.5, 1.0, 2.0])
-def test_a_filter_is_told_from_a_delay(cut_off: float) -> None:
+def test_a_filter_is_reported_from_a_delay(cut_off: float) -> None:
     """A first-order low-pass takes 1/(2π f_c) and a part of the size, neither clock nor unit."""
     keep = np.exp(-2 * np.pi * cut_off * STEP)
     start = keep * DQ[:1]
@@ -237,7 +241,7 @@ def test_velocities_of_joints_that_are_exchanged() -> None:
     assert turned["velocity-order"].where.joints == (1, 2, 3)
 
 
-def test_joints_whose_motions_differ_by_a_factor_only_are_told_apart() -> None:
+def test_joints_whose_motions_differ_by_a_factor_only_are_reported_apart() -> None:
     """In a plane the elbow often turns against the shoulder: own fits too, with another gain."""
     scale = np.array([1.0, 1.0, -1.4, 1.0, 1.0, 1.0])
     q, dq = Q.copy(), DQ.copy()
@@ -252,12 +256,12 @@ def held(samples: int, dq: Array = DQ) -> Array:
     return np.asarray(dq[rows - rows % samples])
 
 
-@pytest.mark.parametrize(("samples", "told"), [(2, False), (3, True), (8, True), (20, True)])
-def test_velocities_that_are_held_are_told(samples: int, told: bool) -> None:
+@pytest.mark.parametrize(("samples", "reported"), [(2, False), (3, True), (8, True), (20, True)])
+def test_velocities_that_are_held_are_reported(samples: int, reported: bool) -> None:
     """Held for two samples, half of the steps repeat: that is the limit."""
     findings = found(dq=held(samples))
-    assert ("velocity-held" in findings) == told
-    if told:
+    assert ("velocity-held" in findings) == reported
+    if reported:
         share = findings["velocity-held"].values["shares_percent"][0]
         assert share == pytest.approx(100 * (1 - 1 / samples), abs=0.5)
         assert "velocity-lag" not in findings
@@ -306,7 +310,7 @@ def test_the_standard_errors_are_the_scatter() -> None:
 
 
 def test_a_velocity_that_was_written_for_a_joint_at_rest() -> None:
-    """J6 stands; J5's velocity is its own, J6's that of J5: both are told, neither as a size."""
+    """J6 rests; J5's velocity is its own, J6's that of J5: both are reported, neither as a size."""
     still = np.array([1.0, 1, 1, 1, 1, 0])
     findings = found(q=Q * still, dq=(DQ * still)[:, [0, 1, 2, 3, 5, 4]])
     assert set(findings) == {"velocity-order"}

@@ -180,7 +180,7 @@ def test_a_resampled_series_closes_to_a_ring() -> None:
     noise = rng.standard_normal((2000, 1)) ** 2
     last, first = noise.copy(), np.roll(noise, 1, axis=0)
     last[-1], first[0] = 500.0, 500.0
-    # 1000 draws of a mean of ~1.25 with a scatter of .25: told to .008, four times that allowed.
+    # 1000 draws of a mean of ~1.25 with a scatter of .25: known to .008, four times that allowed.
     assert drawn_from(last).draws.mean() == pytest.approx(last.mean(), abs=0.035)
     assert drawn_from(first).draws.mean() == pytest.approx(first.mean(), abs=0.035)
 

@@ -101,7 +101,7 @@ def test_a_log_that_lacks_a_part_is_refused(tmp_path: Path, lost: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("column", "value", "told"),
+    ("column", "value", "reported"),
     [
         (
             "jacobian_4_2",
@@ -114,13 +114,13 @@ def test_a_log_that_lacks_a_part_is_refused(tmp_path: Path, lost: str) -> None:
     ],
 )
 def test_a_value_that_nobody_measured_is_refused_in_one_line(
-    tmp_path: Path, column: str, value: float, told: str
+    tmp_path: Path, column: str, value: float, reported: str
 ) -> None:
     path = made_log(tmp_path)
     table = pl.read_csv(path).with_row_index()
     put = pl.when(pl.col("index") == 200).then(value).otherwise(pl.col(column))
     table.with_columns(put.alias(column)).drop("index").write_csv(path)
-    with pytest.raises((ClockError, LogError), match=told):
+    with pytest.raises((ClockError, LogError), match=reported):
         opened(path)
 
 

@@ -1,4 +1,4 @@
-"""Where a log shows contact by itself: planted pushes, free logs, and what cannot be told."""
+"""Where a log shows contact by itself: planted pushes, free logs, and what cannot be known."""
 
 from dataclasses import replace
 from pathlib import Path

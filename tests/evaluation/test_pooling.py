@@ -46,7 +46,7 @@ def test_a_pool_of_one_log_twice_has_its_rmse_and_a_narrower_interval() -> None:
     pooled = row_of(*noisy)
     alone = evaluate("log", noisy[0].estimates, noisy[0].reference).row(0, named=True)
     width = [row["rmse_high_Nm"] - row["rmse_low_Nm"] for row in (pooled, alone)]
-    # Four logs: half the width, told to some 20 % by the bootstrap of each.
+    # Four logs: half the width, known to some 20 % by the bootstrap of each.
     assert width[0] / width[1] == pytest.approx(0.5, rel=0.3)
 
 

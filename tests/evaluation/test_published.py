@@ -35,7 +35,7 @@ def errors(scale: float = 1.0, joints: int = 6) -> pl.DataFrame:
     return pl.DataFrame(rows)
 
 
-def test_sizes_and_winners_are_told() -> None:
+def test_sizes_and_winners_are_reported() -> None:
     found = compare_with("table1", errors(1.5), OBSERVERS, TUNINGS)
     text = " ".join(map(str, found.remarks))
     assert found.names == ("fdo", "gmo", "kfo-fe")
@@ -45,7 +45,7 @@ def test_sizes_and_winners_are_told() -> None:
     assert "delay 138 ms on J1" in text  # 137.5 ms in closed form
 
 
-def test_the_discrete_reading_is_told() -> None:
+def test_the_discrete_reading_is_reported() -> None:
     kalman = KalmanObserver(noise_convention="discrete")
     observers = (*OBSERVERS[:2], kalman)
     tunings = {**TUNINGS, kalman.name: kalman.tuning(STEP, 6)}

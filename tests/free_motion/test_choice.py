@@ -11,9 +11,9 @@ from vftcli.signals.errors import ReferenceTorqueError
 
 
 def test_a_span_of_free_is_the_free_part() -> None:
-    told = FreeChoice.parsed(free=["2:4", "run.csv", ":1"])
-    assert told.spans == ((2.0, 4.0), (-np.inf, 1.0))
-    assert told.logs == (Path("run.csv"),)
+    reported = FreeChoice.parsed(free=["2:4", "run.csv", ":1"])
+    assert reported.spans == ((2.0, 4.0), (-np.inf, 1.0))
+    assert reported.logs == (Path("run.csv"),)
 
 
 def test_a_log_whose_name_holds_a_colon_is_a_log() -> None:

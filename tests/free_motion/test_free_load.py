@@ -1,4 +1,4 @@
-"""A payload nobody told of: weighed in the free part, and not taken for noise."""
+"""A payload that nobody named: weighed in the free part, and not mistaken for noise."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +41,7 @@ def baseline(log: Recording) -> Baseline:
     return baseline_of(FreeMotion(log=run, choice=FreeChoice(cycles=(1,))))
 
 
-def test_a_payload_is_weighed_and_told(log: Recording) -> None:
+def test_a_payload_is_weighed_and_reported(log: Recording) -> None:
     """Friction the profile misses is 10 % of its own here: some 1 N·m, .2 kg at the elbow."""
     found = baseline(carrying(log))
     assert found.load is not None

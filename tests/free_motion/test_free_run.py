@@ -1,4 +1,4 @@
-"""A free run has one owner: read, modelled and aligned once, told from others as an object."""
+"""A free run has one owner: read, modelled and aligned once, one object."""
 
 from collections.abc import Callable
 from dataclasses import replace

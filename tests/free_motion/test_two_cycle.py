@@ -76,7 +76,7 @@ def test_every_rung_knows_its_error(
     assert np.all((ratio >= least) & (ratio <= HONEST[1])), ratio
 
 
-def test_free_cycle_and_joint_at_rest_are_told(circle: Circle, ur5: Robot) -> None:
+def test_free_cycle_and_joint_at_rest_are_reported(circle: Circle, ur5: Robot) -> None:
     reference = two_cycle_difference(circle.recording, (), ur5)
     t = circle.recording.t
     assert np.isnan(reference.tau[t < 3.99]).all()  # the free cycle has no reference of its own

@@ -186,7 +186,7 @@ def test_strict_methods_refuse_what_others_remark_on(recording):
 
 
 @pytest.mark.slow
-def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(recording, data):
+def test_links_of_another_arm_are_reported_from_an_effort_that_no_links_explain(recording, data):
     """The same effort through a UR10e's links, and its own links under noise of 30 N·m."""
 
     def ratio(training):
@@ -214,7 +214,7 @@ def remarks_of(recording, arm):
 
 
 @pytest.mark.slow
-def test_a_joint_that_rubs_less_and_less_is_told(rubbing_arm, rubbing_log):
+def test_a_joint_that_rubs_less_and_less_is_reported(rubbing_arm, rubbing_log):
     assert remarks_of(rubbing_log, rubbing_arm) == []
     # 2 N·m more in joint 1 at the start, gone at the end: +.67 and −.67 in the outer thirds
     more = 2.0 * np.linspace(1.0, 0.0, rubbing_log.samples) * np.sign(rubbing_log.dq[:, 0])

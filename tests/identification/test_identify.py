@@ -225,11 +225,11 @@ def test_different_motions_are_no_pair():
 
 
 @pytest.mark.slow
-def test_a_repeated_trajectory_is_told():
+def test_a_repeated_trajectory_is_reported():
     first, again, other = log(UR5, 1), log(UR5, 1, noise=0.4), log(UR5, 2)
     found = identify([first], UR5, Task(method="friction"), [again, other])
-    (told,) = [r for r in found.remarks if r.code == "repeated-trajectory"]
-    assert told.values["share_percent"] == 100.0
+    (reported,) = [r for r in found.remarks if r.code == "repeated-trajectory"]
+    assert reported.values["share_percent"] == 100.0
     motions = [prepare(r, UR5) for r in (first, again, other)]
     assert repeated_share(motions[0], motions[1]) == 1.0
     assert repeated_share(motions[0], motions[2]) < 0.2
@@ -242,10 +242,10 @@ def test_a_contact_is_found_and_left_out():
     t = motion(0)[0]
     push = np.where((t > 12) & (t < 13), 40.0, 0.0)[:, None] * np.array([1, 1, 0, 0, 0, 0])
     touched = identify([log(true, extra=push)], UR5, Task(method="friction"))
-    (told,) = [r for r in touched.remarks if r.code == "suspected-contacts"]
+    (reported,) = [r for r in touched.remarks if r.code == "suspected-contacts"]
     # the 8 Hz filter spreads the edges by less than a period of 0.125 s
-    assert told.values["starts_s"] == pytest.approx([12.0], abs=0.125)
-    assert told.values["stops_s"] == pytest.approx([13.0], abs=0.125)
+    assert reported.values["starts_s"] == pytest.approx([12.0], abs=0.125)
+    assert reported.values["stops_s"] == pytest.approx([13.0], abs=0.125)
     for j in (0, 1):
         a, b = (r.friction[j].parameters["coulomb"] for r in (clean, touched.robot))
         assert a == pytest.approx(b, rel=0.03)
@@ -272,7 +272,7 @@ def test_a_joint_that_rests_keeps_its_numbers():
 
 
 @pytest.mark.slow
-def test_a_joint_that_never_reverses_is_told():
+def test_a_joint_that_never_reverses_is_reported():
     t, q, dq, ddq = motion(0)
     dq[:, 5], ddq[:, 5] = 0.3, 0.0
     q[:, 5] = 0.3 * t
@@ -284,13 +284,13 @@ def test_a_joint_that_never_reverses_is_told():
     assert "offset" not in found.robot.friction[5].parameters
 
 
-def test_missing_currents_are_told():
+def test_missing_currents_are_reported():
     t, q, dq, _ = motion(0)
     with pytest.raises(MissingSignalError, match="no motor currents"):
         identify([Recording(t=t, q=q, dq=dq)], UR5, Task(method="friction"))
 
 
-def test_missing_targets_are_told():
+def test_missing_targets_are_reported():
     with pytest.raises(MissingSignalError, match="no target currents"):
         identify([log(UR5)], UR5, Task(method="targets"))
 

@@ -244,14 +244,14 @@ def test_the_spread_of_a_solution_counts_what_lasts():
     """
     rng = np.random.default_rng(6)
     A = np.repeat(rng.standard_normal((STRETCHES, 2, 2)), 100, axis=0)
-    usable, found, told = np.ones(A.shape[:2]), [], []
+    usable, found, reported = np.ones(A.shape[:2]), [], []
     for _ in range(200):
         noise = np.repeat(rng.standard_normal((STRETCHES, 1)), 100, axis=0) * [1.0, 1.0]
         fit = fit_all_joints(A, noise, usable)
         found.append(fit.x)
-        told.append(np.diag(fit.motion_covariance(noise, 0.0)))
-    spread, expected = np.std(found, axis=0), np.sqrt(np.mean(told, axis=0))
-    # twelve stretches for two unknowns: told some 20 % too small; 200 fits: 5 %
+        reported.append(np.diag(fit.motion_covariance(noise, 0.0)))
+    spread, expected = np.std(found, axis=0), np.sqrt(np.mean(reported, axis=0))
+    # twelve stretches for two unknowns: some 20 % too small; 200 fits: 5 %
     np.testing.assert_allclose(expected, spread, rtol=0.35)
 
 

@@ -78,12 +78,12 @@ def test_ur10e_residuals_and_observer_floor(ur10e, method, train, test):
 
 
 @pytest.mark.slow
-def test_ur10e_other_days_and_loads_are_told(ur10e):
+def test_ur10e_other_days_and_loads_are_reported(ur10e):
     others = [ur10e(name) for name in ("free_repeat_a", "load_14harm")]
     found = identify([ur10e("free_14harm")], load_robot("ur10e"), Task(method="friction"), others)
-    told = {(r.code, r.where.about, r.where.joints) for r in found.remarks}
-    assert ("more-friction", "free_repeat_a.csv", (1,)) in told
-    assert ("repeated-trajectory", "load_14harm.csv", ()) in told
+    reported = {(r.code, r.where.about, r.where.joints) for r in found.remarks}
+    assert ("more-friction", "free_repeat_a.csv", (1,)) in reported
+    assert ("repeated-trajectory", "load_14harm.csv", ()) in reported
     (load,) = [r for r in found.remarks if r.code == "apparent-load"]
     # weighed 2.805 kg; the estimate leaves the friction that grows with the load out
     assert load.values["mass_kg"] == pytest.approx(2.805, rel=0.02)

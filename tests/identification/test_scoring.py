@@ -125,11 +125,11 @@ def test_the_share_of_a_repeated_path(prepared, sines):
 
 
 @pytest.mark.parametrize(("before", "worse"), [(1.9, True), (2.0, False), (3.0, False)])
-def test_a_model_that_leaves_more_than_the_profile_is_told_of(motion, before, worse):
+def test_a_model_that_leaves_more_than_the_profile_is_reported_of(motion, before, worse):
     left = trace(motion, np.full(motion.q.shape, 2.0), "train")
     remarks = list(score_remarks([left._replace(before=np.full(6, before))]))
-    told = [r.values["profile_Nm"] for r in remarks if r.code == "worse-than-profile"]
-    assert told == pytest.approx([before] if worse else [])
+    reported = [r.values["profile_Nm"] for r in remarks if r.code == "worse-than-profile"]
+    assert reported == pytest.approx([before] if worse else [])
 
 
 def test_a_repeated_log_is_no_test_and_the_training_level_is_said(motion):

@@ -116,7 +116,7 @@ def test_points_and_presliding_are_the_robot_files_friction(prepared):
 
 
 @pytest.mark.parametrize(("speed", "points"), [(0.1, 0), (0.16, 2), (0.79, 2), (0.81, 3), (2.1, 4)])
-def test_a_point_is_told_by_a_motion_that_goes_a_third_of_the_way_to_it(speed, points):
+def test_a_point_is_reported_by_a_motion_that_goes_a_third_of_the_way_to_it(speed, points):
     """.01 + .3·.49 = .157, .5 + .3·1 = .8 and 1.5 + .3·1.7 = 2.01 rad/s."""
     shape = bent(speed)
     assert (0 if shape is None else len(shape.speeds)) == points

@@ -102,7 +102,7 @@ def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth)
 
 
 @pytest.mark.slow
-def test_rounds_of_one_motion_are_told_by_the_pull_they_do_without(train):
+def test_rounds_of_one_motion_are_reported_by_the_pull_they_do_without(train):
     """On the arm that gives before it slides, most parameters are open and no fold sees it."""
     rounds = simulate(load_scenario("ur5-circle", ["contacts=[]"]), SEED).recording
     found = identify([rounds], load_robot("ur5"), Task(method="base"), [train])
@@ -123,4 +123,6 @@ def test_a_motion_that_repeats_itself_does_not_spoil_the_profile(train, other):
     # With a pull of .01 it was 5.0 N·m, seven times the profile's .70.
     assert np.mean(elsewhere.rms) <= 1.25 * np.mean(elsewhere.before)
     if np.mean(elsewhere.rms) > np.mean(elsewhere.before):
-        pytest.xfail("still worse elsewhere than the profile (.79 of .70 N·m), and told so")
+        pytest.xfail(
+            "still worse elsewhere than the profile (.79 of .70 N·m), and a remark says so"
+        )

@@ -186,7 +186,7 @@ def model(constant=KNOWN, rotor=KNOWN, friction=True, gravity=UNKNOWN):
         (model(friction=False), ["unexcited-friction"]),
     ],
 )
-def test_what_the_targets_leave_open_is_told(believed, codes):
+def test_what_the_targets_leave_open_is_reported(believed, codes):
     remarks = list(target_remarks(2, believed, UR5))
     assert [r.code for r in remarks] == codes
     assert all(r.where.joints == (3,) for r in remarks)

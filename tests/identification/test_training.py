@@ -120,7 +120,7 @@ def test_drive_constants_need_currents(recording):
         prepare_training([torque], UR5, fit_constants=True)
 
 
-def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
+def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_reported(data):
     fine = JointFriction(model="coulomb-viscous", parameters={"coulomb": 1.0, "viscous": 1.0})
     assert not list(check_friction(0, fine, data))
     pushing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -5.0, "viscous": -5.0})
@@ -141,13 +141,13 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
     assert remark.values["limits_rad_s"] == [limit]
 
 
-def test_joints_that_are_held_are_told(data):
+def test_joints_that_are_held_are_reported(data):
     moves = np.array([True, False, True, True, True, True])
     reverses = np.array([True, False, False, True, True, True])
     held = replace(data, moves=moves, reverses=reverses, rubs=False)
     remarks = friction_method(held, CleanFit(held, fit_frictions(held), [])).remarks
-    told = [(r.code, r.where.joints) for r in remarks if r.code.endswith("-joint")]
-    assert told == [("static-joint", (2,)), ("one-way-joint", (3,))]
+    reported = [(r.code, r.where.joints) for r in remarks if r.code.endswith("-joint")]
+    assert reported == [("static-joint", (2,)), ("one-way-joint", (3,))]
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, monkey
     assert not fits[0]._replace(errors=(1.0, np.nan)).is_kept
     monkeypatch.setattr(friction_fit, "KEPT", 2.0)
     found = friction_method(data)
-    told = [r.where.joints for r in found.remarks if r.code == "profile-kept"]
-    assert told == [(j,) for j in range(1, 7)]
+    reported = [r.where.joints for r in found.remarks if r.code == "profile-kept"]
+    assert reported == [(j,) for j in range(1, 7)]
     assert found.robot.friction == UR5.friction
     np.testing.assert_array_equal(found.robot.chain.rotor_inertia, UR5.chain.rotor_inertia)

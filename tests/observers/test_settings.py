@@ -99,7 +99,7 @@ def test_what_a_log_would_tune_and_first_order_gains_keep_to_densities() -> None
     assert 1.0 / fdo.omega == pytest.approx(delay.mean(), abs=5e-5)
 
 
-def test_a_bare_robot_gets_ten_per_second_and_is_told() -> None:
+def test_a_bare_robot_gets_ten_per_second_and_is_reported() -> None:
     (gmo,), remarks = build_observers(["gmo"], setup(""))
     np.testing.assert_array_equal(gmo.gain, [10.0] * 6)
     assert [remark.code for remark in remarks] == ["gain-from-default"]

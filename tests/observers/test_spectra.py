@@ -219,7 +219,7 @@ def spectra(contact: float) -> Spectra:
 
 
 @pytest.mark.parametrize(("contact", "free"), [(2.0, True), (3.0, True), (7.0, False)])
-def test_contacts_are_told_below_five_hertz(contact: float, free: bool) -> None:
+def test_contacts_are_reported_below_five_hertz(contact: float, free: bool) -> None:
     """Above, drives ripple louder in some cycles than in others: that says nothing of contact."""
     assert looks_free(spectra(contact)) is free
 

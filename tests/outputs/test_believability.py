@@ -78,7 +78,7 @@ def test_a_reference_that_a_warning_speaks_against_is_a_caution(
     assert "looks touched" in ground.sentence
 
 
-def test_a_load_nobody_told_stands_first_with_its_command(without_reference: Analysis) -> None:
+def test_a_load_nobody_reported_stands_first_with_its_command(without_reference: Analysis) -> None:
     load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
     first = grounds(examined(without_reference, load))[0]
     assert (first.standing, first.subject) == ("bad", "load")
@@ -185,7 +185,7 @@ def test_free_motion_counts_its_false_rows(
     assert f"{false} contact" in ground.sentence
 
 
-def test_what_limits_the_list_is_told_with_its_subject(without_reference: Analysis) -> None:
+def test_what_limits_the_list_is_reported_with_its_subject(without_reference: Analysis) -> None:
     (stop,) = of(replace(without_reference, contacts=contact_list(contact())), "stop")
     assert stop.standing == "caution"
     reason = caution("contacts-not-told", reason="no samples")
@@ -299,7 +299,7 @@ def test_health_is_the_worst_of_the_log_itself(without_reference: Analysis) -> N
     assert health(grounds(examined(without_reference, gap))).subject == "effort"
 
 
-def test_temperature_is_told_where_the_log_has_none(without_reference: Analysis) -> None:
+def test_temperature_is_reported_where_the_log_has_none(without_reference: Analysis) -> None:
     found = fact(
         "no-temperature", robot="ur5", reference_C=35.0, least_percent=20.0, most_percent=24.0
     )

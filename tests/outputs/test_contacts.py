@@ -135,7 +135,7 @@ def test_a_load_that_the_model_lacks_is_in_the_headline() -> None:
     assert "(4.7–50.5 s): franka_hand? Add --payload franka_hand." in hand
 
 
-def test_places_that_cannot_be_told_apart_are_named() -> None:
+def test_places_that_cannot_be_reported_apart_are_named() -> None:
     def words_of(*links: int) -> str:
         return place_words(contact(where="cannot tell", places=links))
 

@@ -215,12 +215,12 @@ def test_the_seal_goes_first_and_comes_last(
     moved = []
     move = Path.replace
 
-    def told(self: Path, target: Path) -> Path:
+    def reported(self: Path, target: Path) -> Path:
         moved.append(self.name if self.parent == tmp_path else target.name)
         return move(self, target)
 
     sealed(tmp_path, {"a.txt": "a", "z.txt": "z"})
-    monkeypatch.setattr(Path, "replace", told)
+    monkeypatch.setattr(Path, "replace", reported)
     sealed(tmp_path, {"a.txt": "a", "z.txt": "z"})
     assert moved[0] == moved[-1] == "run.json"
     assert len(moved) == 6  # three files go and come

@@ -26,7 +26,7 @@ def test_one_robot_joint_by_joint() -> None:
     assert lines[0].index("tau_max") + len("tau_max") == lines[2].index("87.0") + len("87.0")
 
 
-def test_friction_is_told_with_its_numbers_and_how_far_to_trust_it() -> None:
+def test_friction_is_reported_with_its_numbers_and_how_far_to_trust_it() -> None:
     text = joints_grid(load_robot("panda")).rows[1][-1]
     assert str(text).startswith("sigmoid (amplitude 0.54615, ")
     assert str(text).endswith("; published")

@@ -148,7 +148,7 @@ def test_every_axis_has_its_unit_and_rows_share_one_below(width: float, rows: in
 
 
 @pytest.mark.slow
-def test_lines_are_told_apart_without_colour() -> None:
+def test_lines_are_reported_apart_without_colour() -> None:
     """By dashes as they are drawn, or, solid both, by width and lightness."""
     from matplotlib.colors import to_rgb
 
@@ -239,7 +239,7 @@ def test_a_second_chart_has_its_axis_to_the_right_named_at_the_end_of_a_row() ->
     assert [axes.get_ylabel() for axes in rights] == ["", "", "|H| (dB)", "", "", "|H| (dB)"]
 
 
-def test_marks_stand_where_they_are_told_each_shape_its_own() -> None:
+def test_marks_stand_where_they_are_reported_each_shape_its_own() -> None:
     marks = {"a": (np.arange(6.0), np.zeros(6)), "b": (np.ones(6), np.zeros(6))}
     figure = drawn_lines(7.16, [Plot(chart(), 0), Plot(chart(), 3)], marks=marks, below="Rate (Hz)")
     one, other = figure.axes[1].lines[-2:]
@@ -300,7 +300,7 @@ def test_dots_stand_side_by_side_with_their_intervals_and_the_floor() -> None:
     assert named == ["gmo", "best", "floor of the reference"]
 
 
-def test_observers_are_told_apart_without_colour() -> None:
+def test_observers_are_reported_apart_without_colour() -> None:
     gmo, best = drawn_dots([plot()]).axes[0].containers
     assert gmo.lines[0].get_marker() != best.lines[0].get_marker()
     assert gmo.lines[0].get_markerfacecolor() != best.lines[0].get_markerfacecolor()

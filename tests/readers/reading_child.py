@@ -51,10 +51,10 @@ def outcome(path: str) -> tuple[int, str, list[str]]:
         recording = read(path)
     except VftError as error:
         return -1, str(error), []
-    except BaseException as error:  # noqa: BLE001 - whatever it is, it is told
+    except BaseException as error:  # noqa: BLE001 - whatever it is, it is reported
         return -2, f"{type(error).__name__}: {error}", []
-    told = [r for r in recording.source.remarks if r.level == "warning"]
-    return recording.samples, "; ".join(map(str, told)), [remark.code for remark in told]
+    reported = [r for r in recording.source.remarks if r.level == "warning"]
+    return recording.samples, "; ".join(map(str, reported)), [remark.code for remark in reported]
 
 
 def peak_mib() -> float:
@@ -76,8 +76,8 @@ def main() -> None:
         if child == 0:
             resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
             resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_LIMIT, ADDRESS_LIMIT))
-            told = json.dumps([Path(path).name, *outcome(path), peak_mib()])
-            os.write(outlet, told.encode())
+            reported = json.dumps([Path(path).name, *outcome(path), peak_mib()])
+            os.write(outlet, reported.encode())
             os._exit(0)
         os.close(outlet)
         with os.fdopen(inlet, "rb") as pipe:

@@ -88,8 +88,8 @@ def hdf5(path: Path, layout: Layout, **attributes: dict[str, Any]) -> Path:
     with h5py.File(path, "w") as file:
         for name, numbers in layout.items():
             file.create_dataset(name, data=numbers)
-        for group, told in attributes.items():
-            file[group].attrs.update(told)
+        for group, reported in attributes.items():
+            file[group].attrs.update(reported)
     return path
 
 

@@ -22,7 +22,7 @@ def test_positions_are_needed_and_names_are_those_of_a_recording(signals):
         assemble([0.0, 0.1], **signals)
 
 
-def test_the_columns_of_an_observer_are_told_of_our_own_files_alone(tmp_path):
+def test_the_columns_of_an_observer_are_reported_of_our_own_files_alone(tmp_path):
     ours, other, text = (tmp_path / name for name in ("ours", "other", "text"))
     pl.DataFrame({"t": [0.0], "q/1": [0.0], "tau_ext/gmo/1": [1.0]}).write_parquet(ours)
     pl.DataFrame({"t": [0.0], "q/1": [0.0]}).write_parquet(other)

@@ -88,8 +88,8 @@ def test_metadata_that_counts_other_messages_is_said(tmp_path: Path) -> None:
     (folder / "metadata.yaml").write_text(
         text.replace("  message_count: 240", "  message_count: 300")
     )
-    [told] = read(folder).source.warnings
-    assert "kept 240 of the 300 messages that metadata.yaml counts" in told
+    [reported] = read(folder).source.warnings
+    assert "kept 240 of the 300 messages that metadata.yaml counts" in reported
 
 
 def test_metadata_cannot_choose_a_path(tmp_path: Path) -> None:
@@ -278,7 +278,7 @@ def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(tmp_path: P
     assert recording.wrench_frame is None
 
 
-def test_a_topic_that_is_taken_is_not_told_as_left_out(tmp_path: Path) -> None:
+def test_a_topic_that_is_taken_is_not_reported_as_left_out(tmp_path: Path) -> None:
     """Whatever its name: one with a hyphen was not found again in the sentence on its taking."""
     messages = [ur_message(k) for k in range(50)]
     for k in range(400):
@@ -345,7 +345,7 @@ def test_unclosed_ros1_bags_are_read(tmp_path: Path) -> None:
     path.write_bytes(content)
     recording = read(path)
     assert_is_the_motion(recording)
-    assert any("did not close the file" in told for told in recording.source.warnings)
+    assert any("did not close the file" in reported for reported in recording.source.warnings)
 
 
 def changed_index(path: Path, entry: Callable[[bytes], bytes]) -> Path:

@@ -47,7 +47,7 @@ def test_a_pause_is_no_jump():
     assert dropped(raw({4: 30.0})) == 1
 
 
-def test_a_jump_without_garbage_is_left_to_be_told():
+def test_a_jump_without_garbage_is_left_to_be_reported():
     assert dropped(raw({4: 1000.0}, absurd=())) == 0
 
 

@@ -38,7 +38,7 @@ def test_a_folder_is_searched_and_what_is_no_log_left_out(folder: Path) -> None:
     assert [e.path.relative_to(folder).as_posix() for e in entries] == [
         "a/b.csv",
         "b.csv",
-        "empty.csv",  # a recording that failed: told when it is read
+        "empty.csv",  # a recording that failed: reported when it is read
     ]
     assert {path.name for path in collection.passed} == {"b.csv.truth.parquet", "notes.txt"}
 

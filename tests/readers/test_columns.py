@@ -120,13 +120,13 @@ def test_one_of_several_recordings(tmp_path: Path) -> None:
     assert second.samples == 30
     assert second.q[0, 0] == 1.0
     assert "read recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
-    told, *_ = read_first_recording(path).source.remarks
-    assert (told.code, told.level) == ("time-reset", "warning")
-    assert told.values["rows"] == [30, 60]
+    reported, *_ = read_first_recording(path).source.remarks
+    assert (reported.code, reported.level) == ("time-reset", "warning")
+    assert reported.values["rows"] == [30, 60]
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("", "empty"),
         ("t,q:6,speed:6", "no signal 'speed'"),
@@ -143,8 +143,8 @@ def test_one_of_several_recordings(tmp_path: Path) -> None:
         ("t,_:*,q:6,_:*", "give it once"),
     ],
 )
-def test_what_cannot_be_understood_is_said(text: str, told: str) -> None:
-    with pytest.raises(LogError, match=told):
+def test_what_cannot_be_understood_is_said(text: str, reported: str) -> None:
+    with pytest.raises(LogError, match=reported):
         parse_columns(text)
 
 
@@ -159,7 +159,7 @@ def test_columns_that_are_skipped(tmp_path: Path, skipped: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("columns", "told"),
+    ("columns", "reported"),
     [
         ("t,q:6", "skip the rest with _:12"),
         ("t,q:6,dq:6,current:6,tau:6", "describes 25 columns, the table has 19"),
@@ -168,14 +168,14 @@ def test_columns_that_are_skipped(tmp_path: Path, skipped: str) -> None:
     ],
 )
 def test_a_headerless_table_that_is_described_wrongly(
-    tmp_path: Path, columns: str, told: str
+    tmp_path: Path, columns: str, reported: str
 ) -> None:
-    with pytest.raises(LogError, match=told):
+    with pytest.raises(LogError, match=reported):
         read(headerless_csv(tmp_path / "x"), columns=columns)
 
 
 @pytest.mark.parametrize(
-    ("columns", "told"),
+    ("columns", "reported"),
     [
         ("t=time,q=q_{i}", "no column 'time'.*q_0"),
         ("t=t,q=pos_{i}", r"no column 'pos_\{i\}'"),
@@ -184,8 +184,10 @@ def test_a_headerless_table_that_is_described_wrongly(
         ("t=t,q=q_0|q_1|q_1", "a column of q twice"),
     ],
 )
-def test_a_headed_table_that_is_described_wrongly(tmp_path: Path, columns: str, told: str) -> None:
-    with pytest.raises(LogError, match=told):
+def test_a_headed_table_that_is_described_wrongly(
+    tmp_path: Path, columns: str, reported: str
+) -> None:
+    with pytest.raises(LogError, match=reported):
         read(table_csv(tmp_path / "x"), columns=columns)
 
 

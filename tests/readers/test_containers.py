@@ -355,7 +355,7 @@ def xlsx(path: Path) -> None:
         (lambda path: path.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(99)), "a PX4 ULog"),
     ],
 )
-def test_a_file_of_another_kind_is_told_by_name(
+def test_a_file_of_another_kind_is_reported_by_name(
     make: Callable[[Path], None], words: str, tmp_path: Path
 ) -> None:
     make(tmp_path / "x")

@@ -99,9 +99,9 @@ def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(
     log, described = read(path), read(path, columns=T31)
     for signal in ("t", *described.signals):
         np.testing.assert_array_equal(getattr(log, signal), getattr(described, signal))
-    (told,) = [r for r in log.source.remarks if r.code == "columns-by-value"]
-    assert told.values["columns"] == T31
-    assert str(told).startswith(f"31 columns read as {T31}: the first steps evenly")
+    (reported,) = [r for r in log.source.remarks if r.code == "columns-by-value"]
+    assert reported.values["columns"] == T31
+    assert str(reported).startswith(f"31 columns read as {T31}: the first steps evenly")
 
 
 def test_an_open_table_is_refused_with_the_lines_that_fit(tmp_path: Path) -> None:
@@ -127,6 +127,6 @@ def test_real_tables_are_read_as_their_description_says(logs: Path) -> None:
     ("name", "line"),
     [("fr3/run_a.npy", "t,q:7,dq:7,tau:7,_:20"), ("ur10_link4/link4.csv.gz", "t,q:6,dq:6,tau:6")],
 )
-def test_other_real_tables_are_told_what_fits(logs: Path, name: str, line: str) -> None:
+def test_other_real_tables_are_reported_what_fits(logs: Path, name: str, line: str) -> None:
     with pytest.raises(LogError, match=line):
         read(logs / name)

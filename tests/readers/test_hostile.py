@@ -157,7 +157,7 @@ def test_bombs_are_refused_in_one_line_and_little_memory(tmp_path: Path) -> None
         (lambda path: npz(path, time=np.zeros((ROWS, 4, 4))), "clock 'time' holds 16 numbers"),
         (lambda path: npz(path, time=np.array(1.0)), "no clock"),
         (lambda path: npz(path, q=np.zeros((7, ROWS))), "dq has 7 columns, q has 120"),
-        (lambda path: table(path, lambda _: 1.0), "clock stands still: all 120 samples"),
+        (lambda path: table(path, lambda _: 1.0), "clock never moves: all 120 samples"),
         (lambda path: table(path, lambda k: k // 40), "clock is coarser than the samples: 117 of"),
         (lambda path: table(path, lambda k: k * 5e-324), "which no robot's log is"),
         (lambda path: table(path, lambda k: k * 1e300), "which no robot's log is"),
@@ -255,7 +255,7 @@ def test_a_message_longer_than_its_file_is_damage(tmp_path: Path) -> None:
         "INSERT INTO messages VALUES (1, 1, 7, zeroblob(200000))",
     )
     content = bytearray(path.read_bytes())
-    # A blob of n bytes is told as 2 n + 12, in groups of seven bits: 200 000 is 0x98 0xb5 0x0c.
+    # A blob of n bytes has the number 2 n + 12, in groups of seven bits: 200 000 is 0x98 0xb5 0x0c.
     place = content.index(bytes([0x98, 0xB5, 0x0C]))
     content[place : place + 3] = bytes([0xFF, 0xFF, 0x7C])  # about a million bytes
     path.write_bytes(content)
@@ -311,7 +311,7 @@ HOSTILE = {
     "pk_laughs_dict.pkl": (-1, "more numbers than a file of its size can hold"),
     "pq_list_empty_first.parquet": (-1, "dq holds no number in its first row"),
     "pq_q_empty_first.parquet": (-1, "q holds no number in its first row"),
-    "t-const.csv.gz": (-1, "the clock stands still: all 600 samples"),
+    "t-const.csv.gz": (-1, "the clock never moves: all 600 samples"),
     "t-denormal.csv.gz": (-1, "which no robot's log is"),
     "typebomb_empty.mcap": (-1, "more parts than bytes"),
 }

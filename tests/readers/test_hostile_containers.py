@@ -119,7 +119,7 @@ def matlab_bomb(path: Path) -> Path:
 
 
 def matlab_struct_bomb(path: Path) -> Path:
-    """The same inside a struct, whose size is not told before it is unpacked."""
+    """The same inside a struct, of unknown size before it is unpacked."""
     from scipy.io import savemat
 
     with path.open("wb") as file:

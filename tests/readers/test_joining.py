@@ -103,7 +103,7 @@ def test_same_of_bags(tmp_path: Path, made: Callable[[Path], Path]) -> None:
 
 
 def test_repeated_stamps_over_a_border(tmp_path: Path) -> None:
-    """A row that repeats the last stamp of the block before is dropped, and one that differs told.
+    """A row that repeats the last stamp of the block before is dropped; another one is reported.
 
     Parquet comes seven rows at a time, so row 7 is the first of a block.
     """
@@ -133,7 +133,7 @@ def test_gaps_and_jitter(tmp_path: Path) -> None:
     ("row", "column", "value", "error"),
     [(150, "t", 0.0, ClockError), (150, "q/1", float("nan"), LogError)],
 )
-def test_odd_logs_are_told_by_the_whole(
+def test_odd_logs_are_reported_by_the_whole(
     tmp_path: Path,
     row: int,
     column: str,
@@ -191,7 +191,7 @@ def test_quoted_text_is_read_whole(tmp_path: Path) -> None:
     check_same(whole, long)
 
 
-def test_a_last_row_that_is_cut_is_told_as_of_the_whole(tmp_path: Path) -> None:
+def test_a_last_row_that_is_cut_is_reported_as_of_the_whole(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     table().write_csv(path)
     path.write_bytes(path.read_bytes()[:-5])

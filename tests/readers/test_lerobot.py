@@ -57,13 +57,13 @@ def dataset(
         path.parent.mkdir(parents=True, exist_ok=True)
         write_table(table.take(rows), path)
     if version == 3:
-        told = {
+        reported = {
             "episode_index": range(3), "length": ROWS, "dataset_from_index": first,
             "dataset_to_index": first + ROWS, "data/chunk_index": [0] * 3,
             "data/file_index": files,
         }  # fmt: skip
         write_table(
-            pa.table({name: list(values) for name, values in told.items()}),
+            pa.table({name: list(values) for name, values in reported.items()}),
             folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet",
         )
     else:
@@ -129,17 +129,17 @@ def test_a_table_that_the_data_contradict_is_refused(column: str, tmp_path: Path
 
     path = dataset(tmp_path)
     table = path / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
-    told = pq.read_table(table).to_pydict()
-    told["dataset_to_index" if column == "length" else column][1] += 1
-    told["length"][1] += 1 if column == "length" else -1
+    reported = pq.read_table(table).to_pydict()
+    reported["dataset_to_index" if column == "length" else column][1] += 1
+    reported["length"][1] += 1 if column == "length" else -1
     import pyarrow as pa
 
-    pq.write_table(pa.table(told), table)
+    pq.write_table(pa.table(reported), table)
     with pytest.raises(LogError, match="are not those that the table of episodes names"):
         read(path, episode=1)
 
 
-def test_numbers_of_the_state_are_told_apart_by_their_names(tmp_path: Path) -> None:
+def test_numbers_of_the_state_are_reported_apart_by_their_names(tmp_path: Path) -> None:
     """One state for all, joints in no order, a wrist's wrench behind them."""
     order = [3, 0, 6, 1, 5, 2, 4]
     parts = {"positions": LOG["q"], "velocities": LOG["dq"], "efforts": LOG["tau"]}
@@ -163,7 +163,7 @@ def test_signals_are_laid_together_by_the_joints_names(tmp_path: Path) -> None:
         read(dataset(tmp_path / "other", USUAL | other))
 
 
-def test_two_arms_are_told_apart(tmp_path: Path) -> None:
+def test_two_arms_are_reported_apart(tmp_path: Path) -> None:
     names = [f"{side}_{joint}.pos" for side in ("left", "right") for joint in JOINTS]
     features: Features = {
         "observation.state": (np.hstack([LOG["q"], -LOG["q"]]), names),

@@ -57,7 +57,7 @@ def test_another_choice_is_another_reading(folders, count):
     assert len(count) == 2
 
 
-def test_logs_that_were_named_are_told_apart_both(folders):
+def test_logs_that_were_named_are_reported_apart_both(folders):
     paths = [folders / "a" / "log.csv", folders / "b" / "log.csv"]
     library = Library(paths)
     assert [library.open(path).name for path in paths] == ["a/log.csv", "b/log.csv"]
@@ -91,7 +91,7 @@ def test_a_name_of_its_own_is_the_label():
     assert list(found.values()) == ["one.csv", "two.csv"]
 
 
-def test_equal_names_are_told_apart_by_their_folders_and_the_others_stay_short():
+def test_equal_names_are_reported_apart_by_their_folders_and_the_others_stay_short():
     found = labelled(["/x/a/log.csv", "/x/b/log.csv", "/x/b/other.csv"])
     assert list(found.values()) == ["a/log.csv", "b/log.csv", "other.csv"]
 
@@ -101,7 +101,7 @@ def test_as_many_folders_as_it_takes():
     assert list(found.values()) == ["x/a/log.csv", "y/a/log.csv", "b/log.csv"]
 
 
-def test_a_path_that_ends_another_is_told_from_it():
+def test_a_path_that_ends_another_is_reported_from_it():
     assert list(labelled(["/log.csv", "/a/log.csv"]).values()) == ["/log.csv", "a/log.csv"]
 
 

@@ -47,7 +47,7 @@ def test_columns_are_scaled_as_described(write):
         (("t", "a_tau_ext_1", "b_tau_ext_1"), "a_tau_ext and b_tau_ext"),
     ],
 )
-def test_torques_that_cannot_be_told_are_refused(write, names, said):
+def test_torques_that_cannot_be_reported_are_refused(write, names, said):
     with pytest.raises(LogError, match=said):
         read_reference(write(*names))
 

@@ -38,12 +38,12 @@ def log(stamps, **signals):
     ("stamps", "code", "rows"),
     [([0.0, 1.0, 1.0, 2.0], "repeat-dropped", 1), ([0.0, 1.0, 1.0, 1.0], "repeats-dropped", 2)],
 )
-def test_repeated_stamps_are_told_with_their_number(stamps, code, rows):
+def test_repeated_stamps_are_reported_with_their_number(stamps, code, rows):
     (remark,) = cleaned(log(stamps), Path("x"), "test").source.remarks
     assert (remark.code, remark.level, remark.values["rows"]) == (code, "fact", rows)
 
 
-def test_a_gap_is_told_with_its_place_and_is_no_repair():
+def test_a_gap_is_reported_with_its_place_and_is_no_repair():
     source = cleaned(log([0.0, 1.0, 2.0, 3.0, 13.0, 14.0]), Path("x"), "test").source
     (remark,) = source.remarks
     assert (remark.code, remark.level) == ("clock-gap", "caution")
@@ -52,7 +52,7 @@ def test_a_gap_is_told_with_its_place_and_is_no_repair():
     assert source.warnings == (str(remark),)
 
 
-def test_a_cut_wrapping_is_told(tmp_path):
+def test_a_cut_wrapping_is_reported(tmp_path):
     import gzip
 
     rows = "t,q_1,q_2\n" + "".join(f"{k / 100},0,{k / 100}\n" for k in range(100))

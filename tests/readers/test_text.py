@@ -116,7 +116,9 @@ def test_vendor_residual_is_turned_and_plain_tau_ext_is_not(tmp_path: Path) -> N
     [("0", 1, 1e-3), ("1700000000000000000", 1_000_000, 1e-3), ("1700000000000", 8, 8e-3),
      ("0", 2, 2.0), ("1700000000000000", 8000, 8e-3)],
 )  # fmt: skip
-def test_time_units_are_told_by_size(tmp_path: Path, first: str, step: int, seconds: float) -> None:
+def test_time_units_are_reported_by_size(
+    tmp_path: Path, first: str, step: int, seconds: float
+) -> None:
     lines = [f"{int(first) + k * step},0.1,0.2" for k in range(20)]
     recording = read(write(tmp_path / "x", table(lines)))
     np.testing.assert_allclose(recording.t, seconds * np.arange(20), rtol=1e-9)
@@ -201,13 +203,13 @@ BAD_CELLS = [
 ]
 
 
-@pytest.mark.parametrize(("row", "told"), BAD_CELLS)
+@pytest.mark.parametrize(("row", "reported"), BAD_CELLS)
 def test_a_bad_cell_in_the_middle_is_refused_with_its_place(
-    tmp_path: Path, row: str, told: str
+    tmp_path: Path, row: str, reported: str
 ) -> None:
     lines = rows(200, step=0.001)
     lines[150] = row
-    with pytest.raises(LogError, match=told):
+    with pytest.raises(LogError, match=reported):
         read(write(tmp_path / "x", table(lines)))
 
 
@@ -225,7 +227,7 @@ def test_time_that_runs_backwards_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "reported"),
     [
         (b"", "empty"),
         (HEAD.encode() + b"\n", "no samples"),
@@ -236,8 +238,8 @@ def test_time_that_runs_backwards_is_refused(tmp_path: Path) -> None:
         ("t,q1\n0,1\n".encode("utf-16"), "not recognised"),
     ],
 )
-def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes, told: str) -> None:
-    with pytest.raises((LogError, ClockError), match=told) as caught:
+def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes, reported: str) -> None:
+    with pytest.raises((LogError, ClockError), match=reported) as caught:
         read(write(tmp_path / "x", content))
     assert "\n" not in str(caught.value)
 
@@ -289,7 +291,7 @@ def test_wrapped_files_read_the_same(tmp_path: Path, wrap: str) -> None:
     cut = write(tmp_path / "z", packed.read_bytes()[: len(packed.read_bytes()) // 2])
     short = read(cut)
     assert 0 < short.samples < ROWS
-    assert any("file is cut" in told for told in short.source.warnings)
+    assert any("file is cut" in reported for reported in short.source.warnings)
 
 
 def test_signals_that_nobody_asked_for_stay_unread(tmp_path: Path) -> None:

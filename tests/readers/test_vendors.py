@@ -50,7 +50,7 @@ def test_official_text_of_every_line_end(tmp_path: Path, end: str) -> None:
     np.testing.assert_array_equal(recording.q, motion()["q"])
 
 
-def test_ur_rtde_is_told_by_its_commas(tmp_path: Path) -> None:
+def test_ur_rtde_is_reported_by_its_commas(tmp_path: Path) -> None:
     assert read(ur_csv(tmp_path / "x", separator=",", end="\n")).source.format == "ur-rtde"
 
 
@@ -82,7 +82,7 @@ def test_the_point_of_the_controllers_moment(
     np.testing.assert_array_equal(stated.wrench, read(path).wrench)
 
 
-def test_payload_that_the_controller_was_told_of(tmp_path: Path) -> None:
+def test_payload_that_the_controller_was_reported_of(tmp_path: Path) -> None:
     path = ur_csv(tmp_path / "x", separator=",", end="\n")
     lines = path.read_text().splitlines()
     lines[0] += ",payload,payload_cog_0,payload_cog_1,payload_cog_2"

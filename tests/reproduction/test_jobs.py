@@ -22,10 +22,10 @@ def test_fast_takes_the_first_seed_of_each() -> None:
 
 
 def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
-    jobs, told = jobs_of(cheap, tuple(cheap.items), fast=False), []
-    results = run_jobs(jobs, lambda *words: told.append(words), workers=1)
+    jobs, reported = jobs_of(cheap, tuple(cheap.items), fast=False), []
+    results = run_jobs(jobs, lambda *words: reported.append(words), workers=1)
     assert list(results) == jobs
-    assert told[-1] == (6, 6, "timed, seed 0")  # what takes the time has the machine for itself
+    assert reported[-1] == (6, 6, "timed, seed 0")  # what takes the time has the machine for itself
     found = gather(cheap, tuple(cheap.items), results)
     assert found["fig1"].values["a"][CORRECTED] == [3.0, 4.0, 5.0]
     assert found["fig1"].values["b"][CORRECTED] == [-1.0, None, None]

@@ -81,7 +81,7 @@ def test_page_and_text_have_every_item_and_what_failed(made, cheap) -> None:
     assert "- what takes the time\n" in text
 
 
-def test_all_that_is_written_was_told_before(made, cheap, tmp_path: Path) -> None:
+def test_all_that_is_written_was_reported_before(made, cheap, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
     found, jobs = made
     names = files_of(cheap, tuple(cheap.items), "svg")

@@ -20,12 +20,12 @@ def test_items_come_in_the_papers_order() -> None:
 
 
 @pytest.mark.parametrize("words", ["fig14", "table1,nothing", ","])
-def test_what_is_not_there_is_told_with_what_is(words: str) -> None:
+def test_what_is_not_there_is_reported_with_what_is(words: str) -> None:
     with pytest.raises(ParameterError, match="there is table1, table2, guidelines, fig1") as error:
         HUANG.chosen(words)
     assert "\n" not in str(error.value)
 
 
-def test_an_unknown_paper_is_told_with_those_there_are() -> None:
+def test_an_unknown_paper_is_reported_with_those_there_are() -> None:
     with pytest.raises(ParameterError, match="no paper 'huang2026'; there is huang2025"):
         paper_of("huang2026")

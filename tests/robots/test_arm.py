@@ -1,4 +1,4 @@
-"""Which joints are the arm: fingers, rails and heads locked, hands left, two arms told apart."""
+"""Which joints are the arm: fingers, rails and heads locked, hands left, two arms kept apart."""
 
 from pathlib import Path
 

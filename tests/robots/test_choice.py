@@ -59,8 +59,8 @@ def test_the_tip_of_a_description_are_part_of_the_choice(tmp_path: Path) -> None
 
 
 def test_the_payload_that_the_log_declares_is_mounted() -> None:
-    told = replace(log(6), payload_mass=1.2, payload_com=(0.0, 0.01, 0.1))
-    payload = RobotChoice(name="ur5e", payload="log").load(told).payload
+    reported = replace(log(6), payload_mass=1.2, payload_com=(0.0, 0.01, 0.1))
+    payload = RobotChoice(name="ur5e", payload="log").load(reported).payload
     assert payload is not None
     assert (payload.mass, payload.com.tolist()) == (1.2, [0.0, 0.01, 0.1])
     with pytest.raises(RobotError, match="does not say which payload"):

@@ -202,7 +202,7 @@ def test_a_jump_of_a_turn_is_taken_back_and_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.target_q, q, atol=1e-13)
     (remark,) = found.source.remarks
     assert remark.where.joints == (1, 2, 3, 4, 5, 6)
-    assert Examiner().taken(log, arm6, ReadChoice()).source.remarks == (remark,)
+    assert Examiner().read_as(log, arm6, ReadChoice()).source.remarks == (remark,)
 
 
 def test_what_does_not_jump_is_the_log_itself(tmp_path: Path) -> None:

@@ -105,7 +105,7 @@ def test_the_terms_follow_the_log() -> None:
 @pytest.mark.parametrize(
     "law", [(0.0, 0.0, 0.0, 0.0), (-1.0, -0.01, 0.5, -0.01), (1.0, 10.0, 0.0, 0.0), (1e3,) * 4]
 )
-def test_a_law_that_is_none_is_told(law: tuple[float, ...]) -> None:
+def test_a_law_that_is_none_is_reported(law: tuple[float, ...]) -> None:
     assert "temperature makes friction" in lawless(law)
 
 

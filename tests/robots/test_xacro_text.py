@@ -153,7 +153,7 @@ def test_a_maker_s_package_loads_its_tables_and_those_of_a_package_beside_it(
     assert robot.chain.mass[-1] == pytest.approx(1.0 + 0.25)
 
 
-def test_without_the_package_the_line_that_expands_it_is_told(
+def test_without_the_package_the_line_that_expands_it_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)

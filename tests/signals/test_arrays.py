@@ -96,7 +96,7 @@ def test_the_median_is_numpy_s(values: list[float]) -> None:
     assert median(np.array(values)) == np.median(values)
 
 
-def test_even_clocks_are_told_from_jittering_ones() -> None:
+def test_even_clocks_are_reported_from_jittering_ones() -> None:
     t = 0.008 * np.arange(100)
     assert is_uniform(t)
     assert is_uniform(np.round(t, 9))
@@ -107,12 +107,12 @@ def test_even_clocks_are_told_from_jittering_ones() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "reported"),
     [("q", "the text 'q'"), ([[1, 2], [3]], "rows of unequal length"), (object(), "no number")],
 )
-def test_what_is_no_array_of_numbers_is_refused(value: object, told: str) -> None:
+def test_what_is_no_array_of_numbers_is_refused(value: object, reported: str) -> None:
     assert number_array([[1, 2]], "q", "x").tolist() == [[1.0, 2.0]]
-    with pytest.raises(ShapeError, match=f"^q of x is {told}.*; expected an array of numbers$"):
+    with pytest.raises(ShapeError, match=f"^q of x is {reported}.*; expected an array of numbers$"):
         number_array(value, "q", "x")  # type: ignore[arg-type]
 
 

@@ -83,7 +83,7 @@ def test_a_cutoff_beyond_half_the_rate_is_refused(cutoff: float) -> None:
         low_pass(t, np.zeros((100, 1)), cutoff)
 
 
-def test_a_log_that_is_nearly_all_gap_is_refused_and_told_where_it_waits() -> None:
+def test_a_log_that_is_nearly_all_gap_is_refused_and_reported_where_it_waits() -> None:
     t = 0.01 * np.arange(200)
     t[100:] += 1e6
     with pytest.raises(ClockError, match=r"waits 1e\+06 s after t = 0.990 s"):

@@ -22,11 +22,11 @@ def swinging(rate: float, seconds: float = 8.0) -> tuple[Recording, np.ndarray]:
 def test_a_slow_swing_is_derived(rate: float, cutoff: float) -> None:
     log, truth = swinging(rate)
     derived = with_velocity(log)
-    (told,) = derived.source.remarks
-    assert told.code == "derived-velocity"
-    assert told.values["cutoff_Hz"] == pytest.approx(cutoff)
+    (reported,) = derived.source.remarks
+    assert reported.code == "derived-velocity"
+    assert reported.values["cutoff_Hz"] == pytest.approx(cutoff)
     # 40 ms at 12 Hz, longer with a lower cutoff
-    assert told.values["blunted_ms"] == pytest.approx(40 * 12 / cutoff)
+    assert reported.values["blunted_ms"] == pytest.approx(40 * 12 / cutoff)
     assert derived.source.derived == ("dq",)
     inner = slice(int(rate), -int(rate))
     # Both passes together leave 1/(1 + (f/fc)⁴) of a swing of f, a central difference

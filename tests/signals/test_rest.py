@@ -57,7 +57,7 @@ def test_a_reversal_is_no_stop() -> None:
     assert standing(T, speeds((100, 100 + short + 2))).any()
 
 
-def test_joints_are_told_apart() -> None:
+def test_joints_are_reported_apart() -> None:
     both = np.hstack([speeds((100, 149)), speeds()])
     found = standing(T, both)
     assert found[:, 0].any()

@@ -47,9 +47,9 @@ def coverage(scheme: str, runs: int, first: int = 150, last: int = 250) -> np.nd
         estimate = observer.estimate(terms)
         truth = ExternalTorque(name="truth", t=terms.t, tau=tau)
         own = {estimate.name: estimate.sd}
-        told, true = sensor.wrenches((estimate, truth), q, chain, own)
-        assert told.sd is not None
-        inside = np.abs(told.values - true.values) <= 1.96 * told.sd
+        reported, true = sensor.wrenches((estimate, truth), q, chain, own)
+        assert reported.sd is not None
+        inside = np.abs(reported.values - true.values) <= 1.96 * reported.sd
         held += inside[first:].mean(axis=0)
     return held / runs
 

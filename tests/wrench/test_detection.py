@@ -55,22 +55,22 @@ def test_short_spikes_are_dropped_and_close_contacts_joined() -> None:
 def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
     true = find_contacts(T, pulses((2, 4), (8, 9), (14, 15)))
     found = find_contacts(T, pulses((2.2, 4.3), (11, 11.5), (14.1, 15)))
-    told = match_contacts(found, true, 20.0)
-    assert (told.contacts, told.missed, told.false_alarms) == (3, 1, 1)
+    reported = match_contacts(found, true, 20.0)
+    assert (reported.contacts, reported.missed, reported.false_alarms) == (3, 1, 1)
     # one alarm in the 16 s without contact (each contact's last sample is 10 ms early)
-    assert told.false_alarms_per_h == pytest.approx(3600 / 16.03, rel=1e-3)
-    np.testing.assert_allclose(told.delay, [0.2, np.nan, 0.1], atol=1e-9)
-    assert told.mean_delay == pytest.approx(0.15)
-    assert told.longest_delay == pytest.approx(0.2)
+    assert reported.false_alarms_per_h == pytest.approx(3600 / 16.03, rel=1e-3)
+    np.testing.assert_allclose(reported.delay, [0.2, np.nan, 0.1], atol=1e-9)
+    assert reported.mean_delay == pytest.approx(0.15)
+    assert reported.longest_delay == pytest.approx(0.2)
 
 
 def test_a_found_contact_is_credited_to_one_true_one() -> None:
     true = find_contacts(T, pulses((2, 4), (5, 6), (7, 8), (14, 15)))
     # One interval over three contacts, the last of which it has most of; one in two pieces.
     found = find_contacts(T, pulses((3.9, 8), (14, 14.3), (14.6, 15)))
-    told = match_contacts(found, true, 20.0)
-    assert (told.contacts, told.listed, told.found, told.missed) == (4, 3, 2, 2)
-    assert (told.merged, told.split, told.false_alarms) == (2, 1, 0)
+    reported = match_contacts(found, true, 20.0)
+    assert (reported.contacts, reported.listed, reported.found, reported.missed) == (4, 3, 2, 2)
+    assert (reported.merged, reported.split, reported.false_alarms) == (2, 1, 0)
     assert assignment(found, true)[3] == 2  # the longer piece
 
 
@@ -92,17 +92,17 @@ def test_the_free_band_holds_the_free_part() -> None:
     assert np.max(departure(values, values[:300], 0.1)[:300]) < 1.0
 
 
-def test_contacts_are_told_from_torques_before_the_first_true_one() -> None:
+def test_contacts_are_reported_from_torques_before_the_first_true_one() -> None:
     truth = np.zeros((len(T), 6))
     truth[:, 1] = 10 * pulses((5, 6), (10, 11), height=1.0)
     rng = np.random.default_rng(2)
     late = np.roll(truth, 8, axis=0) + 0.1 * rng.standard_normal(truth.shape)
     estimate = ExternalTorque(name="gmo", t=T, tau=late)
     reference = ExternalTorque(name="file:truth", t=T, tau=truth)
-    (told,) = judge_contacts([estimate], None, reference)
-    assert told.signal == "torque"
-    assert (told.detection.contacts, told.detection.missed) == (2, 0)
-    assert told.detection.mean_delay == pytest.approx(0.08, abs=0.011)  # eight samples late
+    (reported,) = judge_contacts([estimate], None, reference)
+    assert reported.signal == "torque"
+    assert (reported.detection.contacts, reported.detection.missed) == (2, 0)
+    assert reported.detection.mean_delay == pytest.approx(0.08, abs=0.011)  # eight samples late
 
 
 def test_a_log_that_starts_in_contact_has_no_free_part() -> None:
@@ -182,7 +182,7 @@ def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReadi
     )
 
 
-def test_contacts_are_told_from_wrenches_where_there_are_some() -> None:
+def test_contacts_are_reported_from_wrenches_where_there_are_some() -> None:
     values = np.zeros((len(T), 6))
     values[:, 2] = push(8.0)
     values[:, 0] = push(5.0, 12.0, 18.0)  # within the zero span, so part of its band
@@ -211,12 +211,12 @@ def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
 
 def test_what_is_listed_is_judged_as_it_stands() -> None:
     """Two rows for one push: one is credited, the other a piece."""
-    told = KnownContacts(
+    reported = KnownContacts(
         untouched=np.zeros(len(T), dtype=bool),
         listed={"best": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
     )
     best = ExternalTorque(name="best", t=T, tau=np.zeros((len(T), 2)))
-    (score,) = judge_contacts([best], None, reference(2.0), told)
+    (score,) = judge_contacts([best], None, reference(2.0), reported)
     assert score.signal == "list"
     assert (score.detection.found, score.detection.listed, score.detection.split) == (1, 2, 1)
 
@@ -226,8 +226,8 @@ def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
     tau = reference(8.0).tau + np.column_stack([push(5.0, 12.0, 13.0), np.zeros(len(T))])
     estimate = [ExternalTorque(name="gmo", t=T, tau=tau)]
 
-    def alarms(told: KnownContacts | None) -> int:
-        (score,) = judge_contacts(estimate, None, reference(8.0), told)
+    def alarms(reported: KnownContacts | None) -> int:
+        (score,) = judge_contacts(estimate, None, reference(8.0), reported)
         assert score.detection.missed == 0
         return score.detection.false_alarms
 

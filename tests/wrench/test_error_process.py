@@ -1,4 +1,4 @@
-"""The model error that a contact is told from."""
+"""The model error that a contact has to exceed."""
 
 from dataclasses import replace
 

@@ -112,7 +112,7 @@ def test_the_pandas_wrench_is_the_atis(logs: Path) -> None:
     assert own.words == "+x +z −y"
 
 
-def test_a_franka_that_logs_zeros_is_told(logs: Path) -> None:
+def test_a_franka_that_logs_zeros_is_reported(logs: Path) -> None:
     request = AnalysisChoice(
         wrench=WrenchChoice(),
         robot=RobotChoice(name="fr3"),

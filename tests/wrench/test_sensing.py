@@ -125,7 +125,7 @@ def recording(mass: float | None) -> Recording:
     return Recording(t=np.arange(3.0), q=np.zeros((3, 6)), payload_mass=mass)
 
 
-def test_a_payload_that_is_not_mounted_is_told_in_the_arms_own_gravity() -> None:
+def test_a_payload_that_is_not_mounted_is_reported_in_the_arms_own_gravity() -> None:
     ur5 = load_robot("ur5")
     (remark,) = payload_remark(recording(0.5), ur5)
     assert remark.values == {

@@ -1,4 +1,4 @@
-"""A reading beside a reference: whose zero is removed, and what is told of the lag."""
+"""A reading beside a reference: which zero is removed, and what is said of the lag."""
 
 from dataclasses import replace
 

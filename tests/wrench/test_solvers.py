@@ -35,7 +35,7 @@ def torque_of(robot: str, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     return np.einsum("tij,ti->tj", np.array(J), np.broadcast_to(wrench, (len(q), 6)))
 
 
-def told(robot: str, q: np.ndarray, tau: np.ndarray, **how):
+def reported(robot: str, q: np.ndarray, tau: np.ndarray, **how):
     torque = ExternalTorque(name="x", t=np.arange(len(q)) * 0.01, tau=tau)
     known = {"x": how.pop("sd")} if "sd" in how else {}
     (found,) = VirtualSensor(frame="base", **how).wrenches(
@@ -51,7 +51,7 @@ def poses(robot: str, samples: int = 60, seed: int = 2) -> np.ndarray:
 @pytest.mark.parametrize("robot", ["ur5", "ur10e", "panda", "fr3"])
 def test_a_wrench_at_the_flange_comes_back(robot: str) -> None:
     q, wrench = poses(robot), np.array([10.0, -20.0, 5.0, 1.0, -0.5, 2.0])
-    found = told(robot, q, torque_of(robot, q, wrench))
+    found = reported(robot, q, torque_of(robot, q, wrench))
     regular = ~found.hidden
     assert regular.sum() > 20
     # normal equations square the condition number, at most (2 m / 0.05 m)² ~ 2e3: 1e-12 of 20 N
@@ -64,7 +64,7 @@ def test_a_wrench_at_the_flange_comes_back(robot: str) -> None:
 def test_pinv_is_numpys(robot: str) -> None:
     q = poses(robot)
     tau = np.random.default_rng(8).normal(size=q.shape)
-    found = told(robot, q, tau)
+    found = reported(robot, q, tau)
     J = flange_jacobian(load_robot(robot).chain, q)
     expected = np.einsum("tij,tj->ti", np.linalg.pinv(np.swapaxes(J, 1, 2)), tau)
     known = ~found.hidden
@@ -84,7 +84,7 @@ def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver: str) ->
     """One sample, dense: cov = A Σ Aᵀ, and the posterior covariance for the MAP solver."""
     q, tau = REGULAR[None], np.array([[1.0, -2.0, 3.0, 0.5, -0.5, 0.2]])
     sd = np.array([0.3, 0.5, 0.4, 0.1, 0.2, 0.15])
-    found = told("ur5", q, tau, solver=solver, sd=sd)
+    found = reported("ur5", q, tau, solver=solver, sd=sd)
     J = flange_jacobian(load_robot("ur5").chain, q)[0]
     prior = np.diag((PRIOR * SCALE) ** -2.0)
     information = J @ np.diag(sd**-2) @ J.T + prior
@@ -104,7 +104,7 @@ def test_the_map_bias_is_a_hundredth_of_a_newton_in_a_regular_pose() -> None:
     """27 N under 0.3 N·m of stated joint noise: the prior of 50 N pulls by 0.01 N (science §4)."""
     wrench = np.array([0.0, 0.0, -27.0, 0.0, 0.0, 0.0])
     tau = torque_of("ur5", REGULAR[None], wrench)
-    found = told("ur5", REGULAR[None], tau, solver="map", sd=np.full(6, 0.3))
+    found = reported("ur5", REGULAR[None], tau, solver="map", sd=np.full(6, 0.3))
     assert np.max(np.abs(found.values[0, :3] - wrench[:3])) < 0.03
 
 
@@ -119,7 +119,7 @@ def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> 
     q = np.tile(pose, (200, 1))
     tau = 0.3 * rng.standard_normal(q.shape)
     sd = np.full(6, 0.3)
-    blown, held = told("ur5", q, tau, sd=sd), told("ur5", q, tau, solver="map", sd=sd)
+    blown, held = reported("ur5", q, tau, sd=sd), reported("ur5", q, tau, solver="map", sd=sd)
     assert blown.hidden.all()
     assert np.isnan(blown.known).all()
     assert blown.sigma_min is not None
@@ -135,7 +135,7 @@ def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> 
 def test_joint_noise_is_newtons_in_a_regular_pose_and_tens_at_the_wrist() -> None:
     """Science §4: 0.3 N·m is 1.2 N in a regular UR5 pose and 38 N at q5 = 0.02."""
     q = np.array([REGULAR, NEAR_WRIST])
-    found = told("ur5", q, np.zeros_like(q), sd=np.full(6, 0.3))
+    found = reported("ur5", q, np.zeros_like(q), sd=np.full(6, 0.3))
     assert found.sd is not None
     rms = np.sqrt(np.mean(found.sd[:, :3] ** 2, axis=1))
     assert 0.5 < rms[0] < 2.5
@@ -202,15 +202,15 @@ def test_a_stretched_arm_cannot_tell_a_push_along_itself() -> None:
 
 def test_six_joints_have_no_null_space_channel() -> None:
     q = np.tile(REGULAR, (3, 1))
-    assert told("ur5", q, np.ones_like(q)).null_space is None
+    assert reported("ur5", q, np.ones_like(q)).null_space is None
 
 
 def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     q = poses("panda", samples=50)
     tau = np.random.default_rng(1).normal(size=q.shape)
-    whole = told("panda", q, tau)
+    whole = reported("panda", q, tau)
     monkeypatch.setattr("vftcli.wrench.solvers.CHUNK", 7)
-    pieces = told("panda", q, tau)
+    pieces = reported("panda", q, tau)
     np.testing.assert_array_equal(pieces.values, whole.values)
 
 

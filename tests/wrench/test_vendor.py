@@ -1,4 +1,4 @@
-"""Conventions of vendors: axes, sign, gain, lag and zeros of a logged wrench, told apart."""
+"""Conventions of vendors: axes, sign, gain, lag and zeros of a logged wrench, each found."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def ours_in_base(recording: Recording, flange: np.ndarray) -> Wrench:
         ("flange", -1.0, "fits flange axes with turned sign"),
     ],
 )
-def test_a_vendors_frame_and_sign_are_told(axes: str, sign: float, words: str) -> None:
+def test_a_vendors_frame_and_sign_are_reported(axes: str, sign: float, words: str) -> None:
     flange = pushes()
     ours = ours_in_base(log(flange, None), flange)
     rng = np.random.default_rng(0)
@@ -80,7 +80,7 @@ def test_a_vendors_zeros_are_called_that() -> None:
     assert [remark.code for remark in remarks] == ["log-wrench-all-zero"]
 
 
-def test_a_fit_that_is_the_same_signal_is_told_to_be_derived() -> None:
+def test_a_fit_that_is_the_same_signal_is_reported_to_be_derived() -> None:
     flange = pushes()
     ours = ours_in_base(log(flange, None), flange)
     remarks = vendor_remarks(log(2.0 * ours.values, None), ours, load_robot("ur5").chain)
@@ -102,7 +102,7 @@ def test_swapped_axes_are_named() -> None:
     assert remark.values["axes"] == "+x +z −y"
 
 
-def test_what_resembles_nothing_is_told_and_zeros_in_part() -> None:
+def test_what_resembles_nothing_is_reported_and_zeros_in_part() -> None:
     flange = pushes()
     ours = ours_in_base(log(flange, None), flange)
     noise = np.random.default_rng(1).standard_normal(flange.shape)
@@ -115,7 +115,7 @@ def test_what_resembles_nothing_is_told_and_zeros_in_part() -> None:
     assert remarks[0].values["force_N"] == pytest.approx(rms)
 
 
-def test_a_late_field_is_told_by_how_much() -> None:
+def test_a_late_field_is_reported_by_how_much() -> None:
     flange = pushes()
     ours = ours_in_base(log(flange, None), flange)
     late = np.roll(ours.values, 4, axis=0)

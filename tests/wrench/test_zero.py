@@ -43,7 +43,7 @@ def test_the_drift_is_the_mean_of_the_span_and_its_removal_leaves_the_load() -> 
     assert "drift of 1 to 4.5 s removed (base axes)" in str(clean.remarks[-1])
 
 
-def test_the_change_between_two_spans_is_told() -> None:
+def test_the_change_between_two_spans_is_reported() -> None:
     wrench = hung(noise=0.0)
     moved = zero_moved(zero_drift(wrench, (1, 2)), zero_drift(wrench, (6, 7)))
     np.testing.assert_allclose(moved.values["force_N"], [0.0, 0.0, -9.2], atol=1e-12)

@@ -84,7 +84,7 @@ class OnlineKalman:
         *,
         averaged: bool,
     ) -> None:
-        """Prepare for samples every `step` [s] whose torque is `averaged` over it, or not."""
+        """Prepare for samples every `step` [s]; `averaged`: torque is its mean over the step."""
         import pinocchio as pin
 
         n = robot.joints
@@ -293,7 +293,7 @@ def steps_in(interval: float, step: float, what: str) -> int:
 class Latency:
     """One application of a force, all in seconds; None where it did not happen."""
 
-    axis: int  #: Index of the axis whose true force is the first to pass its threshold.
+    axis: int  #: Index of the axis on which the true force passes its threshold first.
     force: float  #: When it passes.
     detection: float | None  #: Time from then until the estimate passes it.
     #: Time from `force` until the flange has moved by `STARTED` (or `TURNED`).
@@ -318,7 +318,7 @@ def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
 
 
 def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
-    """The latencies of the contact whose force first passes a threshold in row `k`."""
+    """The latencies of the contact that first passes a threshold in row `k`."""
     axis = int(np.argmax(abs(run.truth[k]) / threshold))
     limit, t = threshold[axis], run.t
     felt, there = abs(run.estimate[:, axis]) > limit, abs(run.truth[:, axis]) > limit

@@ -65,7 +65,7 @@ class AxisMotion:
 
     @property
     def escaped(self) -> Mask:
-        """Controllers whose motion left the finite numbers: finite-time escape. (N,)"""
+        """Controllers with motion that is not finite any more: finite-time escape. (N,)"""
         return np.asarray(~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2)))
 
 

@@ -54,7 +54,7 @@ LONGEST = 600.0  #: Longest release that is computed. [s]
 #: A drag in which the log's arm stays within this distance for so long has a remark.
 #: [s, m]
 RESTING = (2.0, 0.01)
-#: A log whose flange stays this near to its first pose replays as it was: no remark. [m]
+#: Where the flange stays this near to its first pose a log replays as it was: no remark. [m]
 STILL = 0.01
 
 
@@ -337,7 +337,7 @@ def stored_force(
     sensor = VirtualSensor(
         solver=choice.by_pose, frame=choice.frame, mounting=choice.mounting(robot)
     )
-    # The band of a torque whose covariance nobody kept says nothing of the replay.
+    # Nobody kept the covariance of this torque: its band says nothing of the replay.
     seen = replace(sensor.wrench(estimate, recording.q, robot.chain), remarks=())
     source = fact("force-of-observer", observer=observer)
     return DrivingForce(without_zero(seen, choice.zero), source)

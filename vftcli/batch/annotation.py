@@ -97,11 +97,11 @@ class EpisodesTask(NamedTuple):
 def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
     """Records of some episodes, with robot and observer of the first; forces into a file."""
     if task.rows.is_file():
-        return dict(json.loads(str(stored_rows(task.rows)["told"])))
+        return dict(json.loads(str(stored_rows(task.rows)["record"])))
     library, examiner = Library([task.file.log]), Examiner(anyway=choice.anyway)
     arrays: dict[str, Single] = {}
     records: list[Record] = []
-    told: Record = {"episodes": records, "robot": None, "observer": None}
+    found: Record = {"episodes": records, "robot": None, "observer": None}
     for number in task.file.episodes:
         begin(f"episode {number}")
         record: Record = {"episode": number, "file": task.file.place.as_posix()}
@@ -129,14 +129,14 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
         else:
             arrays |= {f"{number}/{name}": values for name, values in columns.items()}
             record |= record_of(analysis, columns)
-            if told["robot"] is None:
+            if found["robot"] is None:
                 observer = analysis.observers[0]
-                told["robot"] = robot_record(analysis.robot)
-                told["observer"] = observer_record(observer, analysis.tunings[observer.name])
+                found["robot"] = robot_record(analysis.robot)
+                found["observer"] = observer_record(observer, analysis.tunings[observer.name])
         records.append(record)
-    text = to_json(told)
+    text = to_json(found)
     if arrays:
-        put_rows(task.rows, told=np.array(text), **arrays)
+        put_rows(task.rows, record=np.array(text), **arrays)
     return dict(json.loads(text))
 
 
@@ -240,7 +240,7 @@ def force_columns(
         ForceColumn(
             name + choice.suffix,
             elements if elements == AXES else tuple(f"{each}.{name}" for each in elements),
-            told,
+            about,
         )
-        for name, elements, told in found
+        for name, elements, about in found
     ]

@@ -194,8 +194,8 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
     moving = {cause: part for cause, part in found.parts.items() if cause != STICTION}
     decided = stuck & (stiction > 0.0)  # no friction known: nothing known of stiction
     named = [
-        STICTION if stands else max(moving, key=lambda cause: float(moving[cause][j]))
-        for j, stands in enumerate(decided)
+        STICTION if rests else max(moving, key=lambda cause: float(moving[cause][j]))
+        for j, rests in enumerate(decided)
     ]
     size = [float(found.parts[cause][j]) for j, cause in enumerate(named)]
     total = np.hypot(found.total, np.where(stuck, stiction, 0.0))

@@ -95,7 +95,7 @@ def main() -> None:
 
 
 def asked_for() -> set[str]:
-    """The command of this call, the one it wants explained, or whose words a shell completes."""
+    """The command of this call, the one to explain, or the one that a shell completes."""
     typed = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS")
     words = typed.split() if typed and "_VFTCLI_COMPLETE" in os.environ else sys.argv
     words = with_command(words[1:])
@@ -168,7 +168,7 @@ class ClosedOutput(io.TextIOBase):
 
 
 def open_streams() -> None:
-    """Make standard streams that the caller closed, or whose letters are too few, harmless."""
+    """Make standard streams harmless that the caller closed, or that lack letters."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)

@@ -31,7 +31,7 @@ MMAP_THRESHOLD = -3
 
 
 def give_back() -> None:
-    """Have freed arrays give their memory back, as far as the C library can be told.
+    """Have freed arrays give their memory back, where the C library has a call for it.
 
     Otherwise it keeps what it once had, and a long log's peak is the sum of all its stages.
     """

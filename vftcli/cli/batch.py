@@ -114,8 +114,8 @@ def say_passed(names: list[str]) -> None:
     if not names:
         return
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    told = "1 file is not a log" if len(names) == 1 else f"{len(names)} files are not logs"
-    say(f"note: {told}: {', '.join(sorted(names)[:3])}{more}")
+    what = "1 file is not a log" if len(names) == 1 else f"{len(names)} files are not logs"
+    say(f"note: {what}: {', '.join(sorted(names)[:3])}{more}")
 
 
 def progress_line() -> "Callable[[BatchCount], None]":
@@ -124,7 +124,7 @@ def progress_line() -> "Callable[[BatchCount], None]":
 
     watched, last = is_watched(), time.monotonic()
 
-    def told(count: "BatchCount") -> None:
+    def watch(count: "BatchCount") -> None:
         nonlocal last
         rate = count.done / count.seconds if count.seconds else 0.0
         words = f"{count.logs - count.left}/{count.logs} logs, {count.failed} failed"
@@ -137,4 +137,4 @@ def progress_line() -> "Callable[[BatchCount], None]":
             last = time.monotonic()
             say(words)
 
-    return told
+    return watch

@@ -1,7 +1,7 @@
 """Options kept in a TOML file: ``--config FILE``, or `vftcli.toml` in the working folder.
 
 Its values are handed to typer as defaults, so that they are read and checked as if they were typed,
-and typed ones go before them. What was taken is said, and stands in the command line of `run.json`.
+and typed ones go before them. What is used is said, and is in the command line of `run.json`.
 """
 
 import shlex
@@ -58,7 +58,7 @@ def effective(words: list[str]) -> list[str]:
     kept = OPTIONS.get().words
     if not kept:
         return words
-    # What stands behind -- are logs.
+    # What follows -- are logs.
     end = words.index("--") if "--" in words else len(words)
     return [*words[:end], *kept, "--config", NONE, *words[end:]]
 
@@ -130,7 +130,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
         for one in value if isinstance(value, list) else [value]:
             if one is True:
                 words.append(f"--{key}")
-            elif one is not None:  # what begins as an option does stands behind =
+            elif one is not None:  # what begins with a dash follows =
                 words += [f"--{key}={one}"] if one.startswith("-") else [f"--{key}", one]
     OPTIONS.set(FileOptions(path, tuple(words), settings))
     said = shlex.join(words) or "nothing that this command takes and is not typed"
@@ -217,12 +217,12 @@ def key_now(path: Path, key: str, value: Any) -> Table:  # noqa: ANN401 - of TOM
     if now is None or not now.startswith("--") or "'" in now or (not text and "VALUE" in now):
         return {key: value}
     echo(printable(f"note: {path}: {key} is now {now.replace('VALUE', '…')}"), err=True)
-    option, _, taken = now.removeprefix("--").partition(" ")
+    option, _, form = now.removeprefix("--").partition(" ")
     if option == "set":
-        name, _, taken = taken.partition("=")
+        name, _, form = form.partition("=")
         group, _, own = name.partition(".")
-        return {} if value is False else {group: {own: taken.replace("VALUE", text)}}
-    return {option: taken.replace("VALUE", text) if taken else value}
+        return {} if value is False else {group: {own: form.replace("VALUE", text)}}
+    return {option: form.replace("VALUE", text) if form else value}
 
 
 def check_keys(path: Path, owner: str, table: Table, there: Mapping[str, object]) -> None:

@@ -48,7 +48,7 @@ def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
         _level.reset(token)
 
 
-#: Remarks that a part of a file was taken which nobody asked for.
+#: Remarks that only a part of a file is read, unasked.
 PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
 
 
@@ -78,7 +78,7 @@ def detail(text: str) -> None:
 
 
 def show(text: str) -> None:
-    """Print a result that stands in a file as well to stdout, unless --quiet.
+    """Print a result that a file holds as well to stdout, unless --quiet.
 
     Its colours are the canvas's affair: there are none where there shall be none.
     """
@@ -211,7 +211,7 @@ def say_recording(recording: "Recording") -> None:
         f"{recording.name}: {source.format}, {recording.joints} joints, "
         f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
     )
-    # That a part was taken is said with the health of the log.
+    # Which part of a file is read is said with the health of the log.
     others = [remark for remark in source.remarks if remark.code not in PARTS]
     for remark in sorted(others, key=lambda remark: remark.level != "fact"):
         detail(f"  note: {remark}")

@@ -27,7 +27,7 @@ NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and of its left
 
 
 class GroupedCommand(TyperCommand):
-    """A command whose `--help` shows its options in groups."""
+    """A command that shows its options in groups for `--help`."""
 
     def __init__(self, *words: Any, **more: Any) -> None:  # noqa: ANN401 - typer's own
         super().__init__(*words, **more)

@@ -52,7 +52,7 @@ def inspect_log(
         recording = choice.within(choice.with_stated_effort(recording))
         if chosen.name or choice.effort == "auto":
             arm = examiner.robot(recording, chosen)
-            recording = examiner.taken(recording, arm, choice)
+            recording = examiner.read_as(recording, arm, choice)
         examinations.append(examine(recording, arm))
     say_robots(examiner.robots)
     if not json:
@@ -80,16 +80,16 @@ def write_options(
     choice = logged.asked(Library(logs), on_screen=True)
     proposed = [from_folder(output.parent, option) for option in propose(logs, choice, given)]
     write_text(output, config_text(proposed), force)
-    taken = {option.key: option.value for option in proposed if option.key and option.taken}
+    settled = {option.key: option.value for option in proposed if option.key and option.holds}
     for option in proposed:
         if not option.key:
             say(f"note: {option.why}")
     how = "unasked by commands run beside it" if output.name == NAME else f"with --config {output}"
-    say(f"wrote {output}: {', '.join(taken) or 'nothing that is settled'}; read {how}")
-    if "robot" not in taken:
+    say(f"wrote {output}: {', '.join(settled) or 'nothing that is settled'}; read {how}")
+    if "robot" not in settled:
         say("which arm it is remains open: name it with --robot, or in the file")
     notes = [option.why for option in proposed]
-    return {"output": str(output), "options": taken, "notes": notes}
+    return {"output": str(output), "options": settled, "notes": notes}
 
 
 def from_folder(folder: Path, option: "ProposedOption") -> "ProposedOption":

@@ -229,7 +229,7 @@ def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:
 
 
 class Part(NamedTuple):
-    """One argument of a command, taken apart."""
+    """One argument of a command in its parts."""
 
     parameters: list[tuple[inspect.Parameter, Option]]  #: What typer sees.
     made: Callable[[Mapping[str, Any]], Any]  #: The argument of the values that typer parsed.

@@ -53,10 +53,10 @@ def reproduce(
     jobs, progress = jobs_of(wanted, names, fast), stages()
     progress(f"{len(jobs)} runs", 0.0, 0.0)
 
-    def told(done: int, of: int, what: str) -> None:
+    def watch(done: int, of: int, what: str) -> None:
         progress(f"{done} of {of} runs done: {what}", done / of, done / of)
 
-    found = gather(wanted, names, run_jobs(jobs, told))
+    found = gather(wanted, names, run_jobs(jobs, watch))
     with folder:
         write_reproduction(folder, wanted, found, jobs, command_line(), figures)
     show(terminal(short_overview(found)))

@@ -78,7 +78,7 @@ def contact_thresholds(
 def truth_of(
     run: "Run", asked: "ReferenceChoice | None"
 ) -> "tuple[ExternalTorque | None, Wrench | None]":
-    """The torque and the wrench that are taken for true along a log, None where nothing says."""
+    """The true torque and wrench along a log, None where nothing says."""
     from vftcli.evaluation.references import make_reference
     from vftcli.free_motion.free_motion import FreeMotion
 
@@ -94,7 +94,7 @@ def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
     if truth.exists():
         return ReferenceChoice(name=f"{FILE}{truth}")
     frame, wrench = recording.wrench_frame, recording.wrench
-    # What states no frame is taken for a sensor's everywhere.
+    # A wrench without a frame counts as a sensor's everywhere.
     of_sensor = frame is None or frame.axes == "sensor"
     measured = of_sensor and wrench is not None and bool(wrench.any())
     return ReferenceChoice(name="sensor") if measured else None

@@ -57,7 +57,7 @@ from vftcli.wrench.smoother import (
 )
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
-SHORTEST = 0.5  #: No contact can be told in a log shorter than this. [s]
+SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
 SLOWEST = 10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
 #: A contact's evidence must be this much above that of any row in the log's own free
 #: part.

@@ -183,7 +183,7 @@ class SignalThreshold(NamedTuple):
     rate: float  #: The false alarms that are this signal's share. [1/h]
     log: str  #: The free log that it comes from: the one that needs the highest.
     #: That log's tail; None where the log is too short for one, and its largest reading
-    #: stands higher than what the others' tails say.
+    #: is higher than what the others' tails say.
     tail: Tail | None
 
     @property
@@ -334,7 +334,7 @@ def thresholds_of_set(
 
 
 def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> list[Remark]:
-    """What the logs can bear: whose estimate it is, how far it is extrapolated, what is missing."""
+    """What the logs can bear: who made the estimate, how far it is extrapolated, what lacks."""
     first = free[0]
     remarks = [
         fact("thresholds-of-vendor") if first.of_vendor else caution("thresholds-of-observer")

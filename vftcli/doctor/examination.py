@@ -190,7 +190,7 @@ class Examiner:
         """All that were loaded, in their order."""
         return tuple(self._robots.values())
 
-    def taken(
+    def read_as(
         self, recording: Recording, robot: Robot, choice: ReadChoice, *, in_stretches: bool = False
     ) -> Recording:
         """A log in its robot's joints; an open effort is read by the model's best fit.

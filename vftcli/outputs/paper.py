@@ -173,7 +173,7 @@ class Plot(NamedTuple):
 
     chart: Chart  #: What it is a panel of.
     panel: int  #: Which, from 0.
-    #: A chart whose same panel is drawn over it with an axis of its own, or None.
+    #: A chart with the same panel, drawn over it with an axis of its own, or None.
     over: Chart | None = None
 
 

@@ -144,7 +144,7 @@ def blueprint(
 
     The eye sees the base and all places where the links have been.
 
-    Rerun lets no file say where its time cursor stands: it opens at the first sample. The
+    Rerun lets no file say where its time cursor is: it opens at the first sample. The
     marked span is visible in the time panel, and a click on a time of the text log goes
     there.
     """

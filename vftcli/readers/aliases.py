@@ -29,7 +29,7 @@ from vftcli.signals.remarks import fact
 
 #: Names of the clock; a unit may follow, as in time_ms.
 CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds")
-#: The nanoseconds beside a column of seconds whose name has the same stem.
+#: The nanoseconds beside a column of seconds: its name has the same stem.
 NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)")
 #: A message's own stamp, or a part of it.
 HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
@@ -72,7 +72,7 @@ AXES = re.compile(r"(?i)r?[xyz]|q[wxyz]|roll|pitch|yaw")
 
 FEWEST_JOINTS = 3
 
-RESIDUAL_TURNED = fact("residual-turned")  #: Said wherever libfranka's residual is taken.
+RESIDUAL_TURNED = fact("residual-turned")  #: Said wherever libfranka's residual is used.
 
 
 class NamedColumns:
@@ -220,7 +220,7 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, Names]:
 def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
     """Columns that bear a signal's name beside a joint's: signal → joint → cell.
 
-    Names are only taken apart so where two signals have the same joints, and are no axes.
+    Names are split so only where two signals have the same joints, and are no axes.
     """
     found: dict[str, dict[str, Cell]] = {}
     for column, name in enumerate(table.names):

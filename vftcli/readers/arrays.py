@@ -121,7 +121,7 @@ def _read_arrays(
     remarks: Notes = (),
 ) -> RawLog:
     """Read named arrays as panda-py's log, by --columns, or by alias."""
-    # Rows of matrices are laid out flat, a column of single numbers is a row of them.
+    # Rows of matrices become flat, a column of single numbers is a row of them.
     shaped = {n: a.reshape(len(a), -1) if a.ndim == 3 else a for n, a in arrays.items() if a.ndim}
     shaped = {n: a[:, 0] if a.shape[1:] == (1,) else a for n, a in shaped.items() if a.ndim < 3}
     table = ArrayTable(path=file.path, columns=shaped, remarks=remarks)

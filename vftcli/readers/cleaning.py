@@ -306,7 +306,7 @@ def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
         return
     if span == 0:
         raise ClockError(
-            f"{path}: the clock stands still: all {rows} samples have the stamp "
+            f"{path}: the clock never moves: all {rows} samples have the stamp "
             f"{raw.stamps[0]:.10g}. Name another column as t with --columns, or state the rate of "
             "a log without a clock, as in t@125Hz."
         )
@@ -335,7 +335,7 @@ def _segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
 
 
 def without_repeats(raw: RawLog, path: Path) -> RawLog:
-    """Drop rows whose stamp repeats the one before, and say so."""
+    """Drop rows that repeat the stamp before, and say so."""
     fresh = np.concatenate([[True], np.diff(raw.stamps) > 0])
     again = np.flatnonzero(~fresh)
     if again.size == 0:

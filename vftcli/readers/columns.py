@@ -351,5 +351,5 @@ def _alike(measured: Array, target: Array) -> bool:
     live = (own > 0) & (other > 0)
     slope = product[live] / other[live]
     cosine = product[live] / np.sqrt(own[live] * other[live])
-    # Where a joint stands its stiction is in what was measured alone.
+    # Where a joint rests its stiction is in what was measured alone.
     return bool(np.any((slope > ALIKE[0]) & (slope < ALIKE[1]) & (cosine > NEAR)))

@@ -40,7 +40,7 @@ def is_number(text: str, *, decimal_comma: bool = False) -> bool:
 
 
 def split_cells(line: str, separator: str) -> list[str]:
-    """The cells of one line, quotes taken off, blanks around them too."""
+    """The cells of one line, without quotes and blanks around them."""
     if '"' in line:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
     return [cell.strip() for cell in line.split(separator)]
@@ -58,7 +58,7 @@ class TextTable(Table):
 
     @cached_property
     def sample(self) -> list[str]:
-        """The first lines that hold something, comments taken off."""
+        """The first lines that hold something, without comments."""
         lines = [decoded(line) for line in self.file.lines[:200]]
         if not lines:
             raise LogError(f"{self.path}: not a table of text; `vftcli inspect` says what it is.")

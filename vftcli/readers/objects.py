@@ -25,7 +25,7 @@ MEMORY_LIMIT = 768 * 1024 * 1024
 #: Letter → bytes of the object that it begins, at most.
 COSTS = {b"[": 64, b"{": 72, b",": 40, b":": 110}
 LONGEST_LINE = 1 << 20  #: Letters of one sample.
-CHUNK_LINES = 8192  #: Lines whose objects are in memory at a time.
+CHUNK_LINES = 8192  #: Lines with objects in memory at a time.
 #: Numbers that are none as C++ streams print them, libfranka's among them.
 NOT_JSON = re.compile(rb"(?<=[\[,:\s])(-?)(nan|inf)(?=[\],}\s])")
 
@@ -177,7 +177,7 @@ class PickledType:
 
 
 class PickledArray:
-    """An array as a pickle tells it, laid over the pickle's own bytes.
+    """An array of a pickle: a view of the pickle's own bytes.
 
     Attributes:
         array: The array; empty where it holds no plain numbers.
@@ -201,7 +201,7 @@ class PickledArray:
 
 
 Built = tuple[Any, int]  #: What was built of a part of a pickle, and how many numbers it holds.
-NOTHING = np.empty(0, dtype="V1")  #: What stands for an array that holds no numbers.
+NOTHING = np.empty(0, dtype="V1")  #: An array that holds no numbers.
 
 
 def _from_buffer(buffer: Data, kind: Data, shape: Data, order: Data = "C") -> PickledArray:
@@ -270,7 +270,7 @@ class ArrayUnpickler(pickle.Unpickler):
         return built
 
     def _settled(self, value: Data, known: dict[int, Built | None], depth: int) -> Built:
-        """A value with arrays for pickled arrays, and how many numbers it takes laid out in full.
+        """A value with arrays for pickled arrays, and how many numbers it has in full.
 
         A part that is named again is not walked again: a few lists that hold one another
         a few times over are more than any memory takes.

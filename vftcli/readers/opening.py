@@ -1,4 +1,4 @@
-"""Opening files: gzip and zstd taken off within bounds, whole files as memory, digests beside."""
+"""Opening files: gzip and zstd unpacked within bounds, whole files as memory, digests beside."""
 
 import hashlib
 import math

@@ -165,7 +165,7 @@ class ReadChoice(Choice):
         return replace(self, interval=None, episode=None, all_episodes=False)
 
     def with_stated_effort(self, recording: "Recording") -> "Recording":
-        """A recording with its effort taken for what it is said to be, its velocities derived.
+        """A recording with its effort as `--effort` calls it, and derived velocities.
 
         Raises:
             MissingSignalError: If the log has no such effort.

@@ -37,7 +37,7 @@ class LogFormat(NamedTuple):
     name: str  #: Name for ``log.format``.
     title: str  #: What it is.
     recording: str  #: How a user records one.
-    takes: str  #: Which signals are taken from it.
+    takes: str  #: Which signals are read from it.
     pitfalls: str  #: What to look out for.
     #: Module of this room that reads it, imported when it is needed: by its `read`, or by
     #: its `episodes`, which gives each one's number and the function that reads it.
@@ -121,7 +121,7 @@ def read(
     Raises:
         UnknownFormatError: If no format fits, or more than one.
         LogError: If the file cannot be read as what it is, or has no such episode or arm.
-        ClockError: If its clock stands still, runs backwards or holds no samples.
+        ClockError: If its clock stops, runs backwards or holds no samples.
     """
     wanted = frozenset(signals) if signals is not None else None
     choice = ReadChoice(format=format, columns=columns, signals=wanted, episode=episode, arm=arm)

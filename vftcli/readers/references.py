@@ -182,7 +182,7 @@ def estimates_columns(path: Path, observer: str) -> str | None:
 
 
 def stored_observers(path: Path) -> list[str]:
-    """The observers whose estimates a file holds, none if it is not one of ours."""
+    """The observers that a file holds estimates of, none if it is not one of ours."""
     try:
         file = open_log(path)
         names = ParquetTable(file).names if file.head.startswith(b"PAR1") else ()

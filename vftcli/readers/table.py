@@ -85,7 +85,7 @@ class Picks(NamedTuple):
     """All signals of a table and its clock, or its rate [Hz] where it has no clock.
 
     `constants` are columns of which the last value counts; `origin` is the column of the
-    log's own stamps [ns] in a table whose clock starts at zero.
+    log's own stamps [ns] in a table with a clock that starts at zero.
     """
 
     signals: tuple[Pick, ...]

@@ -105,7 +105,7 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
 
 
 def read_known_columns(table: Table, usual: str, request: ReadChoice, **more: RawField) -> RawLog:
-    """Read a table whose columns are known, but for what a --columns text says of them."""
+    """Read a table with known columns, but for what a --columns text says of them."""
     stated = request.spec
     if stated.items and not stated.named:
         return from_table(table, request, **more)
@@ -133,7 +133,7 @@ def read_known_columns(table: Table, usual: str, request: ReadChoice, **more: Ra
 
 
 def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
-    """Read a table without a header whose values settle what its columns are, and say it."""
+    """Read a table without a header by its values, and say what its columns are."""
     columns: Block = {}
     if 1 < table.width <= WIDEST and not table.lists:
         with suppress(LogError):  # what is no number somewhere is no clue

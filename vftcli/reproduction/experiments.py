@@ -51,7 +51,7 @@ PAGE, TEXT = "index.html", "reproduction.md"  #: The page, and its Markdown.
 #: What the overview compares.
 RATIOS = (
     "Ours / print: the median of the lines that print a number, in brackets the range, of the "
-    "column that stands behind it."
+    "column that it follows."
 )
 
 

@@ -11,7 +11,7 @@ A robot file states its kinematics in one of three ways:
   along z by nothing (Tz commutes with Rz), so inertials stay where they are.
 - ``standard-dh``: T_j = Rz(q+θ) Tz(d) Tx(a) Rx(α); the table gives inertials in the *distal* frame
   j, which sits at the far end of the link: they are moved by Tz(d) Tx(a) Rx(α).
-- ``xyz-rpy``: T_j = Trans(xyz) R(rpy) Rz(q), as in a URDF whose axes are all z.
+- ``xyz-rpy``: T_j = Trans(xyz) R(rpy) Rz(q), as in a URDF with all axes z.
 """
 
 from collections.abc import Mapping, Sequence

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 #: Values of ``model.friction``: the robot file's, none at all, or that of a simulator.
 FRICTION = ("profile", "none", "model")
-DECLARED = "log"  #: Value of ``--payload``: what the log says that the controller was told of.
+DECLARED = "log"  #: Value of ``--payload``: what the controller knows of, as the log says.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ def choices_for(recording: "Recording") -> str:
 
 
 def declared_payload(recording: "Recording") -> "Payload":
-    """The payload that the controller was told of; nobody tells it an inertia."""
+    """The payload that the controller knows; it never has an inertia."""
     import numpy as np
 
     from vftcli.robots.chain import Payload

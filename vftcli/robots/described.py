@@ -163,7 +163,7 @@ def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]
 def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
     """Which joints, flange and locked parts the arm has."""
     locked = {joint.name: lumped.position(joint) for joint in lumped.locked}
-    taken: dict[str, Any] = {
+    values: dict[str, Any] = {
         "robot": lumped.tree.name,
         "count": chain.joints,
         "joints_taken": list(chain.names),
@@ -172,7 +172,7 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         "root": lumped.tree.root,
     }
     if not locked:
-        yield fact("arm-taken", **taken)
+        yield fact("arm-taken", **values)
     else:
         # Joint of the arm that carries locked ones → mass that its own link carries. [kg]
         lumps = {
@@ -183,11 +183,11 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         zero = [name for name, value in locked.items() if not value]
         held = [f"{name} at {value:g}" for name, value in locked.items() if value]
         held += [f"{shortened(zero)} at 0"] if zero else []
-        taken |= {"locked": locked, "locked_shown": ", ".join(held), "lumped_kg": lumps}
-        taken["lumped_shown"] = (
+        values |= {"locked": locked, "locked_shown": ", ".join(held), "lumped_kg": lumps}
+        values["lumped_shown"] = (
             ", ".join(f"{mass:.3g} kg into {joint}" for joint, mass in lumps.items()) or "none"
         )
-        yield fact("arm-and-locked-taken", **taken)
+        yield fact("arm-and-locked-taken", **values)
     last = chain.joints - 1
     beside = [joint.name for joint, group in lumped.locked.items() if BASE < group < last]
     if beside:

@@ -1,6 +1,6 @@
 """Friction models: torque lost in a joint, by its velocity, its load and what it did before.
 
-Beside each model stands presliding friction a·s, s the state of the play operator
+Each model has presliding friction a·s too, s the state of the play operator
 (`vftcli.robots.running_friction`): a and the Coulomb torque together are the dry friction
 of steady sliding. All but a constant offset follows the joint's temperature where the
 robot has a law for it: a cold gear rubs more than a warm one. The law is that of

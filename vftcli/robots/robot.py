@@ -17,7 +17,7 @@ from vftcli.signals.shown import Shown
 if TYPE_CHECKING:
     import polars as pl
 
-#: Joint temperature that friction is taken for where nobody says one: a warm arm's. [°C]
+#: Joint temperature that friction is for where nobody says one: a warm arm's. [°C]
 REFERENCE = 35.0
 
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
@@ -134,7 +134,7 @@ class Robot(Shown):
     admittance: Mapping[str, Any] = field(default_factory=dict)
     #: Where the file's numbers come from: keys id, what and ref, in words.
     sources: tuple[Mapping[str, Any], ...] = ()
-    #: The publication whose numbers of this arm the tables stand beside, and these.
+    #: The publication with numbers of this arm that the tables show too, and these.
     published: Mapping[str, Any] = field(default_factory=dict)
     #: The whole parsed robot file, for writing a changed one.
     document: Mapping[str, Any] = field(default_factory=dict)

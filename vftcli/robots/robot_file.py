@@ -158,7 +158,7 @@ BOUNDS: dict[str, Bound] = {
     }.items()
     for key in keys.split()
 }
-UNNAMED = either_way(1e6, "")  #: The bound of a number whose key is not listed.
+UNNAMED = either_way(1e6, "")  #: The bound of a number with a key that is not listed.
 #: Least mass of all moving bodies together: the lightest arms have servos of a few grams.
 #: [kg]
 LIGHTEST = 0.05
@@ -170,7 +170,7 @@ def out_of_bounds(key: str, values: Sequence[float]) -> str:
 
 
 def weightless(mass: float) -> str:
-    """Say why an arm whose moving bodies weigh `mass` [kg] together is none, or ""."""
+    """Say why an arm with moving bodies of `mass` [kg] together is none, or ""."""
     if mass >= LIGHTEST:
         return ""
     return (
@@ -224,7 +224,7 @@ class RobotFile:
 
 
 class Section(NamedTuple):
-    """A table of a robot file, whose values are checked as they are read."""
+    """A table of a robot file; values are checked as they are read."""
 
     file: RobotFile  #: The file.
     values: Mapping[str, Any]  #: The table.
@@ -236,11 +236,11 @@ class Section(NamedTuple):
         """Raise a RobotError that names the file, the line and the joint."""
         line = self.file.line(self.table, self.joint, key)
         where = f"{self.file.path}" + (f", line {line}" if line else "")
-        whose = ""
+        owner = ""
         if self.joint is not None:
             name = self.file.document["joints"][self.joint].get("name", "")
-            whose = f"joint {self.joint + 1}{f' ({name})' if name else ''}: "
-        raise RobotError(f"{where}: {whose}{message}")
+            owner = f"joint {self.joint + 1}{f' ({name})' if name else ''}: "
+        raise RobotError(f"{where}: {owner}{message}")
 
     def value(self, key: str, kind: ValueKind, default: Any = None) -> Any:  # noqa: ANN401 - TOML's
         """The value of a key, `default` if it is absent, or a complaint about its line."""

@@ -123,7 +123,7 @@ class Run(Shown):
 
     @cached_property
     def standing(self) -> Mask:
-        """Where a joint stands still. (T, n)"""
+        """Where a joint is at rest. (T, n)"""
         return standing(self.t, self.dq)
 
     @cached_property

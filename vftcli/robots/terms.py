@@ -68,7 +68,7 @@ def gravity_torque(robot: Robot, q: Array) -> Array:
 
 
 def drive_torque(recording: Recording, robot: Robot) -> Array:
-    """Torque of the drives at the joints, friction not yet taken off. (T, n) [N·m]
+    """Torque of the drives at the joints, friction included. (T, n) [N·m]
 
     τ = K i where `effort_name` is current, else the measured torque. Torques without
     gravity get the gravity torque g(q) of the arm with its payload: τ = e + g(q).

@@ -201,7 +201,7 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
         with parser_words() as words:
             model = pin.buildModelFromMJCF(str(path))
     except (ValueError, RuntimeError, IndexError, TypeError) as error:
-        # Behind where in its source it stands.
+        # Behind the place in the parser's source.
         reason = " ".join([*words, *str(error).split()]).rpartition("message: ")[2]
         raise RobotError(f"{path}: not an MJCF that Pinocchio can read: {reason}") from None
     # A joint's link is the body with the joint's own frame, else it has the joint's name.

@@ -1,4 +1,4 @@
-"""What the columns of our tables hold, told in the field metadata of Parquet files.
+"""What the columns of our tables hold, as the field metadata of Parquet files.
 
 A reader of another language, or a person with no documentation, sees unit, meaning, sign
 and frame beside each column:

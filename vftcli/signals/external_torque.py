@@ -117,7 +117,7 @@ class ExternalTorque(TimeSeries):
     #: error and lag included; None where no free part is known to measure it on. (T, n)
     #: [N·m]
     error_sd: Array | None = None
-    #: Whether the joint moves, so that the sample may be relied on; where it stands,
+    #: Whether the joint moves, so that the sample may be relied on; where it rests,
     #: stiction hides what `tau` cannot know. None where that was not looked at. (T, n)
     moving: Mask | None = None
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.

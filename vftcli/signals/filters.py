@@ -188,7 +188,7 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
             power += share * (spectrum.real**2 + spectrum.imag**2)
         count += len(starts)
     power *= 2.0 * step / float(np.sum(window**2))
-    # The density is one-sided: every frequency stands for its negative too, but 0 and
+    # The density is one-sided: every frequency counts for its negative too, but 0 and
     # Nyquist's.
     power[:, [0, -1]] *= 0.5
     return np.ascontiguousarray(power.T), count

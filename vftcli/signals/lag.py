@@ -121,7 +121,7 @@ class Offset(NamedTuple):
     """How far one series runs behind another."""
 
     lag: float  #: Time by which the first is late. [s]
-    correlation: float  #: Correlation once that is taken out.
+    correlation: float  #: Correlation without that lag.
 
 
 def time_offset(t: Array, late: Array, early: Array) -> Offset:

@@ -144,16 +144,18 @@ def folds(samples: int, count: int = FOLDS) -> list[slice]:
     return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
 
-def left_out(lengths: Sequence[int], told: Sequence[bool]) -> list[Array]:
+def left_out(lengths: Sequence[int], use: Sequence[bool]) -> list[Array]:
     """The rows that cross-validation leaves out in turn.
 
-    Of several logs that tell something each is left out whole: another log is what a
-    model is for. A single one is cut into fifths. Rows of logs that tell nothing are
+    Of several logs in `use` each is left out whole: another log is what a
+    model is for. A single one is cut into fifths. Rows of other logs are
     never left out.
     """
     edges = np.cumsum([0, *lengths])
     rows = [
-        np.arange(a, b) for (a, b), use in zip(itertools.pairwise(edges), told, strict=True) if use
+        np.arange(a, b)
+        for (a, b), counts in zip(itertools.pairwise(edges), use, strict=True)
+        if counts
     ]
     if len(rows) > 1:
         return rows

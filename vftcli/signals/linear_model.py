@@ -25,7 +25,7 @@ from vftcli.signals.arrays import Array
 SPIKE = 40.0  #: Variance of a spike, in variances of the innovation.
 #: A state of no larger predicted variance is certain: nothing is carried back to it.
 LEAST_VARIANCE = 1e-14
-STRETCH = 512  #: Blocks whose innovations and gains back are worked on at once.
+STRETCH = 512  #: Blocks for which innovations and gains back are computed at once.
 
 
 class LinearModel(NamedTuple):
@@ -49,7 +49,7 @@ class FilteredBlock(NamedTuple):
 
 
 def beside_errors(H: Array) -> Array:
-    """H of a model whose n numbers have errors of their own: [H; I]. (…, N + n, n)"""
+    """H of a model with n numbers that have errors of their own: [H; I]. (…, N + n, n)"""
     own = np.broadcast_to(np.eye(H.shape[-1]), (*H.shape[:-2], H.shape[-1], H.shape[-1]))
     return np.concatenate([H, own], axis=-2)
 
@@ -93,7 +93,7 @@ def log_likelihood(model: LinearModel) -> Array:
 def smoothed(model: LinearModel) -> tuple[Array, Array]:
     """Mean and covariance of every block given all of them. (K, …, N), (K, …, N, N)
 
-    The gain back C = P F (P⁻)⁻¹ is solved on the states whose predicted variance is above
+    The gain back C = P F (P⁻)⁻¹ is solved on the states with a predicted variance above
     `LEAST_VARIANCE`.
     """
     decay, size = model.decay, model.decay.shape[-1]

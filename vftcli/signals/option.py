@@ -1,6 +1,6 @@
 """Option: how a value is typed and what `--help` says of it, beside the field that holds it.
 
-A room's choice is a dataclass whose fields say how a user gives them, once for the command line,
+The fields of a room's choice, a dataclass, say how a user gives them, once for the command line,
 the file of options and notebooks. What few users need is a setting, given by ``--set NAME=VALUE``::
 
     frame: Annotated[str, Option("--frame", "FRAME", "Give the wrench in this frame.")] = "flange"
@@ -56,8 +56,8 @@ class Option(NamedTuple):
     reads: Callable[[Any], Any] | None = None
     several: bool = False  #: Whether it may be repeated.
     group: str = ""  #: The heading under which it is listed, "" for the command's own.
-    least: float | None = None  #: Smallest number that is taken.
-    most: float | None = None  #: Largest number that is taken.
+    least: float | None = None  #: Smallest number allowed.
+    most: float | None = None  #: Largest number allowed.
     #: What a shell offers for its value; None for the words of `metavar`.
     completes: Callable[[], Iterable[str]] | None = None
 

@@ -1,7 +1,7 @@
-"""Packages that vftcli works without: whoever needs one asks for it here, and is told what lacks.
+"""Packages that vftcli works without: whoever needs one asks for it here; an error says what lacks.
 
 They are ordinary dependencies all the same, or extras. Estimation, errors, contacts and
-pages need none of them; docs/outputs.md tells what each is for.
+pages need none of them; docs/outputs.md says what each is for.
 """
 
 import sys

@@ -24,7 +24,7 @@ def whole(text: str) -> str:
 
 
 def half(found: re.Match[str]) -> str:
-    """What stands for one half: the byte that it is, or its number."""
+    """The text for one half: the byte that it is, or its number."""
     number = ord(found[0])
     # Python reads byte xx of a name as U+DCxx (PEP 383).
     return f"\\x{number - 0xDC00:02x}" if 0xDC80 <= number <= 0xDCFF else f"\\u{number:04x}"
@@ -70,8 +70,8 @@ def check_known(word: str, known: Iterable[str], complaint: str) -> None:
 def check_kind(value: object, kind: type, name: str, how: str) -> None:
     """Raise a ParameterError unless what a caller gives is of a kind."""
     if not isinstance(value, kind):
-        told = shown(value) if isinstance(value, str) else type(value).__name__
-        raise ParameterError(f"{name} is {told}; expected {kind.__name__}: {how} is one")
+        given = shown(value) if isinstance(value, str) else type(value).__name__
+        raise ParameterError(f"{name} is {given}; expected {kind.__name__}: {how} is one")
 
 
 def shown(value: object) -> str:

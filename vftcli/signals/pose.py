@@ -97,7 +97,7 @@ def rpy_angles(rotation: Array) -> tuple[float, float, float]:
 
 
 def rotation_onto(direction: Array) -> Array:
-    """A rotation whose z axis points along `direction` (3,). (3, 3)"""
+    """A rotation with its z axis along `direction` (3,). (3, 3)"""
     z = direction / np.linalg.norm(direction)
     if np.allclose(z, (0.0, 0.0, 1.0), atol=1e-15):
         return np.eye(3)

@@ -1,4 +1,4 @@
-"""How far a long piece of work is: loops tell it, whoever watches is told."""
+"""How far a long piece of work is: loops say it to whoever watches."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar

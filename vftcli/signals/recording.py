@@ -41,7 +41,7 @@ class Cut(NamedTuple):
     start: float  #: Time of the first. [s]
     stop: float  #: Time of the last. [s]
     rows: int  #: How many there are.
-    joints: tuple[int, ...]  #: The joints whose signals say so, from 1.
+    joints: tuple[int, ...]  #: The joints with signals that say so, from 1.
     #: The largest of what says so, in the unit of the finding's words; else its length in
     #: s.
     size: float
@@ -138,7 +138,7 @@ SIGNALS = {
 MEANINGS = {name: meaning for name, (_, meaning) in SIGNALS.items()}
 #: Those of them that hold one column a joint.
 JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
-#: Signals whose columns in tables are called otherwise than the field of a Recording.
+#: Signals with columns in tables that differ in name from the field of a Recording.
 COLUMN_NAMES = {"torque": "tau"}
 #: Those that say what the drives do; a log has one of them or several.
 EFFORTS = ("current", "torque", "torque_without_gravity")
@@ -173,7 +173,7 @@ class Recording(TimeSeries):
     wrench_frame: WrenchFrame | None = None
     joint_names: tuple[str, ...] = ()  #: The joints' names in the log's order, or empty.
     robot_hint: str | None = None  #: Name of the profile the log itself settles, or None.
-    #: Mass of the payload the controller was told of, None if not logged. [kg]
+    #: Mass of the payload that the controller knows, None if not logged. [kg]
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
     source: Source = IN_MEMORY  #: Where it came from and what was repaired.
@@ -191,8 +191,8 @@ class Recording(TimeSeries):
         seal(self, *JOINT_SIGNALS, shape=shape, called=self.name)
         seal(self, "wrench", shape=(self.samples, 6), called=self.name)
         if self.joint_names and len(self.joint_names) != self.joints:
-            told = f"{len(self.joint_names)} joint names for {self.joints} joints"
-            raise ShapeError(f"{self.name}: {told}; expected one a joint, or none")
+            held = f"{len(self.joint_names)} joint names for {self.joints} joints"
+            raise ShapeError(f"{self.name}: {held}; expected one a joint, or none")
         if self.payload_com is not None:
             check_shape(self.payload_com, (3,), "payload_com", self.name)
 
@@ -294,9 +294,9 @@ class Recording(TimeSeries):
             )
         source = source or there[0]
         value: Array = getattr(self, source)
-        taken = fact("effort-taken", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
+        remark = fact("effort-taken", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
         # 0 + x: no zero of the other sign.
-        return self.changed(taken, **{**dict.fromkeys(there), kind: 0.0 + factor * value})
+        return self.changed(remark, **{**dict.fromkeys(there), kind: 0.0 + factor * value})
 
     def without(self, rows: Mask, cuts: Iterable[Cut] = ()) -> "Recording":
         """The recording without some rows (T,); gaps stay in their place."""

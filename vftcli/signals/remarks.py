@@ -78,8 +78,8 @@ class Remarks(Shown, tuple[Remark, ...]):
 
     def _headline(self) -> str:
         counts = {level: sum(r.level == level for r in self) for level in get_args(Level)}
-        told = [f"{n} {level}{'s' * (n != 1)}" for level, n in counts.items() if n]
-        return ", ".join(told) or "none"
+        parts = [f"{n} {level}{'s' * (n != 1)}" for level, n in counts.items() if n]
+        return ", ".join(parts) or "none"
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "level", "code", "message"

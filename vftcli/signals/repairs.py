@@ -58,18 +58,18 @@ NEAR = 2  #: A sample is compared with so many before it and so many behind it, 
 #: How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise.
 #: One sample in a hundred may be bad, and three bends in a hundred with it.
 USUAL = 0.97
-#: Beyond so many times that a sample stands alone: 16 sd of white noise. On 36 sound logs
+#: Beyond so many times that a sample is alone: 16 sd of white noise. On 36 sound logs
 #: of eight arms one sample does in most of those of a UR10e, at most 11 in 1896, and none
 #: in 24 of them.
 FAR = 6.0
 #: And beyond this share of what a velocity or an effort spans but for its outer
-#: hundredths: of smooth motion without noise the bends tell nothing. What an angle spans
+#: hundredths: of smooth motion without noise the bends say nothing. What an angle spans
 #: is no measure.
 SPREAD = 0.03
 
-#: Angles and velocities off by less never stand alone: less than what turns the dry
+#: Angles and velocities off by less are never alone: less than what turns the dry
 #: friction of a joint round, on which a gear's teeth give, and less than a speed at which
-#: a joint stands. [rad, rad/s]
+#: a joint rests. [rad, rad/s]
 LEAST = {"q": 5e-4, "dq": 1e-2}
 
 #: The first and last samples may be so many times as far off: a line of six samples

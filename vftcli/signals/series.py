@@ -39,8 +39,8 @@ def gaps_of(t: Array, steps: float) -> Indices:
     """Samples after which a clock waits longer than `steps` steps. (G,)"""
     if len(t) < 2:
         return np.zeros(0, int)
-    taken = np.diff(t)
-    return np.flatnonzero(taken > steps * median(taken))
+    waits = np.diff(t)
+    return np.flatnonzero(waits > steps * median(waits))
 
 
 def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None) -> Array:

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 LONGEST = 160  #: Letters of a line at most.
 FEW = 7  #: An array of so many numbers, one a joint, is shown; of a larger one its shape.
 ALL = slice(None)  #: All rows of a table.
-UNKNOWN = "–"  #: What stands for a number that is not known.
+UNKNOWN = "–"  #: The text for a number that is not known.
 
 
 class Shown:
-    """A thing whose `repr` is one line, and which a notebook shows as a small table.
+    """A thing with a `repr` of one line, which a notebook shows as a small table.
 
     A dataclass that is one is made with ``repr=False``. It says what it is by
     `_headline`, and what is in it by `_rows`; else both are made of its fields.

@@ -113,7 +113,7 @@ def sum_by_doubling(x: Array, R: Array) -> None:
 
 
 class Fold(NamedTuple):
-    """A piece of a log laid out as position in block × joint × block.
+    """A piece of a log as position in block × joint × block.
 
     Every operation then runs along many blocks at once.
     """

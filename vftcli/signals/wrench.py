@@ -192,7 +192,7 @@ class Wrench(TimeSeries):
 
     @property
     def size_sd(self) -> Array | None:
-        """Standard deviation of |F|, the axes taken as independent. (T,) [N]
+        """Standard deviation of |F|, the axes independent. (T,) [N]
 
         Where there is no force it is the largest of the axes', since F may point anywhere.
         """

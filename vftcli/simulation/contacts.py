@@ -82,7 +82,7 @@ STYLES: dict[str, PushStyle] = {
 
 
 def direction(rng: np.random.Generator, vertical: float) -> Array:
-    """A random direction whose vertical part is scaled by `vertical`. (3,)"""
+    """A random direction with its vertical part scaled by `vertical`. (3,)"""
     vector = rng.standard_normal(3) * np.array([1.0, 1.0, vertical])
     return np.asarray(vector / np.linalg.norm(vector))
 

@@ -55,7 +55,7 @@ class FrictionSpec:
     """Differences in kind of the true friction from the profile's smoothed curve."""
 
     enabled: bool = True  #: False for a frictionless arm.
-    #: Dry friction of an arm whose robot file has no friction. (n,) [N·m]
+    #: Dry friction of an arm without friction in its robot file. (n,) [N·m]
     coulomb: tuple[float, ...] | None = None
     viscous: tuple[float, ...] | None = None  #: Its viscous friction. (n,) [N·m·s/rad]
     #: Torque at breakaway above the sliding Coulomb torque, as a share of it.

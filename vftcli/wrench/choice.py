@@ -17,7 +17,7 @@ START = "start"  #: The word for the unloaded start of the log.
 #: The word for the solver that takes the whole log at once, and needs no observer before
 #: it.
 SMOOTHER = "smoother"
-SMOOTHED = ("best",)  #: Observers whose wrench is the smoother's where no other solver is named.
+SMOOTHED = ("best",)  #: Observers with the smoother's wrench where no other solver is named.
 
 
 @dataclass(frozen=True, kw_only=True)

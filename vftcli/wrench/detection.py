@@ -202,7 +202,7 @@ class KnownContacts:
     untouched: Mask  #: Samples of the log that are known to be free; none where nothing is. (T,)
     #: What each observer reads in free runs of other logs, by name. (S, k) each
     beside: Mapping[str, Array] = field(default_factory=dict)
-    #: Contacts of a list, by the observer in whose wrench they were found.
+    #: Contacts of a list, by the observer that gave the wrench.
     listed: Mapping[str, Sequence[Interval]] = field(default_factory=dict)
 
 

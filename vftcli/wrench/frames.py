@@ -95,7 +95,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
 
 
 def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
-    """A pose whose rotation is one."""
+    """A pose with rotation one."""
     R, p = np.asarray(rotation, float), np.asarray(translation, float)
     if R.shape != (3, 3) or p.shape != (3,) or not (np.isfinite(R).all() and np.isfinite(p).all()):
         raise ParameterError(f"{what}: a pose has a finite 3×3 rotation and three finite lengths")
@@ -163,7 +163,7 @@ def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wren
         tool = None if mounting.tool is None else np.asarray(mounting.tool.translation)
         point, why = controller_point(recording, chain, tool)
         frame, remarks = replace(frame, point=point), [*why]
-    # The flange stands for a tool or sensor of unknown pose; base axes need none.
+    # The flange replaces a tool or sensor of unknown pose; base axes need none.
     fixed = {name: pose or IDENTITY for name, pose in mounting._asdict().items()}
     poses = {"flange": IDENTITY, **fixed}
     points = (*poses, "base")

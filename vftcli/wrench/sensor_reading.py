@@ -91,7 +91,7 @@ class SensorReading(Shown):
     #: Samples known to be unloaded: those of the zero spans, or of the unloaded start.
     #: (T,)
     free: Mask
-    #: What the smoother found, by the observer whose wrench it is.
+    #: What the smoother found, by observer.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
     #: The wrench the others are judged by, in the same frame, or None.
     reference: Wrench | None = None
@@ -110,7 +110,7 @@ class SensorReading(Shown):
 
     @property
     def hides(self) -> bool:
-        """Whether there are samples in which a wrench is not told for the pose."""
+        """Whether there are samples in which the pose hides a part of the wrench."""
         return any(bool(wrench.hidden.any()) for wrench in self.wrenches)
 
     @property

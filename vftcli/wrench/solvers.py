@@ -186,7 +186,7 @@ class VirtualSensor(Shown):
         for torque in torques:
             if torque.tau.shape != q.shape:
                 raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
-        # A view: one row stands for every sample. Zero is raised, so that weights stay
+        # A view: one row serves every sample. Zero is raised, so that weights stay
         # finite.
         errors = [
             np.broadcast_to(np.maximum(sd.get(torque.name, TORQUE_SD), 1e-6), q.shape)

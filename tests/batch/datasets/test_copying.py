@@ -120,9 +120,9 @@ def test_a_run_that_did_nothing_leaves_nothing(tmp_path: Path) -> None:
 def test_rows_are_whole_or_not_there(tmp_path: Path) -> None:
     import numpy as np
 
-    put_rows(tmp_path / "rows.npz", told=np.array("{}"), a=np.ones(2))
+    put_rows(tmp_path / "rows.npz", reported=np.array("{}"), a=np.ones(2))
     held = stored_rows(tmp_path / "rows.npz")
-    assert (str(held["told"]), held["a"].tolist()) == ("{}", [1.0, 1.0])
+    assert (str(held["reported"]), held["a"].tolist()) == ("{}", [1.0, 1.0])
     assert [path.name for path in tmp_path.iterdir()] == ["rows.npz"]
 
 

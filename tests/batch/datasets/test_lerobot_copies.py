@@ -48,9 +48,9 @@ def test_the_other_columns_the_rows_and_their_groups_stay(tmp_path: Path) -> Non
             written, np.concatenate([own[k]["external_torque"] for k in file.episodes])
         )
         assert pq.ParquetFile(target).num_row_groups == pq.ParquetFile(source).num_row_groups
-        told = json.loads(after.schema.metadata[b"huggingface"])["info"]["features"]
-        assert list(told) == after.column_names
-        assert told["observation.external_torque"]["length"] == 7
+        reported = json.loads(after.schema.metadata[b"huggingface"])["info"]["features"]
+        assert list(reported) == after.column_names
+        assert reported["observation.external_torque"]["length"] == 7
 
 
 def test_row_groups_and_rows_in_any_order_are_kept(tmp_path: Path) -> None:
@@ -128,8 +128,8 @@ def test_version_2_1_has_its_statistics_a_line_an_episode(tmp_path: Path) -> Non
     LeRobotDataset(dataset).finish(COLUMNS, statistics, tmp_path / "copy")
     text = (tmp_path / "copy" / "meta" / "episodes_stats.jsonl").read_text()
     assert tuple(json.loads(text)["stats"]["observation.valid"]) == keys
-    told = json.loads((tmp_path / "copy" / "meta" / "info.json").read_text())["features"]
-    assert "fps" not in told["observation.valid"]  # as version 2 has it
+    reported = json.loads((tmp_path / "copy" / "meta" / "info.json").read_text())["features"]
+    assert "fps" not in reported["observation.valid"]  # as version 2 has it
     assert not (tmp_path / "copy" / "meta" / "stats.json").exists()
 
 
@@ -158,10 +158,10 @@ def test_metadata_of_other_kinds_is_left_alone() -> None:
         "n": {"dtype": "int64", "_type": "Value"},
         "a": {"feature": {"dtype": "float32"}, "length": 3, "_type": "List"},
     }
-    told = with_features(
+    reported = with_features(
         {b"huggingface": json.dumps({"info": {"features": new}}).encode()}, COLUMNS
     )
-    features = json.loads(told[b"huggingface"])["info"]["features"]
+    features = json.loads(reported[b"huggingface"])["info"]["features"]
     assert features["observation.external_torque"]["_type"] == "List"
 
 

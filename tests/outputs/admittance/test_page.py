@@ -43,7 +43,7 @@ def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
     assert band[:4].tolist() == [20.0, 20.0, 20.0, 6.0]
     lines = found["x"].series
     assert [line.name for line in lines] == [controller.name for controller in push.controllers]
-    assert len({line.dash for line in lines}) == len(lines)  # none is told by its colour alone
+    assert len({line.dash for line in lines}) == len(lines)  # none differs by its colour alone
 
 
 def test_without_a_drag_the_page_says_so(release: Replay) -> None:

@@ -57,7 +57,7 @@ def test_rows_for_machines_are_not_rounded(release: Replay, tmp_path: Path) -> N
         ([np.inf] * 6, "inf / inf"),
     ],
 )
-def test_equal_axes_are_told_once(release: Replay, values: list[float], text: str) -> None:
+def test_equal_axes_are_reported_once(release: Replay, values: list[float], text: str) -> None:
     parameters = replace(release.parameters, speed_limit=np.array(values, dtype=float))
     changed = replace(release, controllers=controllers(parameters))
     assert f"limit {text}; Ts" in parameter_text(changed)
@@ -73,7 +73,7 @@ def test_parameters_of_the_profile(release: Replay) -> None:
     assert rows["rz"][-2:] == ("6 N·m", "1 rad/s")
 
 
-def test_stability_is_told_of_the_worst_axis(release: Replay) -> None:
+def test_stability_is_reported_of_the_worst_axis(release: Replay) -> None:
     """The discrete number 2 Ts B/M + Ts² K/M; the traditional controller keeps it in recovery."""
     p = release.parameters
     expected = np.max(

@@ -87,7 +87,7 @@ def unlisted(without_reference: Analysis) -> Analysis:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["pushed", "analysis", "with_wrench", "touched", "unlisted"])
-def test_nothing_is_asked_for_nor_told_and_everything_is_drawn(
+def test_nothing_is_asked_for_nor_reported_and_everything_is_drawn(
     opened: Callable, request: pytest.FixtureRequest, name: str
 ) -> None:
     text = render(request.getfixturevalue(name))

@@ -23,7 +23,7 @@ def test_the_best_is_drawn_at_once_the_others_on_demand(analysis: Analysis) -> N
     names = [line.name for line in chart.series]
     assert names == ["reference (vendor)", "fdo", "gmo", "kfo-fe", "kfo-zoh", "best"]
     assert [line.name for line in chart.series if line.shown] == ["reference (vendor)", "best"]
-    assert len({line.dash for line in chart.series[1:]}) == 5  # none is told by its colour alone
+    assert len({line.dash for line in chart.series[1:]}) == 5  # none differs by its colour alone
     assert chart.series[0].colour == REFERENCE
     assert chart.band is not None
     assert chart.band.tolist() == [0.5] * 6

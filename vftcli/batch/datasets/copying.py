@@ -29,9 +29,9 @@ def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
     """See before anything is computed that a copy may be made at a path."""
     source, target = dataset.resolve(), copy.resolve()
     if source == target or source in target.parents or target in source.parents:
-        told = "are the same folder" if source == target else "are one inside the other"
+        how = "are the same folder" if source == target else "are one inside the other"
         raise OutputError(
-            f"-o {copy} and the dataset {dataset} {told}; give another -o, outside of the dataset"
+            f"-o {copy} and the dataset {dataset} {how}; give another -o, outside of the dataset"
         )
     if copy.is_symlink() or (copy.exists() and not copy.is_dir()):
         raise OutputError(f"{copy} is no folder; -o needs the name of a new one")

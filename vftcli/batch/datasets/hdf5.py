@@ -77,7 +77,7 @@ class Hdf5Dataset:
                         compression="gzip",
                         shuffle=True,
                     )
-                    for key, value in column.told.items():
+                    for key, value in column.about.items():
                         data.attrs[key] = value
                     if column.elements:
                         data.attrs["names"] = list(column.elements)

@@ -101,8 +101,8 @@ class LeRobotDataset:
         if done != rows:
             raise LogError(f"{path}: has rows of episodes that the table of episodes lacks")
         added = [pa.field(PREFIX + c.name, kind_of(c.width)) for c in columns]
-        told = with_features(source.schema_arrow.metadata or {}, columns)
-        schema = pa.schema([*source.schema_arrow, *added], metadata=told)
+        metadata = with_features(source.schema_arrow.metadata or {}, columns)
+        schema = pa.schema([*source.schema_arrow, *added], metadata=metadata)
         first = 0
         with pq.ParquetWriter(target, schema, compression=codec_of(source)) as writer:
             for group in range(source.num_row_groups):
@@ -125,7 +125,7 @@ class LeRobotDataset:
                 "shape": [column.width],
                 "names": list(column.elements) or None,
                 **fps,
-                "info": dict(column.told),
+                "info": dict(column.about),
             }
         write_json(copy / "meta" / "info.json", info)
         for path in sorted((self.folder / "meta" / "episodes").rglob("*.parquet")):
@@ -174,12 +174,12 @@ def finish_lines(text: str, columns: ForceColumns, statistics: OfEpisodes, targe
     """Write episodes_stats.jsonl, the statistics of version 2.1."""
     lines = []
     for line in filter(str.strip, text.splitlines()):
-        told = json.loads(line)
-        known = next(iter(told["stats"].values()), KEYS)
+        record = json.loads(line)
+        known = next(iter(record["stats"].values()), KEYS)
         for column in columns:
-            own = statistics[int(told[EPISODE])][column.name]
-            told["stats"][PREFIX + column.name] = plain(own, known)
-        lines.append(json.dumps(told, ensure_ascii=False) + "\n")
+            own = statistics[int(record[EPISODE])][column.name]
+            record["stats"][PREFIX + column.name] = plain(own, known)
+        lines.append(json.dumps(record, ensure_ascii=False) + "\n")
     target.write_text("".join(lines), "utf-8")
 
 
@@ -227,20 +227,19 @@ def named_features(folder: Path, info: dict[str, Any]) -> dict[str, Any]:
 
 def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dict[bytes, bytes]:
     """A schema's metadata with the columns among the features that the `datasets` library reads."""
-    told = dict(metadata)
     try:
-        library = json.loads(told.get(METADATA, b"null"))
+        library = json.loads(metadata.get(METADATA, b"null"))
         features = library["info"]["features"]
         # Lists are called List since its version 4, and Sequence before.
         lists = [f for f in features.values() if isinstance(f, dict) and "length" in f]
     except (ValueError, TypeError, KeyError, AttributeError):
-        return told
+        return dict(metadata)
     number = {"dtype": "float32", "_type": "Value"}
     kind = lists[0]["_type"] if lists else "Sequence"
     for column in columns:
         several = {"feature": number, "length": column.width, "_type": kind}
         features[PREFIX + column.name] = number if column.width == 1 else several
-    return told | {METADATA: json.dumps(library).encode()}
+    return dict(metadata) | {METADATA: json.dumps(library).encode()}
 
 
 def statistics_of(values: Single) -> Statistics:

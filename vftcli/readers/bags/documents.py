@@ -59,7 +59,7 @@ class Documents:
         return True
 
     def streams(self, request: ReadChoice) -> list[Stream]:
-        """The channels whose documents are JointState or WrenchStamped messages.
+        """The channels with documents that are JointState or WrenchStamped messages.
 
         None where --columns speaks of other fields; no channel where its stamps are no
         whole seconds and nanoseconds.
@@ -81,7 +81,7 @@ class Documents:
         return list(filter(None, streams))
 
     def read(self, request: ReadChoice) -> RawLog:
-        """Read the channel whose documents hold joint positions."""
+        """Read the channel with documents that hold joint positions."""
         failures: dict[int, LogError] = {}
         for channel, (rows, times) in self.found.items():
             try:

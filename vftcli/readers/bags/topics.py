@@ -70,7 +70,7 @@ class Gathering:
         stamps, tick, words: Its best clock.
         host: Its header or receive stamps, on which other topics are aligned. (T,) [ns]
         signals: Field of Recording → values at the leading topic's times. (T, k)
-        used: Topics beside the leading one of which a signal was taken.
+        used: Topics beside the leading one that gave a signal.
         remarks: What was chosen, and what looks suspicious.
     """
 
@@ -241,7 +241,7 @@ def same_arm(stream: Stream, lead: Stream) -> bool:
 def leading(
     streams: Sequence[Stream], path: Path, others: dict[str, str], request: ReadChoice
 ) -> Stream:
-    """The topic whose positions lead: measured ones, of most messages; a robot state breaks ties.
+    """The topic of the leading positions: measured, most messages; a robot state breaks ties.
 
     One that --columns names, as in q=TOPIC.position, goes before all others.
     """

@@ -199,7 +199,7 @@ def write_parquet(path: Path, simulation: Simulation) -> None:
 
 
 def write_truth(path: Path, truth: Truth, start: float) -> None:
-    """Write the truth beside a log whose first stamp is `start` [s]: the same clock."""
+    """Write the truth beside a log that begins at `start` [s]: the same clock."""
     columns = truth.columns()
     touched = {name.rpartition("/")[0] for name in columns if name.startswith("contact/")}
     frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(touched, StatedFrame(AT_CONTACT))
