@@ -180,7 +180,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
 
 
 @pytest.mark.slow
-def test_a_free_run_as_long_as_the_log_is_reported_from_it(runs: list[Path]) -> None:
+def test_a_free_run_as_long_as_the_log_is_distinct_from_it(runs: list[Path]) -> None:
     """Its raw disturbance was taken for the log's: the tuned gains collapsed."""
     load, free, more = runs
     one = more.with_name("as_long.csv")

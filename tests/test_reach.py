@@ -231,7 +231,7 @@ READINGS = {
 
 @pytest.mark.statistical
 @pytest.mark.parametrize("name", LOGS)
-def test_an_effort_is_reported_from_four_others_on_real_logs(logs: Path, name: str) -> None:
+def test_an_effort_is_distinct_from_four_others_on_real_logs(logs: Path, name: str) -> None:
     """Each is explained best as what it is; what explains it less than 1.5 × better is said."""
     from vftcli.doctor.causes import readings
     from vftcli.doctor.windows import windows_of

@@ -150,7 +150,7 @@ def test_unknown_samples_are_counted() -> None:
     assert counted(replace(wrench, masked=np.zeros(10, dtype=bool))) == []
 
 
-def test_a_log_that_moves_is_reported_how_far() -> None:
+def test_the_travel_of_a_log_that_moves_is_reported() -> None:
     logged = np.zeros((5, 6))
     logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
     (remark,) = trouble(replayed(logged=logged))

@@ -45,7 +45,7 @@ def test_what_looks_ahead_is_not_causal(asked: ForceChoice) -> None:
     )
 
 
-def test_the_columns_and_what_is_reported_of_them() -> None:
+def test_the_columns_and_what_they_say_of_themselves() -> None:
     asked = ForceChoice(wrench=WrenchChoice(frame="base"), sd=True, contact=True)
     found = force_columns(asked, ["j1", "j2"], derived=False, valid=True)
     assert [(c.name, c.width) for c in found] == [

@@ -7,7 +7,7 @@ import pytest
 from vftcli.cli.analysis import LARGE, MMAP_THRESHOLD, give_back
 
 
-def test_the_c_library_is_reported_once_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_c_library_knows_it_once_it_can(monkeypatch: pytest.MonkeyPatch) -> None:
     reported: list[tuple[int, int]] = []
 
     class Library:

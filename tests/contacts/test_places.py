@@ -52,7 +52,7 @@ def test_every_link_belongs_to_a_part() -> None:
     ]  # fmt: skip
 
 
-def test_a_force_on_the_forearm_is_reported_from_one_on_the_flange() -> None:
+def test_a_force_on_the_forearm_is_distinct_from_one_on_the_flange() -> None:
     chain = load_robot("ur5").chain
     force = np.array([20.0, -40.0, 30.0])
     for link, share in ((3, 0.5), (6, 1.0)):

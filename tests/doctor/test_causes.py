@@ -34,7 +34,7 @@ def test_a_sound_log_has_no_cause(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_an_effort_is_reported_from_what_it_may_be() -> None:
+def test_an_effort_is_read_as_one_of_what_it_may_be() -> None:
     log = moving()
     current = log.require("current")
     constant = np.asarray(UR10E.torque_constant)

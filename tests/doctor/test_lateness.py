@@ -87,7 +87,7 @@ def test_a_clock_of_the_effort_is_reported_by_its_rate(rate: float, pace: str, p
     assert finding.values["pace"] == pace
 
 
-def test_a_drift_in_a_long_log_is_reported_by_its_first_minute() -> None:
+def test_the_first_minute_shows_a_drift_in_a_long_log() -> None:
     """.5 % of 200 s is a second, more than any lag that is tried."""
     finding = reported(log_of(rate=0.005, clock=STEP * np.arange(20000)))
     assert finding is not None

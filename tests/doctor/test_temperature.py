@@ -34,7 +34,7 @@ def test_where_the_law_holds_there_is_nothing_to_say(temperature: float) -> None
     assert found(log(temperature)) == []
 
 
-def test_a_log_without_temperatures_is_reported_what_is_taken() -> None:
+def test_a_log_without_temperatures_is_reported_with_the_one_assumed() -> None:
     (remark,) = found(log(None))
     assert (remark.code, remark.level) == ("no-temperature", "fact")
     # s(25)/s(35) worked by hand: size 3 2.9177/2.5366, size 1 .64593/.52003

@@ -221,7 +221,7 @@ def test_at_a_kilohertz_eight_milliseconds_are_late(late_ms: float, reported: bo
 
 
 @pytest.mark.parametrize("cut_off", [0.5, 1.0, 2.0])
-def test_a_filter_is_reported_from_a_delay(cut_off: float) -> None:
+def test_a_filter_is_distinct_from_a_delay(cut_off: float) -> None:
     """A first-order low-pass takes 1/(2π f_c) and a part of the size, neither clock nor unit."""
     keep = np.exp(-2 * np.pi * cut_off * STEP)
     start = keep * DQ[:1]

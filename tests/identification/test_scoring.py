@@ -125,7 +125,7 @@ def test_the_share_of_a_repeated_path(prepared, sines):
 
 
 @pytest.mark.parametrize(("before", "worse"), [(1.9, True), (2.0, False), (3.0, False)])
-def test_a_model_that_leaves_more_than_the_profile_is_reported_of(motion, before, worse):
+def test_a_model_that_leaves_more_than_the_profile_is_reported(motion, before, worse):
     left = trace(motion, np.full(motion.q.shape, 2.0), "train")
     remarks = list(score_remarks([left._replace(before=np.full(6, before))]))
     reported = [r.values["profile_Nm"] for r in remarks if r.code == "worse-than-profile"]

@@ -42,7 +42,7 @@ def made(joints: int = 7, *, own: bool = True, axes: int = 6) -> Thresholds:
     )
 
 
-def test_libfranka_is_reported_contacts_at_the_threshold_and_collisions_at_its_upper_end() -> None:
+def test_libfranka_gets_contacts_at_the_threshold_and_collisions_at_its_upper_end() -> None:
     text = calls(made())["libfranka"]
     call = ast.parse(text).body[0]
     assert isinstance(call, ast.Expr)
@@ -57,7 +57,7 @@ def test_libfranka_is_reported_contacts_at_the_threshold_and_collisions_at_its_u
     ]
 
 
-def test_franka_ros_is_reported_the_same_in_both_phases() -> None:
+def test_franka_ros_gets_the_same_in_both_phases() -> None:
     head, *lines = calls(made())["franka_ros"].splitlines()
     assert head == "collision_config:"
     found = {key.strip(): ast.literal_eval(value.strip()) for key, value in
@@ -72,7 +72,7 @@ def test_franka_ros_is_reported_the_same_in_both_phases() -> None:
     assert len(found["lower_torque_thresholds_acceleration"]) == 7
 
 
-def test_a_ur_is_reported_the_size_of_the_force() -> None:
+def test_a_ur_gets_the_size_of_the_force() -> None:
     text = calls(made(6))["ur_script"]
     assert re.search(r"if force\(\) > 30\.01:", text)
     assert text.count("end\n") == 3

@@ -101,7 +101,7 @@ def test_as_many_folders_as_it_takes():
     assert list(found.values()) == ["x/a/log.csv", "y/a/log.csv", "b/log.csv"]
 
 
-def test_a_path_that_ends_another_is_reported_from_it():
+def test_a_path_that_ends_another_is_distinct_from_it():
     assert list(labelled(["/log.csv", "/a/log.csv"]).values()) == ["/log.csv", "a/log.csv"]
 
 

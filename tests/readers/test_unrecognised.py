@@ -36,7 +36,7 @@ from vftcli.signals.errors import UnknownFormatError
         (bytes(range(200)), "a binary file of no kind that is known .*00 01 02 03"),
     ],
 )
-def test_a_file_is_reported_what_it_is(tmp_path: Path, content: bytes, words: str) -> None:
+def test_a_file_that_is_no_log_is_named(tmp_path: Path, content: bytes, words: str) -> None:
     path = tmp_path / "file"
     path.write_bytes(content)
     with pytest.raises(UnknownFormatError, match=f"not recognised as a log: .*{words}"):

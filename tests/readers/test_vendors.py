@@ -50,7 +50,7 @@ def test_official_text_of_every_line_end(tmp_path: Path, end: str) -> None:
     np.testing.assert_array_equal(recording.q, motion()["q"])
 
 
-def test_ur_rtde_is_reported_by_its_commas(tmp_path: Path) -> None:
+def test_commas_show_ur_rtde(tmp_path: Path) -> None:
     assert read(ur_csv(tmp_path / "x", separator=",", end="\n")).source.format == "ur-rtde"
 
 

@@ -203,9 +203,7 @@ def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
         ("arm.urdf", "<COLLADA/>", "a mesh; take the URDF that names it"),
     ],
 )
-def test_what_is_no_description_is_reported_what_it_is(
-    name: str, text: str, words: str, tmp_path: Path
-) -> None:
+def test_what_is_no_description_is_named(name: str, text: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(RobotError, match=words):
         load_robot(written(tmp_path, text, name))
 
