@@ -10,7 +10,6 @@ from rerun_rows import rows_of, times_of
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Unexplained
-from vftcli.outputs.capsules import touched_point
 from vftcli.outputs.charts import PLACES
 from vftcli.outputs.rerun_arm import painted_links
 from vftcli.outputs.rerun_recording import (
@@ -20,6 +19,7 @@ from vftcli.outputs.rerun_recording import (
     newton_per_metre,
     write_rrd,
 )
+from vftcli.outputs.shapes import touched_point
 from vftcli.signals.remarks import Where, caution
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from rerun_rows import rows_of
 
-from vftcli.outputs.capsules import capsules
 from vftcli.outputs.rerun_arm import (
     LINK,
     LONGEST,
@@ -20,6 +19,7 @@ from vftcli.outputs.rerun_arm import (
     send_force,
 )
 from vftcli.outputs.rerun_file import Tab, rerun_file
+from vftcli.outputs.shapes import capsules
 from vftcli.robots import PROFILES, load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Mesh
@@ -141,9 +141,9 @@ def test_capsules_join_the_joints(name: str) -> None:
     length = np.linalg.norm(offsets, axis=1).sum()
     for shapes, offset in zip(capsules(chain), offsets, strict=True):
         for shape in shapes:
-            if not shape.joint:
+            if shape.kind != "joint":
                 np.testing.assert_array_equal(shape.start + shape.direction, offset)
-        links = [shape for shape in shapes if not shape.joint]
+        links = [shape for shape in shapes if shape.kind != "joint"]
         assert bool(links) == (np.linalg.norm(offset) > 0.02 * length)
 
 

@@ -5,9 +5,7 @@ capsules, from the chain's own geometry. A contact's arrow is there while it las
 place, below `/contacts`, and the links that it touched have its colour.
 """
 
-import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +13,10 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from vftcli.contacts.contact_list import ContactList
-from vftcli.outputs.capsules import capsules, touched_point
 from vftcli.outputs.charts import PLACES
+from vftcli.outputs.shapes import capsules, touched_point
 from vftcli.robots.chain import Chain, link_poses
-from vftcli.robots.meshes import COLOURED, FORMATS
+from vftcli.robots.meshes import COLOURED, FORMATS, collada
 from vftcli.robots.robot import Mesh, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion, rotation_onto
@@ -37,9 +35,6 @@ LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
 SCALES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
 SHAFT = 0.012  #: Radius of a force arrow. [m]
 LONGEST = 0.5  #: The hardest force's arrow is as long at most. [m]
-#: The unit of a DAE, and the axis that it calls up.
-UNIT = re.compile(rb"(<unit\b[^>]*?\bmeter\s*=\s*[\"'])([^\"']*)")
-UP = re.compile(rb"(<up_axis>\s*)[XY]_UP")
 
 
 class ArmPoses(NamedTuple):
@@ -94,7 +89,7 @@ def send_arm(
                 fill_mode="solid",
             )
             stream.log(link, batch, static=True)
-            own = rgba(*(JOINT if shape.joint else LINK for shape in shapes))
+            own = rgba(*(JOINT if shape.kind == "joint" else LINK for shape in shapes))
             send_colours(stream, link, own, start, painted.get(j, ()))
         if j:
             columns = rr.Transform3D.columns(
@@ -121,18 +116,6 @@ def send_meshes(
         own = rgba(*() if ending in COLOURED else (LINK,))
         send_colours(stream, path, own, start, painted, mesh=True)
     return 0 < len(found) == len(meshes)
-
-
-def collada(contents: bytes) -> tuple[bytes, float]:
-    """A mesh with z up, in metres where it is a DAE, and the unit that its numbers are in. [m]
-
-    Robot descriptions ignore a DAE's axis and Rerun its unit; other files state neither.
-    """
-    found, unit = UNIT.search(contents), 1.0
-    with suppress(ValueError):
-        unit = float(found[2]) if found else 1.0
-    metric = UP.sub(rb"\1Z_UP", UNIT.sub(rb"\g<1>1", contents, count=1))
-    return metric, unit if 1e-6 < unit < 1e3 else 1.0
 
 
 def send_colours(

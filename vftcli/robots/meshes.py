@@ -1,4 +1,4 @@
-"""The mesh files that a URDF names: found near it, and placed on the links of its arm.
+"""The mesh files that a URDF names: found near it, placed on the links of its arm, and read.
 
 Packages that it names are looked for above the file and beside the folders there, by their
 `package.xml`, else by the name of a folder above it.
@@ -7,6 +7,7 @@ Packages that it names are looked for above the file and beside the folders ther
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -16,8 +17,9 @@ from vftcli.robots.arm import LumpedArm
 from vftcli.robots.robot import Mesh
 from vftcli.robots.robot_file import robot_text
 from vftcli.robots.urdf import UrdfPart
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
-from vftcli.signals.pose import IDENTITY, Pose
+from vftcli.signals.pose import IDENTITY, Pose, exp_matrix
 
 #: Ending of a mesh file → its media type.
 FORMATS = {
@@ -29,6 +31,13 @@ FORMATS = {
 COLOURED = (".dae", ".glb")  #: Those that hold colours.
 LARGEST = 1 << 26  #: The files of one arm together; most arms have a tenth of it. [B]
 ABOVE = 5  #: Folders above the file in which packages are looked for.
+FARTHEST = 1e6  #: Corners are nearer to their origin, in the unit of their file.
+#: The unit of a DAE, and the axis that it calls up.
+UNIT = re.compile(rb"(<unit\b[^>]*?\bmeter\s*=\s*[\"'])([^\"']*)")
+UP = re.compile(rb"(<up_axis>\s*)[XY]_UP")
+CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")  #: A corner in an STL of text.
+#: A triangle in an STL of bytes.
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
 NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")  #: The name of a package in its manifest.
 
 
@@ -94,3 +103,104 @@ def packages_near(path: Path) -> Iterator[tuple[str, str]]:
             with suppress(RobotError):  # a neighbour's that is no text
                 if name := NAME.search(robot_text(manifest)):
                     yield name[1], str(manifest.parent)
+
+
+def read_mesh(mesh: Mesh) -> Array:
+    """Triangles of a mesh on its link, their corners counter-clockwise from outside. (F, 3, 3) [m]
+
+    Raises RobotError where its file is not there, is no STL, OBJ or DAE, or holds no triangle.
+    """
+    try:
+        found = CORNERS[Path(mesh.name).suffix.lower()]((mesh.file or Path()).read_bytes())
+    except (OSError, LookupError, ValueError, TypeError, AttributeError, SyntaxError) as error:
+        raise RobotError(f"{mesh.name}: cannot be read as a mesh ({error})") from None
+    if not len(found) or not (abs(found) < FARTHEST).all():
+        raise RobotError(f"{mesh.name}: holds no triangle, or a corner that is nowhere")
+    corners = found @ (mesh.pose.rotation * mesh.scale).T + mesh.pose.translation
+    # Six times its volume: turned over where it or its scale is mirrored.
+    volume = np.linalg.det(corners - corners.mean(axis=(0, 1))).sum()
+    return np.asarray(corners if volume >= 0.0 else corners[:, ::-1])
+
+
+def stl_corners(contents: bytes) -> Array:
+    """Triangles of an STL, of bytes or of text. (F, 3, 3)"""
+    if len(contents) == 84 + FACET.itemsize * int.from_bytes(contents[80:84], "little"):
+        return np.frombuffer(contents, FACET, offset=84)["corners"].astype(float)
+    return np.array(CORNER.findall(contents)).astype(float).reshape(-1, 3, 3)
+
+
+def obj_corners(contents: bytes) -> Array:
+    """Triangles of an OBJ: a face of more corners is a fan of them. (F, 3, 3)"""
+    points, fans = list[list[bytes]](), list[list[int]]()
+    for kind, *words in filter(None, map(bytes.split, contents.splitlines())):
+        if kind == b"v":
+            points.append(words[:3])
+        elif kind == b"f":
+            at = [int(word.split(b"/")[0]) for word in words]
+            at = [k - 1 if k > 0 else len(points) + k for k in at]
+            fans += ([at[0], *pair] for pair in pairwise(at[1:]))
+    every: Array = np.array(points).astype(float).reshape(-1, 3)
+    return np.asarray(every[np.array(fans)])
+
+
+def dae_corners(contents: bytes) -> Array:
+    """Triangles of a DAE with the poses of its nodes, its axes as they are. (F, 3, 3) [m]"""
+    root, found = ET.fromstring(contents), list[Array]()
+    for each in root.iter():
+        each.tag = each.tag.rpartition("}")[2]
+    named = {f"#{each.attrib['id']}": each for each in root.iter() if "id" in each.attrib}
+    waiting = [(scene, np.eye(4)) for scene in root.iter("visual_scene")]
+    while waiting:
+        node, place = waiting.pop()
+        for step in node:
+            place = place @ node_step(step)
+        waiting += [(child, place) for child in node.iterfind("node")]
+        for part in node.iterfind("instance_geometry"):
+            for triangles in named[part.attrib["url"]].iter("triangles"):
+                corners = geometry_corners(triangles, named)
+                found.append(corners @ place[:3, :3].T + place[:3, 3])
+    return collada(contents)[1] * np.concatenate(found)
+
+
+def node_step(step: ET.Element) -> Array:
+    """What an element of a DAE's node does to what is in it. (4, 4)"""
+    made = np.eye(4)
+    if step.tag in {"matrix", "translate", "rotate", "scale"}:
+        numbers = np.array((step.text or "").split(), dtype=float)
+        if step.tag == "matrix":
+            return numbers.reshape(4, 4)
+        if step.tag == "translate":
+            made[:3, 3] = numbers
+        elif step.tag == "scale":
+            made[:3, :3] = np.diag(numbers)
+        else:
+            made[:3, :3] = exp_matrix(numbers[:3] * np.radians(numbers[3]))
+    return made
+
+
+def geometry_corners(triangles: ET.Element, named: Mapping[str, ET.Element]) -> Array:
+    """The corners that an element of a DAE's geometry lists. (F, 3, 3)"""
+    (vertex,) = triangles.iterfind("input[@semantic='VERTEX']")
+    (position,) = named[vertex.attrib["source"]].iterfind("input[@semantic='POSITION']")
+    (points,) = named[position.attrib["source"]].iterfind("float_array")
+    (places,) = triangles.iterfind("p")
+    width = 1 + max(int(each.attrib["offset"]) for each in triangles.iterfind("input"))
+    at = np.array((places.text or "").split(), dtype=int).reshape(-1, 3, width)
+    every: Array = np.array((points.text or "").split(), dtype=float).reshape(-1, 3)
+    return np.asarray(every[at[:, :, int(vertex.attrib["offset"])]])
+
+
+#: Ending of a mesh file → its reader.
+CORNERS = {".stl": stl_corners, ".obj": obj_corners, ".dae": dae_corners}
+
+
+def collada(contents: bytes) -> tuple[bytes, float]:
+    """A mesh with z up, in metres where it is a DAE, and the unit that its numbers are in. [m]
+
+    Robot descriptions ignore a DAE's axis and Rerun its unit; other files state neither.
+    """
+    found, unit = UNIT.search(contents), 1.0
+    with suppress(ValueError):
+        unit = float(found[2]) if found else 1.0
+    metric = UP.sub(rb"\1Z_UP", UNIT.sub(rb"\g<1>1", contents, count=1))
+    return metric, unit if 1e-6 < unit < 1e3 else 1.0

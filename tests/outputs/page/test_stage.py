@@ -5,7 +5,6 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.outputs.capsules import capsules
 from vftcli.outputs.page.packing import Blob, PageClock
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.page.stage import (
@@ -20,6 +19,7 @@ from vftcli.outputs.page.stage import (
     still_arm,
     view_of,
 )
+from vftcli.outputs.shapes import capsules
 from vftcli.robots.chain import link_poses
 
 
@@ -139,7 +139,7 @@ def test_the_free_part_is_the_first_round(pushed: Analysis) -> None:
 
 
 def staged(analysis: Analysis) -> dict:
-    return stage_data(analysis, view_of(analysis), PageClock(Blob(), analysis.t))
+    return stage_data(analysis, view_of(analysis), {}, PageClock(Blob(), analysis.t))
 
 
 def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None:
@@ -152,15 +152,15 @@ def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None
         assert f"{row['force']} {row['band']}" == (unknown if contact.place_unknown else shown)
         assert row["weak"] == (contact.trust == "weak")
     assert data["first"] == data["contacts"][5]["i"]
-    assert (data["least"], data["none"]) == ("4 N", "no contact")
+    assert data["none"] == ("< 4 N", "", "no contact")
     assert data["wrench"] == {"flange": True}
 
 
 def test_a_log_without_a_list_claims_nothing(pushed: Analysis) -> None:
     data = staged(replace(pushed, contacts=None))
-    assert (data["contacts"], data["least"], data["none"]) == ([], None, "")
+    assert (data["contacts"], data["none"]) == ([], ("–", "", ""))
     guessed = staged(replace(pushed, contacts=replace(listed(pushed), basis="friction")))
-    assert (guessed["least"], guessed["none"]) == (None, "no contact listed")
+    assert guessed["none"] == ("–", "", "no contact listed")
 
 
 def test_what_touches_a_loaded_arm_comes_before_its_load(pushed: Analysis) -> None:

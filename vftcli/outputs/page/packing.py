@@ -6,6 +6,7 @@ and the highest value of every stretch, and half of the stretches are where cont
 """
 
 import base64
+import re
 import zlib
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -102,6 +103,7 @@ class PageClock:
         every = 1 if line.shown or self.starts is None else COARSE
         columns = list(zip(line.values.T, chart.units, strict=True))
         lows, spreads = zip(*(self.ends(x, unit, every) for x, unit in columns), strict=True)
+        name = re.sub('[",\\s]+', " ", line.name)  # in the head of a CSV
         data: dict[str, Any] = {
             "name": line.name,
             "colour": paint(line.colour),
@@ -112,12 +114,15 @@ class PageClock:
             "quiet": line.quiet is not None,
             "every": every,
             "low": lows,
+            "columns": [("low", name if self.starts is None else f"{name} min")],
         }
         if self.starts is not None:
             data["spread"] = spreads
+            data["columns"].append(("high", f"{name} max"))
         if line.half is not None and line.shown:
             halves = zip(line.half.T, chart.units, strict=True)
             data["half"] = [self.most(half, unit) for half, unit in halves]
+            data["columns"].append(("half", f"{name} ±"))
         return data
 
 

@@ -1,4 +1,4 @@
-// The live part of a page. Until its #data is unpacked, or where it cannot be, the drawings stay.
+// The live part of a page. Until its #data is unpacked, if ever, the drawings stay.
 const $ = (query, at = document) => at.querySelector(query);
 const $$ = (query, at = document) => [...at.querySelectorAll(query)];
 const on = (target, names, act, how) => names.split(" ").forEach((name) => target.addEventListener(name, act, how));
@@ -13,12 +13,12 @@ const onKeys = (place, acts) => on(place, "keydown", (e) => {
 	act();
 });
 
-// ---- Tables that sort, commands to copy, links into folded parts, paper.
+// ---- Tables that sort, commands to copy.
 const sortBy = (head) => {
 	const column = head.cellIndex, body = head.closest("table").tBodies[0], down = head.ariaSort === "ascending" ? -1 : 1;
 	const rows = [...body.rows].map((row) => {
 		const text = row.cells[column].textContent.trim(), sign = text[1] ? "✗△–✓".indexOf(text[0]) : -1;
-		return { row, text, size: !column ? NaN : sign < 0 ? parseFloat(text.replace(/^\D+(?=\d)/, "")) : sign };
+		return { row, text, size: !column ? NaN : sign < 0 ? parseFloat(text.match(/\d[\d.]*/)) : sign };
 	});
 	// What is unknown comes last.
 	rows.sort((a, b) => isNaN(a.size) - isNaN(b.size) || down * (isNaN(a.size) ? a.text.localeCompare(b.text) : a.size - b.size));
@@ -37,21 +37,10 @@ for (const copy of $$("button.copy")) on(copy, "click", async () => {
 	copy.textContent = await navigator.clipboard?.writeText(command.textContent).then(() => "copied", () => 0) || "selected";
 	setTimeout(() => { copy.textContent = "copy"; }, 1500);
 });
-const reveal = () => $(":target")?.closest("details")?.setAttribute("open", "");
-on(window, "hashchange", reveal);
-reveal();
-let folded = [];
-on(window, "beforeprint", () => { folded = $$("details:not([open])"); for (const each of folded) each.open = true; });
-on(window, "afterprint", () => { for (const each of folded) each.open = false; });
 
 // ---- Numbers, colours, and what every drawing is made of.
 const seconds = (t) => `${t.toFixed(2)} s`;
 const minus = (text) => text.replace("-", "−");
-// Three digits of the largest, as far as the steps of the data go, and no negative nought.
-const number = (x, size, step) => {
-	const digits = clamp(2 - floor(log10(max(size, step))), 0, max(0, ceil(-log10(step) - .1)));
-	return minus((+x.toFixed(digits) + 0).toFixed(digits));
-};
 const ticks = (low, high, count) => {
 	const width = (high - low) / count, power = 10 ** floor(log10(width)), found = [];
 	const step = [1, 2, 5, 10].find((s) => width <= 1.4 * s * power) * power;
@@ -63,15 +52,15 @@ let c = null; // what is drawn on
 const readStyle = () => {
 	const style = getComputedStyle(document.documentElement);
 	css.font = getComputedStyle(document.body).fontFamily;
-	for (const name of "paper card ink mute line force band pale touch stripe weak unseen hatch reference zero".split(" ")) css[name] = style.getPropertyValue(`--${name}`).trim();
+	for (const name of document.styleSheets[0].cssRules[0].style) css[name.slice(2)] = css[`var(${name})`] = style.getPropertyValue(name).trim();
 };
-const paint = (colour) => css[/^var\(--(\w+)/.exec(colour)?.[1]] || colour;
+const paint = (colour) => css[colour] || colour;
 // A path through points, broken at null.
 const path = (points, stroke, width = 1, dash = []) => {
 	let drawn = false;
 	c.beginPath();
 	for (const point of points) {
-		if (point) c[drawn ? "lineTo" : "moveTo"](point[0], point[1]);
+		if (point) c[drawn ? "lineTo" : "moveTo"](...point);
 		drawn = !!point;
 	}
 	Object.assign(c, { strokeStyle: stroke, lineWidth: width, lineCap: dash[0] ? "butt" : "round", lineJoin: "round" });
@@ -88,14 +77,13 @@ const fill = (colour, x, y, width, height) => { c.fillStyle = colour; c.fillRect
 const within = ([x, y, width, height], draw) => { c.save(); c.beginPath(); c.rect(x, y, width, height); c.clip(); draw(); c.restore(); };
 // Keep a drawing's canvas as large as its place.
 const watch = (drawing, canvas) => new ResizeObserver(([{ contentRect: { width, height } }]) => {
-	Object.assign(drawing, { width, height, pen: width && height ? canvas.getContext("2d") : null });
+	Object.assign(drawing, { width, height, pen: width * height ? canvas.getContext("2d") : null });
 	Object.assign(canvas, { width: round(width * devicePixelRatio), height: round(height * devicePixelRatio) });
 	ask(LINES);
 }).observe(canvas);
 // Draw on it, where it is shown.
 const begin = ({ pen }) => {
-	c = pen;
-	c?.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+	(c = pen)?.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
 	return c;
 };
 
@@ -129,11 +117,13 @@ class Clock {
 		Object.assign(this, { t, first, last, head: first, view: [first, last], gaps: new Set(gaps) });
 	}
 	get now() { return this.look ?? this.head; }
-	index(t) {
+	// The last sample before a time that has one behind it.
+	before(t) {
 		let low = 0, high = this.t.length - 1;
 		while (high - low > 1) { const middle = (low + high) >> 1; if (this.t[middle] <= t) low = middle; else high = middle; }
-		return t - this.t[low] < this.t[high] - t ? low : high;
+		return low;
 	}
+	index(t) { const low = this.before(t); return low + (t - this.t[low] >= this.t[low + 1] - t); }
 	go(t, glide) {
 		this.look = this.way = null;
 		t = clamp(t, this.first, this.last);
@@ -157,7 +147,7 @@ class Clock {
 		if (this.way) {
 			const { from, to, start } = this.way, share = clamp((time - start) / 320, 0, 1);
 			if (share === 1) this.way = null;
-			this.put(share === 1 ? to : from + (to - from) * (1 - (1 - share) ** 3));
+			this.put(from + (to - from) * (1 - (1 - share) ** 3));
 		}
 		if (this.running) {
 			this.put(min(this.head + min(time - before, 100) / 1000 * this.speed, this.last));
@@ -222,7 +212,7 @@ class Plot {
 			c.globalAlpha = 1;
 			edges.length = 0;
 		};
-		for (let i = max(this.clock.index(view[0]) - 1, 0); i < t.length && t[max(i - 1, 0)] <= view[1]; i++) {
+		for (let i = this.clock.before(view[0]); i < t.length && t[max(i - 1, 0)] <= view[1]; i++) {
 			const k = min(floor(i / line.every), low.length - 1), x = this.x(t[i]), foot = low[k], peak = foot + (spread?.[k] || 0);
 			if (gaps.has(i) || isNaN(foot)) { points.push(null); ribbon(); }
 			if (isNaN(foot)) continue;
@@ -246,22 +236,24 @@ class Plot {
 		const shown = this.chart.lines.filter((line) => line.shown && !isNaN(this.value(line).low)).sort((a, b) => b.leads - a.leads);
 		const texts = shown.map((line) => {
 			const { low, high, half } = this.value(line), size = max(abs(low), abs(high), half || 0), name = line.leads || !shown[1] ? "" : `${line.name.replace(/ \(.*/, "")} `;
-			const text = (x) => number(x, size, data.steps[line.low[this.panel]]);
+			// Three digits of the largest, as far as the steps of the data go, and no negative nought.
+			const step = data.steps[line.low[this.panel]], digits = clamp(2 - floor(log10(max(size, step))), 0, max(0, ceil(-log10(step) - .1)));
+			const text = (x) => minus((+x.toFixed(digits) + 0).toFixed(digits));
 			return name + text(low) + (high - low > .005 * size ? `…${text(high)}` : "") + (isNaN(half) ? "" : ` ± ${text(half)}`);
 		});
 		return texts[0] ? `${texts.join(" · ")} ${this.chart.units[this.panel]}` : "";
 	}
 	// Hover looks, a click goes there, a drag zooms; a finger scrubs.
 	listen() {
-		const { box, clock, chosen } = this, place = (e) => e.clientX - box.getBoundingClientRect().left, isMouse = (e) => e.pointerType === "mouse";
+		const { box, clock, chosen } = this, isMouse = (e) => e.pointerType === "mouse";
 		let from = null;
 		on(box, "pointerdown", (e) => {
 			if (e.button) return;
-			from = place(e);
+			from = e.offsetX;
 			box.setPointerCapture(e.pointerId);
 		});
 		on(box, "pointermove", (e) => {
-			const x = place(e);
+			const x = e.offsetX;
 			if (!isMouse(e)) return from !== null && clock.go(this.time(x));
 			if (from !== null && abs(x - from) > 5) chosen.hidden = false;
 			Object.assign(chosen.style, { left: `${min(x, from)}px`, width: `${abs(x - from)}px` });
@@ -269,32 +261,31 @@ class Plot {
 			ask(LOOKS);
 		});
 		on(box, "pointerup", (e) => {
-			const x = place(e), start = from, dragged = !chosen.hidden;
-			from = null;
+			const ends = [from, e.offsetX].map((x) => this.time(x)), dragged = !chosen.hidden;
 			chosen.hidden = true;
-			if (start === null) return;
-			if (dragged) clock.zoom(this.time(min(x, start)), this.time(max(x, start)));
-			else clock.go(this.time(x));
-			clock.look = dragged || !isMouse(e) ? null : this.time(x);
+			if (from === null) return;
+			from = null;
+			if (dragged) clock.zoom(min(...ends), max(...ends));
+			else clock.go(ends[1]);
+			clock.look = dragged || !isMouse(e) ? null : ends[1];
 		});
 		on(box, "pointercancel pointerleave", () => { from = clock.look = null; chosen.hidden = true; ask(LOOKS); });
 		on(box, "dblclick", () => clock.zoom());
-		onWheel(box, (factor, e) => clock.magnify(factor, this.time(place(e))));
+		onWheel(box, (factor, e) => clock.magnify(factor, this.time(e.offsetX)));
 	}
 }
 
-// ---- What the reader takes along: what is seen, as CSV or as PNG.
+// ---- What is seen, as CSV or as PNG.
 const csvOf = (plots) => {
 	const { chart, clock } = plots[0], [low, high] = clock.view, heads = ["t [s]"], columns = [];
 	for (const plot of plots) for (const line of chart.lines) if (line.shown) {
-		const name = `${chart.panels[plot.panel]} ${line.name}`.replace(/[",\n]/g, " ");
-		for (const [part, words] of [["low", line.spread ? " min" : ""], line.spread && ["high", " max"], line.half && ["half", " ±"]].filter(Boolean)) {
-			heads.push(`${name}${words} [${chart.units[plot.panel]}]`);
+		for (const [part, name] of line.columns) {
+			heads.push(`${chart.panels[plot.panel]} ${name} [${chart.units[plot.panel]}]`);
 			columns.push((i) => plot.value(line, i)[part]);
 		}
 	}
-	const lines = [...clock.t.keys()].filter((i) => clock.t[i] >= low - 1e-9 && clock.t[i] <= high + 1e-9).map((i) => [clock.t[i].toFixed(4), ...columns.map((of) => (isNaN(of(i)) ? "" : +of(i).toPrecision(6)))]);
-	return new Blob([[`# ${data.about}`, heads, ...lines, ""].join("\n")], { type: "text/csv" });
+	const lines = Array.from(clock.t, (t, i) => t > low - 1e-9 && t < high + 1e-9 && [t.toFixed(4), ...columns.map((of) => (isNaN(of(i)) ? "" : +of(i).toPrecision(6)))]);
+	return new Blob([[`# ${data.about}`, heads, ...lines.filter(Boolean), ""].join("\n")], { type: "text/csv" });
 };
 const pngOf = (plots) => {
 	const ratio = devicePixelRatio, { width, height } = plots[0], sheet = document.createElement("canvas"), wide = plots[1] ? 2 : 1;
@@ -314,7 +305,7 @@ const pngOf = (plots) => {
 		write(`${chart.panels[panel]} [${chart.units[panel]}]`, x + 12, y + 12, css.ink, 12, "left");
 		c.drawImage(drawn, x, y + 24, width, height);
 	});
-	return new Promise((done) => { sheet.toBlob(done); });
+	return new Promise((done) => sheet.toBlob(done));
 };
 const openTools = (chart, plots, tools) => {
 	const whole = $(".whole", tools), log = document.title.split(" – ").at(-1).replace(/[^\w-]+/g, "_");
@@ -332,51 +323,50 @@ const openTools = (chart, plots, tools) => {
 const turn = (R, v) => [0, 3, 6].map((k) => R[k] * v[0] + R[k + 1] * v[1] + R[k + 2] * v[2]);
 const add = (a, b, k = 1) => a.map((x, i) => x + k * b[i]);
 const product = (A, B) => A.map((_, k) => [0, 1, 2].reduce((sum, j) => sum + A[k - k % 3 + j] * B[3 * j + k % 3], 0));
-// Poses of the base, of every link and of the flange in base axes: rotation and origin.
-const posesOf = (chain, q) => {
-	let R = [1, 0, 0, 0, 1, 0, 0, 0, 1], p = [0, 0, 0];
-	const found = [[R, p]];
-	chain.rotation.forEach((turned, j) => {
-		const x = cos(q[j]), y = sin(q[j]);
-		p = add(p, turn(R, chain.translation[j]));
-		R = product(product(R, turned), [x, -y, 0, y, x, 0, 0, 0, 1]);
-		found.push([R, p]);
-	});
-	return [...found, [product(R, chain.flange_rotation), add(p, turn(R, chain.flange_translation))]];
-};
+const placed = ([R, p], v) => add(p, turn(R, v));
+// Hue, saturation, darkest and lightest.
+const METALS = { link: [210, 15, 56, 96], joint: [208, 24, 28, 64], hit: [22, 88, 32, 68], perhaps: [25, 80, 52, 87] };
+const shade = ([hue, part, dark, bright], light) => `hsl(${hue} ${part}% ${round(dark + clamp(light, 0, 1) * (bright - dark))}%)`;
 class Arm {
 	zoom = 1;
 	constructor(clock) {
-		Object.assign(this, { clock, ...stage.view, canvas: $("#arm canvas") });
+		Object.assign(this, stage.view, { clock, canvas: $("#arm canvas") });
 		this.every = ceil(clock.t.length / 3000);
-		this.swept = [...clock.t].filter((_, i) => i % this.every === 0).map((t) => this.poses(t).at(-1)[1]);
+		this.swept = [...clock.t].filter((_, i) => !(i % this.every)).map((t) => this.poses(t).at(-1)[1]);
 		this.listen();
 		watch(this, this.canvas);
 	}
-	// Between two samples a joint goes on evenly.
+	// Rotations and origins of the base, of every link and of the flange; between samples a joint goes on evenly.
 	poses(t) {
-		const { t: times, gaps } = this.clock, near = this.clock.index(t), i = times[near] > t && near ? near - 1 : near, j = min(i + 1, times.length - 1);
-		const share = gaps.has(j) || j === i ? 0 : clamp((t - times[i]) / (times[j] - times[i]), 0, 1);
-		return posesOf(stage.chain, stage.q.map((row) => rows[row][i] + share * (rows[row][j] - rows[row][i] || 0)));
+		const { t: times, gaps } = this.clock, i = this.clock.before(t), j = i + 1, found = [[[1, 0, 0, 0, 1, 0, 0, 0, 1], [0, 0, 0]]];
+		const share = gaps.has(j) ? +(t >= times[j]) : clamp((t - times[i]) / (times[j] - times[i]), 0, 1) || 0;
+		stage.chain.forEach(([turned, moved], k) => {
+			const [from, to = from] = [i, j].map((at) => rows[stage.q[k]]?.[at]), angle = from + share * (to - from) || 0, x = cos(angle), y = sin(angle);
+			found.push([product(product(found[k][0], turned), [x, -y, 0, y, x, 0, 0, 0, 1]), placed(found[k], moved)]);
+		});
+		return found;
 	}
 	// Place on the canvas, depth, pixels a metre there.
 	seen(point) {
-		const [x, y, z] = add(point, this.centre, -1), [cy, sy, cp, sp] = [cos(this.yaw), sin(this.yaw), cos(this.pitch), sin(this.pitch)];
-		const ahead = cy * y - sy * x, depth = cp * ahead - sp * z, near = this.scale * this.zoom / (1 + depth / (4.2 * this.reach));
-		return [this.width / 2 + near * (cy * x + sy * y), this.height / 2 - near * (sp * ahead + cp * z), depth, near];
+		const [x, y, depth] = turn(this.eye, add(point, this.centre, -1)), near = this.scale * this.zoom / (1 + depth / (4.2 * this.reach));
+		return [this.width / 2 + near * x, this.height / 2 - near * y, depth, near];
 	}
 	draw() {
 		if (!begin(this)) return;
-		const { width, height } = this, t = this.clock.now, contact = contactAt(t), frames = this.poses(t);
+		const { width, height, yaw, pitch } = this, t = this.clock.now, contact = contactAt(t), frames = this.poses(t), [cy, sy, cp, sp] = [cos(yaw), sin(yaw), cos(pitch), sin(pitch)];
+		this.eye = [cy, sy, 0, -sy * sp, cy * sp, cp, -sy * cp, cy * cp, -sp];
 		this.scale = .92 * min(width / this.span[0], height / this.span[1]);
 		c.clearRect(0, 0, width, height);
-		const parts = stage.shapes.map(([frame, a, b, radius, joint]) => {
-			const [R, p] = frames[frame], ends = [a, b].map((end) => add(p, turn(R, end)));
-			return { ends, radius, joint, hit: contact?.frames.includes(frame), depth: this.seen(ends[0])[2] + this.seen(ends[1])[2] };
+		const metal = (frame, own) => METALS[contact?.frames.includes(frame) ? contact.sure ? "hit" : "perhaps" : own];
+		const parts = stage.shapes.map(([frame, a, b, radius, own]) => {
+			const ends = [a, b].map((end) => placed(frames[frame], end)), seen = ends.map((end) => this.seen(end));
+			return { frame, ends, seen, radius, metal: metal(frame, own), depth: seen[0][2] + seen[1][2] };
 		});
 		this.ground(parts);
 		this.trace(t);
-		for (const part of parts.sort((a, b) => b.depth - a.depth)) this.link(part, contact && !contact.sure);
+		const drawn = parts.filter(({ frame }) => !stage.surfaces[frame]);
+		stage.surfaces.forEach((surface, frame) => surface && drawn.push(...this.triangles(surface.map((row) => rows[row]), frames[frame], metal(frame, "link"))));
+		for (const part of drawn.sort((a, b) => b.depth - a.depth)) part.colour ? this.triangle(part) : this.capsule(part);
 		this.axes();
 		if (contact?.force) this.arrow(contact, frames, t);
 	}
@@ -396,14 +386,31 @@ class Arm {
 		for (const { start, stop } of stage.contacts) path(part(start, stop), css.touch, 2);
 		path(part(t - 1.2, t), css.force, 2);
 	}
-	link({ ends, radius, joint, hit }, several) {
-		const [[ax, ay, , near], [bx, by]] = ends.map((end) => this.seen(end)), r = radius * near, length = hypot(bx - ax, by - ay);
-		let [nx, ny] = length > 1 ? [(ay - by) / length * r, (bx - ax) / length * r] : [-r, 0];
-		if (nx + 2 * ny > 0) [nx, ny] = [-nx, -ny]; // lit from upper left
-		const light = c.createLinearGradient(ax + nx, ay + ny, ax - nx, ay - ny);
-		const colours = hit ? several ? ["#ffd9bd", "#f2a673", "#c47a45"] : ["#ff9d5c", "#e0610f", "#9c3c05"] : joint ? ["#8da3b8", "#5f7990", "#334a5e"] : ["#fdfefe", "#d5dbe1", "#8d98a4"];
-		colours.forEach((colour, k) => light.addColorStop(k / 2, colour));
-		for (const [colour, wide] of [[css.card, 2 * r + 2.4], [light, 2 * r]]) path([[ax, ay], [bx + .01, by]], colour, wide);
+	capsule({ seen: [[ax, ay, , near], [bx, by]], radius, metal }) {
+		const r = radius * near, [dx, dy] = [bx - ax + .01, by - ay], side = r / hypot(dx, dy) * (2 * dx > dy ? 1 : -1); // lit from upper left
+		const light = c.createLinearGradient(ax + dy * side, ay - dx * side, ax - dy * side, ay + dx * side);
+		for (const share of [0, 1]) light.addColorStop(share, shade(metal, 1 - share));
+		for (const [colour, wide] of [[css.card, 2 * r + 2.4], [light, 2 * r]]) path([[ax, ay], [ax + dx, by]], colour, wide);
+	}
+	// A line of its colour closes the seam to its neighbour.
+	triangle({ seen, colour }) {
+		c.fillStyle = c.strokeStyle = colour;
+		c.lineWidth = .8;
+		c.beginPath();
+		for (const [x, y] of seen) c.lineTo(x, y);
+		c.closePath();
+		c.fill();
+		c.stroke();
+	}
+	// Those of a link that face the eye.
+	triangles([x, y, z, ...faces], frame, metal) {
+		const corners = Array.from(x, (_, i) => this.seen(placed(frame, [x[i], y[i], z[i]]))), found = [];
+		faces[0].forEach((_, k) => {
+			const seen = faces.map((corner) => corners[corner[k]]), [a, b, c] = seen, [ux, uy, uz] = add(b, a, -1), [vx, vy, vz] = add(c, a, -1);
+			const right = uy * vz - uz * vy, down = uz * vx - ux * vz, ahead = (ux * vy - uy * vx) / a[3], light = .2 - (.4 * right + .6 * down + .6 * ahead) / hypot(right, down, ahead);
+			if (ahead < 0) found.push({ seen, depth: 2 / 3 * (a[2] + b[2] + c[2]), colour: shade(metal, light) });
+		});
+		return found;
 	}
 	// On the flange the force has its direction of the moment, elsewhere that of the peak.
 	arrow(contact, frames, t) {
@@ -413,24 +420,23 @@ class Arm {
 		const along = strong > 1e-9 ? (wrench.flange ? turn(R, force) : force).map((x) => x / strong) : contact.along, tip = add(a, add(b, a, -1), .5);
 		const reach = (newtons) => this.reach * (.14 + .6 * clamp(newtons / most, 0, 1)), end = (newtons) => this.seen(add(tip, along, -reach(newtons)));
 		const [x, y, ahead] = this.seen(tip), [u, v, behind, near] = end(size), long = hypot(x - u, y - v) || 1, dx = (x - u) / long, dy = (y - v) / long;
-		// The cone, if any.
-		const wide = Math.tan(contact.cone) * reach(size) * near;
-		area([[x, y], [u - wide * dy, v + wide * dx], [u + wide * dy, v - wide * dx]], css.band);
+		const beside = (back, out) => [x - back * dx + out * dy, y - back * dy - out * dx], wide = Math.tan(contact.cone) * reach(size) * near;
+		area([[x, y], beside(long, wide), beside(long, -wide)], css.band);
 		c.beginPath();
 		c.ellipse(u, v, wide * abs(ahead - behind) / reach(size), wide, Math.atan2(dy, dx), 0, 7);
 		c.fill();
 		path([end(max(size - half, 0)), end(size + half)], css.pale, 9);
-		path([[u, v], [x - 9 * dx, y - 9 * dy]], css.force, 3.2, contact.sure && contact.cone ? [] : [7, 6]);
-		area([[x - 13 * dx - 5.5 * dy, y - 13 * dy + 5.5 * dx], [x, y], [x - 13 * dx + 5.5 * dy, y - 13 * dy - 5.5 * dx]], css.force);
+		path([[u, v], beside(9, 0)], css.force, 3.2, contact.sure && contact.cone ? [] : [7, 6]);
+		area([beside(13, 5.5), [x, y], beside(13, -5.5)], css.force);
 		write(contact.sized ? `${round(size)} N` : contact.force, clamp(u - 24 * dx, 30, this.width - 30), clamp(v - 18 * dy, 14, this.height - 14), css.force, 14, "center", css.card);
 	}
 	axes() {
-		const [x, y, , near] = this.seen(this.centre), corner = [this.width - 44, this.height - 34];
-		for (const [k, name] of [..."xyz"].entries()) {
-			const [u, v] = this.seen(add(this.centre, [0, 1, 2].map((j) => +(j === k) * 22 / near))), [dx, dy] = [u - x, v - y];
-			path([corner, add(corner, [dx, dy])], css.mute, 1.2);
-			write(name, ...add(corner, [dx, dy], 1.45));
-		}
+		const corner = [this.width - 44, this.height - 34];
+		[..."xyz"].forEach((name, k) => {
+			const along = [22 * this.eye[k], -22 * this.eye[k + 3]];
+			path([corner, add(corner, along)], css.mute, 1.2);
+			write(name, ...add(corner, along, 1.45));
+		});
 	}
 	move(change) { Object.assign(this, change); ask(LOOKS); }
 	turned(yaw, pitch) { this.move({ yaw: this.yaw + yaw, pitch: clamp(this.pitch + pitch, -.2, 1.5) }); }
@@ -448,8 +454,8 @@ class Arm {
 			held.set(e.pointerId, e);
 		});
 		onWheel(canvas, (factor) => this.nearer(1 / factor));
-		const turns = (yaw, pitch) => () => this.turned(yaw, pitch), zooms = (factor) => () => this.nearer(factor);
-		onKeys(canvas, { ArrowLeft: turns(.12, 0), ArrowRight: turns(-.12, 0), ArrowUp: turns(0, .1), ArrowDown: turns(0, -.1), "+": zooms(1.15), "-": zooms(1 / 1.15), 0: () => this.reset() });
+		const turns = (yaw, pitch) => () => this.turned(yaw, pitch);
+		onKeys(canvas, { ArrowLeft: turns(.12, 0), ArrowRight: turns(-.12, 0), ArrowUp: turns(0, .1), ArrowDown: turns(0, -.1), "+": () => this.nearer(1.15), "-": () => this.nearer(1 / 1.15), 0: () => this.reset() });
 	}
 }
 
@@ -463,7 +469,7 @@ const forceAt = (contact, t) => {
 };
 const wordsAt = (t) => {
 	const contact = contactAt(t);
-	if (!contact) return [stage.least ? `< ${stage.least}` : "–", "", stage.none];
+	if (!contact) return stage.none;
 	const { size, half } = forceAt(contact, t);
 	if (clocks[0].index(t) === contact.i || !contact.sized || !size) return [contact.force || "unknown", contact.band, contact.words];
 	return [`${round(size)}`, `± ${round(half)} N`, contact.words];
@@ -480,22 +486,19 @@ class ForcePlot extends Plot {
 	}
 	// Numbers above, sizes at the peaks where there is room, the hardest first.
 	over() {
-		const [low, high] = this.clock.view, inside = stage.contacts.filter(({ peak }) => peak >= low && peak <= high), placed = [];
-		let last = 0;
+		const [low, high] = this.clock.view, inside = stage.contacts.filter(({ peak }) => peak >= low && peak <= high);
+		let placed = [];
+		const fits = (at, half) => !placed.some(([other, room]) => abs(at - other) <= half + room) && placed.push([at, half]);
 		for (const { number: name, start, stop, weak } of inside) {
-			const x = this.x((max(start, low) + min(stop, high)) / 2), half = 4 * `${name}`.length + 3;
-			if (x - half < last) continue;
-			last = x + half;
-			write(name, x, 9, weak ? css.mute : css.ink, 12);
+			const x = this.x((max(start, low) + min(stop, high)) / 2);
+			if (fits(x, 4 * `${name}`.length + 1.5)) write(name, x, 9, weak ? css.mute : css.ink, 12);
 		}
+		placed = [];
 		for (const { peak, size, half: band, sized, force, band: words, weak, load } of inside.sort((a, b) => b.sized - a.sized || b.size - a.size)) {
 			if (!size || load) continue;
 			const x = this.x(peak), y = this.y(size), text = `${force} ${words}`.replace(" N", ""), half = 3.4 * text.length + 2, middle = clamp(x, LEFT + half, LEFT + this.wide - half);
-			path([[x, y], [x + .01, y]], weak ? css.mute : css.force, 8);
-			path([[x, y], [x + .01, y]], css.card, 4.4);
-			if (placed.some(([at, room]) => abs(at - middle) <= half + room)) continue;
-			placed.push([middle, half]);
-			write(text, middle, max(this.y(size + band) - 10, 25), weak ? css.mute : css.ink, 12);
+			for (const [colour, wide] of [[weak ? css.mute : css.force, 8], [css.card, 4.4]]) path([[x, y], [x + .01, y]], colour, wide);
+			if (fits(middle, half)) write(text, middle, max(this.y(size + band) - 10, 25), weak ? css.mute : css.ink, 12);
 		}
 	}
 	look(x) {
@@ -528,10 +531,10 @@ const openStage = () => {
 		slider.ariaValueText = `${seconds(t)}, ${force} ${band} ${words}`;
 		play.textContent = clock.running ? "❚❚" : "▶";
 		play.ariaLabel = clock.running ? "Pause" : "Play";
-		for (const { rows: [row, ...why], number: name } of contacts) {
-			const here = name === contact?.number;
+		for (const one of contacts) {
+			const here = one === contact, row = one.rows[0];
 			if (here === !!row.ariaCurrent) continue;
-			for (const each of [row, ...why]) each.ariaCurrent = here ? "true" : null;
+			for (const each of one.rows) each.ariaCurrent = here ? "true" : null;
 			const list = row.closest(".list"), top = row.offsetTop - 40;
 			if (here && abs(top - list.scrollTop - list.clientHeight / 2) > list.clientHeight / 2 - 60) list.scrollTop = top;
 		}
@@ -541,26 +544,23 @@ const openStage = () => {
 		on(contact.rows[0], "click", (e) => { e.preventDefault(); go(contact); });
 	}
 	on(slider, "input", () => clock.go(+slider.value));
-	const to = (samples, more = 0) => () => clock.go(clock.t[clamp(clock.index(clock.head) + samples, 0, clock.t.length - 1)] + more);
+	const to = (samples, more = 0) => () => clock.go((clock.t[clock.index(clock.head) + samples] ?? clock.head) + more);
 	onKeys(slider, { ArrowLeft: to(-1), ArrowDown: to(-1), ArrowRight: to(1), ArrowUp: to(1), PageUp: to(0, 1), PageDown: to(0, -1) });
-	on(play, "click", run);
+	for (const [id, act] of Object.entries({ play: run, previous: () => hop(-1), next: () => hop(1), reset: () => arm.reset() })) on($(`#${id}`), "click", act);
 	on(speed, "click", () => {
 		clock.speed = { 1: .25, .25: .1, .1: 4, 4: 1 }[clock.speed];
 		speed.textContent = `${clock.speed} ×`;
 	});
-	on($("#previous"), "click", () => hop(-1));
-	on($("#next"), "click", () => hop(1));
-	on($("#reset"), "click", () => arm.reset());
 	onKeys(window, { " ": run, n: () => hop(1), p: () => hop(-1), "+": () => clock.magnify(.67), "-": () => clock.magnify(1.5), Escape: () => clock.zoom() });
 	// Scrolled away, the arm docks, until it is closed there.
 	let shut = false;
-	const settle = (away) => {
-		dock.hidden = !away || shut || innerWidth < 1100;
+	const settle = (seen) => {
+		dock.hidden = seen || shut || innerWidth < 1100;
 		(dock.hidden ? home : dock).prepend(view);
 		ask(LOOKS);
 	};
-	new IntersectionObserver(([{ isIntersecting: there }]) => settle(!there)).observe(home);
-	on($("#undock"), "click", () => { shut = true; settle(true); });
+	new IntersectionObserver(([each]) => settle(each.isIntersecting)).observe(home);
+	on($("#undock"), "click", () => { shut = true; settle(); });
 	clock.go(clock.t[stage.first]);
 	self.vftcli = { clock, arm, rows, data }; // for tests
 };
@@ -587,7 +587,7 @@ const open = async () => {
 	clocks.push(...data.clocks.map((each) => new Clock(each)));
 	stage = data.stage;
 	for (const chart of data.charts) {
-		const onStage = stage && chart.key === "force", place = onStage ? $(".time") : $$(".chart").find((each) => each.dataset.of === chart.key);
+		const onStage = stage && chart.key === "force", place = $(`[data-of="${chart.key}"]`);
 		if (!place) continue;
 		chart.clock = clocks[chart.clock];
 		const plots = $$("figure", place).map((figure, k) => new (onStage ? ForcePlot : Plot)(figure, chart, k));

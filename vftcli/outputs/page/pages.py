@@ -26,8 +26,9 @@ from vftcli.outputs.page.shell import Box, page, part, scales_of
 from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, still_arm, view_of
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
 from vftcli.outputs.run_record import run_record
+from vftcli.outputs.shapes import link_surfaces
 from vftcli.signals.parsing import printable
-from vftcli.signals.remarks import sentence
+from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.frames import FRAMES
 
 if TYPE_CHECKING:
@@ -76,13 +77,15 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         view["budget"] = details.budget_grid(refined.budgets[:1])
     if analysis.published is not None:
         view["printed"] = details.beside_print(analysis.published)
-    answer = headline(analysis)
+    answer, (surfaces, lacking) = headline(analysis), link_surfaces(analysis.robot)
+    if lacking:
+        view["drawing"] = fact("meshes-not-found", count=len(lacking), first=lacking[0])
     return page(
         "report.html",
         f"{answer} – {log.name}",
         charts,
         log_charts.observer_styles(analysis),
-        partial(stage_data, analysis, camera),
+        partial(stage_data, analysis, camera, surfaces),
         f"{printable(log.name)} · sha256 {log.source.sha256 or 'unknown'} · torques and forces ON "
         "the robot · ± is the half width of the 95 % band",
         analysis=analysis,

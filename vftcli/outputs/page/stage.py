@@ -4,17 +4,18 @@ The arm is capsules from the chain's own geometry. It is seen in weak perspectiv
 to which it reaches in this log, a little turned; the page's script has the same projection.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.outputs.capsules import capsules, spot_of, touched_point
 from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
 from vftcli.outputs.page.packing import PageClock
 from vftcli.outputs.page.shell import polyline
 from vftcli.outputs.quantity import at_least_shown
+from vftcli.outputs.shapes import Surface, capsules, spot_of, touched_point
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import VftError
@@ -27,6 +28,7 @@ AWAY = 4.2  #: Distance of the camera, in reaches.
 POSES = 600  #: Poses of the log that the view is fitted to.
 WIDEST = np.pi / 4  #: Half the angle of the widest cone that is drawn. [rad]
 SHARES = 0.14, 0.6  #: Length of an arrow of no force, and what the largest adds, in reaches.
+MILLIMETRE = 1e-3  #: Step of a surface's corners. [m]
 WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92  #: Size of the still drawing, and the part it fills.
 
 
@@ -138,7 +140,7 @@ def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillA
         for shape in shapes:
             ends = np.vstack([shape.start, shape.start + shape.direction])
             drawn = view.seen(ends @ rotation[frame].T + origin[frame])
-            kind = "hit" if frame in touched else "joint" if shape.joint else "link"
+            kind = "hit" if frame in touched else shape.kind
             width = 2.0 * shape.radius * drawn[0, 3]
             parts.append((float(drawn[:, 2].sum()), polyline(drawn[:, :2]), width, kind))
     parts.sort(key=lambda part: -part[0])
@@ -167,8 +169,10 @@ def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
     return [(float(t[start]), float(t[stop - 1])) for start, stop in runs_of(own)]
 
 
-def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, Any]:
-    """What the script needs of arm and contacts, beside the charts."""
+def stage_data(
+    analysis: Analysis, view: View, surfaces: Mapping[int, Surface], clock: PageClock
+) -> dict[str, Any]:
+    """What the script needs of arm and contacts, beside the charts; `surfaces` by link."""
     found, chain = analysis.contacts, analysis.robot.chain
     contacts = found.contacts if found is not None else ()
     least = found.detectable_force if found is not None else None
@@ -179,19 +183,23 @@ def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, An
     turns = sensed is not None and sensed.sensor.frame in {"base", "flange"}
     # A load lasts: what touches the arm meanwhile comes before it.
     ordered = sorted(contacts, key=lambda contact: contact.is_load)
-    geometry = {
-        "rotation": chain.rotation.reshape(-1, 9),
-        "flange_rotation": chain.flange_rotation.ravel(),
-        "translation": chain.translation,
-        "flange_translation": chain.flange_translation,
-    }
+    turned = np.concatenate([chain.rotation, chain.flange_rotation[None]]).reshape(-1, 9)
+    moved = np.vstack([chain.translation, chain.flange_translation])
     return {
-        "chain": {key: np.round(values, 9).tolist() for key, values in geometry.items()},
+        "chain": [*zip(np.round(turned, 9).tolist(), np.round(moved, 9).tolist(), strict=True)],
         "q": [clock.pose(column) for column in analysis.recording.q.T],
         "shapes": [
-            (frame, *np.round([s.start, s.start + s.direction], 4).tolist(), s.radius, s.joint)
+            (frame, *np.round([s.start, s.start + s.direction], 4).tolist(), s.radius, s.kind)
             for frame, shapes in enumerate(capsules(chain))
             for s in shapes
+        ],
+        # Per link the rows of x, y and z of corners, and of the three corners of triangles.
+        "surfaces": [
+            [clock.blob.add(x, MILLIMETRE) for x in surfaces[link].corners.T]
+            + [clock.blob.add(k, 1.0) for k in surfaces[link].faces.T]
+            if link in surfaces
+            else None
+            for link in range(chain.joints + 1)
         ],
         "wrench": {"flange": sensed.sensor.frame == "flange"} if turns and sensed else None,
         "view": view._replace(centre=view.centre.tolist(), span=view.span.tolist())._asdict(),
@@ -199,8 +207,12 @@ def stage_data(analysis: Analysis, view: View, clock: PageClock) -> dict[str, An
         "first": 0 if hardest is None else peak_index(hardest, analysis.t, clock),
         "most": most_force(found),
         "floor": least,
-        "least": None if least is None or not sure else at_least_shown(least),
-        "none": "no contact" if sure else "no contact listed" if found is not None else "",
+        # Number, band and words of a moment without one.
+        "none": (
+            "–" if least is None or not sure else f"< {at_least_shown(least)}",
+            "",
+            "no contact" if sure else "no contact listed" if found is not None else "",
+        ),
         "free": free_spans(analysis),
         "stops": () if found is None else found.stops,
     }
