@@ -191,6 +191,111 @@ def test_what_is_unfair_or_another_file_ends_with_one_line(run, manifest: Path) 
     assert not manifest.with_name("out").exists()
 
 
+EVERY_KIND = """
+[[robot]]
+name = "fitted"
+train = ["before"]
+interval = "0:3"
+[[robot]]
+name = "of-nobody"
+train = ["push"]
+[[log]]
+name = "push"
+arm = "UR5"
+day = "monday"
+file = "push.csv"
+robot = "ur5"
+truth = "torque"
+truth_file = "truth.parquet"
+free = ["before"]
+identified = "fitted"
+score = [[0, 4]]
+[[log]]
+name = "before"
+arm = "UR5 free"
+day = "tuesday"
+file = "before.csv"
+robot = "ur5"
+truth = "free"
+[[log]]
+name = "parts"
+arm = "UR5 parts"
+parts = ["t=t.txt", "q=q.txt", "dq=dq.txt", "current=current.txt"]
+robot = "ur5"
+truth = "free"
+[[log]]
+name = "times"
+arm = "UR5 times"
+file = "push.csv"
+robot = "ur5"
+truth = "contacts"
+contacts = [[0.9, 2]]
+"""
+
+
+PARTS = ("q", "dq", "current")
+
+
+@pytest.fixture
+def kinds(tmp_path: Path) -> Path:
+    """`EVERY_KIND` beside its logs: 4 s before the scenario's push, and 3 s with it."""
+    lines = CIRCLE.read_text().splitlines(keepends=True)
+    (tmp_path / "push.csv").write_text("".join([lines[0], *lines[501:901]]))
+    (tmp_path / "before.csv").write_text("".join(lines[:502]))
+    shutil.copy(f"{CIRCLE}.truth.parquet", tmp_path / "truth.parquet")
+    log = Library().open(tmp_path / "before.csv")
+    for name, values in (("t", log.t), *((name, log.require(name)) for name in PARTS)):
+        np.savetxt(tmp_path / f"{name}.txt", values)
+    for name, joints in (("thin", 5), ("wide", 7)):
+        (tmp_path / name).mkdir()
+        table = {"t": log.t, **{f"tau_ext/{j}": 0.0 * log.t for j in range(1, joints + 1)}}
+        pl.DataFrame(table).write_csv(tmp_path / name / "before.csv")
+    (tmp_path / "my.toml").write_text(EVERY_KIND)
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_every_kind_of_entry_is_scored_by_all_that_it_can_be(run, kinds: Path) -> None:
+    """With estimates of 5 and of 7 joints, which fail."""
+    words: list[object] = ["benchmark", kinds / "my.toml", "--jobs", "0", "-o", kinds / "o"]
+    rivals = [word for name in ("thin", "wide") for word in ("--outside", f"{name}={kinds / name}")]
+    code, _, err = run(*words, *rivals)
+    assert code == 3
+    for name, joints in (("thin", 5), ("wide", 7)):
+        assert f"before.csv: torques of {joints} joints for a log of 6" in err
+        assert f"error: before, alone, {name}: " in err
+    record = json.loads((kinds / "o" / "run.json").read_text())
+    scored = [f"push, {p}" for p in ("alone", "free", "identified")]
+    scored += [f"{name}, alone" for name in ("before", "parts", "times")]
+    failed = [f"before, alone, {name}" for name in ("thin", "wide")]
+    assert [x["task"] for x in record["tasks"]] == ["parts", "fitted", *scored, *failed]
+    assert [*record["failures"]] == failed
+    # What is made: a log of its parts, and a robot of the logs that it names.
+    (made,) = (kinds / "o").glob("made/parts-*/parts.parquet")
+    whole, log = (Library().open(path) for path in (made, kinds / "before.csv"))
+    for name in PARTS:
+        np.testing.assert_array_equal(whole.require(name), log.require(name))
+    (robot,) = (kinds / "o").glob("made/robots/*.toml")
+    assert robot.name.startswith("fitted-")
+    rows = pl.read_parquet(kinds / "o" / "scores.parquet")
+    best = rows.filter(method="best", part="contact", log="push")
+    errors = {p: best.filter(protocol=p)["rmse_Nm"].mean() for p in ("alone", "free", "identified")}
+    assert len(set(errors.values())) == 3  # each saw something else
+    assert max(errors.values()) < 0.3 * rows.filter(method="zero", part="contact")["rmse_Nm"].mean()
+    # Of the times of a push that the list finds no peak is known, and of its torque nothing.
+    (times,) = rows.filter(log="times").to_dicts()[:1]
+    assert (times["true_contacts"], times["peak_error_N"]) == (1, [])
+    assert set(rows.filter(log="times")["part"]) == {"list", "list with candidates"}
+    # A second run does what failed, and without these nothing: the same bytes.
+    before = (kinds / "o" / "scores.parquet").read_bytes()
+    assert run(*words, *rivals)[0] == 3
+    again = json.loads((kinds / "o" / "run.json").read_text())
+    assert [x["task"] for x in again["tasks"]] == failed
+    assert run(*words)[0] == 0
+    assert json.loads((kinds / "o" / "run.json").read_text())["tasks"] == []
+    assert (kinds / "o" / "scores.parquet").read_bytes() == before
+
+
 @pytest.mark.slow
 def test_a_method_that_lacks_an_arm_is_named(run, manifest: Path, tmp_path: Path) -> None:
     """Estimates of the first second of one of two arms."""
