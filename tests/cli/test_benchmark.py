@@ -179,6 +179,13 @@ def test_planted_pushes_are_found_in_drive_torque_and_truth(run, tmp_path: Path)
     missing = (before.require("current") - after.require("current")) * constant
     assert missing == pytest.approx(tau, abs=1e-9)
     assert abs(tau[:, 1]).max() > 5.0
+    # It is scored against this truth, of the pushed log alone in contact, of the other when free.
+    rows = pl.read_parquet(tmp_path / "out" / "scores.parquet").drop_nulls("joint")
+    parts = rows.group_by("log", maintain_order=True).agg(pl.col("part").unique().sort())
+    assert dict(parts.iter_rows()) == {"a": ["free"], "a-pushed": ["all", "contact"]}
+    inside = truth.filter(pl.col("t").is_between(1.0, 15.0))["tau_ext/2"].to_numpy()
+    (second,) = rows.filter(method="zero", log="a-pushed", part="all", joint=2).to_dicts()
+    assert second["rmse_Nm"] == pytest.approx(np.sqrt(np.mean(inside**2)), rel=1e-3)  # even clock
 
 
 def test_what_is_unfair_or_another_file_ends_with_one_line(run, manifest: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.reproduction.experiments import gather, item_grid, jobs_of, run_jobs, spread
-from vftcli.reproduction.paper import PAPERS
+from vftcli.reproduction.paper import AS_PRINTED, PAPERS
 
 HUANG = PAPERS["huang2025"]
 DOCUMENT = Path(__file__).parent / "huang2025.md"
@@ -41,14 +41,26 @@ def test_items_without_a_seed_are_the_documents_digit_by_digit() -> None:
 
 
 @pytest.mark.slow
-def test_table_one_of_the_first_seed_lies_in_the_documents_range() -> None:
-    """The range holds every seed's value, rounded to three digits: half of the last is let pass."""
-    (shown,) = computed(("table1",), fast=True).values()
-    document = documented("table1")
-    for line in shown.item.lines:
-        for kind, text in zip((*shown.item.variants, "floor"), document[line.label], strict=True):
-            low, high = ends(text)
-            assert low * 0.995 <= shown.values[line.key][kind][0] <= high * 1.005, line.label
+def test_the_first_seed_lies_in_the_documents_range() -> None:
+    """The range holds every seed's value, rounded to three digits: half of the last is let pass.
+
+    The tapped circle, the sensor, the dragged loop and the bearing: an experiment each. As
+    printed the loop runs astray, where the last bit of a sum turns into another path.
+    """
+    for name, shown in computed(("table1", "fig4", "fig6", "fig7", "fig12"), fast=True).items():
+        document, compared = documented(name), 0
+        for line in shown.item.lines:
+            kinds = (*shown.item.variants, "floor")
+            for kind, text in zip(kinds, document[line.label], strict=False):
+                values = shown.values.get(line.key, {}).get(kind)
+                wanders = kind == AS_PRINTED and name in {"fig6", "fig7"}
+                if wanders or not values or values[0] is None or not re.search(r"\d", text):
+                    continue
+                low, high = ends(text)
+                least, most = low - 0.005 * abs(low), high + 0.005 * abs(high)
+                assert least <= values[0] <= most, f"{name}, {line.label}, {kind}"
+                compared += 1
+        assert compared >= len(shown.item.lines)
 
 
 @pytest.mark.statistical
