@@ -147,6 +147,12 @@ class Analysis(Shown):
         found = self.refinement
         return run if found is None else found.baselines.of(name).of(run)
 
+    def spare(self) -> None:
+        """Of a long log give back what the observers ran on; it is made again where asked for."""
+        self.motion.log.spare("terms")
+        if self.refinement is not None:
+            self.refinement.baselines.best.spare()
+
     def free_log(self, name: str | None = None) -> "FreeLog":
         """The log with what nobody touched, as an observer has it; for None as the model does."""
         from vftcli.free_motion.free_motion import without_load

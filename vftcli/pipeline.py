@@ -26,8 +26,10 @@ from vftcli.signals.recording import Recording, refuse_repeated_logs
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.bias.baseline import Baselines
+    from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.reference_choice import ReferenceChoice
+    from vftcli.signals.remarks import Remark
     from vftcli.wrench.choice import WrenchChoice
     from vftcli.wrench.detection import KnownContacts
     from vftcli.wrench.sensing import Gate
@@ -173,13 +175,17 @@ def analyse(
     tell(f"{name}: examining", 0.05, 0.15)
     motion = read(recording, robot, choice, models or Runs())
     examinations = examine(motion, choice)
-    tell(f"{name}: running observers", 0.15, 0.3)
+    tell(f"{name}: looking for free motion", 0.15, 0.25)
     baselines = model(motion, choice)
-    analysis = replace(observe(motion, baselines, choice), examinations=examinations)
-    analysis = refine(analysis, baselines, choice)
-    analysis = sense(find_contacts(analysis, choice), choice)
+    # Before there are estimates: of a long log both have no room at once.
+    contacts, unlisted = find_contacts(motion, baselines, examinations[0], choice)
+    tell(f"{name}: running observers", 0.4, 0.5)
+    analysis = refine(observe(motion, baselines, choice), baselines, choice)
+    remarks = (*analysis.remarks, *unlisted)
+    analysis = replace(analysis, contacts=contacts, examinations=examinations, remarks=remarks)
+    analysis = sense(analysis, choice)
     tell(f"{name}: comparing", 0.5, WRITING)
-    motion.log.spare()
+    analysis.spare()
     return judge(analysis, choice)
 
 
@@ -228,13 +234,15 @@ def observe(
     shown = LogSpectra() if baselines is None else baselines.spectra(gains=own)
     observers, remarks = choice.observers.build(log.robot, step, shown)
     printed = (caution("as-printed"),) if choice.observers.as_printed else ()
+    ran = observers if running else ()
+    runs = [log if baselines is None else baselines.of(o.name).of(log) for o in ran]
+    estimates = tuple(run(o, given.terms) for o, given in zip(ran, runs, strict=True))
+    for given in runs:
+        given.spare()
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(
-            run(o, (log if baselines is None else baselines.of(o.name).of(log)).terms)
-            for o in (observers if running else ())
-        ),
+        estimates=estimates,
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )
@@ -256,23 +264,26 @@ def refine(
     return replace(analysis, estimates=made.estimates, refinement=made, remarks=remarks)
 
 
-def find_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
-    """List what touched the arm, where that is wanted; a log that tells none says why."""
+def find_contacts(
+    motion: FreeMotion,
+    baselines: "Baselines | None",
+    health: "Examination",
+    choice: AnalysisChoice,
+) -> "tuple[ContactList | None, tuple[Remark, ...]]":
+    """What touched the arm, where that is asked for; if it cannot be known, None and why."""
     if not choice.lists_contacts:
-        return analysis
+        return None, ()
     from vftcli.contacts.listing import list_contacts
     from vftcli.signals.remarks import caution
 
-    choice.progress(f"{analysis.recording.name}: listing contacts", 0.3, 0.5)
+    choice.progress(f"{motion.log.name}: listing contacts", 0.25, 0.4)
     try:
-        motion, made = unloaded_motion(analysis.motion, choice), analysis.refinement
-        bias = None if made is None else made.baselines.best.correction
-        found = list_contacts(motion, bias, referenced=choice.reference is not None)
-        health = analysis.examinations[0]
-        return replace(analysis, contacts=found.weighed(health.load, health.distrusts))
+        bias = None if baselines is None else baselines.best.correction
+        referenced = choice.reference is not None
+        found = list_contacts(unloaded_motion(motion, choice), bias, referenced=referenced)
+        return found.weighed(health.load, health.distrusts), ()
     except VftError as error:
-        reason = caution("contacts-not-told", reason=str(error))
-        return replace(analysis, remarks=(*analysis.remarks, reason))
+        return None, (caution("contacts-not-told", reason=str(error)),)
 
 
 def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:

@@ -18,7 +18,7 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
 from vftcli.observers.tuning import Goal, tune_all
-from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.run import LONG, Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
@@ -63,6 +63,11 @@ class Baseline:
             own = run is self.motion.log
             self._made[run] = (self.correction.corrected if own else self.correction.of)(run)
         return self._made[run]
+
+    def spare(self) -> None:
+        """Of a long log give back what the observers ran on; it can be made again."""
+        if self.motion.log.recording.samples > LONG:
+            self._made.clear()
 
     @property
     def log(self) -> Run:

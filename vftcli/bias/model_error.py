@@ -7,6 +7,7 @@ that follows from the robot's own numbers: a maker's table is good to some perce
 friction to a fifth.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -77,7 +78,7 @@ def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Ar
     return derivative(t, found.p) - found.coriolis_transpose_dq + found.gravity, found.gravity
 
 
-def friction_shapes(run: Run, gravity: Array) -> list[Array]:
+def friction_shapes(run: Run, gravity: Array) -> Iterator[Array]:
     """Possible errors of each joint's friction, from the measured motion.
 
     The smoothed sign, how far the presliding deflection is from it, the sign times the
@@ -85,7 +86,12 @@ def friction_shapes(run: Run, gravity: Array) -> list[Array]:
     """
     q, dq = run.q, run.dq
     sign = np.tanh(dq / SMOOTHING)
-    return [sign, play(q, PLAY).state - sign, abs(gravity) * sign, dq, dq * abs(dq)]
+    # One after the other: of a long log all of them have no room.
+    yield sign
+    yield play(q, PLAY).state - sign
+    yield abs(gravity) * sign
+    yield dq
+    yield dq * abs(dq)
 
 
 def usual_friction(robot: Robot) -> Array:

@@ -204,7 +204,9 @@ def bias_of(
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = motion.t, run.robot.joints
     free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
-    load = handed_over(resample_columns(t, t[::stride], -fit.rows.loads.torque_of(found.loads)))
+    load = np.broadcast_to(0.0, run.q.shape)
+    if (carried := fit.rows.loads.torque_of(found.loads)).any():
+        load = handed_over(resample_columns(t, t[::stride], -carried))
     if found.solution is None:
         said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
         bare = untouched(run.terms, said[0])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #:
 #: Each page of such memory has to be found and cleared anew: of smaller arrays, which come by the
 #: thousand, that took a third of the time of an hour's report and made its peak no lower.
-LARGE = 1 << 26
+LARGE = 1 << 24
 
 #: The number by which the C library knows the size from which memory is mapped.
 MMAP_THRESHOLD = -3

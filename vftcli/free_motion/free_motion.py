@@ -161,7 +161,9 @@ class FreeMotion(Shown):
         """Free cycles of the log: the user's, else those found."""
         if self.cycles_given:
             return FreeCycles(self.cycles_given, None)
-        return find_free_cycles(self.log, self.cycles)
+        found = find_free_cycles(self.log, self.cycles)
+        self.log.spare()
+        return found
 
     @cached_property
     def known(self) -> FreePart:
@@ -311,15 +313,15 @@ def columns(piece: RunSamples) -> tuple[Array, Array] | None:
     series = (run.t, run.terms.p, run.terms.mu, run.q, run.dq)
     t, p, mu, q, dq = (values[first:stop] for values in series)
     try:
-        smooth = zero_phase(t, np.hstack([derivative(t, p) - mu, dq]), CUTOFF)
+        used = weighed(piece) - first
+        d, speed = (zero_phase(t, x, CUTOFF)[used] for x in (derivative(t, p) - mu, dq))
     except (ClockError, ValueError):
         return None
-    used = weighed(piece) - first
     A = np.zeros((len(used), n, 4 + 2 * n))
     A[:, :, :4] = load_regressor(run.robot.chain, q[used])
-    A[:, j, 4 + j] = np.tanh(smooth[used][:, n:] / SIGN_SPEED)
+    A[:, j, 4 + j] = np.tanh(speed / SIGN_SPEED)
     A[:, j, 4 + n + j] = 1.0
-    return smooth[used][:, :n], A
+    return d, A
 
 
 def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:

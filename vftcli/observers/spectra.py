@@ -213,7 +213,8 @@ def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
     known = np.isfinite(read)
     kinds = np.array([known, known & ~resting, known & resting])
     square, counts = np.where(known, read, 0.0) ** 2, np.count_nonzero(kinds, axis=1)
-    means = np.where(kinds, square, 0.0).sum(axis=1) / np.maximum(counts, 1)
+    sums = np.array([np.where(kind, square, 0.0).sum(axis=0) for kind in kinds])
+    means = sums / np.maximum(counts, 1)
     moving, still = np.where(counts[1:] < ENOUGH, means[0], means[1:])
     unseen = counts[1] < ENOUGH
     return FreeError(

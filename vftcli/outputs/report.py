@@ -125,6 +125,7 @@ def fill(
     recorded = choice.detail != NONE and installed("rerun")
     for name in steps(["estimates.parquet", *["recording.rrd"] * recorded, "index.html"]):
         path = folder / f"{place}{name}"
+        analysis.recording.release()
         if name == "estimates.parquet":
             write_estimates(path, analysis)
             put_errors(folder, place, analysis.errors, [analysis])

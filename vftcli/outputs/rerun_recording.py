@@ -110,9 +110,10 @@ def newton_per_metre(analysis: Analysis) -> float:
 
 def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
     """All plots, tab by tab: the force, torques and residuals joint by joint, then the motion."""
-    force, wrench = force_plot(analysis), wrench_chart(analysis)
     reference, joints = analysis.reference, range(analysis.recording.joints)
-    groups: dict[str, Iterable[Chart]] = {"Contacts": [force]} if force is not None else {}
+    groups: dict[str, Iterable[Chart]] = {}
+    if best_wrench(analysis) is not None:
+        groups["Contacts"] = filter(None, map(force_plot, [analysis]))
     # One 95 % band, that of `best`, else of the last: all would hide each other.
     banded = [e.name for e in analysis.estimates if e.error_sd is not None]
     last = BEST if BEST in banded else next(reversed(banded), "")
@@ -129,8 +130,8 @@ def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
         groups["Residual"] = (
             plot_of(left, j, f"/residual/J{j + 1}", reference.tau[:, j : j + 1]) for j in joints
         )
-    if wrench is not None:
-        groups["Wrench"] = wrench_plots(analysis, wrench)
+    if any(wrench.name != "reference" for wrench in analysis.wrenches):
+        groups["Wrench"] = wrench_plots(analysis)
     return {**groups, "Motion": motion_plots(analysis)}
 
 
@@ -150,10 +151,10 @@ def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart
     return Chart(key, named, chart.units[j : j + 1], (panel,), chart.x, (*lines, *edges), family)
 
 
-def wrench_plots(analysis: Analysis, wrench: Chart) -> Iterator[Chart]:
+def wrench_plots(analysis: Analysis) -> Iterator[Chart]:
     """Every axis, what the pose can tell, and the torque that no wrench explains."""
-    for k, axis in enumerate(wrench.panels):
-        yield plot_of(wrench, k, f"/wrench/{axis}")
+    if (wrench := wrench_chart(analysis)) is not None:
+        yield from (plot_of(wrench, k, f"/wrench/{axis}") for k, axis in enumerate(wrench.panels))
     if (sensed := analysis.virtual_sensor) is None or not sensed.wrenches:
         return
     t, styles = analysis.t, observer_styles(analysis)

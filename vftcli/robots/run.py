@@ -28,6 +28,8 @@ from vftcli.signals.shown import Shown
 LONG = 1 << 17
 #: What has a value for each sample, and stays in a part of a run.
 SERIES = ("standing", "standstill", "drive_torque", "model_torque", "momentum")
+#: What is made again in less than an observer's pass.
+BULKY = (*SERIES[1:], "smooth_gap", "smooth_model", "smooth_dq")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -156,14 +158,17 @@ class Run(Shown):
         values = {name: getattr(self, name)[span] for name in SERIES}
         return replace(self, recording=motion).holding(**values)
 
-    def spare(self) -> None:
-        """Of a long recording give back what can be made anew in less than an observer's pass."""
+    def spare(self, *others: str) -> None:
+        """Of a long recording give back what is `BULKY`, and others that can be made again."""
         self.recording.release()
-        if self.recording.samples > LONG and "terms" in vars(self):
-            _ = self.noise
-            del vars(self)["terms"]
+        if self.recording.samples > LONG:
+            if terms := vars(self).get("terms"):
+                _ = self.noise
+                vars(terms).pop("d", None)
+            for name in (*BULKY, *others):
+                vars(self).pop(name, None)
         if (steadied := vars(self).get("steadied", self)) is not self:
-            steadied.spare()
+            steadied.spare(*others)
 
 
 class RunSamples(NamedTuple):

@@ -14,6 +14,7 @@ from vftcli.robots.running_friction import RunningFriction, measured_temperature
 from vftcli.signals.arrays import (
     Array,
     Mask,
+    empty_series,
     handed_over,
     is_uniform,
 )
@@ -115,8 +116,7 @@ class RunningTerms:
         else:
             effort, constant = drive_torque(recording, self.robot), None
         temperature = measured_temperature(recording)
-        # One block of memory: the larger it is, the fewer pages the system has to find.
-        p, mu, room = (rows.T for rows in np.empty((3, *q.T.shape)))
+        p, mu = empty_series(*q.shape), empty_series(*q.shape)
         chunks: Iterable[tuple[slice, Array, list[Array]]]
         if self.literal:
             momentum, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
@@ -140,7 +140,6 @@ class RunningTerms:
             mu=handed_over(mu),
             log_clock=self.clock,
             before=self.before,
-            room=room,
         )
         self.before = terms.last
         return terms
@@ -192,16 +191,17 @@ TIE = 1e-6
 GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch reaches across.
 
 
-def raw_disturbance(terms: DynamicsTerms) -> Array:
+def raw_disturbance(terms: DynamicsTerms, room: Array | None = None) -> Array:
     """The unfiltered external torque d of every sample but the first. (T−1, n) [N·m]
 
     d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times: the mean over a
     sample of the external torque and of everything else that the model leaves
     unexplained.
     """
-    d = np.diff(terms.p, axis=0)
+    d: Array = np.subtract(terms.p[1:], terms.p[:-1], out=room)
     d /= np.diff(terms.t)[:, None]
-    d -= 0.5 * (terms.mu[1:] + terms.mu[:-1])
+    for j, mu in enumerate(terms.mu.T):
+        d[:, j] -= 0.5 * (mu[1:] + mu[:-1])
     return d
 
 
@@ -210,8 +210,13 @@ def disturbance_impulse(terms: DynamicsTerms) -> Array:
 
     A difference of two of its values over the time between them is the mean of d there.
     """
-    gained = raw_disturbance(terms) * np.diff(terms.t)[:, None]
-    return np.concatenate([np.zeros((1, terms.joints)), gained.cumsum(axis=0)])
+    total = empty_series(*terms.p.shape)
+    total[:1] = 0.0
+    gained = raw_disturbance(terms, total[1:])
+    gained *= np.diff(terms.t)[:, None]
+    for column in gained.T:
+        column.cumsum(out=column)
+    return total
 
 
 class Blocks(NamedTuple):

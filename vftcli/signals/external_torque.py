@@ -1,7 +1,7 @@
 """What an observer takes and gives: dynamics terms in, external torque out."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import InitVar, dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -42,18 +42,20 @@ class DynamicsTerms(Shown):
     mu: Array  #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
     log_clock: Clock | None = None  #: The whole log's clock where these are a block of it.
     before: Instant | None = None  #: The sample before the first of a later block of a log.
-    room: InitVar[Array | None] = None  #: Memory for `d`, if it is there already. (T, n)
-    #: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the
-    #: model leaves unexplained: the one input of every observer. Zero at a log's first
-    #: sample. (T, n) [N·m·s]
-    d: Array = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self, room: Array | None) -> None:
+    def __post_init__(self) -> None:
         seal(self, "t", "p", "mu")
         check_shape(self.p, ("T", "n"), "p", called := "the dynamics terms")
         check_clock(self.t, called)
         seal(self, "p", "mu", shape=(self.samples, self.joints), called=called)
-        change = empty_series(*self.p.shape) if room is None else room
+
+    @cached_property
+    def d(self) -> Array:
+        """Change of momentum that the model leaves unexplained, every observer's one input.
+
+        dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), zero at a log's first sample. (T, n) [N·m·s]
+        """
+        change = empty_series(*self.p.shape)
         half, before, explained = 0.5 * self.dt[:, 0], self.before, np.zeros(self.samples)
         # Joint by joint, so that the passes stay in the cache.
         for p, mu, d in zip(self.p.T, self.mu.T, change.T, strict=True):
@@ -64,7 +66,7 @@ class DynamicsTerms(Shown):
         change[:1] = 0.0
         if before is not None:
             change[0] = self.p[0] - before.p - half[0] * (self.mu[0] + before.mu)
-        object.__setattr__(self, "d", handed_over(change))
+        return handed_over(change)
 
     @cached_property
     def clock(self) -> Clock:

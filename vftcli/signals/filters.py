@@ -33,6 +33,8 @@ FREQUENCIES = 1024  #: Frequencies at which a filter's power is summed.
 #: An even clock of more than so many times the log's samples would be filled with gaps
 #: alone.
 MOSTLY_GAP = 100
+#: Values that are filtered together: a filter's passes take five times their memory.
+TOGETHER = 1 << 20
 
 
 def low_pass(
@@ -84,12 +86,16 @@ def filter_columns(t: Array, x: Array, sections: Array, settling: float | None =
         refuse_mostly_gap(t, step)
         clock = np.linspace(t[0], t[-1], max(2, round(float(t[-1] - t[0]) / step) + 1))
         x = resample_columns(clock, t, x)
-    padding = min(len(x) - 1, padding)
-    # The ends are mirrored about their value.
-    before, after = 2.0 * x[:1] - x[padding:0:-1], 2.0 * x[-1:] - x[-2 : -padding - 2 : -1]
-    once = cascade(sections, np.concatenate([before, x, after]))
-    both = cascade(sections, once[::-1])[::-1]
-    smooth = both[padding : len(both) - padding].copy()
+    padding, smooth = min(len(x) - 1, padding), np.empty(x.shape)
+    together = max(1, TOGETHER // len(x))
+    for first in range(0, x.shape[1], together):
+        own = x[:, first : first + together]
+        # The ends are mirrored about their value.
+        before = 2.0 * own[:1] - own[padding:0:-1]
+        after = 2.0 * own[-1:] - own[-2 : -padding - 2 : -1]
+        once = cascade(sections, np.concatenate([before, own, after]))
+        both = cascade(sections, once[::-1])[::-1]
+        smooth[:, first : first + together] = both[padding : len(both) - padding]
     return smooth if even else resample_columns(t, clock, smooth)
 
 

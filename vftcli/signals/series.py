@@ -90,8 +90,9 @@ def grown(t: Array, mask: Mask, margin: float) -> Mask:
 
 def near(mask: Mask, count: int) -> Mask:
     """Samples within `count` samples of a true one, column by column. (T, n)"""
-    total = np.vstack([np.zeros((1, mask.shape[1])), mask.cumsum(axis=0)])
+    total = np.zeros((len(mask) + 1, mask.shape[1]), np.int32)
+    mask.cumsum(axis=0, out=total[1:])
     k = np.arange(len(mask))
     first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(mask))
-    found: Mask = total[last] - total[first] > 0.0
+    found: Mask = total[last] > total[first]
     return found

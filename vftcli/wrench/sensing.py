@@ -111,6 +111,7 @@ def sense(
     disturbance = mean_disturbance(log.terms)
     raw = VirtualSensor(frame="base").wrench(disturbance, q, chain)
     mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
+    del disturbance  # of a long log it takes the room of an estimate
     # The disturbance was solved in base axes, so that --frame moves no zero.
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
     spans, unloaded = zero_spans(choice.zero, raw)

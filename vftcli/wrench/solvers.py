@@ -192,8 +192,7 @@ class VirtualSensor(Shown):
             np.broadcast_to(np.maximum(sd.get(torque.name, TORQUE_SD), 1e-6), q.shape)
             for torque in torques
         ]
-        values = np.empty((len(torques), samples, 6))
-        spread = np.empty((len(torques), samples, 6))
+        values, spread = ([np.empty((samples, 6)) for _ in torques] for _ in range(2))
         residual = np.empty((len(torques), samples))
         sigma = np.empty(samples)
         # Chunk by chunk, so that memory does not grow with the log.
@@ -205,9 +204,9 @@ class VirtualSensor(Shown):
             sigma[span] = parts.sigma_min
             for k, torque in enumerate(torques):
                 gain, root = solve(errors[k][span])
-                values[k, span] = np.squeeze(gain @ torque.tau[span, :, None], axis=2)
+                values[k][span] = np.squeeze(gain @ torque.tau[span, :, None], axis=2)
                 if torque.name in sd:
-                    spread[k, span] = np.sqrt(np.sum(root**2, axis=2))
+                    spread[k][span] = np.sqrt(np.sum(root**2, axis=2))
             if n > 6:
                 every = np.stack([torque.tau[span] for torque in torques], axis=2)
                 residual[:, span] = np.linalg.norm(null_space(parts, every), axis=1).T
@@ -216,12 +215,12 @@ class VirtualSensor(Shown):
             Wrench(
                 name=torque.name,
                 t=torque.t,
-                values=handed_over(values[k].copy()),
+                values=handed_over(values[k]),
                 frame=self.frame,
-                sd=handed_over(spread[k].copy()) if torque.name in sd else None,
+                sd=handed_over(spread[k]) if torque.name in sd else None,
                 sigma_min=sigma,
                 masked=masked,
-                null_space=handed_over(residual[k].copy()) if n > 6 else None,
+                null_space=handed_over(residual[k]) if n > 6 else None,
             )
             for k, torque in enumerate(torques)
         )
