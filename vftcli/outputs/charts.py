@@ -87,7 +87,8 @@ class Chart(NamedTuple):
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
     unit: str = "s"  #: Unit of the horizontal axis.
     log: bool = False  #: Whether the horizontal axis is logarithmic.
-    lowest: float | None = None  #: Least end of the vertical axis, None for what the lines need.
+    #: Least end of the vertical axis, which then holds 0; None for what the lines need.
+    lowest: float | None = None
     highest: float | None = None  #: Upper end, None for what the lines need.
 
     @classmethod
@@ -110,7 +111,7 @@ class Chart(NamedTuple):
         # A line that does not change has no scale of its own.
         room = 0.05 * (high - low) if high > low else abs(high) or 1.0
         low, high = (low - room, high + room) if low <= high else (-1.0, 1.0)
-        low = low if self.lowest is None else max(low, self.lowest)
+        low = low if self.lowest is None else max(min(low, 0.0), self.lowest)
         return Span(low, high if self.highest is None else self.highest)
 
     def _drawn_values(self, panel: int) -> Iterator[Array]:

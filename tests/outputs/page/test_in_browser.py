@@ -175,7 +175,7 @@ def recording_of_a_panda() -> Analysis:
     return analyse_log(log, AnalysisChoice(robot=RobotChoice(name="panda"), contacts=False))
 
 
-#: Draws 120 frames, one after the other: the median and the quickest. [ms]
+#: Draws 120 frames, one after the other: the median, and what a tenth needs at most. [ms]
 FRAMES = """() => {
   const { clock } = vftcli, took = Array.from({ length: 120 }, (_, k) => {
     clock.head = 4 + k / 10;
@@ -184,7 +184,7 @@ FRAMES = """() => {
     clock.moved();
     return performance.now() - start;
   }).sort((a, b) => a - b);
-  return [took[60], took[0]];
+  return [took[60], took[12]];
 }"""
 
 #: Draws the arm and gives every stroke: its colour, width and points on the canvas.
@@ -252,9 +252,9 @@ def test_meshes_are_drawn_where_the_links_are(opened: Callable, shaped: Analysis
 
 @pytest.mark.slow
 def test_a_frame_of_3000_triangles_is_quick(opened: Callable, shaped: Analysis) -> None:
+    """Of 120 frames the quickest tenth: a frame is drawn by threads that others keep waiting."""
     page = live(opened(render(shaped)))
-    took = page.evaluate(FRAMES)
-    assert took[0] <= 8.0
+    assert page.evaluate(FRAMES)[1] <= 8.0
 
 
 @pytest.mark.slow

@@ -118,6 +118,25 @@ def test_the_axis_of_the_force_holds_every_peak_with_its_band(pushed: Analysis) 
     assert chart.ends(0) == (0.0, highest(found))
 
 
+def test_all_of_a_loads_force_is_in_its_chart_which_begins_at_zero(pushed: Analysis) -> None:
+    """Its size is a mean of 20 N: what was felt, up to 32 ± 6 N, is in the chart all the same."""
+    found = pushed.contacts
+    assert found is not None
+    first = found.contacts[0]
+    assert first.course is not None
+    load = replace(first, is_load=True, peak_force=20.0, peak_band=2.0, stop=first.course.t[-1])
+    size = 26.0 + 6.0 * np.sin(9.0 * first.course.t)
+    course = first.course._replace(force=size, band=np.full(len(size), 6.0))
+    only = replace(found, contacts=(replace(load, course=course),))
+    chart = force_chart(pushed, only)
+    assert chart is not None
+    low, high = chart.ends(0)
+    assert low == 0.0
+    assert high >= size.max() + 6.0
+    html = render(replace(pushed, contacts=only))
+    assert 'class="patch contact"></span> contact</span>' not in html.partition("believed")[0]
+
+
 def test_the_force_stands_before_the_logs_own_wrench(pushed: Analysis, as_if: Callable) -> None:
     wrench = np.zeros((len(pushed.t), 6))
     wrench[:, 1:3] = 30.0, -40.0

@@ -7,6 +7,7 @@ from unpacking import page_data
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import Ground
+from vftcli.outputs.contacts import contact_grid
 from vftcli.outputs.page import pages
 from vftcli.outputs.page.pages import eyebrow, render
 from vftcli.outputs.page.shell import HERE, script_json
@@ -259,3 +260,14 @@ def test_a_ground_is_shown_with_its_sign_and_its_remedy(
     assert '<code class="remedy">vftcli x &#x27;&lt;i&gt;&#x27;</code>' in html
     assert "No gap &lt;b&gt;" in html
     assert html.count('class="remedy"') == 1
+
+
+def test_where_is_said_as_in_the_terminal(pushed: Analysis) -> None:
+    """Every row of the page has the place that the list in the terminal has."""
+    assert pushed.contacts is not None
+    html = render(pushed)
+    for row in contact_grid(pushed.contacts.contacts).cells:
+        number, place = row[0].text, row[-2].text
+        shown = html.partition(f'<tr id="contact-{number}"')[2].partition("</tr>")[0]
+        assert f"<td>{place}</td>" in shown
+    assert html.count("<td>link ") == 1  # the list has one at an unknown place

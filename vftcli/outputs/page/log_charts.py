@@ -214,6 +214,8 @@ def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
             # A band wider than its force leaves the chart.
             peak = contact.peak_force + min(contact.peak_band, contact.peak_force)
             top = max(top, 1.12 * peak)
+        if contact.is_load and (course := contact.course) is not None:
+            top = max(top, float(np.max(course.force + np.minimum(course.band, course.force))))
     return top or 1.0
 
 

@@ -428,7 +428,7 @@ class Arm {
 		path([end(max(size - half, 0)), end(size + half)], css.pale, 9);
 		path([[u, v], beside(9, 0)], css.force, 3.2, contact.sure && contact.cone ? [] : [7, 6]);
 		area([beside(13, 5.5), [x, y], beside(13, -5.5)], css.force);
-		write(contact.sized ? `${round(size)} N` : contact.force, clamp(u - 24 * dx, 30, this.width - 30), clamp(v - 18 * dy, 14, this.height - 14), css.force, 14, "center", css.card);
+		write(contact.sized ? `${round(size)} N` : contact.force, clamp(u - 24 * dx, 30, this.width - 30), clamp(v - 18 * dy, 14, this.height - 60), css.force, 14, "center", css.card);
 	}
 	axes() {
 		const corner = [this.width - 44, this.height - 34];
