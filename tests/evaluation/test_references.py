@@ -1,11 +1,13 @@
 """Reference files: the clock that their times are on."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vftcli.evaluation.references import since_start
+from vftcli.evaluation.references import on_the_logs_clock, since_start
+from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording, Source
 
 
@@ -23,3 +25,14 @@ def test_a_file_may_count_from_the_first_sample_or_be_on_the_logs_clock(
     own = np.arange(zero - 0.01, zero + 4.0, 0.003)
     expected = own - zero
     assert since_start(own, replace(log)) == pytest.approx(expected)
+
+
+def test_a_file_of_another_time_is_refused_with_both_spans() -> None:
+    t = np.arange(0.0, 5.0, 0.5)
+    log = Recording(t=t, q=np.zeros((len(t), 6)))
+    message = r"a\.csv: its clock \(50 to 54\.5 s\) does not overlap the log's \(0 to 4\.5 s\)"
+    with pytest.raises(ReferenceTorqueError, match=message):
+        on_the_logs_clock(t + 50.0, np.zeros((len(t), 6)), log, Path("a.csv"))
+    # Half a sample beyond either end is the same clock, rounded; more is no answer.
+    there = on_the_logs_clock(t[:-2] + 0.2, t[:-2, None], log, Path("a.csv"))[:, 0]
+    assert np.isfinite(there).tolist() == [True] * 8 + [False] * 2
