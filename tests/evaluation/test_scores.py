@@ -134,6 +134,18 @@ def test_a_shift_is_read_as_lag() -> None:
     truth, late = (np.sin(2.0 * (t - shift))[:, None] for shift in (0.0, 0.05))
     sums = lag_sums(ExternalTorque(name="late", t=t, tau=late), truth, (t > 1) & (t < 18))
     assert LAGS[np.argmin(sums)] == pytest.approx(0.05)
+    assert LAGS[[0, -1]] == pytest.approx([-0.1, 0.5])  # what docs/benchmark.md states
+    assert len(sums) == 61
+
+
+def test_eight_cells_have_an_interval_and_seven_have_none() -> None:
+    t = np.arange(0.0, 16.0, 0.01)
+    noise = np.random.default_rng(2).normal(size=(len(t), 2))
+    estimate = ExternalTorque(name="noise", t=t, tau=noise)
+    for cells in (7, 8):
+        found = Score.of(estimate, np.zeros_like(noise), t < 2.0 * cells - 0.005).numbers()
+        assert (found["rmse_low_Nm"] < found["rmse_Nm"] < found["rmse_high_Nm"]) == (cells == 8)
+        assert np.isnan(found["rmse_low_Nm"]) == (cells == 7)
 
 
 def test_two_logs_are_one_sum() -> None:
