@@ -1,10 +1,13 @@
 """What a difference cannot know: the pieces its error is made of, on signals of known size."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from vftcli.free_motion.difference import (
     ErrorModel,
+    error_model,
     local_rms,
     noise_below,
     noise_of,
@@ -12,7 +15,8 @@ from vftcli.free_motion.difference import (
     off_line,
     rms,
 )
-from vftcli.robots.run import band
+from vftcli.free_motion.paired_runs import PairedRuns, pair_with_run
+from vftcli.robots.run import Run, band
 from vftcli.signals.filters import low_pass
 
 STEP = 0.008
@@ -76,6 +80,23 @@ def test_what_a_differentiated_noise_leaves() -> None:
     shown = float(np.sqrt(np.mean(slope[50:-50] ** 2)))
     found = noise_below(T, p, MOVING, STEP, band(STEP, 8.0), 8.0, slope=1)
     assert found == pytest.approx(shown, rel=0.1)
+
+
+def test_the_noise_of_momenta_is_no_motion(drive_of: Callable[..., Run]) -> None:
+    """The model's torque of a run that differs by 5 sin πt N·m, and by the slope of its noise.
+
+    Local squares of the noise scatter about their mean, so that half of it is left at most.
+    """
+    p = 0.02 * np.random.default_rng(5).standard_normal((6000, 1))
+    noise = np.gradient(p, T, axis=0)
+    square = np.mean(low_pass(T, noise, 12.0) ** 2)
+    free = drive_of(T, 0.0 * p, 0.0 * p)
+    for motion, least, most in ((0.0, 0.0, 0.5 * square), (5.0, 12.0, 12.5 + 0.5 * square)):
+        model = noise + motion * np.sin(np.pi * T)[:, None]
+        log = drive_of(T, 0.0 * p, 0.0 * p, momentum=p, model_torque=model)
+        pair = PairedRuns(motion=log, pairings=[pair_with_run(T, free, 0.0)])
+        found = error_model(pair, 0.0 * p, 0.0 * p, corrected=False, cutoff=12.0)
+        assert least <= np.mean(found.sd**2) < most
 
 
 def test_a_local_mean_square_spans_a_tenth_of_a_second() -> None:
