@@ -62,6 +62,7 @@ def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
     best = found.of("best")
     assert best.correction is not None
     assert found.of("gmo").correction is None
+    assert not best.by_fit  # the free cycles are known
     plain, off = automatic.motion.log.terms, best.log.terms
     assert best.of(automatic.motion.log) is best.log  # made once
     np.testing.assert_allclose(plain.mu - off.mu, best.correction.bias, atol=1e-9)

@@ -217,7 +217,7 @@ def row_of(
     back, start, released = returns["return_2_s"], float(t[drag.begin]), float(t[drag.release])
     # Row k + 1 is what the force of row k made of row k.
     span = slice(drag.begin, drag.release)
-    work = np.nansum(wrench[span, axis] * v[1:][span]) * (t[1] - t[0]) if len(wrench) else 0.0
+    work = np.nansum(wrench[span, axis] * v[1:][span]) * (t[1] - t[0])
     return {
         "controller": controller.kind,
         "alpha": None if controller.kind == "traditional" else float(controller.alpha[axis]),
