@@ -102,8 +102,11 @@ def test_short_logs_alone_tell_a_guess_and_say_so() -> None:
 
 @pytest.mark.parametrize(("seconds", "said"), [(3602.0, True), (3 * 3600.0 + 2.1, False)])
 def test_a_log_shorter_than_three_false_alarms_extrapolates(seconds: float, said: bool) -> None:
-    found = find_thresholds([free_log("a", seconds, joints=1, axes=0)], 1.0)
+    found = find_thresholds([free_log("a", seconds, joints=2, axes=0)], 1.0)
     assert ("thresholds-extrapolated" in codes(found)) is said
+    for remark in (r for r in found.remarks if r.code == "thresholds-extrapolated"):
+        rates = {name: remark.values[name] for name in ("rate_per_h", "own_rate_per_h", "need_h")}
+        assert rates == {"rate_per_h": 1.0, "own_rate_per_h": 0.5, "need_h": 3.0}
 
 
 def test_an_arm_of_few_joints_has_no_axes() -> None:

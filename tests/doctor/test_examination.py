@@ -148,7 +148,7 @@ def test_straight_lines_are_seen_in_what_only_rises_or_only_falls(sign: float) -
     course = sign * (0.2 * t + 0.05 * np.sin(3.0 * t))[:, None] * np.ones(6)
     log = Recording(t=t, q=course, dq=np.gradient(course, t, axis=0), current=course)
     found = {finding.code: finding for finding in signal_findings(sampled_every(log, 10))}
-    assert found["interpolated"].values["rate_Hz"] == pytest.approx(12.5)
+    assert found["interpolated"].values == pytest.approx({"rate_Hz": 12.5, "logged_Hz": 125.0})
     assert "interpolated" not in {finding.code for finding in signal_findings(log)}
 
 

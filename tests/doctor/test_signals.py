@@ -105,6 +105,8 @@ def test_numbers_that_no_clock_and_no_robot_gives() -> None:
 
     assert codes(t=np.append(T[:-1], 0.9e18)) == []
     assert codes(t=np.append(T[:-1], 1.1e18)) == ["absurd-clock"]
+    (clock,) = unusable_findings(replace(log, t=np.append(T[:-1], 1.1e18)))
+    assert clock.values == {"least_s": T[0], "largest_s": 1.1e18}
     assert codes(t=1e-12 * T) == ["absurd-steps"]
     assert codes(t=1e-10 * T) == []
     assert codes(t=1.1e12 * T) == ["absurd-steps"]

@@ -8,6 +8,7 @@ import pytest
 
 from vftcli.identification import Task, identify
 from vftcli.identification.fitting import repeated_share
+from vftcli.free_motion.free_motion import PARTLY
 from vftcli.identification.payload import payload_from_pair, payload_from_poses
 from vftcli.identification.training import prepare
 from vftcli.robots import JointFriction, Payload, load_robot
@@ -187,7 +188,9 @@ def test_the_payload_comes_back_from_one_motion(seed):
     found = identify(
         [log(rubbed(UR5, "coulomb-viscous-offset").with_payload(HAND), seed)], UR5, asked
     )
-    assert found.remarks[-1].code == "load-from-motion"
+    origin = found.remarks[-1]
+    assert origin.code == "load-from-motion"
+    assert 0.0 < origin.values["left_percent"] < 100.0 * PARTLY
     sd = dict(zip(found.parameters["parameter"], found.parameters["sd"], strict=True))
     # .2 N·m of noise on 900 samples: what is left is how friction is rounded around reversals
     assert found.robot.payload.mass == pytest.approx(2.0, rel=0.02)

@@ -42,14 +42,16 @@ def test_a_sensors_pose_is_found_again_whatever_its_zero() -> None:
 
 
 def test_under_noise_the_pose_is_found_within_its_own_deviation() -> None:
+    """Of 50 noises a deviation is known to 10 %; .05 N·m over √400 samples of 20 N are < 1 mm."""
     flange = pushes()
     rng = np.random.default_rng(2)
     reading = flange @ adjoint(inverse(POSE)).T
-    noisy = flange + rng.standard_normal(flange.shape) * np.repeat([0.5, 0.05], 3)
-    fit = fit_pose(noisy, reading)
-    error = np.abs(fit.pose.translation - POSE.translation)
-    assert np.all(error < 5 * fit.position_sd)
-    assert np.all(fit.position_sd < 1e-3)  # m: 0.05 N·m over √400 samples of 20 N
+    noises = rng.standard_normal((50, *flange.shape)) * np.repeat([0.5, 0.05], 3)
+    fits = [fit_pose(flange + noise, reading) for noise in noises]
+    error = np.array([fit.pose.translation - POSE.translation for fit in fits])
+    sd = np.mean([fit.position_sd for fit in fits], axis=0)
+    np.testing.assert_allclose(sd, np.sqrt(np.mean(error**2, axis=0)), rtol=0.4)
+    assert np.all(sd < 1e-3)
 
 
 def test_pushes_along_one_line_tell_no_pose() -> None:
