@@ -202,3 +202,10 @@ def test_whole_logs_are_left_out_where_the_joint_moves_in_several(prepared):
     both = data._replace(logs=[moving, resting, moving])
     assert [len(part) for part in both.parts] == [moving.samples, moving.samples]
     assert len(data._replace(logs=[moving, resting]).parts) == 5
+
+
+def test_a_joint_without_friction_has_an_offset_at_most(prepared):
+    assert choose_shape(equations(prepared, {"offset": 0.2}, noise=0.0)) == (
+        Shape(("offset",)),
+        {},
+    )

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.free_motion.free_motion import PARTLY
 from vftcli.identification import Task, identify
 from vftcli.identification.fitting import repeated_share
-from vftcli.free_motion.free_motion import PARTLY
 from vftcli.identification.payload import payload_from_pair, payload_from_poses
 from vftcli.identification.training import prepare
 from vftcli.robots import JointFriction, Payload, load_robot
