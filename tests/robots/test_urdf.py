@@ -212,6 +212,9 @@ def test_a_circle_of_joints_is_refused(tmp_path: Path) -> None:
 INERTIAL = '<inertial mass="{}" pos="0.02 -0.01 0.1" diaginertia="0.02 0.018 0.01"/>'
 
 
+TURN = 'quat="0.9 0.1 0.2 0.3"'
+
+
 def mjcf(joint: str = "", hand: str = "", extra: str = "") -> str:
     """An arm of five hinges: `joint` holds attributes of the second one, `hand` stands on it."""
     text, ends = "", ""
@@ -219,7 +222,7 @@ def mjcf(joint: str = "", hand: str = "", extra: str = "") -> str:
         axis = ("0 0 1", "0 1 0", "1 1 0")[k % 3]
         own = joint if k == 2 else ""
         text += (
-            f'<body name="link{k}" pos="0.05 0 0.2" quat="0.9 0.1 0.2 0.3">{INERTIAL.format(4 / k)}'
+            f'<body name="link{k}" pos="0.05 0 0.2" {TURN}>{INERTIAL.format(4 / k)}'
             f'<joint name="joint{k}" axis="{axis}" range="-90 90" {own}/>'
         )
         ends += "</body>"
@@ -291,6 +294,7 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
         ("<mujoco/>", "no moving joint|Pinocchio can read"),
         (mjcf('axis="0 0 0"').replace('axis="1 1 0"', "", 1), "'joint2': its axis points nowhere"),
         (mjcf('armature="-1"'), "joint 'joint2': armature is -1"),
+        (mjcf().replace(TURN, 'xyaxes="1 0 0 2 0 0"', 1), "'joint1': its orientation is no rot"),
         (mjcf().replace('mass="4.0"', 'mass="1e9"'), "'joint1': mass is 1e.09 kg; on a robot"),
         (mjcf(extra='<include file="nowhere.xml"/>'), r"includes 'nowhere\.xml', which Pin"),
         ("<mujoco>" + "<body>" * 5000, "more than 500 elements within one another"),
