@@ -26,7 +26,6 @@ def analysis() -> vft.Analysis:
     return vft.report(CIRCLE, "ur5", observer=["best", "gmo"], reference="two-cycle")
 
 
-@pytest.mark.slow
 def test_contacts_are_those_of_the_pipeline() -> None:
     choice = AnalysisChoice(
         robot=RobotChoice.parsed(robot="ur5"), free=FreeChoice.parsed(free=["0.3:4"])
@@ -41,7 +40,6 @@ def test_contacts_are_those_of_the_pipeline() -> None:
     assert frame["peak_force_N"].to_list() == [peak for _, _, peak in rows]
 
 
-@pytest.mark.slow
 def test_a_log_and_a_robot_may_be_files_or_objects() -> None:
     recording, robot = vft.read(TAPS), vft.load_robot("ur5")
     named = vft.contacts(TAPS, "ur5", free=["0.3:4"], interval="0:6").to_polars()
@@ -73,7 +71,6 @@ def test_a_report_answers_everything(analysis: vft.Analysis) -> None:
     assert len(codes) == len(analysis.remarks)
 
 
-@pytest.mark.slow
 def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> None:
     assert analysis.contacts is not None
     things = [
@@ -84,6 +81,7 @@ def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> N
         *(analysis.refinement, analysis.examinations[0], analysis.tunings["gmo"]),
         *(*analysis.observers, vft.KalmanObserver()),
     ]
+    assert "ur5: best, gmo; 12 contacts" in repr(analysis)
     for thing in things:
         assert len(repr(thing)) <= 162, type(thing)
         assert "\n" not in repr(thing), type(thing)
@@ -92,7 +90,6 @@ def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> N
         assert len(table) < 6000, type(thing)
 
 
-@pytest.mark.slow
 def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
     asked = {"robot": "ur5", "observer": "gmo", "interval": "0:6", "free": "0:4"}
     vft.report(CIRCLE, output=tmp_path / "out", **asked)  # type: ignore[arg-type]
@@ -122,7 +119,6 @@ def test_thresholds_are_those_of_the_command(tmp_path: Path) -> None:
     assert found._repr_html_().count("<tr>") == 1 + 6 + 6 + 1  # head, joints, axes, |F|
 
 
-@pytest.mark.slow
 def test_options_and_settings_are_the_keywords_of_a_call(analysis: vft.Analysis) -> None:
     """Made from the fields of the choices: the calls take what the commands take, as `vftcli`."""
     words = set(signature(vft.report).parameters)
@@ -138,7 +134,6 @@ def test_options_and_settings_are_the_keywords_of_a_call(analysis: vft.Analysis)
     assert table.filter(recording=CIRCLE.name)["rmse_Nm"].equals(analysis.errors["rmse_Nm"])
 
 
-@pytest.mark.slow
 def test_an_analysis_is_plotted_and_saved(analysis: vft.Analysis, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     for what, panels in {"contacts": 1, "torques": 6, "wrench": 6, "errors": 1}.items():

@@ -85,7 +85,6 @@ def test_the_log_must_settle_its_robot_or_be_reported() -> None:
         analyse_log(FIXTURE, AnalysisChoice(read=measured))
 
 
-@pytest.mark.slow
 def test_an_interval_keeps_the_logs_own_time() -> None:
     analysis = analyse_log(
         FIXTURE, AnalysisChoice(read=ReadChoice(interval=(4.0, 8.0)), robot=RobotChoice(name="ur5"))
@@ -179,7 +178,6 @@ def test_every_log_is_read_modelled_and_aligned_once(
     assert counted == {"read_chosen": reads, "dynamics_terms": models, "align": alignments}
 
 
-@pytest.mark.slow
 def test_a_free_run_as_long_as_the_log_is_distinct_from_it(runs: list[Path]) -> None:
     """Its raw disturbance was taken for the log's: the tuned gains collapsed."""
     load, free, more = runs

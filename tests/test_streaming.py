@@ -87,7 +87,6 @@ def test_interruption_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("in_blocks")
 def test_wrong_robot_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     """The stretches that are examined tell what the whole log tells."""

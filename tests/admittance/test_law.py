@@ -96,7 +96,6 @@ def test_traditional_at_xi_one_is_the_other_figure_of_the_science() -> None:
     assert returned(motion, 0, 0.02) == pytest.approx(3.59, rel=0.01)  # printed to three digits
 
 
-@pytest.mark.slow
 def test_release_figures_of_the_panda() -> None:
     robot = load_robot("panda")
     p = from_table(robot.admittance, robot.name, {})
@@ -149,7 +148,6 @@ def test_printed_v_rises_and_w_does_not(limit: float) -> None:
     assert risen == 1000
 
 
-@pytest.mark.slow
 def test_printed_v_of_the_paper_s_release() -> None:
     """0.684 → 1.099 J from 0.3 m at α = 1.9 as Ts → 0 (science of the issue)."""
     controller = variable(parameters(alpha=np.full(6, 1.9), period=1e-4, speed_limit=np.inf))

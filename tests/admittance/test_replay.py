@@ -49,7 +49,6 @@ def codes(found: Replay) -> set[str]:
     return {remark.code for remark in found.remarks}
 
 
-@pytest.mark.slow
 def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
     """24 N for 2 s: 4 N of excess move K = 8 N/m by ≈ 0.6 m at most; the whole 24 N by metres."""
     soft = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
@@ -61,7 +60,6 @@ def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
     assert "travel-implausible-hard" in codes(hard)
 
 
-@pytest.mark.slow
 def test_rows_say_what_happened() -> None:
     found = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
     assert [(r["controller"], r["alpha"], r["axis"]) for r in found.rows] == [
@@ -86,7 +84,6 @@ def test_rows_say_what_happened() -> None:
     assert found.rows[2]["peak_advance_s"] > 0.0  # the release's brake acts sooner
 
 
-@pytest.mark.slow
 def test_as_printed_a_force_below_the_threshold_moves_the_arm() -> None:
     """5 N of 20 for 20 s: to F/K_d and F/(αK_d); as corrected not at all.
 
@@ -108,7 +105,6 @@ def test_work_of_a_constant_force_is_force_times_way() -> None:
     assert found.rows[0]["work_J"] == pytest.approx(24.0 * way, rel=1e-9)  # a sum of equal terms
 
 
-@pytest.mark.slow
 def test_joints_follow_the_flange() -> None:
     """The joint positions put the flange where the deviation says, rotation included."""
     record, q = push(21.0)
@@ -171,7 +167,6 @@ def test_quiet_log_moves_nothing_and_says_so() -> None:
     assert remark.values["share"] == pytest.approx(19.0 / 20.0)
 
 
-@pytest.mark.slow
 def test_force_at_rest_for_long_is_reported() -> None:
     record, q = push(length=10.0)
     wrench = record.values.copy()
@@ -180,7 +175,6 @@ def test_force_at_rest_for_long_is_reported() -> None:
     assert "drag-at-rest" in codes(found)
 
 
-@pytest.mark.slow
 def test_w_never_rises_in_a_replay() -> None:
     record, q = push(30.0)
     wrench = record.values.copy()

@@ -1,7 +1,6 @@
 """Phases: thresholds per axis, hard and soft, hysteresis, unknown forces."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -66,7 +65,6 @@ def test_unknown_force_is_none() -> None:
     assert np.all(np.isfinite(found.force))
 
 
-@pytest.mark.slow
 @given(arrays(float, (30, 6), elements=st.floats(-30, 30)), st.floats(0.0, 0.9))
 def test_latch_is_the_plain_loop(force: np.ndarray, hysteresis: float) -> None:
     p = parameters(hysteresis=hysteresis)

@@ -166,7 +166,6 @@ def test_frames_without_a_number_stop_it_or_are_marked(dataset: Path, tmp_path: 
     assert np.all(np.array(table[TORQUE].to_list())[zero] == 0.0)
 
 
-@pytest.mark.slow
 def test_poses_that_hide_the_wrench_stop_it(dataset: Path, tmp_path: Path) -> None:
     def stretch(positions: np.ndarray) -> None:
         positions[:200, 3] = -0.5  # J4 of episode 0: σ_min .004 m
@@ -183,7 +182,6 @@ def test_poses_that_hide_the_wrench_stop_it(dataset: Path, tmp_path: Path) -> No
         made(dataset, tmp_path / "copy", by_map)
 
 
-@pytest.mark.slow
 def test_what_tells_no_forces_is_refused_and_leaves_nothing(dataset: Path, tmp_path: Path) -> None:
     def zero(values: np.ndarray) -> None:
         values[:, :4] = 0.0
@@ -286,7 +284,6 @@ def test_efforts_that_were_never_measured_are_refused(samples: Path, tmp_path: P
         made(samples / "lerobot_v3_effort_zero", tmp_path / "copy")
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(
     importlib.util.find_spec("datasets") is None,
     reason="the datasets library is not installed: pip install 'vftcli[datasets-test]'",

@@ -76,7 +76,6 @@ def test_files_are_found_in_paths_references_and_robots(tmp_path: Path) -> None:
     assert there.library is not None
 
 
-@pytest.mark.slow
 def test_another_process_makes_the_same_key() -> None:
     """Sets and dictionaries have another order there."""
     script = (

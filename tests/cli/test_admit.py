@@ -47,7 +47,6 @@ def test_release_rows(admit: Run) -> None:
     assert {row["xi"] for row in rows[1:]} == {1.0}
 
 
-@pytest.mark.slow
 def test_default_is_both_controllers_with_the_profile_s_values(admit: Run) -> None:
     rows = json.loads(admit("--release", "rx=0.2", "--robot", "panda", "--json")[1])["rows"]
     assert [(row["controller"], row["alpha"]) for row in rows] == [

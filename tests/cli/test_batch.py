@@ -65,7 +65,6 @@ def test_every_log_is_done_once_whatever_the_workers(run, folder: Path, tmp_path
     assert len(places) == 2
 
 
-@pytest.mark.slow
 def test_a_second_run_does_what_is_left(run, folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     (folder / "empty.csv").touch()

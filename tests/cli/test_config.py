@@ -153,7 +153,6 @@ def test_a_file_with_bytes_that_are_no_letters_is_refused(run, here: Path) -> No
     assert run("help", "robots")[0] == 0
 
 
-@pytest.mark.slow
 def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
     (here / "sub").mkdir()
     (here / "sub/free.csv").write_bytes(LOG.read_bytes())

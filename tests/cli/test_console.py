@@ -92,7 +92,6 @@ def logs(tmp_path: Path) -> tuple[Path, Path]:
     return good, bad
 
 
-@pytest.mark.slow
 def test_a_report_writes_the_others_and_fails(
     logs: tuple[Path, Path], tmp_path: Path, run: Run
 ) -> None:
@@ -109,7 +108,6 @@ def test_a_report_writes_the_others_and_fails(
     assert [log["folder"] for log in record["logs"]] == ["good"]
 
 
-@pytest.mark.slow
 def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run: Run) -> None:
     words = (*logs, "--robot", "ur5")
     code, out, _ = run("contacts", *words, "--json")
@@ -134,7 +132,6 @@ def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run: Run) -> None:
     assert not out.exists()
 
 
-@pytest.mark.slow
 def test_each_log_has_the_robot_that_it_settles_itself(run: Run) -> None:
     code, out, _ = run("contacts", TAPS, OTHER)
     assert code == 0

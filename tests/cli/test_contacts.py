@@ -16,7 +16,6 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 TAPS = FIXTURES / "ur5_taps_ur_rtde.csv"
 
 
-@pytest.mark.slow
 def test_the_answer_is_on_stdout_and_nothing_is_written(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -30,7 +29,6 @@ def test_the_answer_is_on_stdout_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
 def test_json_and_csv_hold_the_same_rows(run: Run) -> None:
     words = ("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
     code, out, _ = run(*words, "--json")
@@ -44,7 +42,6 @@ def test_json_and_csv_hold_the_same_rows(run: Run) -> None:
     assert run(*words, "--csv", "--json")[0] == 2
 
 
-@pytest.mark.slow
 def test_several_logs_are_an_array(run: Run) -> None:
     other = FIXTURES / "panda_bag"
     code, out, _ = run("contacts", TAPS, other, "--json")
@@ -58,7 +55,6 @@ def test_a_free_part_that_is_not_there_is_refused(run: Run) -> None:
     assert "free part" in err
 
 
-@pytest.mark.slow
 def test_estimates_are_listed_as_they_were_written(run: Run, tmp_path: Path) -> None:
     words = ("--robot", "ur5", "--free", "0.3:4")
     assert run("estimate", TAPS, *words, "-q", "-o", tmp_path)[0] == 0

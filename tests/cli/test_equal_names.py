@@ -44,7 +44,6 @@ def compared(logs, *options):
     return result.stdout
 
 
-@pytest.mark.slow
 def test_json_has_the_rows_of_both_logs(logs):
     rows = json.loads(compared(logs, "--json"))["rows"]
     samples = {row["recording"]: row["samples"] for row in rows}
@@ -52,7 +51,6 @@ def test_json_has_the_rows_of_both_logs(logs):
     assert samples["b/log.csv"] == ROWS["b"] - 1
 
 
-@pytest.mark.slow
 def test_csv_has_the_rows_of_both_logs(logs):
     rows = list(csv.DictReader(io.StringIO(compared(logs, "--csv"))))
     assert {row["recording"] for row in rows} == {"a/log.csv", "b/log.csv", "pooled"}
@@ -114,7 +112,6 @@ def test_a_payload_pair_of_equal_names_is_scored_on_the_log_without_load(tmp_pat
     assert {row["parameter"] for row in record["parameters"]} == {"mass", "com_x", "com_y", "com_z"}
 
 
-@pytest.mark.slow
 def test_one_run_given_twice_is_refused(logs, tmp_path):
     log, copy = logs / "a" / "log.csv", logs / "copy.csv"
     common = ("--robot", "ur5")

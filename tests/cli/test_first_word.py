@@ -50,7 +50,6 @@ def test_any_other_word_is_refused_with_the_nearest_command(run: Run, word: str,
     assert said in err
 
 
-@pytest.mark.slow
 def test_an_arm_that_is_not_settled_is_asked_for(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

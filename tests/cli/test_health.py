@@ -124,7 +124,6 @@ def test_every_output_of_a_report_carries_what_was_overridden(
     assert "effort-sign" in pl.read_parquet_metadata(out / "estimates.parquet")["vftcli"]
 
 
-@pytest.mark.slow
 def test_an_open_effort_heals_the_log(turned: str, run: Run, tmp_path: Path) -> None:
     words = ("--observer", "gmo", "--set", "log.effort=auto", "-o", "out", "--json")
     code, out, err = run("estimate", turned, *UR5, *words)

@@ -125,7 +125,6 @@ def test_the_same_bad_value_is_refused_with_the_same_line(
     assert len(set(lines.values())) == 1, lines
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_bad_number_of_an_observer_is_refused(
     command: str, complaint: Callable[..., str]
@@ -192,7 +191,6 @@ OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--dist", "
 """Options in documents that are those of pip, ros2 bag, Dask, our benchmark, or of all programs."""
 
 
-@pytest.mark.slow
 def test_documents_name_every_option_and_no_other() -> None:
     files = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
     # The one names options that are gone, the other those of the developers' tools.

@@ -54,7 +54,6 @@ def test_the_first_is_said_on_the_terminal_and_in_the_record(
     assert "episode-taken" in {reported["code"] for reported in record["warnings"]}
 
 
-@pytest.mark.slow
 def test_contacts_and_convert_say_it_too(
     episodes: Path, tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:
@@ -64,7 +63,6 @@ def test_contacts_and_convert_say_it_too(
     assert "episode 0 of 2: --episode K|all" in capsys.readouterr().err
 
 
-@pytest.mark.slow
 def test_all_are_logs_of_their_own(episodes: Path, monkeypatch: Any, capsys: Any) -> None:
     words = ("contacts", episodes, "--robot", "ur5", "--episode", "all", "--anyway", "--json")
     assert run(monkeypatch, *words) == 0
@@ -81,7 +79,6 @@ def test_a_command_of_one_log_takes_no_all(episodes: Path, monkeypatch: Any, cap
     assert "name one: --episode K" in capsys.readouterr().err
 
 
-@pytest.mark.slow
 def test_inspect_describes_the_left_arm_and_names_both(
     tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:

@@ -193,7 +193,6 @@ def test_no_line_is_wider_than_the_terminal_or_printed_into_the_line(
         assert len(line) <= width or line.lstrip().startswith("vftcli ") or longest > width // 2
 
 
-@pytest.mark.slow
 def test_what_is_for_programs_is_printed_as_it_is() -> None:
     lines = on_a_terminal("compare", LOG, *GMO, "--reference", "zero", "--json", "-q")
     assert json.loads("\n".join(lines))["rows"][0]["observer"] == "gmo"

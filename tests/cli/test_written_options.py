@@ -76,7 +76,6 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     assert "note: vftcli.toml" not in err
 
 
-@pytest.mark.slow
 def test_an_effort_that_is_not_what_it_is_called_is_written(run, here: Path, samples: Path) -> None:
     log = samples / "reach" / "ros2_ur_effort_torque"
     assert run("inspect", log, "--robot", "ur5", "-o", NAME)[0] == 0
@@ -84,7 +83,6 @@ def test_an_effort_that_is_not_what_it_is_called_is_written(run, here: Path, sam
     assert run("compare", log, "--reference", "zero", "--interval", "0.5:3.9")[0] == 0
 
 
-@pytest.mark.slow
 def test_what_is_not_settled_is_there_to_be_taken(run, here: Path, logs: Path) -> None:
     code, _, err = run("inspect", logs / "libfranka_sim" / "pushes.csv.gz", "-o", NAME)
     assert (code, options(here)) == (0, {})

@@ -61,7 +61,6 @@ def test_a_bearing_and_two_knocks_are_three_contacts(listed: Lister) -> None:
     assert not scored.false
 
 
-@pytest.mark.slow
 def test_free_cycles_are_found_where_nothing_is_said(listed: Lister) -> None:
     found = listed("ur5_circle.csv", "ur5")
     assert found.basis == "free motion"
@@ -169,7 +168,6 @@ def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
     assert row.vendor_force == pytest.approx(2.8 * 9.81)
 
 
-@pytest.mark.slow
 def test_a_payload_nobody_reported_is_one_load(logs: Path) -> None:
     free = ur10e(logs, "free_14harm.csv")
     found = list_contacts(motion(ur10e(logs, "load_14harm.csv"), "ur10e", run=free))
@@ -198,7 +196,6 @@ def ranges(found: ContactList) -> list[tuple[float, float]]:
     return [(size - band, size + band) for size, band in sizes]
 
 
-@pytest.mark.slow
 def test_free_motion_and_none_give_one_answer(logs: Path) -> None:
     free, push = ur10e(logs, "free_14harm.csv"), ur10e(logs, "push_pose.csv")
     answers = [list_contacts(motion(push, "ur10e", run=run)) for run in (None, free)]
@@ -318,7 +315,6 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     assert row.wrench[2] < 0.0
 
 
-@pytest.mark.slow
 def test_a_load_that_is_struck_is_listed_as_a_whole(listed: Lister) -> None:
     """The bearing hangs from 4 s to 16 s; only what strikes it in the meantime changes quickly."""
     first = listed("panda_bearing.csv", "panda", "0.3:3.9").contacts[0]
@@ -326,7 +322,6 @@ def test_a_load_that_is_struck_is_listed_as_a_whole(listed: Lister) -> None:
     assert first.stop > 16.0
 
 
-@pytest.mark.slow
 def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
     """Every second sample of a log at 125 Hz."""
     whole = read(FIXTURES / "ur5_taps_ur_rtde.csv")
@@ -337,7 +332,6 @@ def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
     assert not {remark.code for row in fast.contacts for remark in row.remarks}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["press_1", "press_4"])
 def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs: Path, name: str) -> None:
     """Pressed for most of the log, with free motion before and behind."""

@@ -70,7 +70,6 @@ def test_the_vendor_s_residual_tells_a_panda_from_an_fr3() -> None:
     assert codes(arm_findings(log, PANDA)) == []
 
 
-@pytest.mark.slow
 def test_a_user_s_own_file_may_differ_from_its_maker_s_model(tmp_path: Path) -> None:
     """An arm whose elbow is heavier than its maker says, identified: 3 % beside the targets."""
     mine = tmp_path / "mine.toml"
@@ -121,7 +120,6 @@ def test_loads_are_reported_with_their_mass_and_mounted_ones_are_not() -> None:
     assert (finding.code, finding.level) == ("light-load", "caution")
 
 
-@pytest.mark.slow
 def test_a_declared_payload_that_is_not_mounted_is_reported_once() -> None:
     log = replace(moving(load=2.8), payload_mass=2.8)
     finding = only(log, UR10E)
@@ -145,7 +143,6 @@ def test_a_still_arm_is_not_checked_and_that_is_said() -> None:
     assert finding.values["least_Nm"] == 10.0
 
 
-@pytest.mark.slow
 def test_a_vendor_torque_of_the_other_sign_is_reported() -> None:
     """Pushes of 5 N·m on every joint, which the drives carry and the vendor sees."""
     log = moving("panda")

@@ -28,7 +28,6 @@ def test_warnings_go_before_facts() -> None:
     assert len(warnings) == levels.count("warning")
 
 
-@pytest.mark.slow
 def test_one_cause_is_said_once() -> None:
     """Neither no robot that fits nor a load beside a turned sign."""
     log = moving()

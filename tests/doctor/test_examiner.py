@@ -42,7 +42,6 @@ def test_a_log_is_examined_once_for_an_arm() -> None:
     assert examiner.examinations[0] is first
 
 
-@pytest.mark.slow
 def test_a_turned_sign_is_refused_with_its_remedy_unless_it_is_wanted_anyway() -> None:
     log = turned(excited())
     with pytest.raises(ExaminationError, match="effort-sign") as error:
@@ -88,7 +87,6 @@ def test_the_payload_of_one_log_is_not_that_of_another() -> None:
     assert (first.payload.mass, second.payload.mass) == (1.5, 2.0)
 
 
-@pytest.mark.slow
 def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
     """The sign that was turned is turned back; a log that says the truth stays as it is."""
     examiner, log = Examiner(), excited()
@@ -101,7 +99,6 @@ def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
     assert not Examiner().examine(healed, UR5E).refusals()
 
 
-@pytest.mark.slow
 def test_the_unit_of_the_effort_is_what_the_last_tenth_of_a_long_log_says(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

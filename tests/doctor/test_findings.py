@@ -90,14 +90,12 @@ def test_effort_that_is_current_is_reported() -> None:
     assert "--set log.effort=current" in said.remedy
 
 
-@pytest.mark.slow
 def test_milliamperes_are_reported() -> None:
     log = moving("ur5e")
     assert log.current is not None
     assert "milliamperes" in names(altered(log, current=1000 * log.current))
 
 
-@pytest.mark.slow
 def test_units_and_signs_of_velocity() -> None:
     log = moving("panda")
     assert log.dq is not None
@@ -145,7 +143,6 @@ def test_saturation_and_still_joints() -> None:
     assert "still-joints" in names(altered(log, q=q))
 
 
-@pytest.mark.slow
 def test_clock_findings() -> None:
     log = moving("ur5")
     jitter = log.t + np.random.default_rng(1).uniform(0, 2e-3, log.samples)

@@ -43,7 +43,6 @@ def test_rows_keep_their_place_in_the_sound_log(swinging: Table) -> None:
         assert np.diff(made.t).max() < 0.011  # the clock shows neither
 
 
-@pytest.mark.slow
 def test_what_a_fault_costs_is_measured_at_the_same_samples(logs: Path, tmp_path: Path) -> None:
     base = span_log("ur10e", logs)
     # Six seconds of it are enough for both observers.

@@ -92,7 +92,6 @@ def test_another_small_motion_is_neither_slower_nor_on_another_clock() -> None:
         align(small, still)
 
 
-@pytest.mark.slow
 def test_other_trajectories_are_refused() -> None:
     with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
         align(wandering(seed=3), wandering(seed=4))

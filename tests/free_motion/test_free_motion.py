@@ -98,7 +98,6 @@ def test_a_cycle_that_is_not_there_is_refused(circle: Run) -> None:
         _ = motion_of(circle, choice=FreeChoice(cycles=(7,))).part
 
 
-@pytest.mark.slow
 def test_each_run_is_a_piece(part_of: Make, circle: Run) -> None:
     log = Run(recording=part_of(circle.recording, 8.0, 14.0), robot=ROBOT)
     same, more = part_of(circle.recording, 0.0, 4.0), part_of(circle.recording, 4.0, 8.0)

@@ -66,7 +66,6 @@ def test_a_push_is_left_out_of_the_fit(recording):
     np.testing.assert_allclose(fits[1].fit.values[:2], clean.fits[1].fit.values[:2], rtol=0.05)
 
 
-@pytest.mark.slow
 def test_the_dry_friction_of_a_fit_is_what_a_joint_may_stick_with(data):
     fits = fit_frictions(data)
     # noise of .1 N·m; Coulomb torque and the smoothing of the sign share the reversals
@@ -175,7 +174,6 @@ def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
             assert remarks[0].values["mass_kg"] == pytest.approx(mass, rel=0.02)
 
 
-@pytest.mark.slow
 def test_strict_methods_refuse_what_others_remark_on(recording):
     turned = replace(recording, current=-recording.current)
     data = prepare_training([turned], UR5)

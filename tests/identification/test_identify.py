@@ -66,7 +66,6 @@ def rubbed(robot, model="coulomb-viscous-load", **values):
 UR5 = load_robot("ur5")
 
 
-@pytest.mark.slow
 def test_friction_and_rotor_come_back():
     rotor = UR5.chain.rotor_inertia * 1.3
     # 8 − 2·1·v is above zero up to the joints' π rad/s: the parabola may compete
@@ -86,7 +85,6 @@ def test_friction_and_rotor_come_back():
     )
 
 
-@pytest.mark.slow
 def test_a_plain_model_is_chosen_where_nothing_more_is_there():
     true = rubbed(UR5, "coulomb-viscous-offset")
     found = identify([log(true)], UR5, Task(method="friction"))
@@ -111,7 +109,6 @@ def test_a_fall_beside_the_links_is_replaced_by_the_joints_own_fit(monkeypatch):
             assert one.parameters[key] == pytest.approx(other.parameters[key], rel=0.05)
 
 
-@pytest.mark.slow
 def test_a_stribeck_effect_is_seen():
     true = rubbed(UR5, "coulomb-viscous-stribeck", stribeck=4.0, stribeck_velocity=0.1)
     found = identify([log(true, noise=0.05)], UR5, Task(method="friction")).robot
@@ -121,7 +118,6 @@ def test_a_stribeck_effect_is_seen():
     assert values["stribeck_velocity"] == 0.1  # one of the velocities that compete
 
 
-@pytest.mark.slow
 def test_drive_constants_come_back():
     true = rubbed(UR5, "coulomb-viscous-offset")
     true = replace(true, torque_constant=UR5.torque_constant * 1.1)
@@ -149,7 +145,6 @@ def test_links_are_identified_for_another_trajectory():
     assert len(found.base) == 40 + 6 * 3
 
 
-@pytest.mark.slow
 def test_the_payload_comes_back_from_a_pair_in_either_order():
     true = rubbed(UR5, "coulomb-viscous-offset")
     load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
@@ -298,14 +293,12 @@ def test_missing_targets_are_reported():
         identify([log(UR5)], UR5, Task(method="targets"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "error"), [("panda", RobotError), ("ur10e", IdentificationError)])
 def test_the_wrong_robot_is_refused(name, error):
     with pytest.raises(error, match="another"):
         identify([log(rubbed(UR5))], load_robot(name), Task(method="friction"))
 
 
-@pytest.mark.slow
 def test_turned_currents_are_refused():
     good = log(rubbed(UR5))
     with pytest.raises(IdentificationError, match="another sign or unit"):
@@ -332,14 +325,12 @@ def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
     assert found.robot.friction[4].parameters["coulomb"] == pytest.approx(5.0, rel=0.05)
 
 
-@pytest.mark.slow
 def test_turned_velocities_are_refused():
     good = log(rubbed(UR5))
     with pytest.raises(IdentificationError, match="it would push"):
         identify([replace(good, dq=-good.dq)], UR5, Task(method="friction"))
 
 
-@pytest.mark.slow
 def test_an_unknown_load_is_suspected():
     load = Payload(mass=2.5, com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
     with pytest.raises(IdentificationError, match=r"kg on the flange .* --method payload"):
@@ -359,7 +350,6 @@ def test_tasks_that_make_no_sense_are_refused(options, match):
         Task(**options)
 
 
-@pytest.mark.slow
 def test_the_controllers_own_model_is_read_off():
     """A controller with other K, rotor and friction than the profile, and a hand on the arm."""
     K = UR5.torque_constant * [1.05, 0.95, 1.0, 1.1, 1.0, 1.0]
@@ -410,7 +400,6 @@ def test_two_logs_of_one_file_name_stay_two_logs():
     assert found.residuals["log_index"].unique().sort().to_list() == [1, 2]
 
 
-@pytest.mark.slow
 def test_a_pair_of_one_file_name_is_a_pair():
     """The loaded log is known by its content, not by its name."""
     true = rubbed(UR5, "coulomb-viscous-offset")
@@ -429,7 +418,6 @@ def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():
         identify([free], UR5, Task(method="payload"), free=loaded)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", ["friction", "base"])
 def test_a_simulators_arm_has_no_friction(method):
     """Rotors and links are fitted, friction neither competes nor stands in the file."""
@@ -448,7 +436,6 @@ def test_a_simulators_arm_has_no_friction(method):
         np.testing.assert_allclose(found.robot.chain.rotor_inertia, rotor, rtol=0.05)
 
 
-@pytest.mark.slow
 def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
     """Without friction: the rotor is before the gear, the links are the profile's."""
     robot = replace(UR5, torque_source="link_torque", torque_constant=None).without_friction()

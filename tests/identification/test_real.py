@@ -96,7 +96,6 @@ def test_other_free_logs_show_no_contact(ur10e, name):
     assert "suspected-contacts" not in codes(found)
 
 
-@pytest.mark.slow
 def test_ur10e_targets_are_the_controllers_own(ur10e):
     found = identify(
         [ur10e("jointwise_2"), ur10e("free_14harm")], load_robot("ur10e"), Task(method="targets")
@@ -124,7 +123,6 @@ def test_ur10e_targets_are_the_controllers_own(ur10e):
     np.testing.assert_allclose(found_points, points, rtol=0.02)
 
 
-@pytest.mark.slow
 def test_ur10e_payload_of_the_pair(ur10e):
     pair = [ur10e("free_14harm"), ur10e("load_14harm")]
     found = identify(pair, load_robot("ur10e"), Task(method="payload"))
@@ -141,7 +139,6 @@ def weighed(found):
     return rows["mass"], rows["com_z"]
 
 
-@pytest.mark.slow
 def test_ur10e_payload_of_one_motion(ur10e):
     asked = Task(method="payload")
     found = identify([ur10e("load_14harm")], load_robot("ur10e"), asked)

@@ -87,7 +87,6 @@ def test_the_equation_of_a_joint_is_torque_less_rigid_body(data):
     assert data_of_joint(behind_gear, 1, constant=False).fixed.shape[1] == 0
 
 
-@pytest.mark.slow
 def test_friction_and_rotor_of_every_joint_are_found(data):
     fits = fit_frictions(data)
     for j, found in enumerate(fits):
@@ -101,7 +100,6 @@ def test_friction_and_rotor_of_every_joint_are_found(data):
     assert [x.shape for x in left] == [log.tau.shape for log in data.logs]
 
 
-@pytest.mark.slow
 def test_residuals_are_cut_apart_log_by_log(recording):
     logs = [recording, recording.between(0.0, 7.0)]
     data = prepare_training(logs, UR5)
@@ -178,7 +176,6 @@ def test_a_current_that_falls_with_the_torque_is_refused(data):
         by_constant(data, 0, np.array([0.05]), sd)
 
 
-@pytest.mark.slow
 def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
     """Currents of an arm whose K is 1.05 × the profile's: all torques are 1.05 × what is read."""
     log = replace(recording, current=recording.current / 1.05)
@@ -192,7 +189,6 @@ def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
     assert found.robot.torque_constant[1] == pytest.approx(K[2].value, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_the_whole_arm_starts_from_the_profile_and_the_fits(data):
     fits = fit_frictions(data)
     layout, start = initial_columns(data, fits)
@@ -206,7 +202,6 @@ def test_the_whole_arm_starts_from_the_profile_and_the_fits(data):
     np.testing.assert_allclose(start[60], UR5.chain.rotor_inertia[0])
 
 
-@pytest.mark.slow
 def test_a_vector_becomes_a_robot_without_its_payload(data):
     load = Payload(mass=1.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
     layout, start = initial_columns(data, fit_frictions(data))
@@ -235,7 +230,6 @@ def test_the_whole_arm_says_how_it_was_made(data):
     assert np.sqrt(np.mean(change[:, 1:3] ** 2)) < 0.2
 
 
-@pytest.mark.slow
 def test_too_short_logs_are_refused(data):
     layout, start = initial_columns(data, fit_frictions(data))
     few = np.zeros_like(data.logs[0].weights)
@@ -246,7 +240,6 @@ def test_too_short_logs_are_refused(data):
     assert stack(layout, [replace(data.logs[0], weights=few)], start).layout is layout
 
 
-@pytest.mark.slow
 def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, monkeypatch):
     """The log's own arm is its profile: what is fitted predicts as well as the truth, not worse."""
     fits = fit_frictions(data)

@@ -100,7 +100,10 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["batch/**/*.py"],
         ["tests/batch", "tests/cli/test_batch.py", "tests/cli/test_annotate.py"],
     ),
-    "cli": (["cli/*.py", "*.py"], ["tests/cli", "tests/test_pipeline.py"]),
+    "cli": (
+        ["cli/*.py", "*.py"],
+        ["tests/cli", "tests/test_pipeline.py", "tests/test_notebook.py"],
+    ),
 }
 """Room → files that are mutated, and tests that should notice, nearest first.
 

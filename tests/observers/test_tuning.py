@@ -108,7 +108,6 @@ def test_goals_that_are_none(goal: str, threshold: str | None) -> None:
         parse_goal(goal, threshold)
 
 
-@pytest.mark.slow
 def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
     """identify writes it, --gains takes it: GMO then errs as little as was promised."""
     gains, runner = tmp_path / "gains.toml", CliRunner()

@@ -138,7 +138,6 @@ def tuned(spectra: Spectra) -> tuple[Tuned, ...]:
     return tune_all(spectra, parse_goal("auto"))
 
 
-@pytest.mark.slow
 def test_spectra_bear_every_response_and_curves_what_was_chosen(
     spectra: Spectra, tuned: tuple[Tuned, ...]
 ) -> None:

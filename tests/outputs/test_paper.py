@@ -54,7 +54,6 @@ def test_the_same_figure_has_the_same_bytes_whatever_its_user_prefers(
         assert not re.search(rb"20\d\d-\d\d-\d\dT", content)
 
 
-@pytest.mark.slow
 def test_a_pdf_has_the_widths_of_the_ieee_and_its_fonts_embedded_as_truetype(
     tmp_path: Path,
 ) -> None:
@@ -71,7 +70,6 @@ def test_a_pdf_has_the_widths_of_the_ieee_and_its_fonts_embedded_as_truetype(
         assert b"/Type3" not in found[name]
 
 
-@pytest.mark.slow
 def test_a_png_has_600_dots_an_inch_and_an_svg_needs_no_font(tmp_path: Path) -> None:
     """3.5 in at 600 dots are 2100; the width of a PNG is in bytes 16 to 19."""
     picture = written(tmp_path / "png", "png")["a-single.png"]
@@ -136,7 +134,6 @@ def drawn_lines(width: float, *words: Any, **more: Any) -> Any:
     return figure
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("width", "rows"), [(3.5, 3), (7.16, 2)])
 def test_every_axis_has_its_unit_and_rows_share_one_below(width: float, rows: int) -> None:
     figure = drawn_lines(width, plots_of(chart()))
@@ -147,7 +144,6 @@ def test_every_axis_has_its_unit_and_rows_share_one_below(width: float, rows: in
     assert below == [""] * (6 - columns) + ["Time (s)"] * columns
 
 
-@pytest.mark.slow
 def test_lines_are_reported_apart_without_colour() -> None:
     """By dashes as they are drawn, or, solid both, by width and lightness."""
     from matplotlib.colors import to_rgb
@@ -163,7 +159,6 @@ def test_lines_are_reported_apart_without_colour() -> None:
             assert one.get_linewidth() != other.get_linewidth()
 
 
-@pytest.mark.slow
 def test_the_legend_names_a_ribbon_where_no_contact_is_listed() -> None:
     first = chart().series[1]
     quiet = chart(series=(first._replace(quiet=T < 5.0),))
@@ -173,7 +168,6 @@ def test_the_legend_names_a_ribbon_where_no_contact_is_listed() -> None:
         assert texts == (names if isinstance(names, list) else ["line 0", "95 % band"])
 
 
-@pytest.mark.slow
 def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:
     figure = drawn_lines(
         3.5, plots_of(chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor"))
@@ -208,7 +202,6 @@ def test_a_legend_names_lines_bands_and_contacts_but_no_line_alone() -> None:
     assert not drawn_lines(7.16, plots_of(chart(series=made.series[2:3]))).legends
 
 
-@pytest.mark.slow
 def test_contacts_are_numbered_above_the_first_row_where_there_is_room() -> None:
     figure = drawn_lines(7.16, plots_of(chart()), numbers={1: 1.0, 2: 1.1, 3: 5.0})
     assert [[text.get_text() for text in axes.texts] for axes in figure.axes] == [
@@ -231,7 +224,6 @@ def test_frequencies_stand_on_a_logarithmic_axis_without_powers() -> None:
     assert [shown(value) for value in (0.01, 1.0, 100.0)] == ["0.01", "1", "100"]
 
 
-@pytest.mark.slow
 def test_a_second_chart_has_its_axis_to_the_right_named_at_the_end_of_a_row() -> None:
     over = chart(title="|H|", units=("dB",) * 6)
     figure = drawn_lines(7.16, plots_of(chart(), over))
@@ -252,7 +244,6 @@ def test_marks_stand_where_they_are_reported_each_shape_its_own() -> None:
     ]
 
 
-@pytest.mark.slow
 def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
     """Rows stay as close as without it: the numbers below take no room of their own."""
     values = np.zeros((len(T), 7))

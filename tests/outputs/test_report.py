@@ -88,7 +88,6 @@ def test_of_several_logs_one_that_is_left_is_written_as_one_of_several(
         write_report(tmp_path, [touched], command="")
 
 
-@pytest.mark.slow
 def test_several_logs_get_a_folder_each_and_an_index(
     analysis: Analysis, as_if: Callable, tmp_path: Path
 ) -> None:

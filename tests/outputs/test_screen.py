@@ -10,6 +10,7 @@ from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ForceCourse
+from vftcli.outputs.believability import Ground
 from vftcli.outputs.error_tables import blocks
 from vftcli.outputs.screen import (
     FILE_LINES,
@@ -17,6 +18,7 @@ from vftcli.outputs.screen import (
     PLAIN,
     Canvas,
     against,
+    belief_lines,
     column_peaks,
     facts,
     force_bars,
@@ -46,7 +48,6 @@ def listed(analysis: Analysis, count: int) -> Analysis:
     return replace(analysis, contacts=contact_list(*many(count), remarks=()))
 
 
-@pytest.mark.slow
 def test_the_answer_stands_first_and_everything_on_one_screen(analysis: Analysis) -> None:
     text = log_screen(listed(analysis, 4), CANVAS)
     lines = text.splitlines()
@@ -172,6 +173,13 @@ def test_several_logs_are_a_line_each_then_the_worst_three(
     assert lines[7].split() == ["bad.csv", "✗", "left", "out"]
     believed = text.partition("Can it be believed?")[2]
     assert believed.strip().startswith("✗ log2.csv: load")
+
+
+def test_where_room_is_short_good_grounds_share_a_line() -> None:
+    log, model = (Ground("good", name, f"{name} is sound") for name in ("log", "model"))
+    assert belief_lines([log, model], CANVAS, 0)[1:] == [f"  {log.mark} log · model"]
+    assert belief_lines([log], CANVAS, 0)[1].endswith("log is sound")
+    assert len(belief_lines([log, model], CANVAS, 1)) == 3
 
 
 def test_a_hundred_logs_are_one_screen(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]

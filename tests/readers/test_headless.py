@@ -112,7 +112,6 @@ def test_an_open_table_is_refused_with_the_lines_that_fit(tmp_path: Path) -> Non
         read(path)
 
 
-@pytest.mark.slow
 def test_real_tables_are_read_as_their_description_says(logs: Path) -> None:
     files = sorted((logs / "ur10e").iterdir())
     assert len(files) == 11

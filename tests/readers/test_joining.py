@@ -89,7 +89,6 @@ def test_same_in_parts(tmp_path: Path, ending: str) -> None:
         np.testing.assert_array_equal(np.concatenate([block.q for block in blocks]), whole.q)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5_circle.csv"])
 def test_same_of_fixtures(name: str) -> None:
     """The fixtures' own formats, their payload and clocks."""

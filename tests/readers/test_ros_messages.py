@@ -49,7 +49,6 @@ def test_a_schema_embeds_every_type_it_needs(kind):
     assert {name for name in needed if "/" in name} <= {type_name(name) for name in parsed}
 
 
-@pytest.mark.slow
 @given(
     names=st.lists(st.text(max_size=9).filter(lambda text: "\0" not in text), max_size=8),
     joints=st.integers(0, 8),

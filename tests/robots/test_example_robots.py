@@ -152,7 +152,6 @@ def test_an_empty_robot_is_said_to_be_empty() -> None:
         load_robot(files()["ur_description/urdf/ur3"])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "count"),
     [

@@ -107,7 +107,6 @@ def test_current_for_a_robot_without_drive_constants_is_refused() -> None:
         dynamics_terms(recording, load_robot("panda"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [1, 150, 399])
 def test_blocks_of_a_log_have_the_whole_log_s_terms(size: int) -> None:
     """To the last bit, friction that remembers the motion included."""

@@ -28,7 +28,6 @@ def _xacro_installed() -> None:
     pytest.importorskip("xacrodoc", reason="the extra vftcli[xacro] is not installed")
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("_xacro_installed")
 def test_a_xacro_is_expanded_with_its_arguments(tmp_path: Path) -> None:
     path = written(tmp_path, xacro(), "arm.urdf.xacro")

@@ -52,7 +52,6 @@ def test_an_uneven_clock_and_unknown_samples_do_not_move_an_offset() -> None:
     assert time_offset(t, late, waves(t)).lag == pytest.approx(0.05, abs=2e-3)
 
 
-@pytest.mark.slow
 @given(SEEDS)
 def test_the_closest_lag_is_that_of_a_plain_search(seed: int) -> None:
     rng = np.random.default_rng(seed)

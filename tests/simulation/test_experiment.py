@@ -81,7 +81,6 @@ def test_same_seed_same_bytes_another_seed_another_log(tmp_path: Path) -> None:
     assert contents[0][1] != contents[2][1]
 
 
-@pytest.mark.slow
 def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
     """τ_ext = Σ Jᵢᵀ wᵢ from the truth's own columns, through Pinocchio's frame Jacobians."""
     truth, samples, model = many.truth, many.samples, load_robot("panda").model
@@ -103,7 +102,6 @@ def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
     np.testing.assert_array_equal(truth.walks["drift"][before], 0.0)
 
 
-@pytest.mark.slow
 def test_truth_closes_the_equation_of_motion() -> None:
     """M q̈ + C q̇ + g + τ_f = τ + τ_ext with the true arm, from the truth's pieces alone."""
     scenario = load_scenario("ur5-circle", ["duration=6.0", "sensing.torque=instant"])
@@ -184,7 +182,6 @@ def test_switching_one_mismatch_off_leaves_the_others() -> None:
     assert np.any(both.friction.coulomb != other.friction.coulomb)
 
 
-@pytest.mark.slow
 def test_stepping_the_arm_oneself_gives_the_same_log() -> None:
     scenario = load_scenario("ur5-circle", ["duration=0.4"])
     arm, reference = prepare(scenario, 3)
@@ -208,7 +205,6 @@ def test_controller_in_the_loop_reads_what_it_needs() -> None:
     assert np.all(np.abs(arm.mean_torque(0.008) - weight) < 10.0)
 
 
-@pytest.mark.slow
 def test_pair_is_one_motion_with_and_without_the_payload() -> None:
     loaded, free = simulate_pair(load_scenario("payload-pair", ["duration=2.0"]), 1)
     np.testing.assert_array_equal(loaded.samples.target_q, free.samples.target_q)

@@ -72,7 +72,6 @@ def test_readers_read_back_what_is_written(
     assert compared >= 3
 
 
-@pytest.mark.slow
 def test_full_recipe_has_the_columns_of_the_client(ur5: Simulation, tmp_path: Path) -> None:
     save({tmp_path / "log.csv": ur5})
     text = (tmp_path / "log.csv").read_bytes()
@@ -83,7 +82,6 @@ def test_full_recipe_has_the_columns_of_the_client(ur5: Simulation, tmp_path: Pa
     assert all(len(line.split(b" ")) == 119 for line in text.split(b"\r\n")[:-1])
 
 
-@pytest.mark.slow
 def test_libfranka_log_has_its_columns_and_sign(panda: Simulation, tmp_path: Path) -> None:
     save({tmp_path / "log.csv": panda})
     lines = (tmp_path / "log.csv").read_text().splitlines()
@@ -146,7 +144,6 @@ def test_a_bag_that_a_killed_run_left_is_made_anew(ur5: Simulation, tmp_path: Pa
         save({bag: ur5}, "rosbag2", force=True)
 
 
-@pytest.mark.slow
 def test_a_robot_logs_only_in_its_own_formats(
     ur5: Simulation, panda: Simulation, tmp_path: Path
 ) -> None:

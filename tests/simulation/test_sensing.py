@@ -51,7 +51,6 @@ def test_positions_are_quantised() -> None:
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
 
 
-@pytest.mark.slow
 def test_clock_drift_stretches_the_period_on_the_log_clock() -> None:
     run = circle("duration=8.0", "sensing.clock_drift=0.01", *CLEAN, "contacts=[]")
     t, q = run.recording.t, run.recording.q[:, 0]

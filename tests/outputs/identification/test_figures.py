@@ -9,7 +9,6 @@ from vftcli.outputs.paper import WIDTHS, paper_style
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
 
-@pytest.mark.slow
 def test_torque_measured_and_predicted_and_what_is_left(found: Any) -> None:
     identified, _ = found
     drawings = identification_figures(identified)

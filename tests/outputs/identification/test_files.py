@@ -12,7 +12,6 @@ from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError
 
 
-@pytest.mark.slow
 def test_all_files_are_written_and_the_robot_loads(found, tmp_path):
     result, log = found
     path = tmp_path / "mine.toml"

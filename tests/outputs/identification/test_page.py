@@ -5,7 +5,6 @@ import re
 from html.parser import HTMLParser
 
 import numpy as np
-import pytest
 
 from vftcli.doctor import examine
 from vftcli.outputs.identification import (
@@ -35,7 +34,6 @@ class Balance(HTMLParser):
             assert self.open.pop() == tag
 
 
-@pytest.mark.slow
 def test_the_page_is_whole_and_loads_nothing(found):
     result, log = found
     page = render_identification(

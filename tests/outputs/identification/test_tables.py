@@ -12,7 +12,6 @@ from vftcli.outputs.identification import (
 )
 
 
-@pytest.mark.slow
 def test_one_row_a_log_role_and_model_with_its_mean(found):
     result, log = found
     lines = terminal(residual_grid(result)).splitlines()
@@ -23,7 +22,6 @@ def test_one_row_a_log_role_and_model_with_its_mean(found):
     assert log.name in lines[1]
 
 
-@pytest.mark.slow
 def test_two_logs_of_one_label_are_two_rows(found):
     """They were one row of twelve numbers for six joints."""
     result, _ = found
@@ -34,7 +32,6 @@ def test_two_logs_of_one_label_are_two_rows(found):
     assert {len(row) for row in rows} == {8}
 
 
-@pytest.mark.slow
 def test_what_the_log_does_not_determine_is_said(found):
     result, _ = found
     doubted = result.parameters.with_columns(determined=pl.lit(False))
