@@ -1,16 +1,28 @@
 """What is scored of one log: every row beside plain NumPy, the worst span, a carried weight."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from vftcli.evaluation.scores import LAGS
+from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.outside import ListedRow
 from vftcli.reproduction.manifest import BenchmarkLog
-from vftcli.reproduction.scoring import Answer, KnownTruth, rows_of, weighed, worst_of
+from vftcli.reproduction.scoring import (
+    Answer,
+    KnownTruth,
+    ScoreTask,
+    rows_of,
+    truth_of,
+    weighed,
+    worst_of,
+)
+from vftcli.robots import load_robot
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording, Source
 
 LOG = BenchmarkLog(
     name="a",
@@ -137,3 +149,21 @@ def test_a_weight_is_of_what_is_answered() -> None:
     assert found["mean_N"] == pytest.approx((20 + 30 + 80) / 4)
     assert found["rms_error_N"] == pytest.approx(np.sqrt((49 + 9 + 2 * 169) / 4))
     assert found["answered"] == pytest.approx(4 / 5)
+
+
+def test_a_torque_alone_shows_its_contacts(tmp_path: Path) -> None:
+    """Columns by the entry's words; from the sample above .05 N·m to the one below .025."""
+    t = np.arange(0.0, 4.0, 0.01)
+    tau = np.zeros((len(t), 6))
+    tau[100:150, 4] = -0.3
+    tau[200:250, 2] = 0.04  # below where one starts
+    path = tmp_path / "truth.csv"
+    np.savetxt(path, np.column_stack([t, tau]), delimiter=",")
+    log = replace(LOG, truth="torque", truth_columns="t,tau_ext:6")
+    task = ScoreTask(tmp_path, "", log, "alone", AnalysisChoice(), path, path, None, False)
+    source = Source(format="x", clock="x", rows=len(t), duplicates=0, t0=0.0)
+    recording = Recording(t=t, q=np.zeros(tau.shape), source=source)
+    truth = truth_of(task, recording, load_robot("ur5"))
+    assert truth.tau == pytest.approx(tau)
+    assert [x[:2] for x in truth.contacts] == [pytest.approx((1.0, 1.5))]
+    assert truth.wrench is None
