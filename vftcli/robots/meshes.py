@@ -112,7 +112,7 @@ def read_mesh(mesh: Mesh) -> Array:
     """
     try:
         found = CORNERS[Path(mesh.name).suffix.lower()]((mesh.file or Path()).read_bytes())
-    except (OSError, LookupError, ValueError, TypeError, AttributeError, SyntaxError) as error:
+    except (OSError, LookupError, ValueError, SyntaxError) as error:
         raise RobotError(f"{mesh.name}: cannot be read as a mesh ({error})") from None
     if not len(found) or not (abs(found) < FARTHEST).all():
         raise RobotError(f"{mesh.name}: holds no triangle, or a corner that is nowhere")
@@ -164,17 +164,16 @@ def dae_corners(contents: bytes) -> Array:
 
 def node_step(step: ET.Element) -> Array:
     """What an element of a DAE's node does to what is in it. (4, 4)"""
-    made = np.eye(4)
-    if step.tag in {"matrix", "translate", "rotate", "scale"}:
-        numbers = np.array((step.text or "").split(), dtype=float)
-        if step.tag == "matrix":
-            return numbers.reshape(4, 4)
-        if step.tag == "translate":
-            made[:3, 3] = numbers
-        elif step.tag == "scale":
-            made[:3, :3] = np.diag(numbers)
-        else:
-            made[:3, :3] = exp_matrix(numbers[:3] * np.radians(numbers[3]))
+    made, texts = np.eye(4), (step.text or "").split()
+    if step.tag == "matrix":
+        made = np.array(texts, dtype=float).reshape(4, 4)
+    elif step.tag == "translate":
+        made[:3, 3] = np.array(texts, dtype=float)
+    elif step.tag == "scale":
+        made[:3, :3] = np.diag(np.array(texts, dtype=float))
+    elif step.tag == "rotate":
+        *axis, degrees = map(float, texts)
+        made[:3, :3] = exp_matrix(np.radians(degrees) * np.array(axis))
     return made
 
 
