@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
 
+from vftcli.bias.whole_log import whole_log_bias
 from vftcli.contacts.free_statistics import (
     BLOCK,
     DRY_SHARE,
@@ -66,7 +67,8 @@ def test_another_log_is_a_free_part_whatever_its_motion() -> None:
 
 def test_what_repeats_nothing_has_no_free_part() -> None:
     short = read(FIXTURES / "ur5_taps_ur_rtde.csv")
-    assert free_statistics(motion(short, "ur5"), BLOCK) is None
+    bare = motion(short, "ur5")
+    assert free_statistics(bare, whole_log_bias(bare.log), BLOCK) is None
     with pytest.raises(ParameterError, match="free part"):
         free_part(motion(short, "ur5", "90:95"))
 
@@ -115,7 +117,8 @@ def test_resting_joints_are_given_their_stiction() -> None:
 
 
 def test_contacts_that_are_none_read_little() -> None:
-    free = free_statistics(motion(LOG, "ur5", "0.3:4"), BLOCK)
+    named = motion(LOG, "ur5", "0.3:4")
+    free = free_statistics(named, whole_log_bias(named.log), BLOCK)
     assert free is not None
     found = self_test(free, START)
     assert np.all(found.widening >= 1.0)
@@ -139,16 +142,18 @@ def test_a_load_in_the_free_part_is_no_noise() -> None:
     plain = motion(LOG, "ur5", "0.3:4")
     load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, moment_sd=np.zeros(3), share=0.5)
     run = plain.log.less(-load.torque(plain.log))
-    heavy = free_statistics(replace(plain, log=run), BLOCK)
-    light = free_statistics(plain, BLOCK)
+    bias = whole_log_bias(plain.log)
+    heavy = free_statistics(replace(plain, log=run), bias, BLOCK)
+    light = free_statistics(plain, bias, BLOCK)
     assert heavy is not None
     assert light is not None
     assert [remark.code for remark in heavy.remarks] == ["free-span", "free-part-loaded"]
     assert [remark.code for remark in light.remarks] == ["free-span"]
-    assert light.log is plain.log
+    known = bias.corrected(plain.log).terms.mu
+    np.testing.assert_array_equal(light.log.terms.mu, known)
     # What the weighing leaves is a share of the model's own error, 0.5 N·m here.
     assert np.all(heavy.noise.variance < 4.0 * light.noise.variance + 0.3)
-    left = heavy.log.terms.mu - plain.log.terms.mu
+    left = heavy.log.terms.mu - known
     assert np.abs(left).mean() < 0.2 * np.abs(load.torque(plain.log)).mean()
 
 

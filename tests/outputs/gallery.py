@@ -21,7 +21,7 @@ LARGEST = 60_000
 """Bytes of a picture."""
 WINDOW = (1440, 800)
 """Pixels of the Rerun viewer."""
-HARDEST = (11.1, 11.5)
+HARDEST = (4.9, 5.3)
 """Within the hardest contact of the recording that is shown. [s]"""
 
 

@@ -84,22 +84,28 @@ def block_length(t: Array) -> float:
     return max(BLOCK, SAMPLES * usual) if uneven else BLOCK
 
 
-def free_statistics(motion: FreeMotion, seconds: float) -> FreeStatistics | None:
+def free_statistics(
+    motion: FreeMotion, bias: WholeLogBias, seconds: float
+) -> FreeStatistics | None:
     """Statistics of a log's free motion by blocks of a length [s]; None if none is known."""
     part = free_part(motion)
     if part is None:
         return None
+    log = bias.corrected(motion.log)
+    pieces = tuple(
+        p._replace(run=log if p.run is motion.log else bias.of(p.run)) for p in part.pieces
+    )
     load = free_load(part.pieces)
     # An unknown load is no noise: contacts are found beside it.
-    pieces = tuple(p._replace(run=without_load(p.run, load)) for p in part.pieces)
-    found = noise_of(motion.log, pieces, seconds, known=True)
+    pieces = tuple(p._replace(run=without_load(p.run, load)) for p in pieces)
+    found = noise_of(log, pieces, seconds, known=True)
     if found is None:
         return None
     return FreeStatistics(
         noise=found[0],
         level=torque_level(pieces),
         own=part.own,
-        log=without_load(motion.log, load),
+        log=without_load(log, load),
         runs=tuple(p.run for p in pieces if p.run.recording is not motion.log.recording),
         free=pieces,
         pieces=found[1],

@@ -77,9 +77,8 @@ def list_contacts(
     log = motion.log
     check_log(log)
     seconds = block_length(log.t)
-    free = free_statistics(motion, seconds)
-    if free is None:
-        free = inferred_statistics(log, bias or whole_log_bias(log), seconds)
+    bias = bias or whole_log_bias(log)
+    free = free_statistics(motion, bias, seconds) or inferred_statistics(log, bias, seconds)
     if free is None:
         return without_list(log)
     found = by_smoother(free, seconds, proven=referenced or free.basis == "free motion")

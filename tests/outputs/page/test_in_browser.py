@@ -120,12 +120,14 @@ def test_it_opens_at_the_hardest_contact_and_says_one_number(
     opened: Callable, html: str, pushed: Analysis
 ) -> None:
     page = live(opened(html))
-    assert number(page) == "95 ± 9 N"
+    assert number(page) == "91 ± 7 N"
     assert number(page) in " ".join(page.locator("h1").inner_text().split())
     row = page.locator("tr[aria-current]")
     assert row.count() == 1
-    assert "95 ± 9 N" in row.inner_text()
-    assert page.locator("#clock").inner_text() == f"{pushed.contacts.contacts[5].peak:.2f} s"
+    assert "91 ± 7 N" in row.inner_text()
+    at = float(page.locator("#clock").inner_text().removesuffix(" s"))
+    # half a sample of 8 ms, and its last digit
+    assert at == pytest.approx(pushed.contacts.contacts[0].peak, abs=0.0091)
 
 
 @pytest.mark.slow
@@ -474,15 +476,16 @@ def test_the_slider_goes_by_samples_and_seconds_and_says_what_it_reads(
     page.keyboard.press("PageUp")
     assert page.evaluate("vftcli.clock.head") == pytest.approx(before + 1.008)
     page.wait_for_timeout(60)
-    assert re.match(r"12\.33 s, < 4 N\s+no contact", page.evaluate("slider.ariaValueText"))
+    assert re.match(r"6\.0\d s, < 3 N\s+no contact", page.evaluate("slider.ariaValueText"))
 
 
 def test_nothing_glides_where_motion_is_unwanted(opened: Callable, html: str) -> None:
     page = live(opened(html, reduced_motion="reduce"))
-    page.locator("#contact-1").click()
-    assert page.evaluate("[vftcli.clock.way, vftcli.clock.head]") == [None, pytest.approx(5.12)]
+    page.locator("#contact-6").click()
+    there = pytest.approx(11.316, abs=0.0041)  # half a sample
+    assert page.evaluate("[vftcli.clock.way, vftcli.clock.head]") == [None, there]
     page = live(opened(html))
-    page.locator("#contact-1").click()
+    page.locator("#contact-6").click()
     assert page.evaluate("vftcli.clock.way !== null")
 
 

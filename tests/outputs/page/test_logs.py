@@ -50,7 +50,7 @@ def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
     log, robot, span, contacts, hardest, least, error, state = overview_row(line)
     assert (log.text, robot, span) == ("ur5_circle.csv", "ur5", "20.0 s")
     assert log.html == '<a href="a%20b/index.html">ur5_circle.csv</a>'
-    assert (contacts, hardest, least) == ("12", "95 ± 9 N at 11.3 s", "4 N")
+    assert (contacts, hardest, least) == ("12", "91 ± 7 N at 5.1 s", "3 N")
     assert error == "0.273 N·m (best)"  # without J5, which rests
     assert state.text == f"{MARKS[line.standing]} {line.words}"
     bad = line._replace(standing="bad", words="load: heavy <b>", name="<i>")
@@ -82,7 +82,7 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
     title, words = index_headline([pushed, quiet, loaded])
     assert title == "Something pushed the arm in 1 of 3 logs."
     assert words == (
-        "Hardest in ur5_circle.csv: 95 ± 9 N at 11.3 s. "
+        "Hardest in ur5_circle.csv: 91 ± 7 N at 5.1 s. "
         "1 more bears a load, or a wrong payload or model."
     )
     title, words = index_headline([quiet, quiet])

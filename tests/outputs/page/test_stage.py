@@ -151,8 +151,8 @@ def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None
         unknown = f"{low:.0f}–{high:.0f} N"
         assert f"{row['force']} {row['band']}" == (unknown if contact.place_unknown else shown)
         assert row["weak"] == (contact.trust == "weak")
-    assert data["first"] == data["contacts"][5]["i"]
-    assert data["none"] == ("< 4 N", "", "no contact")
+    assert data["first"] == data["contacts"][0]["i"]
+    assert data["none"] == ("< 3 N", "", "no contact")
     assert data["wrench"] == {"flange": True}
 
 
