@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_error_process import B, blocks, drawn, noise
+from drawn_blocks import B, blocks, drawn, noise
 
 from vftcli.contacts.search import (
     AT_FIRST,

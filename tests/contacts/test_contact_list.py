@@ -26,6 +26,10 @@ from vftcli.signals.remarks import caution
         ({"peak_force": None}, "weak"),
         ({"inferred": True}, "fair"),
         ({"peak_band": 0.5 * 64.8, "place_band": 7.1}, "fair"),
+        # 40 % of 64.8 N: from 38.9 to 90.7 N
+        ({"anywhere": (39.0, 90.0)}, "good"),
+        ({"anywhere": (38.0, 90.0)}, "fair"),
+        ({"anywhere": (39.0, 91.0)}, "fair"),
     ],
 )
 def test_trust_goes_by_evidence_band_and_remarks(changed: dict[str, object], trust: str) -> None:

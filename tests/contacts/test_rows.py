@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
 from contact_rows import contact
-from test_error_process import blocks, drawn, noise
+from drawn_blocks import blocks, drawn, noise
 
 from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.rows import (

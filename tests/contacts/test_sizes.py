@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_error_process import B
+from drawn_blocks import B
 
 from vftcli.contacts.search import quiet_pauses, split_at_turns, split_run
 from vftcli.contacts.windows import (

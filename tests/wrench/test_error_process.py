@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawn_blocks import B, blocks, drawn, noise
 
-from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
-from vftcli.robots.terms import Blocks
-from vftcli.signals.arrays import Array, Mask
+from vftcli.robots.friction import PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.linear_model import SPIKE
 from vftcli.wrench.model_error import (
     LEAST_TIME,
     UNKNOWN,
-    TorqueNoise,
     error_model,
     error_process,
     infer_noise,
@@ -21,39 +19,6 @@ from vftcli.wrench.model_error import (
     spiked_white,
     without_reversals,
 )
-
-B = 0.024
-
-
-def blocks(d: Array, velocity: Array, known: Mask | None = None) -> Blocks:
-    """Blocks of `B` seconds."""
-    count = len(d)
-    return Blocks(
-        t=B * (np.arange(count) + 0.5),
-        length=np.full(count, B),
-        d=d,
-        q=np.zeros_like(d),
-        velocity=velocity,
-        known=np.ones(count, dtype=bool) if known is None else known,
-    )
-
-
-def noise(joints: int = 1, *, seen: bool = True) -> TorqueNoise:
-    """White noise of .1 N·m, an error of .5 N·m over .4 s, dry friction of 10 N·m."""
-    values = {"white": 0.01, "variance": 0.25, "time": 0.4, "dry": 10.0}
-    values |= {"at_rest": (CREEP_SHARE * 10.0) ** 2, "pushed": (PUSHED_SHARE * 10.0) ** 2}
-    each = {key: np.full(joints, value) for key, value in values.items()}
-    return TorqueNoise(**each, seen=np.full(joints, seen), free_seconds=4.0)
-
-
-def drawn(count: int, rng: np.random.Generator) -> Array:
-    """Model error and white noise of `noise`, drawn."""
-    f = np.exp(-B / 0.4)
-    b = np.empty(count)
-    b[0] = 0.5 * rng.standard_normal()
-    for k in range(1, count):
-        b[k] = f * b[k - 1] + 0.5 * np.sqrt(1.0 - f * f) * rng.standard_normal()
-    return (b + 0.1 * rng.standard_normal(count))[:, None]
 
 
 def test_what_was_drawn_is_learned() -> None:

@@ -30,12 +30,12 @@ class Phases(NamedTuple):
 def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -> Phases:
     """Split a record (T, 6) [N, N·m] into drag and recovery phases, axis by axis.
 
-    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i, those of
-    `before` (6,) from the start. An unknown (NaN) force counts as none.
+    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i, those
+    of `before` (6,) from the start. An unknown (NaN) force counts as none.
 
-    By the threshold's mode "hard" the whole force of a dragged axis enters (49), by "soft"
-    F − F_tsd·sign(F), which starts from zero; an axis that recovers has none. "literal" is
-    Algorithm 1 as printed: all always enters.
+    By the threshold's mode "hard" the whole force of a dragged axis enters (49), by
+    "soft" F − F_tsd·sign(F), which starts from zero; an axis that recovers has none.
+    "literal" is Algorithm 1 as printed: all always enters.
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = abs(wrench)

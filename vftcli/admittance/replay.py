@@ -54,7 +54,8 @@ LONGEST = 600.0  #: Longest release that is computed. [s]
 #: A drag in which the log's arm stays within this distance for so long has a remark.
 #: [s, m]
 RESTING = (2.0, 0.01)
-#: Where the flange stays this near to its first pose a log replays as it was: no remark. [m]
+#: Where the flange stays this near to its first pose a log replays as it was: no remark.
+#: [m]
 STILL = 0.01
 
 

@@ -172,7 +172,10 @@ class Contact(Shown):
         size = max(self.peak_force, 1e-9)
         if self.place_band > WIDE * size:
             return "weak"
-        return "good" if self.peak_band <= TIGHT * size and not self.inferred else "fair"
+        # Over all places that fit it may be another size.
+        apart = max((abs(end - size) for end in self.anywhere or ()), default=0.0)
+        is_sure = self.peak_band <= TIGHT * size and apart <= WIDE * size and not self.inferred
+        return "good" if is_sure else "fair"
 
 
 class CarriedLoad(NamedTuple):

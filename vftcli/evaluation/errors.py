@@ -312,7 +312,8 @@ class JointMeans(NamedTuple):
     floor: float  #: Mean of the reference's own error, NaN where it is not known. [N·m]
     #: Joints that are left out, because the reference is not to be trusted there.
     without: tuple[int, ...]
-    #: Observer → mean |error| [N·m], and what it is better than zero, where that is known.
+    #: Observer → mean |error| [N·m], and what it is better than zero, where that is
+    #: known.
     l1: Mapping[str, float] = {}
     skill: Mapping[str, float] = {}
 

@@ -180,7 +180,8 @@ def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tu
     The lowest and highest sample of every stretch keep their own time and value, so that
     no spike is lost and none is made. A log of at most twice as many samples is kept
     whole. The line breaks, by a NaN, where a stretch holds no known value and where the
-    clock has a gap; over a logarithmic axis, where stretches are equal, there is no clock.
+    clock has a gap; over a logarithmic axis, where stretches are equal, there is no
+    clock.
     """
     gaps = np.empty(0, dtype=np.intp) if log else gaps_of(t, GAP_STEPS)
     x, y = t, values

@@ -75,9 +75,9 @@ def link_surfaces(robot: Robot) -> tuple[dict[int, Surface], list[str]]:
 def fewer(corners: Array, most: int = MOST_TRIANGLES) -> Surface:
     """A surface of so many triangles at most: the corners in each cell of a grid are one.
 
-    It is where the planes of the triangles there meet best, within the cell, so that nothing
-    moves farther than a cell's diagonal. (Lindstrom 2000, Out-of-core simplification of large
-    polygonal models, section 3)
+    It is where the planes of the triangles there meet best, within the cell, so that
+    nothing moves farther than a cell's diagonal. (Lindstrom 2000, Out-of-core
+    simplification of large polygonal models, section 3)
     """
     long = np.ptp(corners, axis=(0, 1)).max()
     sizes = (long / 2.0 ** np.linspace(1.0, FINEST, 100)).tolist()
@@ -87,7 +87,8 @@ def fewer(corners: Array, most: int = MOST_TRIANGLES) -> Surface:
     middle, planes, ends = np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))
     np.add.at(middle, cells.ravel(), corners.reshape(-1, 3))
     middle /= np.bincount(cells.ravel())[:, None]
-    # Planes n·(x − m) = n·(p − m) about the middle m of each corner's cell, by their areas.
+    # Planes n·(x − m) = n·(p − m) about the middle m of each corner's cell, by their
+    # areas.
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     for cell in cells.T:
         away = np.sum(normal * (corners[:, 0] - middle[cell]), axis=1)

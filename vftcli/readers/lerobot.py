@@ -28,7 +28,8 @@ DESCRIPTION_BYTES = 64 * 1024 * 1024  #: Bytes of a description beside the data 
 
 FRAME = "frame_index"
 
-#: How far the stamps, 32-bit floats, may lie from frame / fps, which is then the clock. [s]
+#: How far the stamps, 32-bit floats, may lie from frame / fps, which is then the clock.
+#: [s]
 CLOCK_SLACK = 1e-3
 #: What an element's name says it measures, in words of `ALIASES`.
 WORDS = "pos|positions?|vel|velocity|velocities|efforts?|torques?|currents?"

@@ -24,8 +24,8 @@ def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
     """Torque and wrench (T, 6) or None of another program's file, at its own stamps.
 
     Its columns are t, tau_ext/1…, band/1… (one standard deviation), wrench/fx… (force and
-    moment on the robot, base axes); a file of `vftcli estimate` has them as tau_ext/NAME/1….
-    NaN is no answer.
+    moment on the robot, base axes); a file of `vftcli estimate` has them as
+    tau_ext/NAME/1…. NaN is no answer.
     """
     file = open_log(path)
     table: Table = ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)

@@ -1,7 +1,7 @@
 """A benchmark: every log of a manifest scored by every protocol, once, and gathered in one table.
 
-First what is made: simulated logs, pushes planted into free ones, robot files from other days.
-Each task writes its rows, by which a second run knows that it is done.
+First what is made: simulated logs, pushes planted into free ones, robot files from other
+days. Each task writes its rows, by which a second run knows that it is done.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,7 @@
 """A benchmark's manifest: logs with truth, how each is scored, and what may have been seen.
 
-One entry is one log. What an entry does not name is an option of `vftcli estimate`, in the
-same words. No log comes with the package and none is downloaded.
+One entry is one log. What an entry does not name is an option of `vftcli estimate`, in
+the same words. No log comes with the package and none is downloaded.
 """
 
 import re
@@ -30,8 +30,8 @@ PROTOCOLS = ("alone", "free", "identified")
 PUSHED = "-pushed"  #: Ending of the name of a log with pushes planted.
 APART = 1.0  #: Least time between what is trained on and what is scored of one log. [s]
 SETTLED = 1.0  #: Scored from here on where nothing is said: causal filters settle. [s]
-#: Options that an entry may have: those of `vftcli estimate`, in its words. What it says of
-#: the arm and of free motion it says itself.
+#: Options that an entry may have: those of `vftcli estimate`, in its words. What it says
+#: of the arm and of free motion it says itself.
 OPTIONS = {
     word: option
     for kind in OF_ESTIMATE
@@ -71,13 +71,15 @@ class BenchmarkLog:
     vendor: str = ""  #: Columns of the controller's own estimate, "" for none.
     score: Spans = ((SETTLED, 1e9),)  #: What is scored, from the first sample. [s]
     vouched: Spans = ALWAYS  #: Where a row is false if nothing touched; `score` if it is given. [s]
-    #: True contacts, where the truth does not show them: start, end [s], peak [N] if known.
+    #: True contacts, where the truth does not show them: start, end [s], peak [N] if
+    #: known.
     contacts: tuple[tuple[float, ...], ...] = ()
     contact_N: float = 1.0  #: Force from which the truth is a contact. [N]
     #: Planted: start [s], length [s], peak force on the flange in base axes [N].
     pushes: tuple[tuple[float, float, Vector], ...] = ()
     weight_N: float = 0.0  #: What is carried over `score`. [N]
-    #: What it is scored by, none of what is only trained on; all that it can be if not given.
+    #: What it is scored by, none of what is only trained on; all that it can be if not
+    #: given.
     protocols: tuple[str, ...] = ("alone",)
     free: tuple[str, ...] = ()  #: Motion that nobody touched: names of logs, or A:B.
     identified: str = ""  #: Name of the ``[[robot]]`` of protocol 3.

@@ -1,7 +1,7 @@
 """The mesh files that a URDF names: found near it, placed on the links of its arm, and read.
 
-Packages that it names are looked for above the file and beside the folders there, by their
-`package.xml`, else by the name of a folder above it.
+Packages that it names are looked for above the file and beside the folders there, by
+their `package.xml`, else by the name of a folder above it.
 """
 
 import re

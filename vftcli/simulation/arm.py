@@ -143,9 +143,9 @@ class Arm:
         self.touching = Touching(
             scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
         )
-        #: Course of the run, one row an inner step; row k covers k·step to (k+1)·step, and one
-        #: more is for the state after the last. State and reference are those at the start of a
-        #: step, all else holds over it.
+        #: Course of the run, one row an inner step; row k covers k·step to (k+1)·step,
+        #: and one more is for the state after the last. State and reference are those at
+        #: the start of a step, all else holds over it.
         rows = self.steps + 1
         self.history = JointSignals(
             **{f.name: np.zeros((rows, len(q))) for f in fields(JointSignals)}

@@ -1,8 +1,9 @@
 """Series of a page as one text: steps of int16, their differences, deflated, in base64.
 
-A clock is the samples that every line of a log shares on the page, so that one index is one
-moment in all of them. A short log has every sample; of a long one each line keeps the lowest
-and the highest value of every stretch, and half of the stretches are where contacts are.
+A clock is the samples that every line of a log shares on the page, so that one index is
+one moment in all of them. A short log has every sample; of a long one each line keeps the
+lowest and the highest value of every stretch, and half of the stretches are where
+contacts are.
 """
 
 import base64

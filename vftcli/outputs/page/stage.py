@@ -1,7 +1,8 @@
 """The stage of the page: the arm in three dimensions, its view, and the contacts beside it.
 
-The arm is capsules from the chain's own geometry. It is seen in weak perspective, from the side
-to which it reaches in this log, a little turned; the page's script has the same projection.
+The arm is capsules from the chain's own geometry. It is seen in weak perspective, from
+the side to which it reaches in this log, a little turned; the page's script has the same
+projection.
 """
 
 from collections.abc import Mapping
@@ -193,7 +194,8 @@ def stage_data(
             for frame, shapes in enumerate(capsules(chain))
             for s in shapes
         ],
-        # Per link the rows of x, y and z of corners, and of the three corners of triangles.
+        # Per link the rows of x, y and z of corners, and of the three corners of
+        # triangles.
         "surfaces": [
             [clock.blob.add(x, MILLIMETRE) for x in surfaces[link].corners.T]
             + [clock.blob.add(k, 1.0) for k in surfaces[link].faces.T]
