@@ -108,17 +108,28 @@ def test_a_size_is_as_sure_as_its_place() -> None:
         force = np.array([size, 0.0, 0.0])
         return PointFit(link=link, share=share, misfit=0.0, score=score, force=force, band=1.0)
 
-    alike = ContactLocation([fit(5, 40.0, 1.0), fit(4, 60.0, 1.0)], 6)
+    alike = ContactLocation([fit(5, 40.0, 1.0), fit(4, 60.0, 1.0)], 6, ())
     assert alike.spread(40.0) == 0.0  # both on the wrist, whose wrench holds them
-    apart = ContactLocation([fit(5, 40.0, 1.0), fit(3, 60.0, 1.0)], 6)
+    apart = ContactLocation([fit(5, 40.0, 1.0), fit(3, 60.0, 1.0)], 6, ())
     assert apart.spread(40.0) == pytest.approx(20.0 / np.sqrt(2.0))
     assert apart.links == (3, 5)
     assert (apart.sizes(40.0, 5.0), apart.sizes(0.5, 5.0)) == ((35.0, 61.0), (0.0, 61.0))
-    tip = ContactLocation([fit(6, 40.0, 1.0, share=1.0), fit(3, 40.0, 1.0, 1.0)], 6)
+    tip = ContactLocation([fit(6, 40.0, 1.0, share=1.0), fit(3, 40.0, 1.0, 1.0)], 6, ())
     assert tip.links == (0, 3)  # the last link's end is the flange, and that of no other
     # Four in the score are e⁻² in likelihood.
-    less = ContactLocation([fit(5, 40.0, 1.0), fit(3, 60.0, 5.0)], 6)
+    less = ContactLocation([fit(5, 40.0, 1.0), fit(3, 60.0, 5.0)], 6, ())
     assert less.spread(40.0) == pytest.approx(20.0 * np.sqrt(np.exp(-2) / (1 + np.exp(-2))))
+
+
+def test_where_no_point_force_fits_the_links_are_those_that_a_moment_may_have_touched() -> None:
+    """A χ² beyond 20 is no point force: its size at other places says nothing either."""
+    force = np.array([60.0, 0.0, 0.0])
+    odd = PointFit(link=3, share=0.5, misfit=21.0, score=30.0, force=force, band=1.0)
+    pushed = ContactLocation([odd], 6, (0, 6))
+    assert (pushed.links, pushed.on_wrist, pushed.spread(40.0)) == ((0, 6), True, 0.0)
+    assert pushed.sizes(40.0, 5.0) == (35.0, 45.0)
+    fits = ContactLocation([odd._replace(misfit=19.0)], 6, (0, 6))
+    assert (fits.links, fits.sizes(40.0, 5.0)) == ((3,), (35.0, 61.0))
 
 
 def test_a_course_bears_the_band_along_its_force() -> None:

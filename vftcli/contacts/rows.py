@@ -58,21 +58,29 @@ class ContactLocation(NamedTuple):
 
     fits: list[PointFit]  #: Points that fit, the best first.
     joints: int  #: How many the arm has.
+    likely: tuple[int, ...]  #: Links that a force and a moment may have touched; 0 is the flange.
+
+    @property
+    def is_force(self) -> bool:
+        """Whether a force at a point explains it."""
+        return self.fits[0].misfit <= MORE_THAN_A_FORCE
 
     @property
     def parts(self) -> list[ArmPart]:
         """Parts of the arm that fit."""
         names = arm_parts(self.joints)
-        return list(dict.fromkeys(names[fit.link] for fit in self.fits))
+        return list(dict.fromkeys(names[link] for link in self.links))
 
     @property
     def on_wrist(self) -> bool:
         """Whether a wrench at the flange explains it: at the wrist, or more than a point force."""
-        return "wrist" in self.parts or self.fits[0].misfit > MORE_THAN_A_FORCE
+        return "wrist" in self.parts or not self.is_force
 
     @property
     def links(self) -> tuple[int, ...]:
         """Links that fit, 0 for the flange."""
+        if not self.is_force:
+            return self.likely
         last = self.joints
         links = {0 if fit.link == last and fit.share > 0.99 else fit.link for fit in self.fits}
         return tuple(sorted(links))
@@ -82,7 +90,7 @@ class ContactLocation(NamedTuple):
 
         The root mean square over the points that fit, each as likely as its score makes it.
         """
-        if self.parts == ["wrist"] or self.fits[0].misfit > MORE_THAN_A_FORCE:
+        if self.parts == ["wrist"] or not self.is_force:
             return 0.0
         likely = np.exp(-0.5 * np.array([fit.score - self.fits[0].score for fit in self.fits]))
         apart = np.array([fit.size for fit in self.fits]) - size
@@ -90,7 +98,8 @@ class ContactLocation(NamedTuple):
 
     def sizes(self, size: float, band: float) -> tuple[float, float]:
         """Smallest and largest |F| over the places that fit, bands included. [N]"""
-        spans = [(size, band), *((fit.size, fit.band) for fit in self.fits)]
+        fits = self.fits if self.is_force else []
+        spans = [(size, band), *((fit.size, fit.band) for fit in fits)]
         low, high = min(s - b for s, b in spans), max(s + b for s, b in spans)
         return max(low, 0.0), high
 
@@ -183,7 +192,9 @@ class ContactMeasurement:
         torque = (blocks.d[core] - mean).mean(axis=0)
         white = self.log.process.white[core].mean(axis=0) / len(core)
         chain, sd = self.run.robot.loaded_chain, np.sqrt(variance.mean(axis=0) + white)
-        return ContactLocation(point_fits(chain, blocks.q[peak], torque, sd), chain.joints)
+        fits, nats = point_fits(chain, blocks.q[peak], torque, sd), self.found.evidence[number]
+        likely = [self.found.places[k].link for k in np.flatnonzero(nats > nats.max() - SURE_NATS)]
+        return ContactLocation(fits, chain.joints, tuple(likely))
 
     def row(
         self,
