@@ -163,6 +163,12 @@ class Contact(Shown):
         return any(remark.code == "size-goes-with-place" for remark in self.remarks)
 
     @property
+    def goes_with_place(self) -> bool:
+        """Whether another possible place changes its force by more than `WIDE` of it."""
+        size = self.peak_force or 0.0
+        return any(abs(end - size) > WIDE * size for end in self.anywhere or ())
+
+    @property
     def trust(self) -> Trust:
         """How far the size of the row may be believed: by its evidence, band and remarks."""
         if self.remarks or self.is_load or self.evidence is None or self.evidence < SURE_NATS:
@@ -172,10 +178,8 @@ class Contact(Shown):
         size = max(self.peak_force, 1e-9)
         if self.place_band > WIDE * size:
             return "weak"
-        # Over all places that fit it may be another size.
-        apart = max((abs(end - size) for end in self.anywhere or ()), default=0.0)
-        is_sure = self.peak_band <= TIGHT * size and apart <= WIDE * size and not self.inferred
-        return "good" if is_sure else "fair"
+        is_sure = self.peak_band <= TIGHT * size and not self.inferred
+        return "good" if is_sure and not self.goes_with_place else "fair"
 
 
 class CarriedLoad(NamedTuple):

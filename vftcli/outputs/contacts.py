@@ -15,7 +15,6 @@ from vftcli.contacts.contact_list import (
     FIRST_COLUMNS,
     KEYS,
     SURE_NATS,
-    TIGHT,
     CarriedLoad,
     Contact,
     ContactList,
@@ -188,12 +187,8 @@ def reason(contact: Contact) -> str:
     if contact.peak_force is None or contact.peak_band is None:
         return "too few joints to know the force"
     share = contact.peak_band / max(contact.peak_force, 1e-9)
-    text = f"the band is {share:.0%} of the force"
-    if contact.trust == "good" and share <= TIGHT and contact.anywhere is not None:
-        low, high = contact.anywhere
-        if high > 2.0 * max(low, 1.0):
-            text += "; the size depends on the place"
-    return text
+    by_place = "; the size depends on the place" * contact.goes_with_place
+    return f"the band is {share:.0%} of the force{by_place}"
 
 
 def free_words(found: ContactList) -> str:
