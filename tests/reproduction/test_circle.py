@@ -14,6 +14,12 @@ DOCUMENT = Path(__file__).parent / "huang2025.md"
 TIMED = re.compile(r"time\b|KFO-ZOH over")
 """Lines that tell how fast this machine is."""
 
+WANDERING = {"fig6", "fig7"}
+"""Items of which the loop as printed runs astray: the last bit of a sum turns into another path.
+
+One commit on two processors gave .0400 and .0672 s to the turn.
+"""
+
 
 def documented(name: str) -> dict[str, list[str]]:
     """Label of a line → what the document's table of an item has of ours."""
@@ -44,8 +50,7 @@ def test_items_without_a_seed_are_the_documents_digit_by_digit() -> None:
 def test_the_first_seed_lies_in_the_documents_range() -> None:
     """The range holds every seed's value, rounded to three digits: half of the last is let pass.
 
-    The tapped circle, the sensor, the dragged loop and the bearing: an experiment each. As
-    printed the loop runs astray, where the last bit of a sum turns into another path.
+    The tapped circle, the sensor, the dragged loop and the bearing: an experiment each.
     """
     for name, shown in computed(("table1", "fig4", "fig6", "fig7", "fig12"), fast=True).items():
         document, compared = documented(name), 0
@@ -53,7 +58,7 @@ def test_the_first_seed_lies_in_the_documents_range() -> None:
             kinds = (*shown.item.variants, "floor")
             for kind, text in zip(kinds, document[line.label], strict=False):
                 values = shown.values.get(line.key, {}).get(kind)
-                wanders = kind == AS_PRINTED and name in {"fig6", "fig7"}
+                wanders = kind == AS_PRINTED and name in WANDERING
                 if wanders or not values or values[0] is None or not re.search(r"\d", text):
                     continue
                 low, high = ends(text)
@@ -72,9 +77,11 @@ def test_the_whole_document_is_what_the_code_gives() -> None:
         if not shown.item.lines:
             continue
         document = documented(name)
+        first = int(name in WANDERING and shown.item.variants[0] == AS_PRINTED)
         for row in item_grid(shown).cells:
             if not TIMED.search(row[0].text):
-                assert [cell.text for cell in row[3:]] == document[row[0].text], (name, row[0])
+                texts = [cell.text for cell in row[3:]]
+                assert texts[first:] == document[row[0].text][first:], (name, row[0])
 
 
 def test_an_entry_of_the_document_reads_back() -> None:
