@@ -29,6 +29,16 @@ def test_the_text_holds_what_holds_and_shows_the_rest() -> None:
     assert max(map(len, text.splitlines())) <= 100
 
 
+def test_settings_come_last_each_group_in_one_table() -> None:
+    keys = ("sensor.delay", "contacts.least", "robot", "sensor.cutoff")
+    text = config_text(ProposedOption("why", key, k) for k, key in enumerate(keys))
+    assert tomllib.loads(text) == {
+        "robot": 2,
+        "sensor": {"delay": 0, "cutoff": 3},
+        "contacts": {"least": 1},
+    }
+
+
 def test_a_controller_s_wrench_comes_after_a_difference_of_cycles() -> None:
     t = np.arange(3.0)
     bare = Recording(t=t, q=np.zeros((3, 6)))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from vftcli.cli.console import steps_of
 from vftcli.cli.progress import BAR, Stages, clock, fitted
 from vftcli.signals.progress import steps
 
@@ -57,6 +58,22 @@ def test_work_over_a_second_shows_share_stage_and_time_left(
     assert shown().strip() == ""
     stages._tick()
     assert shown() == ""
+
+
+def test_steps_of_a_run_are_its_share_and_no_loop_within_one_moves_it(
+    now: list[float], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stages = Stages()
+    monkeypatch.setattr("vftcli.cli.console.STAGES", stages)
+    monkeypatch.setattr("vftcli.cli.console.is_watched", lambda: True)
+    progress = steps_of("simulating")
+    progress(0, 5)
+    now[0] = 2.0
+    progress(2, 5)  # two of five steps in 2 s: the other three take 3 s
+    for _ in steps("ab"):
+        stages._tick()
+        shown = capsys.readouterr().err.replace("·", ".")
+        assert shown.endswith(f"\r{bar(8)} 40 %  simulating  0:03 left")
 
 
 def test_what_is_printed_takes_the_line_away_first(

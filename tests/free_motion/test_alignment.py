@@ -82,6 +82,9 @@ def test_without_velocities_both_causes_are_named() -> None:
     log = replace(wandering(), dq=None)
     with pytest.raises(ReferenceTorqueError, match=r"5 % slower, or a clock is wrong.*t@125Hz"):
         align(log, replace(log, t=1.05 * log.t))
+    # As well where one log begins 300 of 2000 samples later.
+    with pytest.raises(ReferenceTorqueError, match="30 % slower, or a clock is wrong"):
+        align(replace(log, t=log.t[:1700], q=log.q[300:]), replace(log, t=1.3 * log.t))
 
 
 def test_another_small_motion_is_neither_slower_nor_on_another_clock() -> None:

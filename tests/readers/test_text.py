@@ -59,6 +59,17 @@ def test_savetxt_header_is_understood(tmp_path: Path) -> None:
     np.testing.assert_allclose(recording.q[:, 0], matrix[:, 1], rtol=1e-15)
 
 
+def test_a_row_that_the_first_64_kib_cut_does_not_tell_the_separator(tmp_path: Path) -> None:
+    """Line 200 of as many is cut inside its second cell, so that it seems to have two."""
+    lines = [f"{line}\n" for line in table(rows()).replace(",", ";").split()]
+    room = 64 * 1024 - len(lines[0]) - len("0.000;0.1")
+    comments = ["#" * 329 + "\n"] * 197
+    comments.append("#" * (room - 197 * 330 - 1) + "\n")
+    text = "".join([*comments, *lines])
+    assert text[: 64 * 1024].endswith("t;q1;q2\n0.000;0.1")
+    assert read(write(tmp_path / "x", text)).joints == 2
+
+
 def test_quoted_cells(tmp_path: Path) -> None:
     text = table(rows()).replace("t,q1,q2", '"t","q1","q2"')
     assert read(write(tmp_path / "x", text)).joints == 2

@@ -52,7 +52,9 @@ def test_the_first_seed_lies_in_the_documents_range() -> None:
 
     The tapped circle, the sensor, the dragged loop and the bearing: an experiment each.
     """
-    for name, shown in computed(("table1", "fig4", "fig6", "fig7", "fig12"), fast=True).items():
+    for name, shown in computed(
+        ("table1", "fig3", "fig4", "fig6", "fig7", "fig12"), fast=True
+    ).items():
         document, compared = documented(name), 0
         for line in shown.item.lines:
             kinds = (*shown.item.variants, "floor")

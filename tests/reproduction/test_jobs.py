@@ -13,6 +13,8 @@ def test_items_share_their_runs() -> None:
     jobs = jobs_of(HUANG, ("table1", "fig3", "guidelines"), fast=False)
     assert [job.experiment for job in jobs] == ["circle"] * 5 + ["time"]
     assert [job.seed for job in jobs[:5]] == list(HUANG.experiments["circle"].seeds)
+    # An experiment that states no seeds of its own has five.
+    assert [job.seed for job in jobs_of(HUANG, ("fig9",), fast=False)] == [1, 2, 3, 4, 5]
 
 
 def test_fast_takes_the_first_seed_of_each() -> None:

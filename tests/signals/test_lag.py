@@ -84,6 +84,19 @@ def test_the_offset_is_that_of_the_best_normalised_correlation(seed: int) -> Non
     assert abs(found.lag / step - max(value, key=lambda lag: value[lag])) <= 0.5
 
 
+@pytest.mark.parametrize(
+    ("lag", "found"), [(0.9, 0.9), (1.1, np.nan), (-0.1, -0.1), (-0.3, np.nan)]
+)
+def test_a_delay_is_looked_for_up_to_a_second_and_a_lead_up_to_a_fifth(
+    lag: float, found: float
+) -> None:
+    """White noise is like itself at its own delay alone."""
+    early = np.random.default_rng(4).standard_normal((1000, 1))
+    late = np.roll(early, round(lag / 0.01), axis=0)
+    # Beside the peak of 1 two correlations of about 1/√1000 pull it by a hundredth of a sample.
+    assert lags_of_each([late], early, 0.01)[0, 0] == pytest.approx(found, abs=5e-4, nan_ok=True)
+
+
 def test_nothing_fits_noise() -> None:
     noise = np.random.default_rng(0).standard_normal((2000, 1))
     flat = np.zeros((2000, 1))

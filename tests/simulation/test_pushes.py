@@ -106,6 +106,8 @@ def test_random_walk_gains_its_intensity() -> None:
     walk = draw_walk(RandomWalkSpec(name="w", intensity=(4.0,)), 500, 1000, 1e-3, rng())
     # variance of 500 walks after 1 s: 4 (N·m)², good to 2·4/√1000 = 0.25 (one sigma)
     assert np.var(walk[-1]) == pytest.approx(4.0, abs=1.0)
+    # from zero: the mean of 500 first steps of √.004 N·m is 0 to √(.004/500) = .003 (one sigma)
+    assert np.mean(walk[0]) == pytest.approx(0.0, abs=0.012)
 
 
 @pytest.mark.parametrize(

@@ -53,20 +53,23 @@ def test_the_other_columns_the_rows_and_their_groups_stay(tmp_path: Path) -> Non
         assert reported["observation.external_torque"]["length"] == 7
 
 
-def test_row_groups_and_rows_in_any_order_are_kept(tmp_path: Path) -> None:
+@pytest.mark.parametrize("codec", ["none", "snappy", "zstd"])
+def test_compression_row_groups_and_rows_in_any_order_are_kept(codec: str, tmp_path: Path) -> None:
     """An episode's rows may stand apart: its values go to its own rows, in their order."""
     dataset = tmp_path / "set"
     shutil.copytree(FIXTURE, dataset)
     path = dataset / "data" / "chunk-000" / "file-000.parquet"
     table = pq.read_table(path)
     turned = table.take(np.r_[200:360, 0:200])
-    pq.write_table(turned, path, row_group_size=50)
+    pq.write_table(turned, path, row_group_size=50, compression=codec)
     opened = LeRobotDataset(dataset)
     file = next(iter(opened.files()))
     own = forces(file.episodes)
     opened.write(file, COLUMNS, own, tmp_path / "out.parquet")
     made = pq.ParquetFile(tmp_path / "out.parquet")
     assert made.num_row_groups == 8
+    packed = [made.metadata.row_group(k).column(0).compression.lower() for k in range(8)]
+    assert packed == ["uncompressed" if codec == "none" else codec] * 8
     written = np.array(made.read().column("observation.external_torque").to_pylist(), np.float32)
     np.testing.assert_array_equal(written[:160], own[1]["external_torque"])
     np.testing.assert_array_equal(written[160:], own[0]["external_torque"])
