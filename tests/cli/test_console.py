@@ -163,3 +163,11 @@ def test_details_say_everything_that_is_known(tmp_path: Path, run: Run) -> None:
     assert "note: " not in usual
     assert "note: " in details
     assert short.splitlines()[:2] == same.splitlines()[:2]
+
+
+def test_a_log_of_one_sample_has_no_rate(tmp_path: Path, run: Run) -> None:
+    path = tmp_path / "one.csv"
+    path.write_text("".join(TAPS.read_text().splitlines(keepends=True)[:2]))
+    code, _, err = run("identify", path, "--robot", "ur5", "-o", tmp_path / "out.toml", "-v")
+    assert code != 0
+    assert "6 joints, 1 samples, 0.0 s\n" in err

@@ -68,6 +68,19 @@ def test_a_force_on_the_forearm_is_distinct_from_one_on_the_flange() -> None:
     assert parts == {"wrist"}
 
 
+def test_a_force_and_its_band_are_drawn_to_zero_by_the_prior_of_100_N() -> None:
+    """Against least squares with three more rows, 0 = F/100, for torques of 30 N·m sd."""
+    chain, sd = load_robot("ur5").chain, 30.0
+    torque = np.array([10.0, -60.0, -30.0, 20.0, 5.0, 0.0])
+    for fit in point_fits(chain, Q, torque, np.full(6, sd)):
+        J = link_jacobian(link_poses(chain, Q[None]), fit.link, fit.share)[0, :3].T
+        rows, values = np.vstack([J / sd, np.eye(3) / 100.0]), np.append(torque / sd, np.zeros(3))
+        np.testing.assert_allclose(fit.force, np.linalg.lstsq(rows, values)[0], rtol=1e-9)
+        # The size's variance is |rows⁺ᵀ u|², u the force's direction.
+        along = np.linalg.pinv(rows).T @ (fit.force / fit.size)
+        assert fit.band == pytest.approx(1.96 * np.linalg.norm(along), rel=1e-9)
+
+
 def test_what_loads_the_first_joints_alone_can_be_anywhere() -> None:
     """Little is known of a torque on J1 and J2 with stiction on all: many places fit."""
     torque, sd = (

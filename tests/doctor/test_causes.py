@@ -110,6 +110,14 @@ def test_an_offset_is_reported_with_its_size() -> None:
     assert 0 < found.values["sd_Nm"] < 0.5
 
 
+def test_an_offset_below_a_tenth_of_the_effort_is_none() -> None:
+    """3 N·m, sure to .01 N·m, on a joint of 33 N·m."""
+    log = moving()
+    current = log.require("current").copy()
+    current[:, 2] += 3.0 / np.asarray(UR10E.torque_constant)[2]
+    assert cause(replace(log, current=current)) == ("", ())
+
+
 def test_a_long_push_is_no_tilt_and_no_offset() -> None:
     """A steady 40 N sideways for three quarters of the log: the rest of it refutes a tilt."""
     from vftcli.robots.chain import flange_jacobian

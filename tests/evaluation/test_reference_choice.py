@@ -1,5 +1,6 @@
 """References by name: what is checked before a log is read, and what each is made from."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +9,16 @@ import pytest
 
 from vftcli.evaluation import references
 from vftcli.evaluation.reference_choice import NAMES, ReferenceChoice
-from vftcli.evaluation.references import REFERENCES, make_reference, reference_wrench
+from vftcli.evaluation.references import REFERENCES, judge, make_reference, reference_wrench
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.references import read_reference
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.wrench.sensor_reading import SensorReading
 from vftcli.wrench.solvers import VirtualSensor
 
 ROBOT = load_robot("ur5")
@@ -137,3 +140,24 @@ def test_a_torque_becomes_a_wrench_by_least_squares(tmp_path) -> None:
     solved = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
     assert not solved.hidden.any()
     np.testing.assert_allclose(solved.values, WRENCH, atol=1e-6)  # condition of J below 1e3
+
+
+def test_a_lag_behind_the_sensor_is_said_where_the_sensor_is_the_reference(tmp_path) -> None:
+    """A wrench equal to the sensor's: no lag. A file's wrench is no sensor's."""
+    recording = Recording(t=T, q=Q, wrench=WRENCH)
+    motion = FreeMotion(log=Run(recording=recording, robot=ROBOT))
+    estimate = ExternalTorque(name="gmo", t=T, tau=np.zeros((300, 6)))
+    never = np.zeros(300, bool)
+    sensor, choice = VirtualSensor(frame="base"), ReferenceChoice(name="sensor")
+    same = reference_wrench(recording, ROBOT, make_reference(motion, choice), sensor)
+    wrenches = (replace(same, name="gmo"),)
+    read = SensorReading(sensor=sensor, wrenches=wrenches, masked=never, free=never)
+    found = judge(motion, [estimate], read, choice)[2]
+    assert found is not None
+    (lag,) = (remark for remark in found.remarks if remark.code == "lag-behind-sensor")
+    assert lag.values["lag_ms"] == pytest.approx(0.0, abs=5.0)  # half a sample
+    assert lag.values["correlation"] == pytest.approx(1.0)
+    file = write_wrench(tmp_path / "truth.parquet", WRENCH)
+    found = judge(motion, [estimate], read, file)[2]
+    assert found is not None
+    assert found.remarks == ()

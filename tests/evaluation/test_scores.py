@@ -136,6 +136,11 @@ def test_a_shift_is_read_as_lag() -> None:
     assert LAGS[np.argmin(sums)] == pytest.approx(0.05)
     assert LAGS[[0, -1]] == pytest.approx([-0.1, 0.5])  # what docs/benchmark.md states
     assert len(sums) == 61
+    # Unknown is read as 0 whatever the lag: the truth's own squares, 10 ms each.
+    silent = ExternalTorque(name="silent", t=t, tau=np.full((len(t), 1), np.nan))
+    inside = (t > 1) & (t < 18)
+    squares = 0.01 * float((truth[inside] ** 2).sum())
+    assert lag_sums(silent, truth, inside) == pytest.approx([squares] * 61, **CLOSE)
 
 
 def test_eight_cells_have_an_interval_and_seven_have_none() -> None:

@@ -208,6 +208,24 @@ def test_a_load_is_found_from_poses_and_too_few_are_refused():
             payload_from_poses([steps(few, load=load)], UR5)
 
 
+def test_poses_seen_again_narrow_the_mass_as_of_independent_torques():
+    """Each pose once, twice, three times with the same 0.1 N·m of stiction.
+
+    The unbiased variance of m times 30 torques with 4 unknowns is K/(30 m − 4), beside what the
+    drive constants add to all three: (K/26 − K/56) / (K/56 − K/86) = 86/26.
+    """
+    load = Payload(mass=0.8, com=np.array([0.0, 0.04, 0.07]), inertia=np.zeros((3, 3)))
+    stiction = np.random.default_rng(8).normal(0, 0.1, (5, 6)) / UR5.torque_constant
+    variances = []
+    for times in (1, 2, 3):
+        log = steps(np.tile(POSES, (times, 1)), load=load)
+        current = log.current + np.repeat(np.tile(stiction, (times, 1)), 120, axis=0)
+        variances.append(payload_from_poses([replace(log, current=current)], UR5).mass_sd ** 2)
+    one, two, three = variances
+    # differences of variances: rounding
+    assert (one - two) / (two - three) == pytest.approx(86 / 26, rel=1e-6)
+
+
 def test_what_settles_at_the_edges_of_a_rest_does_not_count():
     recording = steps(POSES)
     settling = recording.current.copy()

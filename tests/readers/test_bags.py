@@ -300,6 +300,18 @@ def test_a_wrench_that_does_not_cover_the_motion_is_left_out(tmp_path: Path) -> 
     assert any("does not cover" in warning for warning in recording.source.warnings)
 
 
+def test_a_wrench_that_ends_within_three_of_its_steps_is_held(tmp_path: Path) -> None:
+    """Joints every 8 ms up to 392 ms; a wrench every 20 ms up to 340 ms, 2.6 steps earlier."""
+    messages = [ur_message(k) for k in range(50)]
+    for k in range(18):
+        time = START + k * 20_000_000
+        messages.append({"topic": "/wrench", "time": time, "force": (float(k), 0.0, 0.0)})
+    messages.sort(key=lambda message: message["time"])
+    recording = read(write_joint_states(tmp_path / "x", messages))
+    assert recording.wrench is not None
+    np.testing.assert_allclose(recording.wrench[-7:, 0], 17.0, atol=1e-9)
+
+
 def test_two_arms_are_refused(tmp_path: Path) -> None:
     messages = []
     for side in ("left", "right"):

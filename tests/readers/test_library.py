@@ -77,6 +77,11 @@ def test_a_copy_is_the_same_run_under_any_name(folders):
     assert same_run(one.between(1.0, 2.0), other)
 
 
+def test_a_log_that_is_read_is_one_log_where_all_episodes_are_asked_for():
+    log = Library().open(FIXTURE)
+    assert Library().open_logs([log], ReadChoice(all_episodes=True)) == (log,)
+
+
 def test_a_part_of_a_log_is_not_read_again(folders, count):
     library = Library()
     whole = library.open(folders / "a" / "log.csv")

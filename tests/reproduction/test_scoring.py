@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,13 @@ import pytest
 from vftcli.evaluation.scores import LAGS
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.outside import ListedRow
+from vftcli.reproduction import scoring
 from vftcli.reproduction.manifest import BenchmarkLog
 from vftcli.reproduction.scoring import (
     Answer,
     KnownTruth,
     ScoreTask,
+    own_answers,
     rows_of,
     truth_of,
     weighed,
@@ -167,3 +170,31 @@ def test_a_torque_alone_shows_its_contacts(tmp_path: Path) -> None:
     assert truth.tau == pytest.approx(tau)
     assert [x[:2] for x in truth.contacts] == [pytest.approx((1.0, 1.5))]
     assert truth.wrench is None
+
+
+def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A contact whose force is unknown is listed with 0 N; candidates are sorted in by time."""
+    contact = SimpleNamespace(start=3.0, stop=4.0, peak_force=17.0, peak_band=4.0, is_load=False)
+    unknown = SimpleNamespace(start=1.0, stop=2.0, peak_force=None, peak_band=None, is_load=True)
+    t = 0.01 * np.arange(500)
+    made = SimpleNamespace(
+        wrenches=(),
+        contacts=SimpleNamespace(contacts=[contact], candidates=[unknown]),
+        estimates=[
+            ExternalTorque(name=name, t=t, tau=np.zeros((500, 6))) for name in ("best", "gmo")
+        ],
+    )
+    monkeypatch.setattr(scoring, "analyse", lambda *_: made)
+    path = tmp_path / "a.csv"
+    task = ScoreTask(tmp_path, "", LOG, "own", AnalysisChoice(), path, path, None, False)
+    answers = own_answers(task, Recording(t=t, q=np.zeros((500, 6))), load_robot("ur5"))
+    lists = {answer.torque.name: answer.lists for answer in answers}
+    listed = ListedRow(3.0, 4.0, 17.0, 4.0)
+    both = [ListedRow(1.0, 2.0, 0.0, 0.0, is_load=True), listed]
+    assert lists == {
+        "zero": {},
+        "gmo": {},
+        "best": {"list": [listed], "list with candidates": both},
+    }

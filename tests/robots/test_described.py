@@ -1,5 +1,6 @@
 """Robots from descriptions: the TOML beside them, and what is said of their inertia."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -172,6 +173,20 @@ def test_a_link_without_mass_is_said(tmp_path: Path) -> None:
     assert said(at_the_end, "mass-matrix-singular")
     terms = momentum_terms(at_the_end.chain, np.zeros((1, 6)), np.ones((1, 6)))
     assert np.all(np.isfinite(terms.p))
+
+
+def test_a_small_arm_is_not_called_singular(tmp_path: Path) -> None:
+    """Lengths and masses a hundredth, moments a millionth: all of the mass matrix is as small."""
+
+    def scaled(found: re.Match[str]) -> str:
+        factor = 0.01 if found[1] in ("xyz", "value") else 1e-6
+        return f'{found[1]}="{" ".join(str(factor * float(x)) for x in found[2].split())}"'
+
+    text = robot(link("base"), arm(6))
+    small = re.sub(r'(xyz|value|i[xyz]{2})="([^"]*)"', scaled, text)
+    found = load_robot(written(tmp_path, without_inertia(small, "link3")))
+    assert said(found, "links-without-mass").where.joints == (3,)
+    assert "mass-matrix-singular" not in {remark.code for remark in found.remarks}
 
 
 def test_the_base_s_place_is_in_the_chain_and_gravity_is_said(tmp_path: Path) -> None:

@@ -91,7 +91,11 @@ def test_a_bent_line_is_the_models_and_bends_where_it_does():
         model="coulomb-logarithmic",
         parameters={"coulomb": 2.0, "logarithmic": 3.0, "logarithmic_velocity": 1.2},
     )
-    robot = replace(robot, friction=(LINE, short, flat, short, LINE, JointFriction()))
+    square = JointFriction(
+        model="coulomb-viscous-quadratic",
+        parameters={"coulomb": 2.0, "viscous": 1.0, "quadratic": 0.5},
+    )
+    robot = replace(robot, friction=(LINE, short, flat, square, LINE, JointFriction()))
     friction = true_friction(robot, FrictionSpec())
     load = np.array([-30.0, 20.0, 5.0, 0.0, 1.0, 2.0])
     for speed in (-4.0, -1.0, -0.3, -0.05, 0.05, 0.3, 1.0, 4.0):
