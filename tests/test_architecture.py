@@ -269,11 +269,11 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 54_680,
+    "lines of Python": 54_688,
     "files": 241,
     "functions": 2933,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 391_204,
+    "names, operators, numbers": 391_240,
     "characters a line that is not blank": 50.92,
     "noqa": 95,
     "lines of TOML, JavaScript, CSS": 7464,

@@ -20,6 +20,7 @@ from vftcli.outputs.contacts import (
     direction,
     hardest_rows,
     hardest_words,
+    otherwise,
     place_words,
     reason,
     stored_list,
@@ -112,13 +113,21 @@ def test_the_answer_is_a_sentence() -> None:
     )
 
 
-def test_a_log_without_free_motion_is_never_called_untouched() -> None:
+def test_what_may_have_been_touched_is_never_called_untouched() -> None:
     empty = contact_list(basis="whole log")
     assert answer(empty) == "No contact stands out."
     likely = replace(empty, candidates=(contact(peak_force=33.0, peak_band=7.0, peak=12.9),))
     assert answer(likely).startswith(
         "No contact stands out. Up to 40 N near 12.9 s this model cannot explain: name free motion "
     )
+    # A press of 3 N on an arm that the model misses by 5 N·m: one candidate of any size.
+    hidden = replace(contact_list(), candidates=likely.candidates)
+    assert not hidden.tells_untouched
+    assert answer(hidden) == (
+        "No contact stands out. Up to 40 N near 12.9 s this model cannot explain: measure your "
+        "friction (vftcli identify)."
+    )
+    assert otherwise(hidden) == "Pushes below 6 N do not show. 1 candidate more: --all."
     nothing = contact_list(basis="none", unexplained=Unexplained(22.1, 4, 3.2))
     assert answer(nothing).startswith(
         "Largest unexplained torque: 22 N·m on J4 at 3.2 s: a contact or a model error."

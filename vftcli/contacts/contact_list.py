@@ -326,8 +326,14 @@ class ContactList(Shown):
 
     @property
     def tells_untouched(self) -> bool:
-        """Whether nothing touches the arm outside of the rows: known from its free motion."""
-        return self.basis == "free motion" and not any(c.is_load for c in self.contacts)
+        """Whether nothing touches the arm outside of the rows: known from its free motion.
+
+        Where only candidates are, one of them may be a touch that the model hides.
+        """
+        rows = self.contacts or not self.candidates
+        return (
+            self.basis == "free motion" and bool(rows) and not any(c.is_load for c in self.contacts)
+        )
 
     @property
     def detectable_force(self) -> float | None:

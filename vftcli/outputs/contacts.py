@@ -57,7 +57,7 @@ def otherwise(found: ContactList) -> str:
         return ""
     if least is None:
         return "A push along one axis may go unseen: the pose hardly shows it."
-    if found.basis != "free motion":
+    if found.basis != "free motion" or not (found.contacts or found.tells_untouched):
         more = f" {counted(len(found.candidates), 'candidate')} more: --all."
         return (
             f"Pushes below {at_least_shown(least)} do not show.{more if found.candidates else ''}"
@@ -122,7 +122,8 @@ def none_words(found: ContactList) -> str:
             "No contact stands out from the free part, which itself shows "
             f"{found.false_on_free}: was nobody there?"
         )
-    if found.basis == "free motion":
+    known = found.basis == "free motion"
+    if known and not found.candidates:
         return "Nothing touched the arm, as far as this log shows."
     felt = [c for c in found.candidates if c.peak_force is not None]
     if not felt:
@@ -131,7 +132,8 @@ def none_words(found: ContactList) -> str:
     most = (hardest.peak_force or 0.0) + (hardest.place_band or 0.0)
     return (
         f"No contact stands out. Up to {most:.0f} N near {hardest.peak:.1f} s this model cannot "
-        "explain: name free motion (--free) or measure your friction (vftcli identify)."
+        f"explain: {'' if known else 'name free motion (--free) or '}measure your friction (vftcli "
+        "identify)."
     )
 
 
