@@ -143,7 +143,7 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
     smallest = measurement.test.smallest_force
     if not np.isfinite(smallest) and not named and run.robot.joints >= 6:
         smallest = felt_by(run, free.level)
-    told, weak = (
+    listed, weak = (
         [row for row in rows if shows_force(row, smallest) == wanted] for wanted in (True, False)
     )
     if others:
@@ -153,7 +153,7 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
-        contacts=numbered(told, inferred=not proven),
+        contacts=numbered(listed, inferred=not proven),
         candidates=numbered(weak, inferred=True),
         basis=free.basis,
         free=free.remarks,
