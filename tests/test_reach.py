@@ -105,8 +105,8 @@ def check_log(name: str, log: Recording, reported: dict[str, Any]) -> None:
 def check_robot(path: Path, reported: dict[str, Any]) -> None:
     """Check a robot's joints and flange, its masses, and its torques to 1e-6 N·m."""
     robot = load_robot(path)
-    taken = next(r.values for r in robot.remarks if "flange" in r.values)
-    assert taken["flange"] == reported["flange"]
+    arm = next(r.values for r in robot.remarks if "flange" in r.values)
+    assert arm["flange"] == reported["flange"]
     if (motion := reported.get("inverse_dynamics")) is not None:
         pin = pytest.importorskip("pinocchio", reason="an MJCF is read by pin, which is missing")
         model = robot.chain.to_pinocchio()
@@ -115,7 +115,7 @@ def check_robot(path: Path, reported: dict[str, Any]) -> None:
         np.testing.assert_allclose(torque, motion["N·m"], atol=1e-6)
         return
     assert list(robot.chain.names) == reported["joints"]
-    assert sorted(taken["locked"]) == sorted(reported["locked"])
+    assert sorted(arm["locked"]) == sorted(reported["locked"])
     np.testing.assert_allclose(robot.chain.mass, reported["link_masses"], rtol=1e-12)
     q = np.array([reported["gravity_torque"]["q"]])
     gravity = momentum_terms(robot.chain, q, np.zeros((1, 6))).gravity[0]

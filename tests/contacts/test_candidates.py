@@ -30,8 +30,8 @@ def joints_of(d: Array) -> tuple[Blocks, Array]:
     return blocks(d, np.full_like(d, 0.5)), jacobian
 
 
-def taken(log: Blocks, jacobian: Array) -> Mask:
-    """Blocks that the two-state filter takes for contact."""
+def touched_blocks(log: Blocks, jacobian: Array) -> Mask:
+    """Blocks that the two-state filter calls contact."""
     courses = error_process(noise(), log), error_process(noise(), turned_round(log))
     return filtered_contacts(log, courses, jacobian)
 
@@ -44,26 +44,28 @@ def pushed(count: int, seed: int) -> Array:
 
 
 def test_a_push_is_found_to_a_block_or_two() -> None:
-    runs = runs_of(taken(*joints_of(pushed(300, 1))))
+    runs = runs_of(touched_blocks(*joints_of(pushed(300, 1))))
     assert len(runs) == 1
     assert abs(runs[0][0] - 100) <= 2
     assert abs(runs[0][1] - 120) <= 2
 
 
 def test_nothing_is_found_in_what_was_drawn_free() -> None:
-    assert not taken(*joints_of(drawn(1000, np.random.default_rng(2)))).any()
+    assert not touched_blocks(*joints_of(drawn(1000, np.random.default_rng(2)))).any()
 
 
 def test_the_list_of_a_log_turned_round_is_the_list_turned_round() -> None:
     log, jacobian = joints_of(pushed(300, 3))
-    np.testing.assert_array_equal(taken(turned_round(log), jacobian), taken(log, jacobian)[::-1])
+    np.testing.assert_array_equal(
+        touched_blocks(turned_round(log), jacobian), touched_blocks(log, jacobian)[::-1]
+    )
 
 
 def test_one_bad_block_is_no_contact() -> None:
     d = drawn(300, np.random.default_rng(4))
     # Six standard deviations of the innovation.
     d[150] += 1.0
-    assert not taken(*joints_of(d)).any()
+    assert not touched_blocks(*joints_of(d)).any()
 
 
 @pytest.mark.parametrize("push", [3.4, 3.5])
@@ -79,7 +81,7 @@ def test_a_contact_is_what_is_99_percent_sure(push: float) -> None:
     size = PUSH[0] * jacobian[:, 0]
     odds = max(float(both[141]) for each in two_state_odds(log, courses, size) for both in each)
     assert 0.98 < 1.0 / (1.0 + np.exp(-odds)) < 0.995
-    assert taken(log, jacobian).any() == (1.0 / (1.0 + np.exp(-odds)) > 0.99)
+    assert touched_blocks(log, jacobian).any() == (1.0 / (1.0 + np.exp(-odds)) > 0.99)
 
 
 def textbook_odds(d: Array, process: ErrorProcess, size: Array, time: float, lasts: float) -> Array:

@@ -250,9 +250,9 @@ def test_time_that_runs_backwards_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes, reported: str) -> None:
-    with pytest.raises((LogError, ClockError), match=reported) as caught:
+    with pytest.raises((LogError, ClockError), match=reported) as error:
         read(write(tmp_path / "x", content))
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)
 
 
 def test_paths_that_are_no_files(tmp_path: Path) -> None:

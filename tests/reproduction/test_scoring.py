@@ -175,7 +175,7 @@ def test_a_torque_alone_shows_its_contacts(tmp_path: Path) -> None:
 def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A contact whose force is unknown is listed with 0 N; candidates are sorted in by time."""
+    """A contact of unknown force is listed with 0 N; candidates are sorted in by time."""
     contact = SimpleNamespace(start=3.0, stop=4.0, peak_force=17.0, peak_band=4.0, is_load=False)
     unknown = SimpleNamespace(start=1.0, stop=2.0, peak_force=None, peak_band=None, is_load=True)
     t = 0.01 * np.arange(500)
