@@ -21,8 +21,8 @@ LARGEST = 60_000
 """Bytes of a picture."""
 WINDOW = (1440, 800)
 """Pixels of the Rerun viewer."""
-HARDEST = (4.9, 5.3)
-"""Within the hardest contact of the recording that is shown. [s]"""
+TOUCHED = (11.1, 11.5)
+"""Within a hard contact of the recording, on the side of the arm that is seen. [s]"""
 
 
 class Picture(NamedTuple):
@@ -95,16 +95,16 @@ EXAMPLE = (
 
 
 def launch_touched() -> None:
-    """Run vftcli; a recording plays the middle of the hardest contact instead of resting at zero.
+    """Run vftcli; a recording plays the middle of a hard contact instead of resting at zero.
 
-    Rerun lets no file say where its time cursor stands, and at the first sample nothing touches the
+    Rerun lets no file say where its time cursor is, and at the first sample nothing touches the
     arm. The picture is taken within a second or so of its clock: the playing is quick.
     """
     import rerun.blueprint as rrb
 
     from vftcli.cli import launch
 
-    span = rrb.components.AbsoluteTimeRange(*(round(1e9 * t) for t in HARDEST))
+    span = rrb.components.AbsoluteTimeRange(*(round(1e9 * t) for t in TOUCHED))
     playing = {
         "play_state": "playing",
         "playback_speed": 100.0,
