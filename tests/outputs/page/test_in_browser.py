@@ -230,6 +230,7 @@ TRIANGLES = """() => {
 }"""
 
 
+@pytest.mark.slow
 def test_meshes_are_drawn_where_the_links_are(opened: Callable, shaped: Analysis) -> None:
     """Balls of 6 cm about the origins of the links; the link without its file is capsules."""
     html = render(shaped)
