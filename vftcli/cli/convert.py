@@ -85,8 +85,8 @@ def simulate_log(
 ) -> None:
     """Simulate an experiment, with its true forces.
 
-    They stand beside the log, as PATH.truth.parquet. The settings are the scenario's keys, as
-    duration=8 or servo.stiffness=soft; without --as the format is the arm's own.
+    They are written beside the log, as PATH.truth.parquet. The settings are the scenario's keys,
+    as duration=8 or servo.stiffness=soft; without --as the format is the arm's own.
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """

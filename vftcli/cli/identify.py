@@ -82,8 +82,8 @@ def identify_robot(
     """Make a robot file: friction, inertia, payload, gains.
 
     Without --method friction, but base where the robot's links are wrong. A page and run.json
-    stand beside the file. For a payload a LOG may be a dataset, of which every episode counts;
-    gains are for the goal that --gains states.
+    are written beside the file. For a payload a LOG may be a dataset; every episode of it counts.
+    Gains are for the goal that --gains states.
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
