@@ -12,7 +12,7 @@ from vftcli.readers import read
 from vftcli.readers.aliases import UR_NAMES, UR_WORDS
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
-from vftcli.robots.run import SERIES, Run, Runs, paired, places, unwound, white_noise
+from vftcli.robots.run import SERIES, Run, Runs, paired, places, unwound
 from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import Recording
 
@@ -213,11 +213,3 @@ def test_what_does_not_jump_is_the_log_itself(tmp_path: Path) -> None:
     missing = replace(jumping, q=np.array([[0.0] * 5, [np.nan] * 5]))
     for log, robot_ in ((jumping, limited), (still, endless), (missing, endless)):
         assert unwound(log, robot_) is log
-
-
-def test_white_noise_of_a_ramp_is_that_of_its_second_differences() -> None:
-    rng = np.random.default_rng(2)
-    x = 3.0 * np.arange(20_000)[:, None] + 0.7 * rng.standard_normal((20_000, 1))
-    # A standard deviation of 20 000 samples, to 1/√(2·20 000), three times that for what overlaps.
-    assert white_noise(x)[0] == pytest.approx(0.7, rel=0.02)
-    assert np.isnan(white_noise(x[:2])[0])

@@ -1,20 +1,15 @@
-"""What the paper prints, beside one's own log: its error table and its guidelines (Sec. IV-A)."""
+"""The error table that the paper prints, beside one's own log."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.errors import joint_means
 from vftcli.observers.observer import Observer, Tuning
-from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import Remark, fact, on_joints
-from vftcli.signals.series import median_step
 
 #: Errors that differ by less than this share are one filter's, computed in two ways.
 SAME_FILTER = 1e-6
@@ -156,105 +151,3 @@ def compare_with(
         observers={observer.name: observer for observer in observers},
         tunings=tunings,
     )
-
-
-STEP_TIME = 3.0  #: Length of the step that response times are read from. [s]
-REACHED = 0.9  #: Share of a step at which it counts as seen.
-#: Contacts by a person's deliberate action lie below this frequency, the rest is noise.
-#: [Hz]
-FAST = 5.0
-
-
-class Facts(NamedTuple):
-    """Speed, noise and error of one observer on one log."""
-
-    name: str  #: The observer.
-    response: float  #: Time until 90 % of a step is seen, the slowest joint. [s]
-    delay: float  #: Delay behind a slow ramp, the slowest joint. [s]
-    #: Noise of the estimate, mean of joints: the drive torque's white noise through the
-    #: observer's own response. [N·m]
-    noise: float
-    #: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
-    passed: float
-    rmse: float  #: Root-mean-square error against the reference, mean of joints, NaN without. [N·m]
-    parameter_count: int  #: Numbers to tune.
-
-
-class Advice(NamedTuple):
-    """One guideline and what this log says of it."""
-
-    purpose: str  #: Use of the observer.
-    criterion: str  #: Deciding number.
-    best: tuple[str, ...]  #: The observers that are best by it, alike within 2 %.
-    paper: str  #: Advice of the paper.
-
-
-def facts(
-    observers: Sequence[Observer],
-    tunings: Mapping[str, Tuning],
-    run: Run,
-    errors: pl.DataFrame | None,
-) -> tuple[Facts, ...]:
-    """The facts of every observer that has a response of its own."""
-    step, noise, each = median_step(run.recording.t), run.noise, list[Facts]()
-    means = {} if errors is None else joint_means(errors).errors
-    frequency = np.linspace(0.0, 0.5 / step, 513)[1:]
-    fast = frequency >= min(FAST, frequency[-1])
-    for observer in observers:
-        if (tuning := tunings.get(observer.name)) is None:
-            continue
-        gain = abs(observer.frequency_response(frequency, step, len(noise))) ** 2
-        one = Facts(
-            name=observer.name,
-            response=float(step_response(observer, step, len(noise)).max()),
-            delay=float(tuning.delay.max()),
-            noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
-            passed=float(np.sqrt(gain[fast].mean(axis=0)).mean()),
-            rmse=means.get(observer.name, float("nan")),
-            parameter_count=tuning.parameter_count,
-        )
-        each.append(one)
-    return tuple(each)
-
-
-def step_response(observer: Observer, step: float, joints: int) -> Array:
-    """Time of a unit step's estimate to 90 %, NaN if never. (n,) [s]"""
-    t = np.arange(0.0, STEP_TIME, step)
-    p = t[:, None].repeat(joints, axis=1)
-    seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED
-    return np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
-
-
-#: Use of an observer, the deciding number in words, its name in `Facts`, and the paper's
-#: advice.
-GUIDELINES = (
-    (
-        *("collision detection", "shortest response", "response"),
-        "GMO or FDO: fast to compute and to respond",
-    ),
-    (
-        *("safe response", f"least noise above {FAST:g} Hz", "passed"),
-        "FDO: its one cutoff chooses what passes",
-    ),
-    (
-        *("force estimation", "smallest RMSE against the reference", "rmse"),
-        "KFO: ZOH for accuracy, FE for computation",
-    ),
-)
-
-
-def advice(found: Sequence[Facts]) -> tuple[Advice, ...]:
-    """The paper's three guidelines with the best observers on this log."""
-    return tuple(
-        Advice(purpose, criterion, best(found, [getattr(f, name) for f in found]), paper)
-        for purpose, criterion, name, paper in GUIDELINES
-    )
-
-
-def best(found: Sequence[Facts], values: Sequence[float]) -> tuple[str, ...]:
-    """Names of those within 2 % of the smallest value; none where no value is known."""
-    known = [v for v in values if np.isfinite(v)]
-    if not known:
-        return ()
-    least = min(known)
-    return tuple(f.name for f, v in zip(found, values, strict=True) if v <= 1.02 * least)

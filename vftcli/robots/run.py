@@ -109,11 +109,6 @@ class Run(Shown):
         return low_pass(self.t, self.dq, min(12.0, 0.2 / self.step))
 
     @cached_property
-    def noise(self) -> Array:
-        """Standard deviation of the white part of μ. (n,) [N·m]"""
-        return white_noise(self.terms.mu)
-
-    @cached_property
     def dry_friction(self) -> Array:
         """Dry friction of each joint by the robot's model, 0 without one. (n,) [N·m]"""
         return dry_friction(self.robot.friction, self.robot.joints)
@@ -163,7 +158,6 @@ class Run(Shown):
         self.recording.release()
         if self.recording.samples > LONG:
             if terms := vars(self).get("terms"):
-                _ = self.noise
                 vars(terms).pop("d", None)
             for name in (*BULKY, *others):
                 vars(self).pop(name, None)
@@ -201,14 +195,6 @@ def band(step: float, cutoff: float | None) -> tuple[float, float]:
 
 
 NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
-
-
-def white_noise(x: Array) -> Array:
-    """Standard deviation of each column's white part. (n,)"""
-    if len(x) < 3:
-        return np.full(x.shape[1], np.nan)
-    curvature = (column[:-2] - 2.0 * column[1:-1] + column[2:] for column in x.T)
-    return np.sqrt([np.mean(bend**2) / 6.0 for bend in curvature])
 
 
 def paired(recording: Recording, robot: Robot) -> Recording:

@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.bias.refine import Budget
 from vftcli.contacts.contact_list import ContactList
-from vftcli.evaluation.published import Comparison, advice, facts
+from vftcli.evaluation.published import Comparison
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.contacts import hardest_rows
 from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, words
@@ -108,25 +108,6 @@ def joint_values(values: Array) -> str:
     texts = enumerate(map(significant, values.tolist()), 1)
     runs = [(text, [j for j, _ in run]) for text, run in groupby(texts, itemgetter(1))]
     return part("parts/joint_values", runs)
-
-
-def selection_guide(analysis: Analysis) -> tuple[Grid, ...]:
-    """Which observer for what, by what was computed on this log."""
-    found = facts(analysis.observers, analysis.tunings, analysis.motion.log, analysis.errors)
-    if not found:
-        return ()
-    advised = [(a.purpose, a.criterion, ", ".join(a.best) or DASH, a.paper) for a in advice(found)]
-    heads = words("For", "what decides", "best here", "the paper advises")
-    rows: Rows = []
-    for f in found:
-        numbers = map(float, (1e3 * f.response, 1e3 * f.delay, f.noise, f.passed, f.rmse))
-        rows.append((f.name, *numbers, f.parameter_count))
-    computed = "90 % of a step [ms]", "delay [ms]", "noise [N·m]", "noise > 5 Hz passed"
-    columns = *words("observer"), *map(Column, (*computed, "mean RMSE [N·m]", "to tune"))
-    return (
-        Grid(heads, advised, "Which observer for what (Sec. IV-A)"),
-        Grid(columns, rows, "Computed on this log", swatches=True),
-    )
 
 
 def beside_print(comparison: Comparison) -> Grid:

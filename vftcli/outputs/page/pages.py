@@ -99,7 +99,6 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         wrench=wrench,
         errors=errors_view(analysis),
         observers=details.observers_view(analysis),
-        guide=details.selection_guide(analysis),
         files=[(name, what, sizes[name]) for name, what in FILES.items() if name in sizes],
         remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["remarks"]],
         **view,
