@@ -176,12 +176,15 @@ def two_bags(folder: Path) -> list[Any]:
 
 
 def with_jacobian(table: pl.DataFrame) -> pl.DataFrame:
-    """A vendor's torques beside its Jacobian, its axes of length 1, and no positions."""
+    """A vendor's torques beside its Jacobian, its axes of length 1, a wrench, no positions."""
     cells = {
         f"jacobian_{row}_{k}": pl.lit(float(row % 3 == k % 3)) if row > 2 else pl.col(f"q{k + 1}")
         for row in range(6) for k in range(6)
     }  # fmt: skip
-    return table.select("t", **{f"tau_ext_{k}": pl.col(f"q{k + 1}") for k in range(6)}, **cells)
+    axes = zip(("fx", "fy", "fz", "mx", "my", "mz"), range(1, 7), strict=True)
+    wrench = {axis: pl.col(f"q{k}") for axis, k in axes}
+    torques = {f"tau_ext_{k}": pl.col(f"q{k + 1}") for k in range(6)}
+    return table.select("t", **torques, **wrench, **cells)
 
 
 def two_copies(folder: Path) -> list[Any]:

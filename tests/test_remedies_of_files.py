@@ -77,6 +77,8 @@ class Row(NamedTuple):
     value: str | bool | None = ""
 
 
+BY_SENSOR = "compare", "--reference", "sensor", "--wrench"
+
 ROWS = [
     # cli
     Row("give one of LOG, SCENARIO, --release", lambda _: ["admit", "--robot", "ur5"],
@@ -182,11 +184,9 @@ ROWS = [
     Row("leave --episode out.", on(same, "compare", *GMO, "--reference", "zero", "--episode",
                                    "all"), "--episode", LEFT_OUT),
     Row("two arms were recorded", two_bags, "--columns"),
-    Row("no observer can run on that", on(with_jacobian, "estimate", "-o", "out"), "--wrench",
-        FLAG),
     Row("no external torques of", on(
         lambda table: with_jacobian(table).rename(lambda c: c.replace("tau_ext", "pull")),
-        "estimate", "-o", "out", "--wrench"), "--columns", "tau_ext=pull_{i}"),
+        *BY_SENSOR), "--columns", "tau_ext=pull_{i}"),
     # robots
     Row("only joints that move by themselves", mimicking, "--tip"),
     Row("which payload was set", gripping, "--payload", "gripper"),
@@ -240,6 +240,9 @@ COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
     "of another log `vftcli estimate` writes": (
         on(same, "annotate", "-o", "out", "--robot", "ur5"),
         (on(same, "estimate", "-o", "out", *GMO),),
+    ),
+    "no observer can run on that": (
+        on(with_jacobian, "estimate", "-o", "out"), (on(with_jacobian, *BY_SENSOR),),
     ),
     "not a table of text": (
         lambda _: ["inspect", BAG, "--set", "log.format=table"], (lambda _: ["inspect", BAG],),

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from vftcli.admittance.replay import DrivingForce, Replay
     from vftcli.contacts.thresholds import ComparedSignals, Thresholds
     from vftcli.doctor.examination import Examination
-    from vftcli.evaluation.wrenches import JacobianJudgement
     from vftcli.identification import Identification
     from vftcli.observers.spectra import Spectra
     from vftcli.observers.tuning import Goal, Tuned
@@ -35,15 +34,15 @@ OpenedLogs = Sequence[Opened]  #: Several such logs.
 
 
 def errors_of(
-    analyses: Sequence[Analysis], others: "Sequence[JacobianJudgement]" = ()
+    analyses: Sequence[Analysis], others: "Sequence[pl.DataFrame]" = ()
 ) -> "pl.DataFrame":
-    """The errors of several logs in one table, pooled rows of each arm last."""
+    """The errors of several logs in one table, those of others too, pooled rows last."""
     import polars as pl
 
     from vftcli.evaluation.errors import PoolMember, evaluate_pooled
     from vftcli.outputs.error_tables import marked
 
-    errors = [*(made.errors for made in analyses), *(made.errors for made in others)]
+    errors = [*(made.errors for made in analyses), *others]
     judged = [
         PoolMember(a.robot.name, a.estimates, a.reference)
         for a in analyses

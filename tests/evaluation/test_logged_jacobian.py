@@ -57,7 +57,6 @@ def judged(log: JacobianLog, *spans: tuple[float, float]) -> JacobianJudgement:
 
 
 def axis_errors(made: JacobianJudgement, name: str = "rmse") -> np.ndarray:
-    assert made.errors is not None
     rows = made.errors.filter(pl.col("axis").is_not_null())
     assert rows["axis"].to_list() == ["fx", "fy", "fz", "mx", "my", "mz"]
     return np.array([*rows[f"{name}_N"].to_list()[:3], *rows[f"{name}_Nm"].to_list()[3:]])

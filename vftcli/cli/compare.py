@@ -9,12 +9,18 @@ from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
 from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.signals.errors import VftError
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import polars as pl
 
+    from vftcli.analysis import Analysis
+    from vftcli.evaluation.wrenches import JacobianJudgement
     from vftcli.outputs.files import OutputFolder
+    from vftcli.pipeline import AnalysisChoice
 
 MORE = "Intervals, lags, pairs of observers: --details"  #: What screens leave out.
 
@@ -72,6 +78,39 @@ class DrawnErrors(opt.Bundle):
             say(f"wrote {self.output}: figures/errors-single.{self.figures}, errors-double")
 
 
+def judged_by_jacobian(log: Path, error: VftError, choice: "AnalysisChoice") -> "JacobianJudgement":
+    """What a vendor's torques beside a Jacobian tell; raises any other error."""
+    from vftcli.evaluation.wrenches import judge_jacobian
+    from vftcli.readers.references import jacobian_log
+    from vftcli.readers.table import JacobianError
+
+    if not isinstance(error, JacobianError):
+        raise error
+    read = jacobian_log(log, error, choice.read, choice.library.label(log))
+    reference = choice.reference.name if choice.reference is not None else None
+    made = judge_jacobian(read, choice.wrench, reference)
+    for remark in (*read.remarks, *made.remarks):
+        say(f"note: {read.name}: {remark}")
+    return made
+
+
+def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, details: bool) -> str:
+    """The errors for the terminal, with details the pairs of observers below them."""
+    import polars as pl
+
+    from vftcli.evaluation import paired_significance
+    from vftcli.outputs.error_tables import to_terminal
+    from vftcli.outputs.grids import pairs_text
+
+    text = to_terminal(rows, analyses, every=details)
+    pairs = [
+        paired_significance(a.recording.name, a.estimates, a.reference)
+        for a in analyses
+        if a.reference is not None and details
+    ]
+    return f"{text}\n{pairs_text(pl.concat(pairs))}" if pairs else text if details else text + MORE
+
+
 @opt.command
 def compare(
     logs: opt.Logs,
@@ -84,14 +123,9 @@ def compare(
 
     Example: vftcli compare fixtures/ur5_circle.csv --robot ur5 --reference zero --interval 0:4
     """
-    import polars as pl
-
     from vftcli.answering import errors_of
     from vftcli.batch.log_work import for_comparison
-    from vftcli.evaluation import paired_significance
-    from vftcli.outputs import error_tables as tables
-    from vftcli.outputs.grids import pairs_text
-    from vftcli.outputs.report import jacobian_entry
+    from vftcli.outputs.error_tables import FORMS
     from vftcli.outputs.run_record import all_remarks
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
@@ -99,29 +133,30 @@ def compare(
     drawn.folder()
     library = Library(logs)
     choice = for_comparison(analysis.choice(library, reference))
-    left_out, analyses = LeftOut(library, logs, choice), []
-    for made in analyse_logs(logs, choice, left_out.add):
+    left_out, analyses, judged = LeftOut(library, logs), [], []
+
+    def leave_out(log: Path, error: VftError) -> None:
+        """Judge a vendor's torques by their Jacobian; leave any other log out."""
+        try:
+            judged.append(judged_by_jacobian(log, error, choice))
+        except VftError as reason:
+            left_out.add(log, reason)
+
+    for made in analyse_logs(logs, choice, leave_out):
         if not table.json:
             say_analysis(made)
         analyses.append(made)
-    if not (analyses or left_out.judged):
+    if not (analyses or judged):
         left_out.end(0)
-    rows = errors_of(analyses, left_out.judged)
+    rows = errors_of(analyses, [made.errors for made in judged])
     drawn.write(rows)
     if table.form == "terminal":
-        text = tables.to_terminal(rows, analyses, every=analysis.talk.details)
-        echo(text if analysis.talk.details else f"{text}{MORE}")
-        pairs = [
-            paired_significance(a.recording.name, a.estimates, a.reference)
-            for a in analyses
-            if a.reference is not None and analysis.talk.details
-        ]
-        if pairs:
-            echo(pairs_text(pl.concat(pairs)))
+        echo(terminal_text(rows, analyses, details=analysis.talk.details))
     elif table.json:
         every = [remark for a in analyses for remark in all_remarks(a)]
-        judged = [jacobian_entry(made.log) for made in left_out.judged]
-        say_json([*(a.recording for a in analyses), *judged], every, rows=rows.to_dicts())
+        logged = (made.log for made in judged)
+        about = [{"recording": x.name, "path": str(x.path), "sha256": x.sha256} for x in logged]
+        say_json([*(a.recording for a in analyses), *about], every, rows=rows.to_dicts())
     else:
-        echo_data(tables.FORMS[table.form](rows, analyses))
-    left_out.end(len(analyses) + len(left_out.judged))
+        echo_data(FORMS[table.form](rows, analyses))
+    left_out.end(len(analyses) + len(judged))

@@ -21,11 +21,8 @@ from vftcli.signals.parsing import printable
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
-    from vftcli.evaluation.wrenches import JacobianJudgement
     from vftcli.outputs.screen import Canvas
-    from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
-    from vftcli.readers.table import JacobianError
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
@@ -151,28 +148,15 @@ class LeftOut:
     """The logs of a command that could not be analysed: one line each, the others go on.
 
     Attributes:
-        judged: Of a vendor's torques beside a Jacobian what they tell, where a choice is given.
         reasons: Label of every other log → why it is left out.
     """
 
-    def __init__(
-        self, library: "Library", logs: Sequence[Path], choice: "AnalysisChoice | None" = None
-    ) -> None:
-        self._library, self._several, self._choice = library, len(logs) > 1, choice
-        self.judged: list[JacobianJudgement] = []
+    def __init__(self, library: "Library", logs: Sequence[Path]) -> None:
+        self._library, self._several = library, len(logs) > 1
         self.reasons: dict[str, str] = {}
 
     def add(self, log: Path, error: VftError) -> None:
-        """Judge a log by its Jacobian, else say that it is left out, and why."""
-        from vftcli.readers.table import JacobianError
-
-        if self._choice is not None and isinstance(error, JacobianError):
-            try:
-                self.judged.append(judge_by_jacobian(log, error, self._choice))
-            except VftError as other:
-                error = other
-            else:
-                return
+        """Say that a log is left out, and why; of the only one raise it."""
         if not self._several:
             raise error
         reason = " ".join(str(error).split())
@@ -186,21 +170,6 @@ class LeftOut:
         if not done:
             echo("error: none of the logs can be analysed", err=True)
         raise typer.Exit(1)
-
-
-def judge_by_jacobian(
-    log: Path, found: "JacobianError", choice: "AnalysisChoice"
-) -> "JacobianJudgement":
-    """What a vendor's torques beside a Jacobian tell of what is asked, with the notes on them."""
-    from vftcli.evaluation.wrenches import judge_jacobian
-    from vftcli.readers.references import jacobian_log
-
-    read = jacobian_log(log, found, choice.read, choice.library.label(log))
-    reference = choice.reference.name if choice.reference is not None else None
-    made = judge_jacobian(read, choice.wrench, reference)
-    for remark in (*read.remarks, *made.remarks):
-        say(f"note: {read.name}: {remark}")
-    return made
 
 
 def say_recording(recording: "Recording") -> None:

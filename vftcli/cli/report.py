@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
@@ -11,10 +10,7 @@ from vftcli.cli.console import (
     LeftOut,
     canvas,
     command_line,
-    echo_data,
-    judge_by_jacobian,
     open_made,
-    say,
     say_analysis,
     say_written,
     show,
@@ -25,8 +21,6 @@ from vftcli.signals.option import WRITE, Choice, Option, setting
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.outputs.estimates import Group
-    from vftcli.pipeline import AnalysisChoice
-    from vftcli.readers.table import JacobianError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +58,6 @@ def report(
     from vftcli.outputs.report import FILES, SUMMARY_FILES, report_files, write_report
     from vftcli.pipeline import WRITING, analyse_logs
     from vftcli.readers.library import Library
-    from vftcli.readers.table import JacobianError
 
     library, published, written = Library(logs), beside.choice().table, also.choice()
     output = opt.folder_of(output, logs, analysis.log.reading)
@@ -75,17 +68,13 @@ def report(
         check_published(published, reference.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
     left_out, analyses = LeftOut(library, logs), []
-    try:
-        for made in analyse_logs(logs, choice, left_out.add):
-            table = None
-            if published is not None and made.errors is not None:
-                table = compare_with(published, made.errors, made.observers, made.tunings)
-            analyses.append(replace(made, published=table))
-            if not json:
-                say_analysis(made)
-    except JacobianError as found:  # of one log; among several it is left out
-        write_by_jacobian(logs[0], found, choice, output, force=force, json=json)
-        return
+    for made in analyse_logs(logs, choice, left_out.add):
+        table = None
+        if published is not None and made.errors is not None:
+            table = compare_with(published, made.errors, made.observers, made.tunings)
+        analyses.append(replace(made, published=table))
+        if not json:
+            say_analysis(made)
     if not analyses:
         left_out.end(0)
     failed = left_out.reasons
@@ -153,7 +142,6 @@ def estimate(
     from vftcli.pipeline import analyse, prepared
     from vftcli.readers.library import Library
     from vftcli.readers.references import refuse_estimates
-    from vftcli.readers.table import JacobianError
     from vftcli.signals.packages import check_installed
     from vftcli.signals.recording import EXAMINED
     from vftcli.streaming import analysed_in_blocks, comes_in_blocks
@@ -170,19 +158,15 @@ def estimate(
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = for_estimates(choice)
-    try:
-        recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))
-        # What needs no complete log comes in blocks, so that memory does not grow with it.
-        if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
-            found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
-        else:
-            found = analyse(*prepared(recording, choice), choice)
-            if not json:  # the answer first; of blocks it comes with the last of them
-                show_short(found)
-        made, record = write_estimate_folder(output, found, command_line(), written, force)
-    except JacobianError as error:
-        write_by_jacobian(log, error, choice, output, force=force, json=json)
-        return
+    recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))
+    # What needs no complete log comes in blocks, so that memory does not grow with it.
+    if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
+        found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
+    else:
+        found = analyse(*prepared(recording, choice), choice)
+        if not json:  # the answer first; of blocks it comes with the last of them
+            show_short(found)
+    made, record = write_estimate_folder(output, found, command_line(), written, force)
     if not json and made is not found:
         show_short(made)
     say_written(record, output, names, json=json)
@@ -196,28 +180,3 @@ def show_short(made: "Analysis") -> None:
 
     say_analysis(made)
     show(short_screen(made, canvas()))
-
-
-def write_by_jacobian(
-    log: Path,
-    found: "JacobianError",
-    choice: "AnalysisChoice",
-    output: Path,
-    *,
-    force: bool,
-    json: bool,
-) -> None:
-    """Write what there is of a vendor's torques beside a Jacobian, where it is asked for."""
-    from vftcli.outputs.error_tables import to_terminal
-    from vftcli.outputs.report import write_jacobian_folder
-
-    if choice.wrench is None and choice.reference is None:
-        raise found
-    made = judge_by_jacobian(log, found, choice)
-    record = write_jacobian_folder(output, made, command_line(), force=force)
-    if json:
-        echo_data(record)
-        return
-    if made.errors is not None:
-        show(to_terminal(made.errors, every=False))
-    say(f"{output}: estimates.parquet and run.json; no page and no recording without positions")

@@ -1,7 +1,6 @@
 """Errors of wrenches and of contacts below the joints'; a log with a Jacobian of its own."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from vftcli.signals.wrench import AXES, Wrench
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 from vftcli.wrench.detection import ContactScore
 from vftcli.wrench.sensor import RESEMBLES, fit_axes
-from vftcli.wrench.solvers import LEAST_SIGMA, decompose, null_space, wrench_of
+from vftcli.wrench.solvers import LEAST_SIGMA, decompose, wrench_of
 
 #: Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
 #:
@@ -112,94 +111,64 @@ def with_contacts(
     return pl.concat([errors, table], how="diagonal")
 
 
-VENDOR, SENSOR = "vendor", "sensor"
-#: The frame of such a wrench: axes and point of the log's Jacobian.
-AXES_OF_LOG = "jacobian"
-
-
-class Compared(NamedTuple):
-    """One source of torque on the robot and the wrench that goes with it."""
-
-    torque: ExternalTorque
-    wrench: Wrench
-
-
-@dataclass(frozen=True, kw_only=True)
-class JacobianJudgement:
-    """Wrenches and errors by a log of torques and a Jacobian."""
+class JacobianJudgement(NamedTuple):
+    """A vendor's torques beside a sensor, by a log without positions."""
 
     log: JacobianLog  #: The log.
-    vendor: Compared  #: The vendor's torques, and their wrench through the Jacobian.
-    #: The sensor's wrench, and its torques, or None where nothing is compared.
-    sensor: Compared | None
-    errors: pl.DataFrame | None  #: The tidy error table, None where nothing is compared.
+    errors: pl.DataFrame  #: The tidy error table.
     remarks: tuple[Remark, ...]  #: Limits of the numbers.
 
 
 def judge_jacobian(
     log: JacobianLog, asked: WrenchChoice | None, reference: str | None
 ) -> JacobianJudgement:
-    """Wrench of the vendor's torques, compared with the sensor's if asked."""
+    """Errors of the vendor's torques, of their wrench where one is asked for, by the sensor.
+
+    The wrench is in axes and about the point of the log's own Jacobian; the sensor's
+    axes, their order and signs, are fitted to it.
+    """
     zero = asked.zero if asked is not None else ZeroChoice()
     if asked is not None and asked != WrenchChoice(zero=ZeroChoice(spans=zero.spans)):
         raise ParameterError(
             f"{log.name}: the log has no positions, so its wrench is least squares in the axes of "
             "its own Jacobian: of the wrench's options it takes only --zero A:B"
         )
-    if reference not in {None, SENSOR}:
+    if reference != "sensor":
         raise ReferenceTorqueError(
-            f"{log.name}: the log has no positions; its torques can be compared with its "
-            f"{SENSOR} alone: --reference {SENSOR}"
+            f"{log.name}: the log has no positions; its torques can be compared with its sensor "
+            "alone: --reference sensor"
         )
-    parts = decompose(log.jacobian)
-    sigma, loose = parts.sigma_min, null_space(parts, log.tau_ext[:, :, None])[:, :, 0]
-    wrench = Wrench(
-        name=VENDOR,
-        t=log.t,
-        values=unloaded(log, wrench_of(log.tau_ext, log.jacobian).values, zero),
-        frame=AXES_OF_LOG,
-        sigma_min=sigma,
-        null_space=np.linalg.norm(loose, axis=1) if log.tau_ext.shape[1] > 6 else None,
-    )
-    least = float(sigma.min())
-    remarks: tuple[Remark, ...] = (caution("logged-jacobian", sigma_min_m=least),)
-    if least < LEAST_SIGMA:
-        remarks += (
-            caution("logged-jacobian-near-singular", sigma_min_m=least, limit_m=LEAST_SIGMA),
-        )
-    vendor = Compared(ExternalTorque(name=VENDOR, t=log.t, tau=log.tau_ext), wrench)
-    if reference is None:
-        return JacobianJudgement(log=log, vendor=vendor, sensor=None, errors=None, remarks=remarks)
-    sensor, fitted = sensor_of(log, wrench, zero)
-    errors = evaluate(log.name, [vendor.torque], sensor.torque)
-    if asked is not None:
-        rows = evaluate_wrenches(log.name, [wrench], sensor.wrench)
-        errors = pl.concat([errors, rows], how="diagonal")
-    remarks = (*remarks, fitted)
-    return JacobianJudgement(log=log, vendor=vendor, sensor=sensor, errors=errors, remarks=remarks)
-
-
-def sensor_of(log: JacobianLog, ours: Wrench, zero: ZeroChoice) -> tuple[Compared, Remark]:
-    """Sensor's wrench in the Jacobian's axes, order and signs fitted; torques."""
     if log.wrench is None:
         raise MissingSignalError(
             f"{log.name}: the log has no wrench of a sensor to compare with. Name its columns with "
             "--columns, as in wrench=fx|fy|fz|mx|my|mz"
         )
+    sigma = decompose(log.jacobian).sigma_min
+    values = unloaded(log, wrench_of(log.tau_ext, log.jacobian).values, zero)
+    ours = Wrench(name="vendor", t=log.t, values=values, frame="jacobian", sigma_min=sigma)
+    least = float(sigma.min())
+    remarks = [caution("logged-jacobian", sigma_min_m=least)]
+    if least < LEAST_SIGMA:
+        near = "logged-jacobian-near-singular"
+        remarks.append(caution(near, sigma_min_m=least, limit_m=LEAST_SIGMA))
     fit = fit_axes(ours.force, log.wrench[:, :3])
     # Offsets do not tell axes, and without a contact nothing does.
     known = fit.correlation > RESEMBLES
-    turn = fit.matrix if known else np.eye(3)
-    values = log.wrench.reshape(-1, 2, 3) @ turn
-    values = unloaded(log, values.reshape(-1, 6), zero)
-    wrench = replace(ours, name=SENSOR, values=values, sigma_min=None, null_space=None)
-    tau = np.einsum("tij,ti->tj", log.jacobian, values)
-    remark = (
+    turned = log.wrench.reshape(-1, 2, 3) @ (fit.matrix if known else np.eye(3))
+    values = unloaded(log, turned.reshape(-1, 6), zero)
+    remarks.append(
         fact("sensor-axes-fitted", axes=fit.words, correlation=fit.correlation)
         if known
         else caution("sensor-axes-unknown", correlation=fit.correlation)
     )
-    return Compared(ExternalTorque(name=SENSOR, t=log.t, tau=tau), wrench), remark
+    tau = np.einsum("tij,ti->tj", log.jacobian, values)
+    vendor = ExternalTorque(name="vendor", t=log.t, tau=log.tau_ext)
+    errors = evaluate(log.name, [vendor], ExternalTorque(name="sensor", t=log.t, tau=tau))
+    if asked is not None:
+        sensor = Wrench(name="sensor", t=log.t, values=values, frame="jacobian")
+        rows = evaluate_wrenches(log.name, [ours], sensor)
+        errors = pl.concat([errors, rows], how="diagonal")
+    return JacobianJudgement(log, errors, tuple(remarks))
 
 
 def unloaded(log: JacobianLog, values: Array, zero: ZeroChoice) -> Array:

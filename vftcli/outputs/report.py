@@ -1,7 +1,4 @@
-"""Files of `vftcli report`: page, recording, estimates, errors, run.json.
-
-Of a log of torques and a Jacobian: estimates, errors and run.json.
-"""
+"""Files of `vftcli report`: page, recording, estimates, errors, run.json."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -11,22 +8,16 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation.wrenches import JacobianJudgement
 from vftcli.outputs import NONE, PLAIN, OutputChoice
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.contacts import contacts_csv, contacts_latex, contacts_record
 from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
-from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_table, put_text
+from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text
 from vftcli.outputs.paper import figure_files, write_figures
-from vftcli.outputs.run_record import CONVENTIONS, envelope, log_entry, run_record, seal, to_json
-from vftcli.readers.references import JacobianLog
-from vftcli.signals.arrays import Array
-from vftcli.signals.columns import StatedFrame
+from vftcli.outputs.run_record import envelope, log_entry, run_record, seal, to_json
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
-from vftcli.signals.shown import per_joint
-from vftcli.signals.wrench import per_axis
 
 if TYPE_CHECKING:
     import polars as pl
@@ -176,53 +167,3 @@ def put_errors(
     errors = tables.marked(errors, analyses)
     for name, text_of in zip(ERROR_TABLES, tables.FORMS.values(), strict=True):
         folder.write(f"{place}{name}", text_of(errors, analyses))
-
-
-#: Frame of what a log of a Jacobian holds.
-JACOBIAN_FRAME = StatedFrame("axes and point of the log's own Jacobian, as force on the robot")
-
-
-def write_jacobian_folder(
-    path: Path, made: JacobianJudgement, command: str, *, force: bool = False
-) -> str:
-    """Write estimates, the errors if there are any, and `run.json`; return the latter's text."""
-    import polars as pl
-
-    log, wrench = made.log, made.vendor.wrench
-    both = {"vendor": made.vendor}
-    if made.sensor is not None:
-        both["reference"] = made.sensor
-    columns: dict[str, Array | None] = {"t": log.t}
-    for name, one in both.items():
-        columns |= per_joint(f"tau_ext/{name}", one.torque.tau)
-    for name, one in both.items():
-        columns |= per_axis(f"wrench/{name}", one.wrench.values)
-    columns |= {"null_space/vendor": wrench.null_space, "sigma_min": wrench.sigma_min}
-    table = pl.DataFrame({name: x for name, x in columns.items() if x is not None})
-    found = {
-        "input": {
-            "path": str(log.path),
-            "sha256": log.sha256,
-            "samples": len(log.t),
-            "joints": log.tau_ext.shape[1],
-            "start_s": float(log.t[0]),
-            "end_s": float(log.t[-1]),
-        },
-        "robot": None,
-        "observers": [],
-        "reference": None if made.sensor is None else {"name": made.sensor.torque.name},
-        "conventions": CONVENTIONS,
-        "repairs": list(log.remarks),
-    }
-    record = envelope(command, [jacobian_entry(log)], made.remarks, found)
-    frames = dict.fromkeys(("wrench/vendor", "wrench/reference"), JACOBIAN_FRAME)
-    names = ("estimates.parquet", SEAL, *ERROR_TABLES)
-    with OutputFolder(path, force, names) as folder:
-        put_table(folder / "estimates.parquet", table, frames)
-        put_errors(folder, "", made.errors, [])
-        return seal(folder, SEAL, record)
-
-
-def jacobian_entry(log: JacobianLog) -> dict[str, Any]:
-    """A log of a vendor's torques by name, path and digest."""
-    return {"recording": log.name, "path": str(log.path), "sha256": log.sha256}

@@ -231,9 +231,8 @@ def require_positions(table: Table, picks: Picks) -> Picks:
         if any(JACOBIAN.match(name) for name in table.names):
             raise JacobianError(
                 f"{table.path}: no joint positions (q), but a vendor's estimate beside its "
-                "Jacobian: no observer can run on that. The vendor's wrench, pinv(Jᵀ) tau_ext, is "
-                "written by `estimate --wrench`, and beside the log's sensor by `compare "
-                "--reference sensor --wrench`.",
+                "Jacobian: no observer can run on that. Its torques and wrench are set beside the "
+                "log's sensor by `compare --reference sensor --wrench`.",
                 table,
                 picks,
             )
