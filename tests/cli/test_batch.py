@@ -8,6 +8,8 @@ import polars as pl
 import pytest
 
 from vftcli.batch.keys import digest_of
+from vftcli.batch.run import BatchCount
+from vftcli.cli.batch import progress_line, say_passed
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 CIRCLE = FIXTURES / "ur5_circle.csv"
@@ -175,6 +177,52 @@ def test_what_describes_logs_is_passed_over_and_said_once(
     code, _, err = run("batch", described, *HERE, "-o", tmp_path / "named")
     assert code == 1
     assert "error: meta.json: no joint positions (q) among gains" in err
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ([], ""),
+        (["b"], "note: 1 file is not a log: b\n"),
+        (["d", "b", "c"], "note: 3 files are not logs: b, c, d\n"),
+        (["d", "b", "c", "a", "e"], "note: 5 files are not logs: a, b, c and 2 more\n"),
+    ],
+)
+def test_three_files_that_are_no_logs_are_named(names, said: str, capsys) -> None:
+    say_passed(names)
+    assert capsys.readouterr().err == said
+
+
+def test_ten_failures_are_told_the_others_counted(run, tmp_path: Path) -> None:
+    for k in range(12):
+        (tmp_path / f"{k:02}.csv").write_text(f"a,b,c\n1,2,{k}\n")
+    words = ("--do", "contacts", "--robot", "ur5", "--jobs", "0", "-o")
+    few, every = (sorted(tmp_path.glob(some)) for some in ("0?.csv", "??.csv"))
+    code, _, err = run("batch", *few, *words, tmp_path / "few")
+    assert (code, err.count("error: "), "more" in err) == (1, 10, False)
+    code, _, err = run("batch", *every, *words, tmp_path / "every")
+    assert (code, err.count("error: ")) == (1, 10)
+    assert "… 2 more in failures.parquet\n12 logs: 0 done now, 0 before, 12 failed; " in err
+
+
+def test_a_batch_that_nobody_watches_is_told_every_two_seconds(
+    monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    watch, count = progress_line(), BatchCount(logs=10, before=2, done=3, failed=1, seconds=6.0)
+
+    def told(at: float, count: BatchCount = count) -> str:
+        now[0] = at
+        watch(count)
+        return str(capsys.readouterr().err)
+
+    assert told(102.0) == ""
+    # 4 of 10 are left: at half a log a second 8 s
+    assert told(102.1) == "6/10 logs, 1 failed, 0.5 logs/s, 0:08 left\n"
+    assert told(104.0) == ""
+    assert told(104.2, count._replace(done=0)) == "3/10 logs, 1 failed\n"
+    assert told(109.0, count._replace(done=7)) == ""  # the end has its own line
 
 
 @pytest.mark.statistical

@@ -1,5 +1,6 @@
 """The line that says how far the work is: bar, stage, time left, and nothing printed into it."""
 
+import io
 import json
 import os
 import re
@@ -91,20 +92,72 @@ def test_what_is_printed_takes_the_line_away_first(
     assert capsys.readouterr() == ("again\n", "")
 
 
-def test_a_long_stage_is_cut_to_the_terminal(
+def test_the_line_comes_after_a_second_and_anew_each_second(
     now: list[float], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "60")
+    waited: list[float] = []
+    monkeypatch.setattr(Stages, "_wait", lambda _, seconds: waited.append(seconds))
+    stages = Stages()
+    stages.begin("one")
+    now[0] = 1.0
+    stages.begin("two", 0.02)
+    assert capsys.readouterr().err == ""
+    now[0] = 2.0
+    stages.begin("three", 0.02)  # a fiftieth is too little to guess the rest from
+    assert capsys.readouterr().err.endswith("]  2 %  three")
+    stages.begin("four", 0.03)  # 2 s · .97/.03
+    assert capsys.readouterr().err.endswith("]  3 %  four  1:05 left")
+    stages.begin("four", 0.04)  # what is the same stage waits for its second
+    assert capsys.readouterr().err == ""
+    stages._tick()
+    assert capsys.readouterr().err.rstrip().endswith("]  4 %  four  0:48 left")
+    assert waited == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(("width", "shown"), [(60, 59), (80, 79), (200, 79)])
+def test_a_long_stage_is_cut_to_the_terminal(
+    now: list[float],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    width: int,
+    shown: int,
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
     stages = Stages()
     stages.begin("one")
     now[0] = 2.0
     stages.begin("x" * 200, 0.5)
     line = capsys.readouterr().err.lstrip("\r")
-    assert (len(line), line.endswith("x  0:02 left")) == (59, True)
+    assert (len(line), line.endswith("x  0:02 left")) == (shown, True)
+    stages.begin("y", 0.75)  # what is shorter blots out what was there
+    assert len(capsys.readouterr().err.lstrip("\r")) == shown
+
+
+@pytest.mark.parametrize(("encoding", "rest"), [("utf-8", "·"), ("ascii", ".")])
+def test_the_bar_is_of_letters_that_the_terminal_has(
+    now: list[float], monkeypatch: pytest.MonkeyPatch, encoding: str, rest: str
+) -> None:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    monkeypatch.setattr("sys.stderr", stream)
+    stages = Stages()
+    stages.begin("one")
+    now[0] = 2.0
+    stages.begin("two", 0.25)
+    stream.flush()
+    shown = stream.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
+    assert shown == f"\r[{'#' * 5}{rest * 15}] 25 %  two  0:06 left"
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(8.4, "0:08"), (59.6, "1:00"), (70.0, "1:10"), (3725.0, "1:02:05")]
+    ("seconds", "text"),
+    [
+        (8.4, "0:08"),
+        (59.6, "1:00"),
+        (70.0, "1:10"),
+        (3599.4, "59:59"),
+        (3600.0, "1:00:00"),
+        (3725.0, "1:02:05"),
+    ],
 )
 def test_times_are_minutes_and_seconds_and_hours_from_one_on(seconds: float, text: str) -> None:
     assert clock(seconds) == text
@@ -220,6 +273,20 @@ def test_a_line_is_fitted_but_colours_have_no_width() -> None:
     assert fitted(f"{bright}\nvftcli {'x' * 20}\n  {'word ' * 5}", 16) == "\n".join(
         [bright, f"vftcli {'x' * 20}", "  word word word", "    word word"]
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "width", "lines"),
+    [
+        ("ab cd", 5, ["ab cd"]),
+        ("ab cd", 4, ["ab", "  cd"]),
+        ("a bcdefg", 6, ["a", "  bcdefg"]),  # a word of the width is broken off,
+        ("a bcdefgh", 6, ["a bcdefgh"]),  # a longer one is a path to copy
+        ("  a-b c", 5, ["  a-b", "    c"]),
+    ],
+)
+def test_a_line_is_broken_where_it_does_not_fit(text: str, width: int, lines: list[str]) -> None:
+    assert fitted(text, width).split("\n") == lines
 
 
 def test_a_dumb_terminal_has_no_line() -> None:

@@ -46,8 +46,11 @@ def test_the_scenario_beside_makes_the_same_log(tmp_path: Path) -> None:
 
 
 def test_pair_writes_two_logs(tmp_path: Path) -> None:
-    run("payload-pair", "-o", str(tmp_path / "p.csv"), "--set", "duration=0.3")
-    assert {p.name for p in tmp_path.glob("*.csv")} == {"p.csv", "p.free.csv"}
+    lossy = ("--set", "duration=0.3", "--set", "sensing.dropped=0.5")
+    out = run("payload-pair", "-o", str(tmp_path / "p.csv"), *lossy, "--json")
+    rows = {p.name: p.read_text().count("\n") - 1 for p in tmp_path.glob("*.csv")}
+    assert rows.keys() == {"p.csv", "p.free.csv"}
+    assert json.loads(out)["samples"] == rows["p.csv"] != rows["p.free.csv"]
 
 
 def test_lists_the_scenarios() -> None:

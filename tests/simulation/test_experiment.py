@@ -10,6 +10,7 @@ from vftcli.observers.paper import MomentumObserver
 from vftcli.outputs.conversion import save
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
+from vftcli.robots.friction import COLDEST, WARMEST
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
@@ -48,6 +49,8 @@ name = "drift"
 kind = "random-walk"
 intensity = [2.0]
 begin = 0.5
+[sensing]
+torque = "instant"
 """
 
 
@@ -102,20 +105,20 @@ def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
     np.testing.assert_array_equal(truth.walks["drift"][before], 0.0)
 
 
-def test_truth_closes_the_equation_of_motion() -> None:
+def test_truth_closes_the_equation_of_motion(many: Simulation) -> None:
     """M q̈ + C q̇ + g + τ_f = τ + τ_ext with the true arm, from the truth's pieces alone."""
     scenario = load_scenario("ur5-circle", ["duration=6.0", "sensing.torque=instant"])
-    run = simulate(scenario, 2)
-    rng = np.random.default_rng(np.random.SeedSequence(2).spawn(3)[0])
-    model = build_arm(scenario, run.robot, rng).chain.to_pinocchio()
-    data, samples = model.createData(), run.samples
-    states = zip(samples.q, samples.v, samples.a, strict=True)
-    needed = np.array([pin.rnea(model, data, *state) for state in states])
-    gap = needed + samples.friction - samples.tau - run.truth.tau_ext
     # the torque is that of the step before the sample, q̈ and friction the mean of both sides:
     # half a step's change of a torque that moves by up to 2 N·m a step while pushed
-    assert np.all(rms(gap[10:-10]) < 0.3)
-    assert np.median(np.abs(gap)) < 0.02
+    for run, most in ((simulate(scenario, 2), 0.3), (many, 0.05)):
+        rng = np.random.default_rng(np.random.SeedSequence(run.seed).spawn(3)[0])
+        model = build_arm(run.scenario, run.robot, rng).chain.to_pinocchio()
+        data, samples = model.createData(), run.samples
+        states = zip(samples.q, samples.v, samples.a, strict=True)
+        needed = np.array([pin.rnea(model, data, *state) for state in states])
+        gap = needed + samples.friction - samples.tau - run.truth.tau_ext
+        assert np.all(rms(gap[10:-10]) < most)
+        assert np.median(np.abs(gap)) < 0.02
 
 
 @pytest.mark.slow
@@ -162,26 +165,6 @@ def test_a_push_moves_the_arm_by_millimetres(stiffness: str, low: float, high: f
     assert np.all((off[:3] > low) & (off[:3] < high)), off
 
 
-def test_mismatch_of_zero_is_the_profile_itself() -> None:
-    scenario = load_scenario("ur5-circle", EXACT)
-    robot = load_robot("ur5")
-    arm = build_arm(scenario, robot, np.random.default_rng(0))
-    np.testing.assert_array_equal(arm.chain.mass, robot.chain.mass)
-    np.testing.assert_array_equal(arm.chain.com, robot.chain.com)
-    np.testing.assert_array_equal(arm.gain, 1.0)
-    assert arm.friction.coulomb[0] == robot.friction[0].torques[0]
-
-
-def test_switching_one_mismatch_off_leaves_the_others() -> None:
-    robot = load_robot("ur5")
-    both = build_arm(load_scenario("ur5-circle"), robot, np.random.default_rng(5))
-    one = load_scenario("ur5-circle", ["mismatch.friction=0"])
-    other = build_arm(one, robot, np.random.default_rng(5))
-    np.testing.assert_array_equal(both.chain.mass, other.chain.mass)
-    np.testing.assert_array_equal(both.gain, other.gain)
-    assert np.any(both.friction.coulomb != other.friction.coulomb)
-
-
 def test_stepping_the_arm_oneself_gives_the_same_log() -> None:
     scenario = load_scenario("ur5-circle", ["duration=0.4"])
     arm, reference = prepare(scenario, 3)
@@ -195,14 +178,39 @@ def test_stepping_the_arm_oneself_gives_the_same_log() -> None:
 def test_controller_in_the_loop_reads_what_it_needs() -> None:
     arm, reference = prepare(load_scenario("ur5-drag", ["duration=0.1"]), 1)
     assert isinstance(arm, Arm)
+    seen = []
     for _ in range(50):
         arm.command(reference.q[0])
+        seen.append((arm.mean_torque(0.001) - arm.true.offset) * arm.true.gain)
     assert arm.t == pytest.approx(0.05)
-    assert arm.q.shape == arm.v.shape == arm.mean_torque(0.008).shape == (6,)
+    np.testing.assert_array_equal([arm.q, arm.v], [arm.plant.q, arm.plant.v])
+    # the mean of the last steps, as the drives' gain and offset show it; of all, of one at least
+    for interval, steps in ((0.008, 8), (0.0124, 12), (9.0, 50), (0.0, 1)):
+        mean = np.mean(seen[-steps:], axis=0) / arm.true.gain + arm.true.offset
+        np.testing.assert_allclose(arm.mean_torque(interval), mean, rtol=1e-9)
     # at rest the drives hold the arm against gravity within the stiction
     data = arm.robot.model.createData()
     weight = pin.computeGeneralizedGravity(arm.robot.model, data, arm.q)
     assert np.all(np.abs(arm.mean_torque(0.008) - weight) < 10.0)
+    for _ in range(50):
+        arm.command(reference.q[0])
+    with pytest.raises(ParameterError, match="prepared for 100 steps and has made them"):
+        arm.command(reference.q[0])
+
+
+@pytest.mark.parametrize(("duration", "steps"), [(0.07, 70), (0.0702, 71), (0.3, 300)])
+def test_a_run_has_as_many_steps_as_fit_and_tells_of_them(duration: float, steps: int) -> None:
+    """.07/.001 is a little more than 70 in doubles."""
+    arm, reference = prepare(load_scenario("ur5-circle", [f"duration={duration}"]), 1)
+    assert arm.steps == steps
+    assert len(reference.q) == steps + 1
+
+
+def test_progress_is_told_every_500_steps_and_at_the_end() -> None:
+    told = []
+    scenario = load_scenario("ur5-circle", ["duration=0.6", "contacts=[]"])
+    simulate(scenario, 1, lambda done, of: told.append((done, of)))
+    assert told == [(0, 600), (500, 600), (600, 600)]
 
 
 def test_pair_is_one_motion_with_and_without_the_payload() -> None:
@@ -231,9 +239,16 @@ def test_warming_joints_rub_less() -> None:
     np.testing.assert_array_equal(cold.measured.signals["temperature"], 25.0)
 
 
-def test_a_temperature_that_no_joint_has_is_refused() -> None:
-    with pytest.raises(ParameterError, match="temperature_end is 300 °C; a joint has"):
-        simulate(load_scenario("ur5-circle", ["friction.temperature_end=300"]), 1)
+def test_a_joint_is_as_warm_as_the_scenario_says_between_start_and_end() -> None:
+    for begin, end in ((COLDEST, WARMEST), (30.0, None), (None, 45.0), (None, None)):
+        stated = {"temperature_begin": begin, "temperature_end": end}
+        settings = [f"friction.{k}={v}" for k, v in stated.items() if v is not None]
+        arm, _ = prepare(load_scenario("ur5-circle", ["robot=ur5e", "duration=8", *settings]), 1)
+        first = 35.0 if begin is None else begin  # of the profile's friction
+        last = first if end is None else end
+        found = arm.temperature(np.array([0.0, 2.0, 8.0]))
+        expected = [first, 0.75 * first + 0.25 * last, last]
+        np.testing.assert_allclose(found, np.tile(expected, (6, 1)).T)
 
 
 @pytest.mark.slow

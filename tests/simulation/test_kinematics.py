@@ -6,6 +6,7 @@ import pytest
 
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
+from vftcli.simulation import load_scenario
 from vftcli.simulation.trajectories import (
     HOMES,
     check_limits,
@@ -14,6 +15,13 @@ from vftcli.simulation.trajectories import (
     follow,
     reach,
 )
+
+
+def test_the_usual_poses_are_those_of_the_paper_and_of_franka():
+    """The start of the circle, and Franka's: 0, −π/4, 0, −3π/4, 0, π/2, π/4 to four digits."""
+    np.testing.assert_array_equal(HOMES[6], load_scenario("ur5-circle").trajectory.start)
+    ready = np.pi * np.array([0, -1, 0, -3, 0, 2, 1]) / 4.0
+    np.testing.assert_allclose(HOMES[7], ready, atol=5e-5)
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda"])

@@ -1,21 +1,24 @@
 """The arm that is drawn: how far it lies from its profile, and what leaves it alone."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from vftcli.robots import load_robot
+from vftcli.robots import Payload, load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
 from vftcli.simulation.arm import build_arm, deviate
+from vftcli.simulation.plant import true_friction
 from vftcli.simulation.scenario import MismatchSpec
 
 UR5 = load_robot("ur5")
 
 
-def arm(*settings, seed=1, robot=UR5):
+def arm(*settings):
     """The arm of a UR5 scenario with these settings."""
-    scenario = load_scenario("ur5-circle", settings)
-    return build_arm(scenario, robot, np.random.default_rng(seed))
+    return build_arm(load_scenario("ur5-circle", settings), UR5, np.random.default_rng(1))
 
 
 def test_deviates_are_normal_and_cut_at_two():
@@ -26,43 +29,85 @@ def test_deviates_are_normal_and_cut_at_two():
     assert np.mean(draw) == pytest.approx(0.0, abs=0.002)
 
 
-NOTHING = tuple(f"mismatch.{name}=0" for name in MismatchSpec.__dataclass_fields__)
+SIZES = {
+    "mass": 0.05,
+    "com": 0.004,
+    "rotor_inertia": 0.1,
+    "friction": 0.2,
+    "torque_constant": 0.03,
+    "torque_offset": 0.5,
+    "payload": 0.06,
+}
+MORE = [
+    "payload={mass=2.0, com=[0.01, 0.02, 0.03], inertia=[0.01, 0.02, 0.03]}",
+    "force_sensor={mass=0.35, com=[0.0, 0.01, 0.03]}",
+]
 
 
-def test_each_size_moves_its_own_parameters():
-    exact = arm(*NOTHING)
-    np.testing.assert_array_equal(exact.chain.mass, UR5.chain.mass)
-    np.testing.assert_array_equal(exact.gain, 1.0)
-    heavy = arm(*NOTHING, "mismatch.mass=0.05")
-    ratio = heavy.chain.mass / UR5.chain.mass
-    assert np.all((ratio != 1.0) & (np.abs(ratio - 1.0) <= 0.1))
-    np.testing.assert_allclose(heavy.chain.inertia, UR5.chain.inertia * ratio[:, None, None])
-    np.testing.assert_array_equal(heavy.chain.com, UR5.chain.com)
-    np.testing.assert_array_equal(heavy.chain.rotor_inertia, UR5.chain.rotor_inertia)
-    moved = arm(*NOTHING, "mismatch.com=0.01")
-    assert np.max(np.abs(moved.chain.com - UR5.chain.com)) <= 0.02
-    np.testing.assert_array_equal(moved.chain.mass, UR5.chain.mass)
+@pytest.mark.parametrize("off", [None, "all", *SIZES])
+def test_an_arm_is_its_profile_with_what_the_seed_draws(off):
+    """The draws of NumPy's generator, one after another, whatever their sizes are."""
+    sizes = {name: 0.0 if off in {name, "all"} else size for name, size in SIZES.items()}
+    assert sizes.keys() == MismatchSpec.__dataclass_fields__.keys()
+    drawn = arm(*MORE, *(f"mismatch.{name}={size}" for name, size in sizes.items()))
+    rng = np.random.default_rng(1)
+
+    def draw(name, *shape):
+        return sizes[name] * np.clip(rng.standard_normal(shape), -2.0, 2.0)
+
+    mass, com, rotor = 1.0 + draw("mass", 6), draw("com", 6, 3), 1.0 + draw("rotor_inertia", 6)
+    dry, wet = 1.0 + draw("friction", 6), 1.0 + draw("friction", 6)
+    gain, offset = 1.0 + draw("torque_constant", 6), draw("torque_offset", 6)
+    scale = 1.0 + draw("payload", 1)[0]
+    tensor = np.diag([0.01, 0.02, 0.03])
+    load = Payload(mass=2.0 * scale, com=np.array([0.01, 0.02, 0.03]), inertia=scale * tensor)
+    sensor = Payload(mass=0.35, com=np.array([0.0, 0.01, 0.03]), inertia=np.zeros((3, 3)))
+    links = replace(
+        UR5.chain,
+        mass=UR5.chain.mass * mass,
+        com=UR5.chain.com + com,
+        inertia=UR5.chain.inertia * mass[:, None, None],
+        rotor_inertia=UR5.chain.rotor_inertia * rotor,
+    )
+    same(drawn.chain, links.with_payload(load).with_payload(sensor))
+    same(drawn.nominal.chain, UR5.chain)
+    own = true_friction(UR5, load_scenario("ur5-circle").friction)
+    for name, factor in (("coulomb", dry), ("presliding", dry), ("bend_slopes", wet)):
+        moved, profile = getattr(drawn.friction, name), getattr(own, name)
+        np.testing.assert_allclose(moved, profile * factor, rtol=1e-12)
+        assert profile.any()
+    np.testing.assert_allclose(drawn.gain, gain)
+    np.testing.assert_allclose(drawn.offset, offset)
 
 
-def test_dry_and_viscous_friction_err_apart():
-    friction = arm(*NOTHING).friction
-    other = arm(*NOTHING, "mismatch.friction=0.1").friction
-    dry = other.coulomb / friction.coulomb
-    for wet in other.bend_slopes / friction.bend_slopes:
-        assert np.all(np.abs(dry - wet) > 1e-6)
-    np.testing.assert_array_equal(other.offset, friction.offset)
+def same(chain, other):
+    for name in ("mass", "com", "inertia", "rotor_inertia"):
+        np.testing.assert_allclose(
+            getattr(chain, name), getattr(other, name), rtol=1e-12, atol=1e-15, err_msg=name
+        )
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_a_payload_is_on_the_arm_and_in_the_controller_if_it_knows(known):
-    scenario = load_scenario("payload-pair", [f"payload.known={str(known).lower()}", *NOTHING])
-    drawn = build_arm(scenario, UR5, np.random.default_rng(1))
-    mass = scenario.payload.mass
-    assert drawn.chain.mass[-1] == pytest.approx(UR5.chain.mass[-1] + mass)
-    assert drawn.nominal.chain.mass[-1] == pytest.approx(UR5.chain.mass[-1] + known * mass)
+def test_a_controller_knows_payload_and_sensor_if_it_is_told_to():
+    """Their stated masses, not the drawn one."""
+    drawn = arm(*MORE, "payload.known=true", "force_sensor.known=true", "mismatch.payload=0.4")
+    load = Payload(mass=2.0, com=np.array([0.01, 0.02, 0.03]), inertia=np.diag([0.01, 0.02, 0.03]))
+    sensor = Payload(mass=0.35, com=np.array([0.0, 0.01, 0.03]), inertia=np.zeros((3, 3)))
+    same(drawn.nominal.chain, UR5.chain.with_payload(load).with_payload(sensor))
     assert drawn.nominal.payload is None
 
 
-def test_negative_sizes_are_refused():
-    with pytest.raises(ParameterError, match=r"mismatch\.com is -0\.1"):
-        arm("mismatch.com=-0.1")
+@pytest.mark.parametrize(
+    ("name", "most"), [(name, {"com": 1.0, "torque_offset": 1e4}.get(name, 0.45)) for name in SIZES]
+)
+def test_sizes_beyond_what_leaves_all_positive_are_refused(name, most):
+    arm(f"mismatch.{name}={most}")
+    for size in (-0.1, 1.01 * most):
+        words = f"mismatch.{name} is {size:g}; it is within 0 to {most:g}"
+        with pytest.raises(ParameterError, match=re.escape(words)):
+            arm(f"mismatch.{name}={size}")
+
+
+def test_a_sensor_heavier_than_sensors_are_is_refused():
+    for name in ("mass", "tool_mass"):
+        with pytest.raises(ParameterError, match=r"force_sensor\.mass is -1 kg"):
+            arm(f"force_sensor={{{name}=-1.0}}")

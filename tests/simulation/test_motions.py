@@ -1,5 +1,7 @@
 """Commanded motions: geometry, derivatives, limits, and how well they excite."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,12 +12,15 @@ from vftcli.simulation import load_scenario
 from vftcli.simulation.trajectories import (
     CircleSpec,
     Command,
+    ExcitationSpec,
     HoldSpec,
     JointMovesSpec,
     JointwiseSpec,
     OffsetsSpec,
     PosesSpec,
     check_limits,
+    check_start,
+    check_times,
     flange_pose,
     plan,
 )
@@ -59,14 +64,65 @@ def test_circle_is_a_horizontal_circle_of_fixed_orientation() -> None:
     spec = CircleSpec(towards=-1.5)
     q = plan(spec, robot, np.linspace(0.0, 20.0, 101)).q
     poses = [flange_pose(robot.model, row) for row in q]
-    points = np.array([p.translation for p in poses])
-    centre = points[0] + 0.2 * np.array([np.cos(-1.5), np.sin(-1.5), 0.0])
+    centre = poses[0].translation + 0.2 * np.array([np.cos(-1.5), np.sin(-1.5), 0.0])
+    # counterclockwise, a round in 4 s, from opposite to where the centre is
+    angle = np.pi - 1.5 + 2.0 * np.pi * np.linspace(0.0, 5.0, 101)
+    points = centre + 0.2 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     # the inverse kinematics stop at 1e-10; the series of 48 harmonics leaves 1e-9
-    np.testing.assert_allclose(np.linalg.norm(points - centre, axis=1), 0.2, atol=1e-8)
-    np.testing.assert_allclose(points[:, 2], points[0, 2], atol=1e-8)
+    np.testing.assert_allclose([p.translation for p in poses], points, atol=1e-8)
     for pose in poses:
         np.testing.assert_allclose(pose.rotation, poses[0].rotation, atol=1e-8)
     np.testing.assert_allclose(q[0], q[20], atol=1e-9)
+    assert spec.motion(robot).duration == 20.0
+
+
+MIDWAY = 0.103515625  # of a minimum-jerk move after a quarter of its time: 10/64 − 15/256 + 6/1024
+
+
+def test_moves_lead_straight_to_where_they_say() -> None:
+    """The flange on lines without turning, the joints by their displacements."""
+    robot = load_robot("ur5")
+    t, way = np.array([0.0, 0.5, 0.75, 1.25, 1.5, 1.9]), [0, 0, MIDWAY, 1 - MIDWAY, 1, 1]
+    line, joints = SPECS[2], SPECS[3]
+    back = line.motion(robot).at(np.array([2.25, 3.0, 9.0])).q  # type: ignore[attr-defined]
+    q = np.vstack([line.motion(robot).at(t).q, back])  # type: ignore[attr-defined]
+    home, *poses = (flange_pose(robot.model, row) for row in q)
+    for pose, share in zip(poses, [*way[1:], 1 - MIDWAY, 0, 0], strict=True):
+        # a polynomial of degree 16 for the joints leaves less than a nanometre
+        away = home.translation + share * np.array([0.1, 0.0, 0.05])
+        np.testing.assert_allclose(pose.translation, away, atol=1e-9)
+        np.testing.assert_allclose(pose.rotation, home.rotation, atol=1e-9)
+    q = joints.motion(robot).at(0.2 + 1.3 * (t - 0.5)).q  # type: ignore[attr-defined]
+    np.testing.assert_allclose(q - q[0], np.outer(way, [0.1, 0, 0.3, 0, 0, 0.2]), atol=1e-12)
+
+
+@pytest.mark.parametrize("unknown", [False, True])
+def test_drawn_poses_are_held_inside_the_limits_above_the_table(unknown: bool) -> None:
+    robot = load_robot("panda")
+    low, high = robot.limits.q_min + 0.05, robot.limits.q_max - 0.05
+    if unknown:
+        nothing = np.full(7, np.nan)
+        robot = replace(robot, limits=replace(robot.limits, q_min=nothing, q_max=nothing))
+        low, high = np.full((2, 7), [[-np.pi], [np.pi]])
+    spec = PosesSpec(count=80, spread=2.0, move=1.5, dwell=0.5)
+    motion = spec.motion(robot)
+    assert motion.duration == 80 * 0.5 + 79 * 1.5
+    begin, middle, end = (motion.at(2.0 * np.arange(80) + dt).q for dt in (0.0, 0.2, 0.5))
+    np.testing.assert_allclose([begin, end], [middle, middle], atol=1e-12)
+    home = check_start(robot, ())
+    assert np.all((middle >= low - 1e-12) & (middle <= high + 1e-12))
+    # 80 draws of 2 rad to both sides: each joint has gone to nine tenths, or to its limit
+    reached = np.array([np.maximum(low, home - 1.8), np.minimum(high, home + 1.8)])
+    assert np.all(middle.min(axis=0) <= reached[0])
+    assert np.all(middle.max(axis=0) >= reached[1])
+    assert 0.15 < min(flange_pose(robot.model, q).translation[2] for q in middle) < 0.2
+    (first, *_), (again, *_) = (PosesSpec(count=k).motion(robot).at(np.zeros(1)).q for k in (2, 3))
+    np.testing.assert_array_equal(first, again)
+
+
+def test_a_quick_sweep_takes_a_fifth_of_a_second() -> None:
+    motion = JointwiseSpec(speeds=(10.0, 20.0), rest=0.1).motion(load_robot("ur5"))
+    assert motion.duration == pytest.approx(0.1 + 6 * 2 * (3 * 0.2 + 0.1))
 
 
 def regressor(robot, motion):
@@ -118,6 +174,10 @@ def test_excitation_is_well_conditioned_inside_the_limits(name, rank, condition)
     [
         (["trajectory.radius=0.6"], "cannot reach"),
         (["trajectory.period=1.0"], "its limit is 3.14"),
+        *(
+            ([f"trajectory.{name}=0"], "must be positive")
+            for name in ("radius", "period", "cycles")
+        ),
         (["trajectory.radius=-0.1"], "must be positive"),
         (["trajectory.start=[0,0,0]"], "has 3 angles"),
         (
@@ -132,7 +192,44 @@ def test_impossible_circles_are_refused(settings: list[str], words: str) -> None
         plan(scenario.trajectory, load_robot(scenario.robot), np.linspace(0, 4, 50))
 
 
-def test_moves_out_of_order_are_refused() -> None:
-    spec = OffsetsSpec(moves=((2.0, 1.0, 0.1, 0.0, 0.0),), length=3.0)
+ROW, SHORT = (0.1,) * 6, (0.1,) * 5
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        (JointMovesSpec(moves=((0.0, 1.0, *SHORT),), length=1.0), "two times and 6 displacements"),
+        (PosesSpec(move=0.0), "count at least 2"),
+        (PosesSpec(dwell=-0.1), "dwell not negative"),
+        (PosesSpec(count=1), "count at least 2"),
+        (JointwiseSpec(speeds=()), "speeds must be positive"),
+        (JointwiseSpec(speeds=(0.1, 0.0)), "speeds must be positive"),
+        (ExcitationSpec(mean=ROW, cosine=(ROW,), sine=(SHORT,)), "must have 6 numbers"),
+        (ExcitationSpec(mean=SHORT, cosine=(ROW,), sine=(ROW,)), "must have 6 numbers"),
+        (ExcitationSpec(mean=ROW, cosine=(ROW, ROW), sine=(ROW,)), "as many rows"),
+        (ExcitationSpec(mean=ROW, cosine=(ROW,), sine=(ROW,), period=0.0), "must be positive"),
+    ],
+)
+def test_impossible_motions_are_refused(spec: object, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        spec.motion(load_robot("ur5"))  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("times", "good"),
+    [
+        ([(0.0, 1.0), (1.0, 2.0)], True),
+        ([], False),
+        ([(-0.1, 1.0)], False),
+        ([(1.0, 2.1)], False),
+        ([(0.0, 1.0), (0.9, 2.0)], False),
+        ([(1.0, 1.0)], False),
+        ([(2.0, 1.0)], False),
+    ],
+)
+def test_moves_follow_one_another_inside_their_length(times: list[object], good: bool) -> None:
+    if good:
+        check_times(np.array(times), 2.0)
+        return
     with pytest.raises(ParameterError, match="times that increase"):
-        spec.motion(load_robot("ur5"))
+        check_times(np.array(times), 2.0)

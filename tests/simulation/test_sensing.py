@@ -3,11 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from vftcli.robots import Payload, load_robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.terms import gravity_torque
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
-from vftcli.simulation.sensing import check_sensing
+from vftcli.simulation.scenario import SensingSpec
+from vftcli.simulation.sensing import check_sensing, log_rate
 
 SHORT = ["duration=0.4", "contacts.hand.begin=0.0"]
 CLEAN = ["sensing.noise=0", "sensing.position_step=0"]
@@ -88,9 +93,37 @@ def test_dropped_samples_leave_gaps_and_repeated_rows_are_counted() -> None:
 
 
 def test_jittering_stamps_still_increase() -> None:
-    steps = np.diff(circle("sensing.jitter=0.003").recording.t)
-    assert np.all(steps > 0)
-    assert np.std(steps) > 1e-3
+    """By at most .45 of a step to either side, however large the jitter is."""
+    run = circle("sensing.jitter=0.0002", "duration=0.5", "sensing.rate=500")
+    away = run.measured.stamp - run.samples.stamp
+    # 251 stamps: a standard deviation to 4.5 % (one sigma)
+    assert np.std(away) == pytest.approx(2e-4, rel=0.2)
+    wild = circle("sensing.jitter=1.0", "duration=0.1")
+    away = wild.measured.stamp - wild.samples.stamp
+    assert abs(away).max() == pytest.approx(0.45 * 0.008)
+    assert abs(away).min() > 0.0
+    assert np.all(np.diff(wild.recording.t) > 0)
+    # one sample has no neighbour to run into
+    circle("sensing.jitter=1.0", "duration=0.004")
+
+
+def test_the_first_and_the_last_sample_are_always_in_the_log() -> None:
+    kept = circle("duration=1.0", "sensing.dropped=0.8", "sensing.rate=1000").measured.rows
+    assert (kept[0], kept[-1]) == (0, 1000)
+    assert len(kept) == pytest.approx(200, abs=40)  # of 999 each with .2: 200 ± 12.6 (one sigma)
+    again = circle("duration=0.1", "sensing.repeated=0.9", "sensing.rate=1000").measured.rows
+    before = np.arange(101) - again
+    assert set(before) == {0, 1}
+    assert (before[0], before[-1]) == (0, 0)
+    assert before.sum() == pytest.approx(0.9 * 99, abs=10)  # ± 3 (one sigma)
+
+
+def test_noise_of_the_current_may_be_stated() -> None:
+    silent, loud = (circle(f"sensing.current_noise={n}", "duration=1") for n in (0.0, 0.3))
+    away = loud.recording.require("current") - silent.recording.require("current")
+    # 126 samples of six joints: to 3 % (one sigma)
+    assert np.std(away) == pytest.approx(0.3, rel=0.1)
+    np.testing.assert_array_equal(loud.recording.q, silent.recording.q)
 
 
 @pytest.mark.slow
@@ -103,38 +136,114 @@ def test_vendor_estimate_sees_the_push_late_and_through_a_filter() -> None:
     assert 0.016 <= 0.008 * (1 + int(np.argmax(lags))) <= 0.08
 
 
-@pytest.mark.slow
-def test_force_sensor_reads_the_handle_in_its_own_axes() -> None:
-    quiet = ["noise_force=0", "noise_torque=0", "drift_force=0", "tool_mass=0"]
-    settings = [f"force_sensor.{s}" for s in quiet]
-    run = simulate(
-        load_scenario("ur5-sensor", ["duration=9", *settings, "force_sensor.bias=[0,0,0,0,0,0]"]), 1
-    )
-    assert "wrench" in run.measured.signals
-    # lengths of a vector do not depend on the axes
-    there = np.linalg.norm(run.truth.wrench[:, :3], axis=1)
-    np.testing.assert_allclose(
-        np.linalg.norm(run.measured.signals["wrench"][:, :3], axis=1), there, atol=1e-9
-    )
-    assert np.max(there) > 20.0
+SENSOR = {
+    "position": [0.01, -0.02, 0.03],
+    "rpy": [0.3, -0.4, 0.5],
+    "tool_mass": 0.5,
+    "tool_com": [0.02, 0.01, 0.06],
+}
 
 
-def test_force_sensor_at_rest_weighs_its_tool() -> None:
-    run = simulate(load_scenario("ur5-sensor", ["duration=2", "force_sensor.tool_mass=0.5"]), 1)
-    assert "wrench" in run.measured.signals
-    bias = np.array(run.scenario.force_sensor.bias)  # type: ignore[union-attr]
-    weight = np.linalg.norm((run.measured.signals["wrench"] - bias)[:, :3].mean(axis=0))
-    # 250 samples of 0.1 N noise and 2 mN drift: 0.01 N
-    assert weight == pytest.approx(0.5 * 9.81, abs=0.02)
+def sensed(duration: float = 0.2, **more: object) -> Simulation:
+    """A UR5 pushed on the circle, a sensor without noise, drift and offset on its flange."""
+    sensor = ", ".join(f"{name}={value}" for name, value in (SENSOR | more).items())
+    push = "{name='p', kind='profile', spans=[[0.0, 9.0]], force=[5.0, 9.0, -20.0], rise=0.1}"
+    settings = [f"duration={duration}", f"force_sensor={{{sensor}}}", f"contacts=[{push}]"]
+    return simulate(load_scenario("ur5-circle", settings), 1)
+
+
+def test_a_force_sensor_reads_contacts_and_what_its_tool_weighs() -> None:
+    """The tool as the joint torques that Pinocchio gives with it and without it."""
+    run = sensed()
+    chain, frame = run.robot.chain, run.robot.model.getFrameId("flange")
+    turn = pin.rpy.rpyToMatrix(*SENSOR["rpy"])
+    com = np.array(SENSOR["position"]) + turn @ SENSOR["tool_com"]
+    tool = Payload(mass=0.5, com=com, inertia=np.zeros((3, 3)))
+    models = [chain.with_payload(tool).to_pinocchio(), run.robot.model]
+    samples, axes = run.samples, pin.LOCAL_WORLD_ALIGNED
+    for k in range(len(samples.q)):
+        state = samples.q[k], samples.v[k], samples.a[k]
+        more, less = (pin.rnea(model, model.createData(), *state) for model in models)
+        data = run.robot.model.createData()
+        J = pin.computeFrameJacobian(run.robot.model, data, state[0], frame, axes)
+        wrench = run.truth.wrench[k] - np.linalg.solve(J.T, more - less)
+        R, away = data.oMf[frame].rotation @ turn, data.oMf[frame].rotation @ SENSOR["position"]
+        moment = wrench[3:] - np.cross(away, wrench[:3])
+        # the solve through J, of condition 10, rounds to 1e-13
+        np.testing.assert_allclose(
+            run.measured.signals["wrench"][k], [*(R.T @ wrench[:3]), *(R.T @ moment)], atol=1e-9
+        )
+    assert np.linalg.norm(run.truth.wrench[-1, :3]) > 20.0
+
+
+def test_a_force_sensor_errs_by_offset_drift_and_noise() -> None:
+    bias = [0.1, 0.2, 0.3, 0.04, 0.05, 0.06]
+    plain, off = sensed(), sensed(bias=bias, drift_force=0.5, drift_torque=0.02)
+    away = off.measured.signals["wrench"] - plain.measured.signals["wrench"]
+    drift = np.outer(plain.samples.time, [0.5] * 3 + [0.02] * 3)
+    np.testing.assert_allclose(away, bias + drift, atol=1e-12)
+    still, noisy = (sensed(0.5, noise_force=n, noise_torque=0.1 * n) for n in (0.0, 0.2))
+    away = noisy.measured.signals["wrench"] - still.measured.signals["wrench"]
+    # 63 samples of three axes: a standard deviation to 5 % (one sigma)
+    spread = [np.std(away[:, :3]), np.std(away[:, 3:])]
+    assert spread == pytest.approx([0.2, 0.02], rel=0.2)
+
+
+def test_the_controllers_targets_and_estimate_are_of_its_nominal_model() -> None:
+    """Inverse dynamics by Pinocchio, friction by the profile; at 100 kHz no filter is left."""
+    run = circle("duration=0.1", "sensing.vendor_cutoff=1e5")
+    samples, seen, robot = run.samples, run.measured.signals, run.robot
+    data, constant = robot.model.createData(), robot.torque_constant
+    target = [
+        pin.rnea(robot.model, data, *row)
+        for row in zip(samples.target_q, samples.target_dq, samples.target_ddq, strict=True)
+    ]
+    np.testing.assert_allclose(seen["target_torque"], target, atol=1e-9)
+    load = gravity_torque(robot, samples.target_q)
+    rubs = friction_torque(robot.friction, samples.target_dq, load)
+    np.testing.assert_allclose(seen["target_current"] * constant, target + rubs, atol=1e-9)
+    model = [
+        pin.rnea(robot.model, data, *row)
+        for row in zip(seen["q"], seen["dq"], samples.target_ddq, strict=True)
+    ]
+    model += friction_torque(robot.friction, seen["dq"], load)
+    np.testing.assert_allclose(seen["tau_ext"], model - seen["current"] * constant, atol=1e-9)
+
+
+def test_the_controllers_estimate_is_low_passed_at_its_cutoff() -> None:
+    """First order, from its first sample on: y += (1 − exp(−2π·5 Hz·8 ms)) (x − y)."""
+    raw, slow = (
+        circle("duration=0.4", f"sensing.vendor_cutoff={hz}").measured.signals["tau_ext"]
+        for hz in (1e6, 5.0)
+    )
+    y, share = raw[0], 1.0 - np.exp(-2.0 * np.pi * 5.0 * 0.008)
+    for x, found in zip(raw, slow, strict=True):
+        y = y + share * (x - y)
+        np.testing.assert_allclose(found, y, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("source", "rate"), [("current", 125.0), ("link_torque", 1000.0), ("joint_torque", 500.0)]
+)
+def test_a_log_has_the_rate_stated_the_robots_or_the_usual_one(source: str, rate: float) -> None:
+    robot = replace(load_robot("ur5"), torque_source=source, sample_rate_hz=float("nan"))
+    assert log_rate(SensingSpec(), robot) == rate
+    assert log_rate(SensingSpec(), replace(robot, sample_rate_hz=320.0)) == 320.0
+    assert log_rate(SensingSpec(rate=50.0), replace(robot, sample_rate_hz=320.0)) == 50.0
 
 
 @pytest.mark.parametrize(
     ("setting", "words"),
     [
-        ("sensing.dropped=1.5", "share from 0 to 1"),
-        ("sensing.jitter=-1", "not be negative"),
+        ("sensing.dropped=1.0", "share from 0 to 1"),
+        ("sensing.repeated=-0.1", "share from 0 to 1"),
+        *(
+            (f"sensing.{name}=-0.1", f"{name} is -0.1; it must not be negative")
+            for name in ("rate", "noise", "current_noise", "position_step", "jitter")
+        ),
         ("sensing.torque=peak", "average or instant"),
-        ("sensing.clock_drift=0.9", "below 0.5"),
+        ("sensing.clock_drift=-0.5", "below 0.5"),
+        ("sensing.vendor_cutoff=0.0", "vendor_cutoff positive"),
     ],
 )
 def test_impossible_sensing_is_refused(setting: str, words: str) -> None:

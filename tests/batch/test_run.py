@@ -1,0 +1,63 @@
+"""A batch before its work: which logs a worker is given together."""
+
+from pathlib import Path
+
+import pytest
+
+from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.keys import digest_of
+from vftcli.batch.log_work import LogJob
+from vftcli.batch.run import BatchCount, BatchRun
+from vftcli.outputs.batch_folder import BatchFolder
+from vftcli.pipeline import AnalysisChoice
+from vftcli.readers.library import LogEntry
+
+
+def batch(folder: Path, sizes: list[int], jobs: int | None, **more: int) -> BatchRun:
+    """A batch of logs of these sizes [B], each of bytes of its own."""
+    digest_of.cache_clear()
+    logs = []
+    for k, size in enumerate(sizes):
+        path = folder / f"{k:03}.csv"
+        path.write_bytes(f"{k:08}".encode().ljust(size))
+        logs.append(LogEntry(path=path, files=(path,), **more))
+    return BatchRun(
+        logs=logs,
+        job=LogJob(do="estimate", choice=AnalysisChoice(), anyway=False, written=()),
+        folder=BatchFolder(folder / "out"),
+        workers=WorkersChoice(jobs=jobs),
+        command="",
+        tell=print,
+        progress=print,
+    )
+
+
+@pytest.mark.parametrize(
+    ("logs", "jobs", "most"),
+    # eight groups a worker at least, of four workers where none are stated, of 64 logs at most
+    [(5, 2, 1), (64, 2, 4), (95, 2, 5), (64, None, 2), (64, 0, 2), (520, 1, 64)],
+)
+def test_small_logs_go_together_so_that_workers_end_together(
+    tmp_path: Path, logs: int, jobs: int | None, most: int
+) -> None:
+    groups = [len(group) for group in batch(tmp_path, [8] * logs, jobs).groups()]
+    assert groups == [most] * (logs // most) + [logs % most] * (logs % most > 0)
+
+
+def test_a_log_of_300_kB_goes_alone_but_an_episode_with_others(tmp_path: Path) -> None:
+    sizes = [8, 8, 8, 300_000, 299_999, *[8] * 59]
+    asked = batch(tmp_path, sizes, 2)
+    groups = [[int(task.path.stem) for task in group] for group in asked.groups()]
+    assert groups[:3] == [[0, 1, 2], [3], [4, 5, 6, 7]]
+    episodes = batch(tmp_path, [300_000] * 64, 2, episode=0)
+    assert [len(group) for group in episodes.groups()] == [4] * 16
+
+
+def test_equal_bytes_are_done_once_and_what_cannot_be_read_fails(tmp_path: Path) -> None:
+    asked = batch(tmp_path, [8] * 4, 1)
+    (tmp_path / "001.csv").write_bytes((tmp_path / "000.csv").read_bytes())
+    (tmp_path / "002.csv").unlink()
+    assert [task.path.stem for group in asked.groups() for task in group] == ["000", "003"]
+    assert asked.count()[:4] == BatchCount(logs=4, failed=1)[:4]
+    assert asked.count().left == 3
+    assert asked.failures[2].stage == "finding"
