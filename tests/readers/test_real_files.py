@@ -73,8 +73,8 @@ LOGS = {
 REFUSED_LOGS = {
     "fr3/run_a.npy": "42 columns without a header",
     "other_robot_yu_cobot.parquet": "4 recordings one after another",
-    "panda_ati/press_1.csv": r"no joint positions .*pinv\(Jᵀ\) tau_ext",
-    "panda_ati/traj_raw.csv": r"no joint positions .*pinv\(Jᵀ\) tau_ext",
+    "panda_ati/press_1.csv": r"no joint positions .*compare --reference sensor --wrench",
+    "panda_ati/traj_raw.csv": r"no joint positions .*compare --reference sensor --wrench",
     "libfranka_sim/pushes_truth.csv.gz": "no joint positions",
     "panda_exciting/exciting_traj_positions.txt": "single column",
     "panda_exciting/exciting_traj_time.txt": "single column",

@@ -8,13 +8,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from vftcli.readers.bags.container import type_name
 from vftcli.readers.bags.ros_messages import (
-    DEFINITIONS,
-    FRANKA,
-    ROS,
     fields_of,
     in_parts,
     long_name,
-    own_types,
     schema_text,
     serialised,
     stamped,
@@ -29,17 +25,6 @@ def header(time, frame):
     """The header that rosbags makes of a stamp [ns]."""
     stamp = STORE.types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
     return STORE.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
-
-
-@pytest.mark.parametrize("kind", sorted(kind for kind in ROS if long_name(kind) in STORE.fielddefs))
-def test_the_types_of_ros_are_those_of_rosbags(kind):
-    assert own_types()[kind] == fields_of(STORE.fielddefs[long_name(kind)][1])
-
-
-@pytest.mark.parametrize("kind", sorted({*FRANKA, "foxglove_msgs/Log"}))
-def test_the_fields_of_other_types_are_those_that_rosbags_parses(kind):
-    parsed = get_types_from_msg(DEFINITIONS[kind], long_name(kind))[long_name(kind)][1]
-    assert own_types()[kind] == fields_of(parsed)
 
 
 @pytest.mark.parametrize("kind", ["sensor_msgs/JointState", "geometry_msgs/WrenchStamped"])

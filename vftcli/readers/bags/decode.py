@@ -1,156 +1,18 @@
-"""Bulk decoding: messages of one layout become arrays at once, the odd ones one by one.
-
-A layout says where the numbers of a serialised ROS message lie. It is found by walking
-one message along its definition. Another message has the same layout if and only if it is
-as long and all its length prefixes are equal; strings are required to be equal too, so
-that joint names hold for every message of a group.
-"""
+"""Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.readers.aliases import along_arm
-from vftcli.readers.bags.container import Batch, Bytes, Channel, Integers, ReadBudget, strided
-from vftcli.readers.bags.ros_messages import SIZES, Field, LayoutError, Types, types_for
+from vftcli.readers.bags.container import Batch, Channel, Integers, ReadBudget
+from vftcli.readers.bags.ros_messages import LayoutError, MessageLayout, Types, types_for
 from vftcli.readers.table import Column, Columns, JoinedRows, Names, Signals
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
-
-MAX_DEPTH = 24
-MAX_LEAVES = 20_000
-#: Fields that a walk may visit beyond one a byte: messages without fields take none.
-SPARE_VISITS = 1000
-#: The numbers below a wrench.
-VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
-
-
-class Leaf(NamedTuple):
-    """Numbers in a message: where, of which type, how many."""
-
-    offset: int
-    code: str
-    numbers: int
-
-
-class MessageLayout:
-    """Where everything lies in messages of one shape.
-
-    Attributes:
-        leaves: Dotted path → numbers.
-        texts: Dotted path → strings, one or several.
-        fixed: Ranges of bytes that have to be equal for a message to have this layout.
-    """
-
-    def __init__(self, types: Types, message: Bytes, kind: str, *, cdr: bool) -> None:
-        self.leaves: dict[str, Leaf] = {}
-        self.texts: dict[str, Names] = {}
-        self.fixed: list[tuple[int, int]] = []
-        self._types, self._message, self._cdr = types, message, cdr
-        self._order, self._position, self._visits = "<", 0, 0
-        if cdr:  # four bytes: representation and byte order
-            if len(message) < 4 or message[0] != 0 or message[1] > 1:
-                raise LayoutError("unknown encapsulation")
-            self._order = "<" if message[1] == 1 else ">"
-            self.fixed.append((0, 2))
-            self._position = 4
-        self._walk("", kind, 0)
-        # Some writers pad a message at its end.
-        if len(message) - self._position > (8 if cdr else 0):
-            raise LayoutError(f"{len(message) - self._position} bytes too many")
-        self._expected = [message[a:b].copy() for a, b in self.fixed]
-        del self._message  # a part of a batch, all of which would stay in memory
-
-    def fits(self, buffer: Bytes, offsets: Integers) -> Mask:
-        """Which messages, all of this layout's length, have this layout. (k,)"""
-        same = np.ones(len(offsets), dtype=bool)
-        for (a, b), expected in zip(self.fixed, self._expected, strict=True):
-            same &= (strided(buffer, offsets, a, b) == expected).all(axis=1)
-        return same
-
-    def numbers(
-        self, paths: Sequence[str], buffer: Bytes, offsets: Integers
-    ) -> NDArray[np.float64]:
-        """The numbers of each message at the first path that is there. (k, count)
-
-        At a path without numbers of its own are the six of a wrench, or none.
-        """
-        each = [[p] if p in self.leaves else [f"{p}.{part}" for part in VECTORS] for p in paths]
-        found = next((names for names in each if self.leaves.keys() >= set(names)), [])
-        columns = [np.empty((len(offsets), 0))]
-        for leaf in map(self.leaves.__getitem__, found):
-            dtype = np.dtype(leaf.code)
-            raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.numbers * dtype.itemsize)
-            columns.append(np.ascontiguousarray(raw).view(dtype).astype(np.float64))
-        return np.hstack(columns) if len(columns) != 2 else columns[1]
-
-    def _walk(self, path: str, kind: str, depth: int) -> None:
-        if depth > MAX_DEPTH:
-            raise LayoutError("nested too deeply")
-        # Empty messages take no bytes: a few nested types of them would be visited
-        # without end.
-        self._visits += 1
-        if self._visits > len(self._message) + SPARE_VISITS:
-            raise LayoutError("more parts than bytes")
-        if kind not in self._types:
-            raise LayoutError(f"no definition of {kind}")
-        for part in self._types[kind]:
-            inner = f"{path}.{part.name}" if path else part.name
-            many = self._count() if part.many == -1 else part.many
-            if part.type in SIZES:
-                self._numbers(inner, part, 1 if many is None else many)
-            elif part.type == "string":
-                texts = [self._text(inner) for _ in range(1 if many is None else many)]
-                self.texts[inner] = tuple(texts)
-            elif many is None:
-                self._walk(inner, part.type, depth + 1)
-            else:
-                for k in range(many):
-                    self._walk(f"{inner}[{k}]", part.type, depth + 1)
-
-    def _take(self, size: int, what: str) -> int:
-        start, self._position = self._position, self._position + size
-        if self._position > len(self._message):
-            raise LayoutError(f"{what} is outside the message")
-        return start
-
-    def _take_fixed(self, size: int, what: str) -> Bytes:
-        """The next bytes, which every message of this layout must repeat."""
-        start = self._take(size, what)
-        if self.fixed and self.fixed[-1][1] == start:
-            start, _ = self.fixed.pop()
-        self.fixed.append((start, self._position))
-        return self._message[self._position - size : self._position]
-
-    def _align(self, size: int) -> None:
-        if self._cdr:
-            self._position += -(self._position - 4) % size
-
-    def _numbers(self, path: str, part: Field, count: int) -> None:
-        code = SIZES[part.type]
-        size = np.dtype(code).itemsize
-        if count:
-            self._align(size)
-        start = self._take(count * size, path)
-        if len(self.leaves) > MAX_LEAVES:
-            raise LayoutError(f"{path} is outside the message")
-        self.leaves[path] = Leaf(start, self._order + code, count)
-
-    def _count(self) -> int:
-        self._align(4)
-        count = int(self._take_fixed(4, "a length").view(f"{self._order}u4")[0])
-        # An element takes a byte or more: a larger count is damage, not data.
-        if count > len(self._message) - self._position:
-            raise LayoutError("a count larger than what is left of the message")
-        return count
-
-    def _text(self, path: str) -> str:
-        raw = self._take_fixed(self._count(), path).tobytes()
-        return raw.removesuffix(b"\0").decode("utf-8", "replace")
 
 
 def _paths_by_name(text: str) -> dict[str, Names]:

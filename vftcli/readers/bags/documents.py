@@ -13,7 +13,8 @@ import numpy as np
 
 from vftcli.readers.aliases import along_arm, laid_along
 from vftcli.readers.bags.container import Batch, Channel
-from vftcli.readers.bags.decode import KINDS, VECTORS, Stream
+from vftcli.readers.bags.decode import KINDS, Stream
+from vftcli.readers.bags.ros_messages import VECTORS
 from vftcli.readers.objects import flat
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import Column, Names

@@ -1,18 +1,23 @@
-"""ROS 2 messages that vftcli knows by itself: their definitions, for reading bags and for writing.
+"""ROS messages: their definitions, where the numbers of a serialised one lie, and many at once.
 
 Bags of ROS 2 Humble and older hold no definitions, and a bag that is written needs them.
+A layout is found by walking one message along its definition. Another message has the
+same layout if and only if it is as long and all its length prefixes are equal; strings
+are required to be equal too, so that joint names hold for every message of a group.
 """
 
-import struct
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.bags.container import Bytes, Channel, type_name
+from vftcli.readers.bags.container import Bytes, Channel, Integers, strided, type_name
 from vftcli.readers.opening import reason_of
+from vftcli.readers.table import Names
+from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import LogError, OutputError
 from vftcli.signals.parsing import tables_beside
 
@@ -41,6 +46,138 @@ Described = Any  #: Fields or their type as nested tuples of rosbags.
 
 class LayoutError(ValueError):
     """A message does not fit its definition."""
+
+
+MAX_DEPTH = 24
+MAX_LEAVES = 20_000
+#: Fields that a walk may visit beyond one a byte: messages without fields take none.
+SPARE_VISITS = 1000
+#: The numbers below a wrench.
+VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
+
+
+class Leaf(NamedTuple):
+    """Numbers in a message: where, of which type, how many."""
+
+    offset: int
+    code: str
+    numbers: int
+
+
+class MessageLayout:
+    """Where everything lies in messages of one shape.
+
+    Attributes:
+        leaves: Dotted path → numbers.
+        texts: Dotted path → strings, one or several.
+        fixed: Ranges of bytes that have to be equal for a message to have this layout.
+    """
+
+    def __init__(self, types: Types, message: Bytes, kind: str, *, cdr: bool) -> None:
+        self.leaves: dict[str, Leaf] = {}
+        self.texts: dict[str, Names] = {}
+        self.fixed: list[tuple[int, int]] = []
+        self._types, self._message, self._cdr = types, message, cdr
+        self._order, self._position, self._visits = "<", 0, 0
+        if cdr:  # four bytes: representation and byte order
+            if len(message) < 4 or message[0] != 0 or message[1] > 1:
+                raise LayoutError("unknown encapsulation")
+            self._order = "<" if message[1] == 1 else ">"
+            self.fixed.append((0, 2))
+            self._position = 4
+        self._walk("", kind, 0)
+        # Some writers pad a message at its end.
+        if len(message) - self._position > (8 if cdr else 0):
+            raise LayoutError(f"{len(message) - self._position} bytes too many")
+        self._expected = [message[a:b].copy() for a, b in self.fixed]
+        del self._message  # a part of a batch, all of which would stay in memory
+
+    def fits(self, buffer: Bytes, offsets: Integers) -> Mask:
+        """Which messages, all of this layout's length, have this layout. (k,)"""
+        same = np.ones(len(offsets), dtype=bool)
+        for (a, b), expected in zip(self.fixed, self._expected, strict=True):
+            same &= (strided(buffer, offsets, a, b) == expected).all(axis=1)
+        return same
+
+    def numbers(
+        self, paths: Sequence[str], buffer: Bytes, offsets: Integers
+    ) -> NDArray[np.float64]:
+        """The numbers of each message at the first path that is there. (k, count)
+
+        At a path without numbers of its own are the six of a wrench, or none.
+        """
+        each = [[p] if p in self.leaves else [f"{p}.{part}" for part in VECTORS] for p in paths]
+        found = next((names for names in each if self.leaves.keys() >= set(names)), [])
+        columns = [np.empty((len(offsets), 0))]
+        for leaf in map(self.leaves.__getitem__, found):
+            dtype = np.dtype(leaf.code)
+            raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.numbers * dtype.itemsize)
+            columns.append(np.ascontiguousarray(raw).view(dtype).astype(np.float64))
+        return np.hstack(columns) if len(columns) != 2 else columns[1]
+
+    def _walk(self, path: str, kind: str, depth: int) -> None:
+        if depth > MAX_DEPTH:
+            raise LayoutError("nested too deeply")
+        # Empty messages take no bytes: a few nested types of them would be visited
+        # without end.
+        self._visits += 1
+        if self._visits > len(self._message) + SPARE_VISITS:
+            raise LayoutError("more parts than bytes")
+        if kind not in self._types:
+            raise LayoutError(f"no definition of {kind}")
+        for part in self._types[kind]:
+            inner = f"{path}.{part.name}" if path else part.name
+            many = self._count() if part.many == -1 else part.many
+            if part.type in SIZES:
+                self._numbers(inner, part, 1 if many is None else many)
+            elif part.type == "string":
+                texts = [self._text(inner) for _ in range(1 if many is None else many)]
+                self.texts[inner] = tuple(texts)
+            elif many is None:
+                self._walk(inner, part.type, depth + 1)
+            else:
+                for k in range(many):
+                    self._walk(f"{inner}[{k}]", part.type, depth + 1)
+
+    def _take(self, size: int, what: str) -> int:
+        start, self._position = self._position, self._position + size
+        if self._position > len(self._message):
+            raise LayoutError(f"{what} is outside the message")
+        return start
+
+    def _take_fixed(self, size: int, what: str) -> Bytes:
+        """The next bytes, which every message of this layout must repeat."""
+        start = self._take(size, what)
+        if self.fixed and self.fixed[-1][1] == start:
+            start, _ = self.fixed.pop()
+        self.fixed.append((start, self._position))
+        return self._message[self._position - size : self._position]
+
+    def _align(self, size: int) -> None:
+        if self._cdr:
+            self._position += -(self._position - 4) % size
+
+    def _numbers(self, path: str, part: Field, count: int) -> None:
+        code = SIZES[part.type]
+        size = np.dtype(code).itemsize
+        if count:
+            self._align(size)
+        start = self._take(count * size, path)
+        if len(self.leaves) > MAX_LEAVES:
+            raise LayoutError(f"{path} is outside the message")
+        self.leaves[path] = Leaf(start, self._order + code, count)
+
+    def _count(self) -> int:
+        self._align(4)
+        count = int(self._take_fixed(4, "a length").view(f"{self._order}u4")[0])
+        # An element takes a byte or more: a larger count is damage, not data.
+        if count > len(self._message) - self._position:
+            raise LayoutError("a count larger than what is left of the message")
+        return count
+
+    def _text(self, path: str) -> str:
+        raw = self._take_fixed(self._count(), path).tobytes()
+        return raw.removesuffix(b"\0").decode("utf-8", "replace")
 
 
 @lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
@@ -75,9 +212,8 @@ def _described(kind: Described) -> tuple[str, int | None]:
     return name, int(bound) if node == 3 else -1
 
 
-#: The definitions of ROS 2's own types that are written, and of Franka's state.
-ROS, FRANKA = tables_beside(__file__, "messages.toml").values()
-DEFINITIONS: dict[str, str] = {**ROS, **FRANKA}  #: Message type as package/Name → its definition.
+#: The definitions of types that ROS 2 has not, by package/Name: Franka's state, Foxglove's log.
+DEFINITIONS: dict[str, str] = tables_beside(__file__, "messages.toml")
 
 
 def long_name(kind: str) -> str:
@@ -86,41 +222,31 @@ def long_name(kind: str) -> str:
 
 
 @cache
-def own_types() -> Types:
-    """The fields of every type of `DEFINITIONS`."""
-    found: Types = {}
+def type_store() -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
+    """The types of ROS 2 Humble, of rosbags, and those defined here."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store, types = get_typestore(Stores.ROS2_HUMBLE), dict[str, Any]()
     for kind, text in DEFINITIONS.items():
-        found |= types_of(text, long_name(kind), idl=False)
+        types |= get_types_from_msg(text, long_name(kind))
+    store.register(types)
+    return store
+
+
+@cache
+def known_types() -> Types:
+    """The fields of every type of the store."""
+    found = {}
+    for name, (_, fields) in type_store().fielddefs.items():
+        with suppress(LayoutError):
+            found[type_name(name)] = fields_of(fields)
     return found
 
 
 def schema_text(kind: str) -> str:
     """A type's definition followed by those of the types it is made of, as bags embed them."""
-    parts = (f"{'=' * 80}\nMSG: {name}\n{DEFINITIONS[name].rstrip()}" for name in parts_of(kind))
-    return "\n".join([DEFINITIONS[kind].rstrip(), *parts]) + "\n"
-
-
-def parts_of(kind: str) -> Sequence[str]:
-    """The types of `DEFINITIONS` that a type is made of, each once, in the order they are met."""
-    found: dict[str, None] = {}
-    for field in own_types()[kind]:
-        if field.type in DEFINITIONS:
-            found |= dict.fromkeys([field.type, *parts_of(field.type)])
-    return tuple(found)
-
-
-@cache
-def known_types() -> Types:
-    """The fields of ROS 2 Humble's types, from rosbags' store, and of those defined here."""
-    from rosbags.typesys import Stores, get_typestore
-
-    found = {}
-    for name, (_, fields) in get_typestore(Stores.ROS2_HUMBLE).fielddefs.items():
-        try:
-            found[type_name(name)] = fields_of(fields)
-        except LayoutError:
-            continue
-    return found | own_types()
+    text: str = type_store().generate_msgdef(long_name(kind), ros_version=2)[0]
+    return text
 
 
 def types_for(channel: Channel) -> Types:
@@ -131,7 +257,7 @@ def types_for(channel: Channel) -> Types:
     if channel.encoding == "ros1":
         # ROS 1 has no int32 seconds in a message of their own: time is a primitive of two
         # words.
-        time = own_types()["builtin_interfaces/Time"]
+        time = known["builtin_interfaces/Time"]
         known |= {"builtin_interfaces/Time": time, "builtin_interfaces/Duration": time}
     if channel.type not in known:
         raise LogError(
@@ -145,23 +271,43 @@ def types_for(channel: Channel) -> Types:
 Value = str | Sequence[str] | float | NDArray[Any]
 
 
-def serialised(
-    kind: str, values: Mapping[str, Value], rows: int, types: Types | None = None
-) -> Bytes:
+def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
     """Many messages of one type and one layout in CDR, little-endian. (T, size)
 
-    The definition is walked once; every message has the same bytes but for the numbers,
-    which are put in column by column.
+    One is made and laid out; every message has the same bytes but for the numbers, which
+    are put in column by column.
     """
-    message = Serialiser(types if types is not None else own_types(), values)
-    message.walk("", kind)
-    if unknown := set(values) - message.met:
-        raise OutputError(f"{kind} has no field {sorted(unknown)[0]}")
-    out = np.tile(np.frombuffer(bytes(message.template), dtype=np.uint8), (rows, 1))
-    for start, numbers in message.numbers:
-        packed = numbers.view(np.uint8)
-        out[:, start : start + packed.shape[1]] = packed
+    template = type_store().serialize_cdr(template_of(kind, values), long_name(kind))
+    layout = MessageLayout(known_types(), np.frombuffer(template, np.uint8), kind, cdr=True)
+    if unknown := sorted({*values} - {*layout.leaves, *layout.texts}):
+        raise OutputError(f"{kind} has no field {unknown[0]}")
+    out = np.tile(np.frombuffer(template, np.uint8), (rows, 1))
+    for path, leaf in layout.leaves.items():
+        if path in values and leaf.numbers:
+            table = np.asarray(values[path], dtype=leaf.code).reshape(-1, leaf.numbers)
+            packed = np.ascontiguousarray(table).view(np.uint8)
+            out[:, leaf.offset : leaf.offset + packed.shape[1]] = packed
     return out
+
+
+def template_of(kind: str, values: Mapping[str, Value], path: str = "") -> Any:  # noqa: ANN401
+    """A message with the texts of values, and as many zeros as they have numbers."""
+    made: dict[str, Any] = {}
+    for field in known_types()[kind]:
+        inner = f"{path}.{field.name}" if path else field.name
+        given: Any = values.get(inner)
+        if field.type in SIZES and field.many is None:
+            made[field.name] = 0
+        elif field.type in SIZES:
+            # A sequence is as long as the rows that it is given.
+            width = field.many if field.many != -1 else 0 if given is None else given.shape[-1]
+            made[field.name] = np.zeros(width, SIZES[field.type])
+        elif field.type == "string":
+            made[field.name] = str(given or "") if field.many is None else [*map(str, given or ())]
+        else:  # sequences of messages stay empty
+            deeper = field.many is None
+            made[field.name] = template_of(field.type, values, inner) if deeper else []
+    return type_store().types[long_name(kind)](**made)
 
 
 def stamped(times: NDArray[np.int64], path: str = "header.stamp") -> dict[str, Value]:
@@ -172,61 +318,3 @@ def stamped(times: NDArray[np.int64], path: str = "header.stamp") -> dict[str, V
 def in_parts(path: str, names: str, columns: NDArray[Any]) -> dict[str, Value]:
     """The values of a vector's parts: ``in_parts("force", "xyz", …)`` gives force.x and so on."""
     return {f"{path}.{name}": column for name, column in zip(names, columns.T, strict=True)}
-
-
-class Serialiser:
-    """Walks a definition and lays its fields one behind the other.
-
-    Attributes:
-        template: The bytes of a message, zeros where numbers go.
-        numbers: Where numbers go, and one row of them a message or one for all.
-        met: Paths of all fields that were walked.
-    """
-
-    def __init__(self, types: Types, values: Mapping[str, Value]) -> None:
-        self.types = types
-        self.values = values
-        self.template = bytearray(b"\0\1\0\0")  # CDR, little-endian
-        self.numbers: list[tuple[int, NDArray[Any]]] = []
-        self.met: set[str] = set()
-
-    def walk(self, path: str, kind: str) -> None:
-        """Lay the fields of one message: numbers, text, or other messages."""
-        for field in self.types[kind]:
-            inner = f"{path}.{field.name}" if path else field.name
-            value: Any = self.values.get(inner)
-            self.met.add(inner)
-            if field.type in SIZES:
-                self._numbers(value, np.dtype(f"<{SIZES[field.type]}"), field.many)
-            elif field.type == "string":
-                texts = [value or ""] if field.many is None else value or ()
-                if field.many == -1:
-                    self._count(len(texts))
-                for text in texts:
-                    raw = str(text).encode() + b"\0"
-                    self._count(len(raw))
-                    self.template += raw
-            elif field.many is None:
-                self.walk(inner, field.type)
-            else:
-                self._count(0)  # sequences of messages stay empty
-
-    def _numbers(self, value: Value | None, dtype: np.dtype[Any], many: int | None) -> None:
-        given = np.zeros(0) if value is None else np.asarray(value, dtype=dtype)
-        width = given.shape[-1] if many == -1 else many or 1
-        if many == -1:
-            self._count(width)
-        if not width:
-            return
-        self._align(dtype.itemsize)
-        if value is not None:
-            table = np.ascontiguousarray(given.reshape(-1, width), dtype=dtype)
-            self.numbers.append((len(self.template), table))
-        self.template += bytes(width * dtype.itemsize)
-
-    def _count(self, count: int) -> None:
-        self._align(4)
-        self.template += struct.pack("<I", count)
-
-    def _align(self, size: int) -> None:
-        self.template += bytes(-(len(self.template) - 4) % size)

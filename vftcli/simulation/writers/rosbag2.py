@@ -1,19 +1,17 @@
 """rosbag2 (MCAP storage): FrankaRobotState for the Franka arms, JointState for the others."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.bags.ros_messages import (
-    FRANKA,
     Value,
     in_parts,
-    known_types,
     long_name,
     serialised,
     stamped,
+    type_store,
 )
 from vftcli.signals.arrays import Array
 from vftcli.simulation.experiment import FlangeMotion, Simulation
@@ -45,7 +43,6 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     sensor is a second topic, WrenchStamped in the sensor's frame.
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     rows, signals = simulation.measured.rows, simulation.measured.signals
     clock = simulation.measured.stamp[rows] + simulation.scenario.sensing.start
@@ -54,14 +51,9 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     topics = [make(simulation, rows, stamps)]
     if "wrench" in signals:
         topics.append(wrenches(signals["wrench"][rows], stamps))
-    # The bag declares the types of ROS 2 Humble, and Franka's.
-    store, types = get_typestore(Stores.ROS2_HUMBLE), dict[str, Any]()
-    for name, text in FRANKA.items():
-        types |= get_types_from_msg(text, long_name(name))
-    store.register(types)
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         ends = [
-            (bag.add_connection(name, long_name(kind), typestore=store), messages)
+            (bag.add_connection(name, long_name(kind), typestore=type_store()), messages)
             for name, kind, messages in topics
         ]
         for k, stamp in enumerate(stamps.tolist()):
@@ -133,7 +125,7 @@ def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
         "control_command_success_rate": 1.0,
         "robot_mode": MODE_MOVE,
     }
-    messages = serialised(ROBOT_STATE, values, len(rows), known_types())
+    messages = serialised(ROBOT_STATE, values, len(rows))
     return "/franka_robot_state_broadcaster/robot_state", ROBOT_STATE, messages
 
 
