@@ -222,6 +222,7 @@ def test_a_batch_that_nobody_watches_is_told_every_two_seconds(
     assert told(102.1) == "6/10 logs, 1 failed, 0.5 logs/s, 0:08 left\n"
     assert told(104.0) == ""
     assert told(104.2, count._replace(done=0)) == "3/10 logs, 1 failed\n"
+    assert told(106.3, count._replace(seconds=0.0)) == "6/10 logs, 1 failed\n"
     assert told(109.0, count._replace(done=7)) == ""  # the end has its own line
 
 

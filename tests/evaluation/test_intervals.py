@@ -7,9 +7,6 @@ from scipy.special import stdtrit
 
 from vftcli.evaluation import evaluate, paired_significance
 from vftcli.evaluation.intervals import (
-    LEAST_BLOCKS,
-    MEMORY,
-    MOST_BLOCKS,
     Resampled,
     block_lengths,
     correlation_time,
@@ -62,14 +59,43 @@ def test_correlation_time_of_a_known_process(decay: float) -> None:
 
 
 def test_blocks_follow_the_memory() -> None:
+    """Five correlation times, of 10 to 300 blocks: docs/compare.md."""
     rng = np.random.default_rng(1)
     white = rng.standard_normal((30_000, 1)) ** 2
-    assert block_lengths(white) == 30_000 // MOST_BLOCKS
+    assert block_lengths(white) == 100
+    assert block_lengths(white[:29_999]) == 100
     slow = np.repeat(rng.standard_normal((30, 1)) ** 2, 100, axis=0)
-    assert block_lengths(slow) == 3000 // LEAST_BLOCKS
-    middle = np.repeat(rng.standard_normal((3000, 1)) ** 2, 10, axis=0)
-    assert block_lengths(middle) == pytest.approx(10 * MEMORY, abs=50)
+    assert block_lengths(slow) == 300
+    middle = np.repeat(rng.standard_normal((600, 1)) ** 2, 10, axis=0)
+    assert block_lengths(middle) == np.ceil(5.0 * correlation_time(middle))
     assert block_lengths(np.ones((5, 1))) == 1
+
+
+def ring(squares: Array, length: int) -> Array:
+    """Means of blocks that are drawn from the series closed to a ring, sample by sample. (B, m)"""
+    blocks = round(len(squares) / length)
+    starts = np.random.default_rng(20250811).integers(0, len(squares), (1000, blocks))
+    inside = (starts[..., None] + np.arange(length)) % len(squares)
+    return np.asarray(squares[inside].mean(axis=(1, 2)))
+
+
+@pytest.mark.parametrize(("length", "blocks"), [(1, 30), (7, 4), (8, 4), (30, 1)])
+def test_draws_are_means_of_blocks_of_the_ring(length: int, blocks: int) -> None:
+    squares = np.random.default_rng(9).standard_normal((30, 2)) ** 2
+    found = resample(squares, length)
+    assert found.blocks == blocks
+    np.testing.assert_allclose(found.draws, ring(squares, length), rtol=1e-9)
+
+
+def test_a_pair_s_interval_is_of_the_differences_drawn() -> None:
+    """White errors of 900 samples: blocks of a 300th; the 2.5 % and 97.5 % of 1000 draws."""
+    first, second = np.random.default_rng(4).standard_normal((2, 900))
+    row = paired_significance("log", *pair(first, 1.1 * second)).row(0, named=True)
+    squares = np.column_stack([first, 1.1 * second]) ** 2
+    gap = -np.diff(np.sqrt(ring(squares, int(block_lengths(squares).max()))))[:, 0]
+    assert (row["low_Nm"], row["high_Nm"]) == pytest.approx(np.percentile(gap, [2.5, 97.5]))
+    assert row["difference_Nm"] == pytest.approx(-np.diff(np.sqrt(squares.mean(axis=0)))[0])
+    assert row["p"] == pytest.approx(2.0 * min(np.mean(gap > 0), np.mean(gap <= 0)))
 
 
 def test_an_interval_does_not_depend_on_who_else_is_asked() -> None:

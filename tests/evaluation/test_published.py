@@ -43,6 +43,19 @@ def test_sizes_and_winners_are_reported() -> None:
     assert "J4 (gmo in print, kfo-fe here)" in text
     assert "fdo and gmo agree on J4, J5, J6" in text
     assert "delay 138 ms on J1" in text  # 137.5 ms in closed form
+    by_code = {remark.code: remark.values for remark in found.remarks}
+    sizes = by_code["print-sizes"]
+    # GMO has FDO's numbers on J4 to J6, which the paper prints as larger there
+    ratios = np.array(TABLE_1.rmse["fdo"])[3:] / np.array(TABLE_1.rmse["gmo"])[3:]
+    assert [sizes[k] for k in ("median", "least", "most")] == pytest.approx(
+        [1.5, 1.5, 1.5 * ratios.max()]
+    )
+    # J6 of all four in print, and the reference's own error there
+    floor = by_code["print-noise-floor"]
+    assert [floor[k] for k in ("least_Nm", "most_Nm", "floor_Nm")] == [0.9322, 0.9443, 0.4]
+    # FDO, GMO and KFO: of them another one is best on J4 alone
+    other = by_code["print-other-best"]
+    assert (other["joints"], other["same"]) == (6, 6 - len(other["differing"]))
 
 
 def test_the_discrete_reading_is_reported() -> None:

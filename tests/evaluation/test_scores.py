@@ -165,15 +165,21 @@ def test_two_logs_are_one_sum() -> None:
 
 
 def test_episodes_start_end_and_join() -> None:
-    t = np.arange(0.0, 4.0, 0.01)
+    t = np.arange(0.0, 6.0, 0.01)
     size = np.zeros(len(t))
+    size[90:100] = 0.5  # above where one ends, before it starts
     size[100:150] = 2.0  # a contact
-    size[150:155] = 0.1  # a gap of less than 0.1 s
-    size[155:200] = 3.0
-    size[250:251] = 9.0  # too short
-    size[300:320] = 0.9  # below where one starts
-    (found,) = episodes(t, size, 1.0, 0.5)
-    assert found == pytest.approx((1.0, 2.0, 3.0))
+    size[150:158] = 0.1  # a gap of .08 s is closed,
+    size[158:200] = 3.0
+    size[212:240] = 4.0  # one of .12 s parts two
+    size[240:250] = 0.5  # not yet below where one ends
+    size[300:302] = 9.0  # two samples and the one in which it ends: .02 s
+    size[400:404] = 9.0  # .04 s
+    size[500:520] = 1.0  # not above where one starts
+    found = episodes(t, size, 1.0, 0.5)
+    assert found == [
+        pytest.approx(each) for each in ((1.0, 2.0, 3.0), (2.12, 2.5, 4.0), (4.0, 4.04, 9.0))
+    ]
 
 
 def test_what_is_near_a_contact_is_in_no_part_but_all() -> None:
@@ -181,6 +187,6 @@ def test_what_is_near_a_contact_is_in_no_part_but_all() -> None:
     scored_from_one = t >= 1.0
     parts = parts_of(t, scored_from_one, [(4.0, 5.0, 1.0)])
     assert t[parts["contact"]][[0, -1]] == pytest.approx([4.0, 5.0])
-    assert not parts["free"][(t > 3.5) & (t < 5.5)].any()
+    np.testing.assert_array_equal(parts["free"], scored_from_one & ~((t > 3.495) & (t < 5.505)))
     assert parts["all"].sum() == scored_from_one.sum()
     assert parts["free"].sum() < parts["all"].sum() - parts["contact"].sum()

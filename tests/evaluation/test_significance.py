@@ -48,3 +48,10 @@ def test_p_is_two_sided() -> None:
     assert p_value(first, second) == pytest.approx(0.06)
     assert p_value(second, first) == pytest.approx(0.06)
     assert p_value(first, first) == 1.0
+
+
+@pytest.mark.parametrize(("apart", "same"), [(0.9e-9, True), (1.1e-9, False)])
+def test_draws_within_a_billionth_are_one_number(apart: float, same: bool) -> None:
+    first = np.linspace(1.0, 3.0, 500)  # of mean 2
+    assert p_value(first, first + 2.0 * apart) == (1.0 if same else 1.0 / 500)
+    assert p_value(first + 2.0 * apart, first) == (1.0 if same else 1.0 / 500)
