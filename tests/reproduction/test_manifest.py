@@ -111,6 +111,10 @@ ROBOT = '[[robot]]\nname = "r"\ntrain = ["{}"]\n'
             "interval of [[robot]] r (0 s to the end) must stay 1 s away from score (1 s to",
         ),
         (
+            ENTRY + 'free = ["20.9:30"]\nscore = [[10, 20]]\n',
+            "free (20.9 s to 30 s) must stay 1 s away from score (10 s to 20 s)",
+        ),
+        (
             ENTRY + 'free = ["0:9.5"]\nscore = [[10, 20]]\n',
             "free (0 s to 9.5 s) must stay 1 s away from score (10 s to 20 s); change one of them",
         ),
@@ -124,7 +128,7 @@ def test_what_would_be_unfair_is_one_line(tmp_path: Path, text: str, line: str) 
 
 def test_what_is_fair_has_no_line(tmp_path: Path) -> None:
     earlier = ROBOT.format("a").replace("train", 'interval = "0:8"\ntrain')
-    later = ENTRY + 'identified = "r"\nscore = [[9.5, 20]]\nfree = ["0:8"]\n'
+    later = ENTRY + 'identified = "r"\nscore = [[9, 20]]\nfree = ["0:8", "21:30"]\n'
     assert not lines(made(tmp_path, earlier + later))
     another_day = ROBOT.format("c") + ENTRY + 'identified = "r"\n' + other("c", "tuesday")
     assert not lines(made(tmp_path, another_day))

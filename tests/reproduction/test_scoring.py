@@ -6,18 +6,20 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from vftcli.evaluation.scores import LAGS
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.outside import ListedRow
 from vftcli.reproduction import scoring
-from vftcli.reproduction.manifest import BenchmarkLog
+from vftcli.reproduction.manifest import BenchmarkLog, Declaration, Rival
 from vftcli.reproduction.scoring import (
     Answer,
     KnownTruth,
     ScoreTask,
     own_answers,
+    planted,
     rows_of,
     truth_of,
     weighed,
@@ -154,22 +156,84 @@ def test_a_weight_is_of_what_is_answered() -> None:
     assert found["answered"] == pytest.approx(4 / 5)
 
 
+def read_truth(path: Path, columns: dict[str, Any], words: str, **more: Any) -> KnownTruth:
+    """The truth that an entry with these words finds in a file."""
+    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",")
+    log = replace(LOG, truth_columns=words, **more)
+    task = ScoreTask(path.parent, "", log, "alone", AnalysisChoice(), path, path, None, False)
+    t = columns["t"]
+    source = Source(format="x", clock="x", rows=len(t), duplicates=0, t0=0.0)
+    recording = Recording(t=t, q=np.zeros((len(t), 6)), source=source)
+    return truth_of(task, recording, load_robot("ur5"))
+
+
 def test_a_torque_alone_shows_its_contacts(tmp_path: Path) -> None:
     """Columns by the entry's words; from the sample above .05 N·m to the one below .025."""
     t = np.arange(0.0, 4.0, 0.01)
     tau = np.zeros((len(t), 6))
-    tau[100:150, 4] = -0.3
-    tau[200:250, 2] = 0.04  # below where one starts
-    path = tmp_path / "truth.csv"
-    np.savetxt(path, np.column_stack([t, tau]), delimiter=",")
-    log = replace(LOG, truth="torque", truth_columns="t,tau_ext:6")
-    task = ScoreTask(tmp_path, "", log, "alone", AnalysisChoice(), path, path, None, False)
-    source = Source(format="x", clock="x", rows=len(t), duplicates=0, t0=0.0)
-    recording = Recording(t=t, q=np.zeros(tau.shape), source=source)
-    truth = truth_of(task, recording, load_robot("ur5"))
+    tau[100:150, 4] = -0.06
+    tau[150:160, 4] = 0.03
+    tau[160:170, 4] = 0.02
+    tau[250:300, 2] = 0.04  # below where one starts
+    truth = read_truth(tmp_path / "truth.csv", {"t": t, "tau": tau}, "t,tau_ext:6", truth="torque")
     assert truth.tau == pytest.approx(tau)
-    assert [x[:2] for x in truth.contacts] == [pytest.approx((1.0, 1.5))]
+    assert [x[:2] for x in truth.contacts] == [pytest.approx((1.0, 1.6))]
+    assert np.isnan(truth.contacts[0][2])
     assert truth.wrench is None
+
+
+def test_a_wrench_shows_contacts_of_the_force_that_the_entry_says(tmp_path: Path) -> None:
+    """From 2 N on until it is below half of that, whatever its moment is."""
+    t = np.arange(0.0, 4.0, 0.01)
+    w = np.zeros((len(t), 6))
+    w[100:150, :2] = [1.5, -2.0]  # 2.5 N
+    w[150:160, 0] = 1.1
+    w[160:170, 0] = 0.9
+    w[250:300, 1], w[300:, 3] = 1.9, 9.0
+    words = {"truth": "sensor", "contact_N": 2.0}
+    truth = read_truth(tmp_path / "truth.csv", {"t": t, "w": w}, "t,wrench:6", **words)
+    assert truth.wrench == pytest.approx(w)
+    assert truth.contacts == [pytest.approx((1.0, 1.6, 2.5))]
+
+
+@pytest.mark.parametrize(("name", "signal"), [("ur5", "current"), ("panda", "torque")])
+def test_a_planted_push_is_half_a_sine_at_the_flange_and_missing_in_the_drives(
+    name: str, signal: str
+) -> None:
+    """Its joint torque by Pinocchio's Jacobian; two pushes that meet add up."""
+    robot, t = load_robot(name), np.linspace(0.0, 4.0, 401)
+    q = np.linspace(-0.6, 0.5, robot.joints) + 0.1 * t[:, None]
+    free = Recording(t=t, q=q, dq=0.1 + 0.0 * q, **{signal: np.ones(q.shape)})
+    pushes = ((1.0, 2.0, (3.0, -4.0, 12.0)), (2.0, 0.5, (0.0, 8.0, 0.0)))
+    pushed, wrench, tau = planted(free, robot, replace(LOG, pushes=pushes))
+    sine = np.sin(np.pi * np.clip((t - 1.0) / 2.0, 0.0, 1.0))[:, None] * [3.0, -4.0, 12.0]
+    sine[:, 1] += 8.0 * np.sin(np.pi * np.clip((t - 2.0) / 0.5, 0.0, 1.0))
+    np.testing.assert_allclose(wrench[:, :3], sine, atol=1e-12)
+    assert not wrench[:, 3:].any()
+    data, axes = robot.model.createData(), pin.LOCAL_WORLD_ALIGNED
+    flange = robot.model.getFrameId("flange")
+    for k in range(0, 401, 40):
+        J = pin.computeFrameJacobian(robot.model, data, q[k], flange, axes)
+        np.testing.assert_allclose(tau[k], J.T @ wrench[k], atol=1e-9)
+    effort = tau if signal == "torque" else tau / robot.torque_constant
+    np.testing.assert_allclose(pushed.require(signal), 1.0 - effort, atol=1e-12)
+
+
+@pytest.mark.parametrize(("apart", "own"), [(0.9e-6, True), (1.1e-6, False)])
+def test_stamps_within_a_microsecond_are_the_logs_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, apart: float, own: bool
+) -> None:
+    """Else what another program says is read off between its samples."""
+    t = 0.01 * np.arange(50)
+    steps = np.where(np.arange(50)[:, None] % 2, 1.0, 0.0) * np.ones(6)
+    said = ExternalTorque(name="theirs", t=t + apart, tau=steps)
+    monkeypatch.setattr(scoring, "read_outside", lambda *_: (said, None))
+    rival = Rival("theirs", tmp_path, Declaration(causal=True))
+    (tmp_path / "a.csv").touch()
+    task = ScoreTask(tmp_path, "", LOG, "own", AnalysisChoice(), tmp_path, None, rival, False)
+    (answer,) = scoring.outside_answer(task, Recording(t=t, q=np.zeros((50, 6))), load_robot("ur5"))
+    assert np.array_equal(answer.torque.tau, steps) == own
+    assert (answer.future, answer.lists) == (False, {})
 
 
 def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
