@@ -130,6 +130,16 @@ def test_what_is_wrong_with_a_file_is_said_in_one_line(
     assert not (here / "out").exists()
 
 
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(("more", "refused"), [(0, False), (1, True)])
+def test_a_file_of_options_has_a_mebibyte_at_most(
+    run, here: Path, more: int, refused: bool
+) -> None:
+    keep(here, 'robot = "ur5"'.ljust((1 << 20) + more, "\n"))
+    code, _, err = run("inspect", LOG)
+    assert (code, "too large for a file of options" in err) == (int(refused), refused)
+
+
 def test_a_file_in_another_encoding_is_refused_in_words(run, here: Path) -> None:
     (here / "odd.toml").write_bytes("robot = 'ur5'".encode("utf-16"))
     code, _, err = run("report", LOG, "-o", "out", "--config", "odd.toml")
@@ -164,6 +174,15 @@ def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
     # A log is no free run of itself.
     code, _, err = run("contacts", Path("sub/free.csv"), *kept)
     assert (code, "gives --robot ur5 --free 0.3:4 (" in err) == (0, True)
+
+
+def test_switches_and_numbers_are_kept_as_they_are_typed(run, here: Path) -> None:
+    """Of one log too, whose own name alone is left out of what is free."""
+    keep(here, 'robot = "ur5"\nanyway = true\ndetails = true\n[contacts]\nall = true\n')
+    _, _, err = run("contacts", LOG, "--interval", "0:2")
+    gives = err.splitlines()[0]
+    for word in ("--robot ur5", "--anyway", "--details", "--all"):
+        assert word in gives
 
 
 def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: Path) -> None:

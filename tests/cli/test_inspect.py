@@ -53,7 +53,10 @@ def test_inspect_in_words(table: Path) -> None:
 
 
 def test_strict_fails_on_warnings(table: Path) -> None:
-    assert run("inspect", table, "--strict")[0] == 1
+    result = CliRunner().invoke(app, ["inspect", str(table), "--strict"])
+    warned = result.stdout.count("warning: ")
+    said = f"{warned} warning{'s' * (warned != 1)} (--strict)\n"
+    assert (result.exit_code, result.stderr.endswith(said)) == (1, True)
 
 
 def test_names_with_control_characters_are_shown_harmlessly(tmp_path: Path) -> None:

@@ -50,6 +50,36 @@ def test_what_is_written_gives_the_numbers_of_typed_options(
     assert kept["rows"]
 
 
+def test_each_option_stands_under_its_reason(run, here: Path) -> None:
+    words = (FIXTURES / "ur5_circle.csv", "--robot", "ur5", "--interval", "0:9", "-o", NAME)
+    assert run("inspect", *words)[0] == 0
+    parts = (here / NAME).read_text("utf-8").strip().split("\n\n")
+    reasons = [part.rpartition("\n") for part in parts[1:]]
+    assert [(why, option) for why, _, option in reasons if why.startswith("# ")] == [
+        ("# as given", 'interval = "0:9"'),
+        ("# as given", 'robot = "ur5"'),
+        (
+            "# the free motion is known too: the reference is the difference of the two",
+            'reference = "two-cycle"',
+        ),
+        (
+            "# ur5_circle.csv is recognised by its content; a file that is not needs this",
+            '# format = "ur-csv"',
+        ),
+        (
+            "# as the log calls it; the robot's model explains no other reading clearly better",
+            '# effort = "current"',
+        ),
+    ]
+
+
+def test_an_arm_is_looked_for_where_it_is_named_or_tells_what_an_effort_is(run) -> None:
+    words = ("inspect", FIXTURES / "ur5_circle.csv")
+    assert "robot guessed" not in run(*words)[2]
+    assert "note: robot guessed: ur5" in run(*words, "--set", "log.effort=auto")[2]
+    assert "note: torque_constant: " in run(*words, "--robot", "ur5")[2]  # of its profile
+
+
 @pytest.mark.slow
 def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> None:
     """The load's own log, the same motion without the load, and a pose that hands push."""
