@@ -135,7 +135,8 @@ def test_what_is_wrong_with_a_file_is_said_in_one_line(
 def test_a_file_of_options_has_a_mebibyte_at_most(
     run, here: Path, more: int, refused: bool
 ) -> None:
-    keep(here, 'robot = "ur5"'.ljust((1 << 20) + more, "\n"))
+    text = 'robot = "ur5"\n' + 1100 * ("#".ljust(999, "x") + "\n")
+    keep(here, text[: (1 << 20) + more])
     code, _, err = run("inspect", LOG)
     assert (code, "too large for a file of options" in err) == (int(refused), refused)
 
