@@ -192,6 +192,36 @@ def test_a_free_run_as_long_as_the_log_is_distinct_from_it(runs: list[Path]) -> 
     np.testing.assert_allclose(*tunings, rtol=0.1)  # grid of 1.1: two samples change little
 
 
+def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
+    """Seven tenths of it, after which its files are written."""
+    told: list[tuple[str, float, float]] = []
+    asked = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        read=ReadChoice(interval=(0.0, 6.0)),
+        observers=ObserverChoice(names=("gmo",)),
+        progress=lambda *step: told.append(step),
+    )
+    assert analyse_log(FIXTURE, asked).contacts is not None
+    words, begins, ends = zip(*told, strict=True)
+    assert [each.rpartition(": ")[2].split()[0] for each in words] == [
+        *("reading", "examining", "looking", "listing", "running", "comparing")
+    ]
+    assert begins == (0.0, *ends[:-1])
+    assert sorted(ends) == list(ends)
+    assert ends[-1] == pipeline.WRITING == 0.7
+
+
+@pytest.mark.parametrize(
+    ("contacts", "causal", "listed"),
+    [(True, False, True), (False, False, False), (True, True, False), (False, True, False)],
+)
+def test_contacts_are_listed_where_they_are_asked_for_of_a_complete_log(
+    contacts: bool, causal: bool, listed: bool
+) -> None:
+    asked = AnalysisChoice(contacts=contacts, observers=ObserverChoice(causal=causal))
+    assert asked.lists_contacts == listed
+
+
 def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None:
     online = AnalysisChoice(observers=ObserverChoice(causal=True), wrench=WrenchChoice())
     with pytest.raises(ParameterError, match=r"bias\.method=whole-log needs the complete log"):
