@@ -156,6 +156,8 @@ def test_stop_pushes_and_never_pulls() -> None:
     np.testing.assert_array_equal(wrench(wall, 0.0, leaving), 0.0)
     away = HERE._replace(position=np.array([0.4, 0.1, 0.32]))
     np.testing.assert_array_equal(wrench(wall, 0.0, away), 0.0)
+    coming = away._replace(velocity=np.array([0.0, 0, -1.0]))  # the damper waits for the plane
+    np.testing.assert_array_equal(wrench(wall, 0.0, coming), 0.0)
 
 
 def test_random_walk_gains_its_intensity() -> None:
