@@ -10,7 +10,6 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.bias.refine import (
     EXPECTED,
-    SIGN_SPEED,
     STICTION,
     Budget,
     expected_gap,
@@ -31,7 +30,7 @@ DQ = RNG.uniform(-1.0, 1.0, (4000, 2))
 
 
 def test_pure_friction_is_all_friction() -> None:
-    tau = 3.0 * np.tanh(DQ / SIGN_SPEED) + 0.5 * DQ
+    tau = 3.0 * np.tanh(DQ / 0.02) + 0.5 * DQ
     np.testing.assert_allclose(friction_share(DQ, tau), 1.0, atol=1e-12)
 
 
@@ -39,8 +38,8 @@ def test_pure_friction_is_all_friction() -> None:
 def test_friction_beside_another_error_is_its_share_of_the_power(size: float) -> None:
     """tanh has a mean square of nearly 1, the other error `size`²; 4000 samples tell 3 %."""
     other = size * RNG.standard_normal(DQ.shape)
-    power = np.mean(np.tanh(DQ / SIGN_SPEED) ** 2, axis=0)
-    found = friction_share(DQ, np.tanh(DQ / SIGN_SPEED) + other)
+    power = np.mean(np.tanh(DQ / 0.02) ** 2, axis=0)
+    found = friction_share(DQ, np.tanh(DQ / 0.02) + other)
     np.testing.assert_allclose(found, power / (power + size**2), atol=0.03)
 
 

@@ -5,14 +5,11 @@ import pytest
 from known_errors import STEP, drawn_error, shortened, ur10e, wrong_run
 
 from vftcli.bias.model_error import (
-    CUTOFF,
     error_columns,
     expected_error,
     smooth_motion,
 )
 from vftcli.bias.robust_fit import (
-    LEAST_SCALE,
-    LEAST_TORQUE,
     Rows,
     first_fit,
     fit_robustly,
@@ -36,7 +33,7 @@ def rows_of(external, noise=0.3, size=1.0):
     robot = shortened(ur10e(), 3)
     run = wrong_run(robot, drawn_error(robot, size=size), external, noise=noise)
     motion = smooth_motion(run)
-    d = zero_phase(motion.t, np.gradient(run.terms.p, motion.t, axis=0) - run.terms.mu, CUTOFF)
+    d = zero_phase(motion.t, np.gradient(run.terms.p, motion.t, axis=0) - run.terms.mu, 6.0)
     return Rows(
         columns=error_columns(run, motion, expected_error(robot), STRIDE),
         loads=slow_loads(robot.chain, motion.t[::STRIDE], motion.q[::STRIDE]),
@@ -74,14 +71,14 @@ def test_the_error_is_fitted_as_if_nobody_had_pushed(pushed):
 def test_a_scale_is_never_below_a_share_of_the_dry_friction():
     """A log that the model explains to the last digit is not full of contacts."""
     fit = fit_robustly(rows_of(None, noise=0.0, size=0.0), STRIDE * STEP, DRY)
-    np.testing.assert_allclose(fit.scale, np.maximum(LEAST_SCALE * DRY, LEAST_TORQUE))
+    np.testing.assert_allclose(fit.scale, np.maximum(0.08 * DRY, 0.02))
     assert fit.free.all()
 
 
 def test_weights_count_what_is_correlated_once(pushed):
     """.3 s of samples count as one: ten at a step of 30 ms."""
     fit = fit_robustly(pushed, STRIDE * STEP, DRY)
-    assert fit.weight.max() <= 1.0 / (10.0 * LEAST_TORQUE**2)
+    assert fit.weight.max() <= 1.0 / (10.0 * 0.02**2)
     halved = fit_robustly(pushed, 2 * STRIDE * STEP, DRY)
     ratio = np.median(halved.weight * halved.scale**2) / np.median(fit.weight * fit.scale**2)
     assert ratio == pytest.approx(2.0)

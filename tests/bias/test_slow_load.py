@@ -6,8 +6,6 @@ import pytest
 from known_errors import motion, shortened, ur10e
 
 from vftcli.bias.robust_fit import (
-    FORCE,
-    MOMENT,
     slow_loads,
 )
 from vftcli.robots import load_robot
@@ -29,7 +27,7 @@ def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
         data = model.createData()
         for row, found in zip(q, loads.torque[:, :, 6 + 3 * k : 9 + 3 * k], strict=True):
             J = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
-            np.testing.assert_allclose(found, -FORCE * J.T, atol=1e-12 * FORCE)
+            np.testing.assert_allclose(found, -50.0 * J.T, atol=1e-12 * 50.0)
 
 
 @pytest.mark.parametrize(("joints", "points"), [(3, 1), (4, 1), (5, 1), (6, 2)])
@@ -78,5 +76,5 @@ def test_columns_are_the_torque_with_its_sign_turned_of_one_standard_deviation()
     frame = robot.model.getFrameId("flange")
     for row, torque in zip(q, loads.torque, strict=True):
         J = pin.computeFrameJacobian(robot.model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
-        sd = np.array([FORCE] * 3 + [MOMENT] * 3)
+        sd = np.array([50.0] * 3 + [10.0] * 3)
         np.testing.assert_allclose(torque[:, :6], -J.T * sd, atol=1e-10)

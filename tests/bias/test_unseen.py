@@ -13,10 +13,6 @@ from vftcli.bias.model_error import (
     smooth_motion,
 )
 from vftcli.bias.robust_fit import (
-    LARGEST,
-    SCALES,
-    WORTH,
-    WORTHLESS,
     Rows,
     faded,
     fit_robustly,
@@ -40,6 +36,10 @@ def fit_of(size, noise=0.3):
         d=d[::STRIDE],
     )
     return fit_robustly(rows, STRIDE * STEP, np.array([17.0, 16.0, 6.0])), motion.dq[::STRIDE]
+
+
+SCALES = (0.0, 0.1, 0.3, 1.0)
+"""What the guard chooses among: no error of the model, a share of its spread, all of it."""
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_the_unseen_share_is_that_of_dense_fits(wrong):
                     costs.append((cost, one[:P]))
                 u = min(costs, key=lambda pair: pair[0])[1]
             left = np.abs(rows.d[fold] + A[fold][:, :, :P] @ u) / wrong.scale
-            squares[k] += np.sum(np.minimum(left, LARGEST) ** 2 * moves[fold], axis=0)
+            squares[k] += np.sum(np.minimum(left, 6.0) ** 2 * moves[fold], axis=0)
     best = int(np.argmin(squares.mean(axis=1)))
     expected = np.sqrt(squares[best] / squares[0])
     found = guarded(wrong, dq)
@@ -145,6 +145,4 @@ def test_a_joint_that_seldom_moves_is_judged_by_all_samples(wrong):
 def test_between_worth_it_and_not_a_part_is_used():
     """.9 of the unseen error left: all of the correction; .95: none; between in proportion."""
     share = np.array([0.3, 0.9, 0.91, 0.94, 0.95, 1.2])
-    np.testing.assert_allclose(
-        faded(share, WORTH, WORTHLESS), [1.0, 1.0, 0.8, 0.2, 0.0, 0.0], atol=1e-12
-    )
+    np.testing.assert_allclose(faded(share, 0.9, 0.95), [1.0, 1.0, 0.8, 0.2, 0.0, 0.0], atol=1e-12)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.cli.console import steps_of
-from vftcli.cli.progress import BAR, Stages, clock, fitted
+from vftcli.cli.progress import Stages, clock, fitted
 from vftcli.signals.progress import steps
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -31,7 +31,7 @@ def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def bar(done: int) -> str:
-    return f"[{'#' * done}{'.' * (BAR - done)}]"
+    return f"[{'#' * done}{'.' * (20 - done)}]"
 
 
 def test_work_over_a_second_shows_share_stage_and_time_left(

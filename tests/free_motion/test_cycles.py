@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.free_motion.cycles import COMPLETE, Cycles, Period, segment
+from vftcli.free_motion.cycles import Cycles, Period, segment
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
@@ -23,10 +23,10 @@ def test_numbers_and_spans_belong_together() -> None:
 
 
 def test_a_last_cycle_that_lacks_a_few_samples_is_whole() -> None:
-    almost = CYCLES._replace(end=1.0 + 4.0 * (2.0 + COMPLETE + 0.001))
+    almost = CYCLES._replace(end=1.0 + 4.0 * (2.971))
     assert almost.whole == 3
     assert almost.span(2) == (9.0, almost.end)
-    assert CYCLES._replace(end=1.0 + 4.0 * (2.0 + COMPLETE - 0.001)).whole == 2
+    assert CYCLES._replace(end=1.0 + 4.0 * (2.969)).whole == 2
     assert CYCLES._replace(end=0.0).whole == 0
 
 

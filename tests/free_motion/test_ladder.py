@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vftcli.free_motion.difference import (
-    WORTH,
     Difference,
     ErrorModel,
     difference,
@@ -76,9 +75,9 @@ def test_the_simpler_of_two_alike_is_taken() -> None:
         )
 
     low = made("period", 1.0, 1.0)
-    assert most_certain([low, made("phase", WORTH + 0.01, WORTH + 0.01)])[0].rung == "period"
-    assert most_certain([low, made("phase", WORTH - 0.01, WORTH - 0.01)])[0].rung == "phase"
-    better = [low, made("phase", 0.9, 0.9), made("model", 0.9 * WORTH + 0.01, 0.88)]
+    assert most_certain([low, made("phase", 0.98, 0.98)])[0].rung == "period"
+    assert most_certain([low, made("phase", 0.96, 0.96)])[0].rung == "phase"
+    better = [low, made("phase", 0.9, 0.9), made("model", 0.9 * 0.97 + 0.01, 0.88)]
     assert most_certain(better)[0].rung == "phase"
     # A joint that stands decides nothing.
     stands = replace_standing(made("model", 0.5, 9.0), joint=1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.free_motion.paired_runs import REPEATED, STUCK, PairedRuns, by_phase, pair_with_run
+from vftcli.free_motion.paired_runs import PairedRuns, by_phase, pair_with_run
 
 T = 0.008 * np.arange(600)
 
@@ -33,7 +33,7 @@ def test_the_differences_are_those_of_the_mean_over_the_free_runs(drive_of) -> N
     np.testing.assert_array_equal(pair.standing, log.standing | there[0] | there[1])
     stops = [log.standstill, *(np.nan_to_num(p.there(p.free.standstill)) for p in pairings)]
     longest, shortest = np.max(stops, axis=0), np.min(stops, axis=0)
-    share = np.minimum(longest / STUCK, 1) * (1 - REPEATED * shortest / np.maximum(longest, 1e-9))
+    share = np.minimum(longest / 0.3, 1) * (1 - 0.5 * shortest / np.maximum(longest, 1e-9))
     np.testing.assert_array_equal(pair.stopped, np.maximum(share, pair.standing))
 
 
