@@ -23,7 +23,8 @@ def test_releases_of_the_ur5_are_those_of_the_law() -> None:
     assert [x[CORRECTED] for x in found] == pytest.approx([4.66, 3.53, 2.80, 2.31], abs=5e-3)
     assert [x["ξ = 1"] for x in found] == pytest.approx([3.14, 2.30, 1.74, 1.35], abs=6e-3)
     assert values["return_2_s/traditional"][CORRECTED] == pytest.approx(4.84, abs=5e-3)
-    assert values["overshoot/traditional"][CORRECTED] == pytest.approx(15.0, abs=0.5)
+    # e^{−πζ/√(1 − ζ²)}, ζ .5103; Euler's steps of 8 ms miss .13 of it
+    assert values["overshoot/traditional"][CORRECTED] == pytest.approx(15.50, abs=0.2)
     assert values["threshold/rx"][CORRECTED] == 6.0
 
 
@@ -67,6 +68,8 @@ def test_without_a_threshold_the_traditional_one_alone_feels_the_rest_of_the_for
     found = pushed("hard")
     other = ungated(found)
     np.testing.assert_array_equal(other.motion.x[:, 1], found.motion.x[:, 1])
-    np.testing.assert_array_equal(other.motion.x[:, 0], pushed("literal").motion.x[:, 0])
+    literal = pushed("literal").motion
+    np.testing.assert_array_equal(other.motion.x[:, 0], literal.x[:, 0])
+    np.testing.assert_array_equal(other.motion.v[:, 0], literal.v[:, 0])
     advance = [one.rows[1]["peak_advance_s"] for one in (found, other)]
     assert advance[1] > advance[0] > 0.0

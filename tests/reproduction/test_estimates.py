@@ -3,11 +3,42 @@
 from types import SimpleNamespace
 
 import numpy as np
+import polars as pl
 import pytest
 
+from vftcli.outputs.charts import Chart, ChartLine
+from vftcli.reproduction import estimates
 from vftcli.reproduction.estimates import mean_of, put_motion, put_weights, rms
 from vftcli.reproduction.paper import CORRECTED, RunResult
 from vftcli.signals.wrench import Wrench
+
+
+def test_the_circles_lag_and_free_rms_are_those_of_the_first_three_joints(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Free is its first round, but for a second in which observers settle."""
+    t = np.arange(0.0, 8.0, 0.5)
+    tau = np.where((t > 1.0) & (t < 4.0), 2.0, 50.0)[:, None] * [1.0, 2.0, 2.0, 9.0, 9.0, 9.0]
+    named = ("observer", "joint", "rmse_Nm", "reference_floor_Nm", "lag_s")
+    rows = [("gmo", j, 0.1 * j, 0.01 * j, None if j == 2 else float(j)) for j in range(1, 7)]
+    errors = pl.DataFrame([*rows, ("fdo", 1, 9.0, 0.01, None)], schema=named, orient="row")
+    made = SimpleNamespace(
+        errors=errors, estimates=[SimpleNamespace(name="gmo", t=t, tau=tau)], observers=()
+    )
+    chart = Chart("torque", "", (), (), t, (ChartLine("gmo", tau, "#000", half=tau),))
+    monkeypatch.setattr(estimates, "simulate", lambda *_: SimpleNamespace(recording=None))
+    monkeypatch.setattr(estimates, "analyse", lambda *_: made)
+    monkeypatch.setattr(estimates, "guideline_numbers", lambda _: {"gmo": {"delay": 0.2}})
+    monkeypatch.setattr(estimates, "torque_chart", lambda _: chart)
+    found = estimates.tapped_circle(1, scenario="ur5-circle", period=4.0)
+    of = {key: value[CORRECTED] for key, value in found.values.items() if CORRECTED in value}
+    assert of["free/gmo"] == pytest.approx(2.0 * np.sqrt(3.0))  # 1, 2 and 2 of each 3
+    assert of["lag/gmo"] == 2.0  # of J1 and J3, the one that is not known left out
+    assert (of["gmo/6"], of["fdo/1"], of["delay/gmo"]) == (pytest.approx(0.6), 9.0, 0.2)
+    assert "lag/fdo" not in of
+    assert found.values["gmo/6"]["floor"] == pytest.approx(0.06)
+    (line,) = found.charts["fig3"].series
+    assert (line.shown, line.half) == (True, None)
 
 
 def test_a_mean_is_of_what_is_known_inside_a_span() -> None:

@@ -227,13 +227,16 @@ def test_stamps_within_a_microsecond_are_the_logs_own(
     t = 0.01 * np.arange(50)
     steps = np.where(np.arange(50)[:, None] % 2, 1.0, 0.0) * np.ones(6)
     said = ExternalTorque(name="theirs", t=t + apart, tau=steps)
+    listed = [ListedRow(0.1, 0.2, 3.0, 1.0)]
     monkeypatch.setattr(scoring, "read_outside", lambda *_: (said, None))
+    monkeypatch.setattr(scoring, "read_list", lambda _: listed)
     rival = Rival("theirs", tmp_path, Declaration(causal=True))
-    (tmp_path / "a.csv").touch()
+    for name in ("a.csv", "a.contacts.csv"):
+        (tmp_path / name).touch()
     task = ScoreTask(tmp_path, "", LOG, "own", AnalysisChoice(), tmp_path, None, rival, False)
     (answer,) = scoring.outside_answer(task, Recording(t=t, q=np.zeros((50, 6))), load_robot("ur5"))
     assert np.array_equal(answer.torque.tau, steps) == own
-    assert (answer.future, answer.lists) == (False, {})
+    assert (answer.future, answer.lists) == (False, {"list": listed})
 
 
 def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
