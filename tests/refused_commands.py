@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import polars as pl
 from seed_logs import libfranka_csv
-from test_bags import ALPHABETICAL, ur_message, write_joint_states
 from test_remedies import Command, printed, robot_file, sound
+from test_topics import ALPHABETICAL, ur_message, write_joint_states
 
 FIXTURES = Path(__file__).parent.parent / "fixtures"
 EPISODES, UR5 = FIXTURES / "panda_episodes", FIXTURES / "ur5_circle.csv"

@@ -195,6 +195,12 @@ class Gathering:
             times = lead.receive
         fresh = np.concatenate([[True], np.diff(own) > 0])
         own, values = own[fresh], stream.signals[signal][fresh]
+        if signal != "wrench":
+            # Another topic may hold further joints, or the same in another order.
+            if stream.names and lead.names and values.shape[1] == len(stream.names):
+                values = values[:, [stream.names.index(name) for name in lead.names]]
+            if values.shape[1] != lead.width:
+                return False
         usual = median_step(own.astype(np.float64)) if len(own) > 1 else 0.0
         outside = (times < own[0] - NEAR * usual) | (times > own[-1] + NEAR * usual)
         if len(own) < 2 or np.mean(outside) > 0.05 or np.any(np.diff(own) < 0):
