@@ -23,16 +23,23 @@ def write(path: Path, columns: dict[str, object]) -> Path:
 @pytest.mark.parametrize(
     "pattern", ["{signal}_{joint}", "{joint}_{signal}", "{joint}.{signal}", "{signal}/{joint}"]
 )
-def test_a_joints_name_beside_the_signals_gives_its_place(tmp_path: Path, pattern: str) -> None:
+@pytest.mark.parametrize(
+    ("word", "effort"), [("effort", "current"), ("eff", "current"), ("tau", "torque")]
+)
+def test_a_joints_name_beside_the_signals_gives_its_place(
+    tmp_path: Path, pattern: str, word: str, effort: str
+) -> None:
+    """UR's drivers publish currents as effort; what is called torque is one."""
     columns: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
-    for k, signal in enumerate(("pos", "vel", "effort")):
+    for k, signal in enumerate(("pos", "vel", word)):
         for joint in reversed(UR_NAMES):
             columns[pattern.format(signal=signal, joint=joint)] = k + 0.1 * UR_NAMES.index(joint)
     log = read(write(tmp_path / "log", columns))
     assert log.joint_names == UR_NAMES
+    assert log.signals == ("q", "dq", effort)
     np.testing.assert_allclose(log.q[0], 0.1 * np.arange(6))
     np.testing.assert_allclose(log.require("dq")[0], 1 + 0.1 * np.arange(6))
-    np.testing.assert_allclose(log.require("current")[0], 2 + 0.1 * np.arange(6))
+    np.testing.assert_allclose(log.require(effort)[0], 2 + 0.1 * np.arange(6))
 
 
 @pytest.mark.parametrize("pattern", ["{signal}_{k}", "{signal}_joint{k}", "joint{k}_{signal}"])

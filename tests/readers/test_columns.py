@@ -247,3 +247,12 @@ def test_a_name_that_stands_for_no_columns_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "x", "t,q1,tau1\n" + "\n".join(f"{k},0.1,0.2" for k in range(5)))
     with pytest.raises(LogError, match=r"no column 'effort' for tau; the table has t, q1, tau1"):
         read(path, columns="-tau=effort")
+
+
+def test_an_error_lists_24_columns_and_counts_the_others(tmp_path: Path) -> None:
+    """A name of more than 40 letters is cut to 37."""
+    names = ["t", "q1", "x" * 40, "y" * 41, *(f"c{k}" for k in range(22))]
+    path = write(tmp_path / "x", f"{','.join(names)}\n{','.join('1' * len(names))}\n")
+    shown = ", ".join([*names[:3], "y" * 37 + "…", *names[4:24]])
+    with pytest.raises(LogError, match=f"the table has {shown} and 2 more.$"):
+        read(path, columns="q=nope")

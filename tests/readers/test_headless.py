@@ -24,7 +24,7 @@ def table(joints: int = 6, seed: int = 3) -> dict[str, np.ndarray]:
     w = 0.6 + 0.2 * np.arange(joints)
     q, dq = np.sin(np.outer(t, w)), w * np.cos(np.outer(t, w))
     torque = 30 * np.cos(q) + 5 * np.gradient(dq, t, axis=0)
-    current = (torque + 8 * np.tanh(dq / 0.002) + 4 * dq) / K[:joints]
+    current = (torque + 8 * np.tanh(dq / 0.002) + 4 * dq) / np.resize(K, joints)
     measured = current + 0.4 * rng.standard_normal(current.shape)
     found = {"t": t[:, None], "q": q, "dq": dq, "current": measured}
     return found | {"target_current": current, "target_torque": torque}
@@ -45,10 +45,65 @@ def test_a_controllers_targets_settle_three_efforts_in_any_order(order: tuple[in
     assert found.others == ()
 
 
-def test_positions_with_velocities_alone_are_settled() -> None:
-    assert guess("t", "q", "dq", joints=5) == Guess(
-        "t,q:5,dq:5", "the first steps evenly, dq is the derivative of q"
-    )
+@pytest.mark.parametrize(
+    ("joints", "fits"), [(2, False), (3, True), (5, True), (12, True), (13, False)]
+)
+def test_positions_with_velocities_alone_are_settled(joints: int, fits: bool) -> None:
+    """Of three to twelve joints."""
+    columns = ",".join(["t", f"q:{joints}", f"dq:{joints}"])
+    expected = Guess(columns, "the first steps evenly, dq is the derivative of q")
+    assert guess("t", "q", "dq", joints=joints) == (expected if fits else None)
+
+
+@pytest.mark.parametrize(("pause", "fits"), [(19.5, True), (20.5, False)])
+def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(pause: float, fits: bool) -> None:
+    t = np.cumsum(np.where(np.arange(2000) % 16 == 5, pause, 1.0)) * 0.001  # 6 % of the steps
+    w = 0.6 + 0.2 * np.arange(6)
+    columns = np.hstack([t[:, None], np.sin(np.outer(t, w)), w * np.cos(np.outer(t, w))])
+    assert (guess_columns(list(columns.T)) is not None) == fits
+
+
+@pytest.mark.parametrize(
+    ("current", "target", "constant", "settled"),
+    [
+        # noise of the measured current and of its target by their rms, drive constant
+        (0.30, 0.0, 1.0, True),
+        (0.44, 0.0, 1.0, True),  # a cosine of 1/√(1 + .44²) = .92
+        (0.56, 0.0, 1.0, False),  # .87
+        (0.30, 0.10, 1.0, True),
+        (0.30, 0.14, 1.0, False),  # no current is .12 of a torque
+        (0.02, 0.02, 1.0, False),  # both currents fit as well
+        (0.30, 0.0, 4.9 / 9.8, True),
+        (0.30, 0.0, 2.8 / 9.8, False),
+        (0.30, 0.0, 390 / 12.0, True),
+        (0.30, 0.0, 410 / 12.0, False),
+    ],
+)
+def test_how_well_targets_and_currents_have_to_fit(
+    current: float, target: float, constant: float, settled: bool
+) -> None:
+    signals, rng = table(), np.random.default_rng(7)
+    clean = signals["target_current"]
+    for name, noise in (("current", current), ("target_current", target)):
+        scale = noise * np.sqrt(np.mean(clean**2, axis=0))
+        signals[name] = clean + scale * rng.standard_normal(clean.shape)
+    signals["target_torque"] = constant * signals["target_torque"]
+    found = guess_columns(list(np.hstack(list(signals.values())).T))
+    assert found is not None
+    assert (found.columns == T31 and found.others == ()) == settled
+
+
+@pytest.mark.parametrize(
+    ("gain", "settled"), [(0.45, False), (0.55, True), (1.9, True), (2.1, False), (-1.0, False)]
+)
+def test_a_measured_current_is_between_half_and_twice_its_target(
+    gain: float, settled: bool
+) -> None:
+    signals = table()
+    signals["current"] = gain * signals["current"]
+    found = guess_columns(list(np.hstack(list(signals.values())).T))
+    assert found is not None
+    assert (found.columns == T31 and found.others == ()) == settled
 
 
 def test_one_effort_may_be_torque_or_current() -> None:
@@ -85,8 +140,10 @@ def test_a_joint_that_stands_is_counted_and_one_that_moves_without_velocity_is_n
     found = guess_columns(list(columns.T))
     assert found is not None
     assert found.columns == "t,q:6,dq:6"
-    columns[:, 1] = signals["q"][:, 0]
-    assert guess_columns(list(columns.T)) is None
+    # Travel below 20 mrad need not show its velocity.
+    for travel, fits in ((0.018, True), (0.022, False), (2.0, False)):
+        columns[:, 1] = 0.5 * travel * signals["q"][:, 0]
+        assert (guess_columns(list(columns.T)) is not None) == fits
 
 
 @pytest.mark.parametrize("kind", ["csv", "npy"])
