@@ -169,3 +169,12 @@ def test_stretches_cover_the_log() -> None:
     assert begins[0] == 0
     assert begins[-1] + length >= 5000
     assert stretches_of(100, B) == ([0], 0, 100)
+
+
+def test_behind_a_gap_of_an_hour_the_odds_are_those_of_a_log_that_begins() -> None:
+    """Contacts come every 30 s: by then one is there as often as not, and that is no 0/0."""
+    log, _ = joints_of(drawn(300, np.random.default_rng(8)))
+    log = log._replace(t=log.t + np.where(np.arange(300) < 150, 0.0, 3600.0))
+    courses = error_process(noise(), log), error_process(noise(), turned_round(log))
+    for each in two_state_odds(log, courses, np.full((300, 1), 15.0)):
+        assert all(np.isfinite(odds).all() and odds[[145, 299]].max() < 0.0 for odds in each)
