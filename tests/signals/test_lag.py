@@ -97,6 +97,25 @@ def test_a_delay_is_looked_for_up_to_a_second_and_a_lead_up_to_a_fifth(
     assert lags_of_each([late], early, 0.01)[0, 0] == pytest.approx(found, abs=5e-4, nan_ok=True)
 
 
+@pytest.mark.parametrize(
+    ("samples", "lag", "found"),
+    [
+        (43, 10, True),
+        (43, 11, False),
+        (43, -10, True),
+        (43, -11, False),
+        (7, 1, True),
+        (7, 2, False),
+    ],
+)
+def test_a_lag_is_looked_for_within_a_quarter_of_a_short_log(
+    samples: int, lag: int, found: bool
+) -> None:
+    early = np.random.default_rng(4).standard_normal((samples, 1))
+    (value,) = lags_of_each([np.roll(early, lag, axis=0)], early, 0.01)[0]
+    assert (abs(value / 0.01 - lag) < 0.5) == found
+
+
 def test_nothing_fits_noise() -> None:
     noise = np.random.default_rng(0).standard_normal((2000, 1))
     flat = np.zeros((2000, 1))

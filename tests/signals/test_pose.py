@@ -116,3 +116,7 @@ def test_z_is_turned_onto_a_direction(x: float, y: float, z: float) -> None:
     np.testing.assert_allclose(R[:, 2], direction / np.linalg.norm(direction), atol=ROUNDING)
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=ROUNDING)
     assert np.linalg.det(R) > 0.0
+
+
+def test_what_is_upright_is_not_turned() -> None:
+    np.testing.assert_array_equal(rotation_onto(np.array([0.0, 0.0, 2.0])), np.eye(3))
