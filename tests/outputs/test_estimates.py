@@ -47,6 +47,22 @@ def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("extra", "name", "begins"),
+    [
+        ("csv", "estimates.csv", b"t,q/1,"),
+        ("mcap", "estimates.mcap", b"\x89MCAP0\r\n"),
+        pytest.param("rrd", "recording.rrd", b"RRF2", marks=pytest.mark.slow),
+    ],
+)
+def test_an_extra_is_one_more_file_of_its_format(
+    analysis: Analysis, tmp_path: Path, extra: str, name: str, begins: bytes
+) -> None:
+    write_estimate_folder(tmp_path, analysis, "", OutputChoice(extras=(extra,)))
+    assert {path.name for path in tmp_path.iterdir()} == {"estimates.parquet", "run.json", name}
+    assert (tmp_path / name).read_bytes().startswith(begins)
+
+
 def test_every_sample_says_which_contact_it_lies_in(analysis: Analysis) -> None:
     assert analysis.contacts is not None
     table = estimates_table(analysis)

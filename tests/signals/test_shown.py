@@ -67,10 +67,36 @@ def test_fields_are_numbers_or_shapes_and_their_letters_are_escaped() -> None:
     assert "<i>" not in thing._repr_html_()
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (np.arange(7.0), "[0 1 2 3 4 5 6]"),
+        (np.arange(8.0), "array (8,)"),
+        (np.zeros((2, 3)), "array (2, 3)"),
+        (tuple("abcdefg"), "a b c d e f g"),
+        (tuple("abcdefgh"), "8 × str"),
+        ({"a": 1, "b": 2}, "a b"),
+        ([Path("a"), Path("b")], f"2 × {type(Path()).__name__}"),
+        (Path("a/b"), str(Path("a/b"))),
+        (12345.678, "1.235e+04"),
+        (3, "3"),
+        (float("nan"), "–"),
+        (T.mean, "builtin_function_or_method"),
+    ],
+)
+def test_a_field_is_a_few_letters(value: object, text: str) -> None:
+    assert repr(Thing(words=value)) == f"<Thing name a\\nb <i>, words {text}>"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("nothing", [None, "", (), [], {}])
+def test_a_field_that_says_nothing_is_left_out(nothing: object) -> None:
+    assert repr(Thing(words=nothing)) == "<Thing name a\\nb <i>>"  # type: ignore[arg-type]
+
+
 def test_a_long_line_is_cut() -> None:
-    line = repr(Thing(name="x" * 1000))
-    assert len(line) == LONGEST + 2
-    assert line.endswith("…>")
+    whole = "x" * (LONGEST - len("Thing name "))
+    assert repr(Thing(name=whole)) == f"<Thing name {whole}>"
+    assert repr(Thing(name=whole + "x")) == f"<Thing name {whole[:-1]}…>"
 
 
 def test_frames_have_the_columns_of_the_files_and_null_for_what_is_not_known() -> None:
