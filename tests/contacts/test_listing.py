@@ -67,6 +67,9 @@ def test_free_cycles_are_found_where_nothing_is_said(listed: Lister) -> None:
     assert found.free
     scored = score(found.contacts, true_contacts(*true_wrench("ur5_circle.csv")))
     assert (len(scored.pairs), len(scored.false)) == (12, 0)
+    # The circle turns J5 by 5 mrad.
+    (held,) = found.remarks
+    assert (held.code, held.where.joints) == ("free-part-misses-joints", (5,))
 
 
 def part(recording: Recording, chosen: np.ndarray) -> Recording:

@@ -134,7 +134,8 @@ def test_standstill_is_spread_by_a_period_of_the_filter(prepared):
 def test_neighbours_are_joined_and_the_larger_one_names_them(prepared):
     motion, residual = prepared(T, dq=np.full((len(T), 3), 0.5)), touched(0.0, 0.0)
     gap = round(100 * 2 * TOUCH_MARGIN)
-    residual[100:201, 0] = -25.0
+    residual[100:201, 0] = -24.0
+    residual[150, 0] = -25.0  # its largest, in joint 1
     residual[200 + gap - 1 : 301, 1] = 20.0  # .59 s later
     residual[300 + gap + 1 : 501, 2] = 15.0  # .61 s later
     spans = find_contacts(motion, residual, np.zeros((len(T), 3)))
