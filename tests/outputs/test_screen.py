@@ -9,7 +9,6 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import ForceCourse
 from vftcli.outputs.believability import Ground
 from vftcli.outputs.error_tables import blocks
 from vftcli.outputs.screen import (
@@ -19,17 +18,14 @@ from vftcli.outputs.screen import (
     Canvas,
     against,
     belief_lines,
-    column_peaks,
     facts,
-    force_bars,
-    forces_of_list,
+    ground_lines,
+    list_lines,
     log_screen,
     logs_screen,
-    seconds,
     short_screen,
     written_lines,
 )
-from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import caution, fact, warning
 
 CANVAS = Canvas(width=80)
@@ -263,82 +259,73 @@ def test_a_text_is_wrapped_behind_its_indent_and_cut() -> None:
     assert canvas.wrapped("", 10) == [""]
 
 
-T = np.linspace(0.0, 18.0, 1801)
+WAITS = Ground(
+    "caution",
+    "log",
+    "The clock waits 12 times, for 40 ms at most, and the velocities lag the positions by 8 ms, "
+    "which is more than most.",
+    "vftcli inspect log.csv --derive dq",
+)
 
 
-def pushed(*pushes: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Time and forces that are constant from and to a time."""
-    force = np.zeros(len(T))
-    for begin, end, size in pushes:
-        force[(begin <= T) & (end >= T)] = size
-    return T, force
+@pytest.mark.parametrize(
+    ("ground", "most", "about", "lines"),
+    [
+        (WAITS, None, "", [
+            "  △ log               The clock waits 12 times, for 40 ms at most, and",
+            "                      the velocities lag the positions by 8 ms, which is",
+            "                      more than most.",
+            "                      vftcli inspect log.csv --derive dq",
+        ]),
+        (WAITS, 1, "a_log.csv", [
+            "  △ a_log.csv: log    The clock waits 12 times, for 40 ms at most, and …",
+            "                      vftcli inspect log.csv --derive dq",
+        ]),
+        (WAITS, 1, "long_name.csv", [
+            "  △ long_name.csv: log",
+            "                      The clock waits 12 times, for 40 ms at most, and …",
+            "                      vftcli inspect log.csv --derive dq",
+        ]),
+        (WAITS._replace(remedy="x" * 50), 1, "", [
+            "  △ log               The clock waits 12 times, for 40 ms at most, and …",
+            "                      " + "x" * 50,
+        ]),
+        (WAITS._replace(remedy="x" * 51), 1, "", [
+            "  △ log               The clock waits 12 times, for 40 ms at most, and …",
+            "    " + "x" * 51,
+        ]),
+    ],
+)  # fmt: skip
+def test_a_ground_is_a_mark_a_subject_and_a_sentence_with_its_remedy_below(
+    ground: Ground, most: int | None, about: str, lines: list[str]
+) -> None:
+    assert list(ground_lines(ground, Canvas(width=72), most, about)) == lines
 
 
-def test_the_bars_are_as_high_as_the_force_and_stand_where_it_is() -> None:
-    canvas = Canvas(width=72)
-    lines = force_bars(*pushed((3.0, 6.0, 45.0), (9.0, 12.0, 90.0)), [], canvas)
-    unit, top, middle, bottom, axis = lines
-    assert unit.split() == ["N"]
-    assert [line.split()[0] for line in (top, middle, bottom)] == ["90", "45", "0"]
-    bars = [line.partition("┤")[2] for line in (top, middle, bottom)]
-    columns = canvas.width - 2 - 8
-
-    def at(row: str, time: float) -> str:
-        return row.ljust(columns)[round(time / 18.0 * columns)]
-
-    # Half of the largest force fills one and a half of the three lines.
-    assert [at(row, 10.5) for row in bars] == ["█", "█", "█"]
-    assert [at(row, 4.5) for row in bars] == [" ", "▄", "█"]
-    assert [at(row, 15.0) for row in bars] == [" ", " ", "▁"]
-    assert axis.split()[-1] == "s"
-    assert max(map(len, lines)) <= canvas.width
+HEADS = "  #  from – to [s]    |F| [N]  range  direction  where  trust"
+ROW = "  {0}    {0}.00 –   4.78   5{0} ± 7  57–78  +y, down   wrist  fair"
+EACH = [*map(ROW.format, (1, 2, 3))]
+END = [
+    "  Nothing else above 6 N. Weaker pushes would not show.",
+    "  (± 95 %; force ON the robot, base axes; range: if it touched another possible place)",
+]
 
 
-def test_a_terminal_of_ascii_gets_ascii() -> None:
-    lines = force_bars(*pushed((3.0, 6.0, 45.0)), [], Canvas(unicode=False))
-    assert "".join(lines).isascii()
-    assert "#" in lines[1]
-
-
-def test_every_sample_counts_in_a_column_and_a_gap_is_bridged() -> None:
-    one = pushed((5.0, 5.001, 70.0))  # a single sample
-    assert column_peaks(*one, 60).max() == 70.0
-    few = np.array([0.0, 10.0]), np.array([0.0, 20.0])
-    assert np.all(np.diff(column_peaks(*few, 8)[:-1]) > 0)
-
-
-def test_seconds_count_in_round_steps() -> None:
-    assert seconds(T, 60).split() == ["0", "2", "4", "6", "8", "10", "12", "14", "16", "18", "s"]
-    assert seconds(np.array([0.0, 0.9]), 60).split()[:3] == ["0", "0.1", "0.2"]
-
-
-def test_numbers_stand_below_the_peaks_where_there_is_room() -> None:
-    rows = [contact(number=1, peak=0.0), contact(number=2, peak=9.0), contact(number=3, peak=9.1)]
-    *bars, line = force_bars(*pushed((8.0, 10.0, 5.0)), rows, Canvas(width=69))
-    assert line.split() == ["#", "1", "2"]  # the third would touch the second
-    begins = next(bar.index("┤") for bar in bars if "┤" in bar) + 1
-    assert (line.index("1"), line.index("2")) == (begins, begins + 30)
-
-
-def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
-    rows = [
-        contact(start=1.0, stop=1.5, course=risen(1.0, 1.5, 30.0)),
-        contact(start=2.0, stop=2.2, number=2, course=risen(2.0, 2.2, 12.0)),
-    ]
-    made = replace(without_reference, contacts=contact_list(*rows))
-    force, t = forces_of_list(made), made.t
-    assert force is not None
-    assert np.isclose(force[(t >= 1.0) & (t <= 1.5)].max(), 30.0, rtol=0.05)  # between samples
-    assert np.isclose(force[(t >= 2.0) & (t <= 2.2)].max(), 12.0, rtol=0.1)
-    assert not force[(t < 1.0) | (t > 2.2) | ((t > 1.5) & (t < 2.0))].any()
-
-
-def risen(start: float, stop: float, peak: float) -> ForceCourse:
-    """A force that rises to a peak and falls."""
-    force = np.array([0.0, peak, 0.0])
-    return ForceCourse(np.array([start, (start + stop) / 2, stop]), force, 0.1 * force)
-
-
-def test_without_forces_there_are_no_bars(without_reference: Analysis) -> None:
-    assert forces_of_list(replace(without_reference, contacts=None)) is None
-    assert forces_of_list(replace(without_reference, contacts=contact_list())) is None
+@pytest.mark.parametrize(
+    ("most", "weak", "lines"),
+    [
+        (2, 1, [HEADS, *EACH[1:], "  the 2 hardest of 3; --details shows all", *END]),
+        (3, 1, [HEADS, *EACH, *END]),
+        (None, 0, [HEADS, *EACH, *END]),
+        (None, 1, [
+            HEADS, *EACH, "",
+            "  Candidates, too little evidence or force to list:", HEADS, ROW.format(4), *END,
+        ]),
+    ],
+)  # fmt: skip
+def test_a_list_is_its_rows_and_what_can_be_said_of_the_rest(
+    most: int | None, weak: int, lines: list[str]
+) -> None:
+    rows = [contact(number=k, start=k * 1.0, peak_force=50.0 + k) for k in (1, 2, 3, 4)]
+    found = contact_list(*rows[:3], candidates=tuple(rows[3:][:weak]))
+    assert list_lines(found, most, Canvas(width=72)) == lines
