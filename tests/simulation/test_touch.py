@@ -1,18 +1,13 @@
 """Contacts on the arm: their joint torque by virtual work, and the truth they leave."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation import load_scenario, simulate
-from vftcli.simulation.contacts import Touching, cross, draw_walk
-from vftcli.simulation.experiment import at_other_point
+from vftcli.simulation.contacts import Touching, draw_walk
 from vftcli.simulation.scenario import HandSpec, ProfileSpec, RandomWalkSpec
-from vftcli.simulation.sensing import first_order_low_pass
 
 ROBOT = load_robot("ur5")
 FORCE, MOMENT, POINT = (3.0, -4.0, 12.0), (0.5, 0.2, -0.3), (0.02, 0.05, 0.1)
@@ -129,31 +124,3 @@ def test_a_walk_of_no_intensity_stays_where_it_is_drawn():
     np.testing.assert_array_equal(walk, np.tile(walk[0], (5, 1)))
     assert np.std(walk[0]) == pytest.approx(2.0, rel=0.1)
     assert np.mean(walk[0]) == pytest.approx(0.0, abs=0.3)
-
-
-def test_small_algebra():
-    a, b = np.random.default_rng(2).standard_normal((2, 3))
-    np.testing.assert_allclose(cross(a, b), np.cross(a, b), atol=1e-15)
-    wrench = at_other_point(np.array([0.0, 0.0, 10.0, 1.0, 2.0, 3.0]), np.array([0.2, 0.1, 0.0]))
-    # moment r × f = (0.1·10, −0.2·10, 0) is added, the force stays
-    np.testing.assert_allclose(wrench, [0.0, 0.0, 10.0, 2.0, 0.0, 3.0], atol=1e-15)
-
-
-def test_the_truth_of_a_flange_push_is_its_wrench_at_the_origin():
-    scenario = load_scenario("ur5-circle", ["duration=1.0", "contacts=[]"])
-    push = ProfileSpec(name="p", spans=((0.2, 0.8),), force=(0, 0, -20.0), point=(0.1, 0, 0))
-    run = simulate(replace(scenario, contacts=(push,)), 1)
-    middle = np.argmin(np.abs(run.truth.t - 0.5))
-    np.testing.assert_allclose(run.truth.wrench[middle, :3], [0, 0, -20.0], atol=1e-9)
-    # lever of 0.1 m in flange axes, turned into the base, times 20 N: at most 2 N·m
-    assert np.linalg.norm(run.truth.wrench[middle, 3:]) <= 2.0 + 1e-9
-    assert not run.truth.wrench[run.truth.t < 0.19].any()
-    assert set(run.truth.columns()) >= {"t", "tau_ext/1", "tau_ext/6", "wrench/fx", "wrench/mz"}
-
-
-def test_the_vendors_filter_is_first_order():
-    step = np.vstack([np.zeros((1, 1)), np.ones((500, 1))])
-    out = first_order_low_pass(step, cutoff=5.0, step=0.002)[:, 0]
-    t = 0.002 * np.arange(501)
-    # input held over the step: exactly 1 − exp(−2π f t)
-    np.testing.assert_allclose(out, 1.0 - np.exp(-2 * np.pi * 5.0 * t), atol=1e-12)
