@@ -13,9 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from vftcli.batch import annotated_copy
-from vftcli.batch.annotated_copy import annotate
+from vftcli.batch.annotated_copy import annotate, gathered, joint_names
 from vftcli.batch.annotation import ForceChoice
 from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.cluster import Outcome
 from vftcli.batch.datasets.copying import partial_of
 from vftcli.observers.choice import ObserverChoice
 from vftcli.readers import recognise
@@ -70,6 +71,56 @@ def edited(dataset: Path, column: str, edit: Any) -> None:
     edit(values)
     lists = pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
     pq.write_table(table.set_column(table.column_names.index(column), column, lists), path)
+
+
+MISSING = {"status": "missing", "file": "a/t.h5", "episode": 0, "reason": "t.h5: no dq."}
+DONE = {"status": "done", "file": "b/t.h5", "episode": 0, "joints": None, "joint_count": 2}
+
+
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        (MISSING, r"^a/t.h5: no dq\. --anyway"),
+        (MISSING | {"reason": "no dq"}, r"^no dq\. --anyway"),
+        (
+            DONE | {"status": "part", "missing_frames": {"wrench": 3}, "frames": 9},
+            "b/t.h5: episode 0: wrench is missing in 3 of 9 frames: these poses hide it",
+        ),
+    ],
+)
+def test_an_episode_that_lacks_frames_is_refused_by_its_file(record: Any, said: str) -> None:
+    outcome = Outcome(None, {"episodes": [record], "robot": None, "observer": None})
+    with pytest.raises(LogError, match=said):
+        gathered([outcome], ForceChoice(), print)
+    assert gathered([outcome], ForceChoice(anyway=True), lambda *_: None)["episodes"] == [record]
+
+
+def test_episodes_are_gathered_in_the_order_of_their_files() -> None:
+    told, arms = [], ({"name": "one"}, {"name": "two"})
+    results = [
+        {"episodes": [DONE | {"episode": 2}, DONE], "robot": None, "observer": "gmo"},
+        {"episodes": [DONE | {"file": "a/t.h5"}], "robot": arms[0], "observer": "fdo"},
+        {"episodes": [], "robot": arms[1], "observer": None},
+    ]
+    ended = [Outcome(None, result) for result in results]
+    made = gathered(ended, ForceChoice(), lambda *step: told.append(step))
+    found = [(one["file"], one["episode"]) for one in made["episodes"]]
+    assert found == [("a/t.h5", 0), ("b/t.h5", 0), ("b/t.h5", 2)]
+    assert (made["robot"], made["observer"]) == (arms[0], "gmo")
+    assert told == [(f"{count} episodes estimated", 0.0, 0.8) for count in (2, 3, 3)]
+
+
+def test_joints_are_named_by_the_first_episode_that_is_done() -> None:
+    named = DONE | {"joints": ["a", "b"]}
+    assert joint_names({"episodes": [MISSING, DONE, named]}) == ["joint_1", "joint_2"]
+    assert joint_names({"episodes": [MISSING, named, DONE]}) == ["a", "b"]
+    for episodes, said in (
+        ([], "the dataset has no episodes"),
+        ([MISSING, MISSING | {"reason": "why"}], "none of the 2 .* the first: t.h5: no dq"),
+        ([DONE, DONE | {"joint_count": 7}], "arms of 2 and 7 joints"),
+    ):
+        with pytest.raises(LogError, match=said):
+            joint_names({"episodes": episodes})
 
 
 def test_the_whole_copy(tmp_path: Path) -> None:
