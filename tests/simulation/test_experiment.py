@@ -10,7 +10,7 @@ from vftcli.observers.paper import MomentumObserver
 from vftcli.outputs.conversion import save
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.friction import COLDEST, WARMEST
+from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
@@ -196,6 +196,20 @@ def test_a_joint_is_as_warm_as_the_scenario_says_between_start_and_end() -> None
         found = arm.temperature(np.array([0.0, 2.0, 8.0]))
         expected = [first, 0.75 * first + 0.25 * last, last]
         np.testing.assert_allclose(found, np.tile(expected, (6, 1)).T)
+
+
+def test_friction_follows_the_temperature_every_quarter_of_a_second() -> None:
+    span = ["friction.temperature_begin=25", "friction.temperature_end=45"]
+    scenario = load_scenario("ur5-circle", ["robot=ur5e", "duration=1", "contacts=[]", *span])
+    arm, reference = prepare(scenario, 1)
+    for k in range(251):
+        arm.command(reference.q[k])
+        if k in {0, 249, 250}:
+            middle = np.array([0.0005 if k < 250 else 0.2505])  # of the step that looks
+            factor = friction_factor(arm.robot.friction, arm.temperature(middle))[0]
+            rubs = arm.plant.true_friction.presliding / arm.true.friction.presliding
+            np.testing.assert_allclose(rubs, factor, rtol=1e-12)
+            assert np.all(rubs > 1.02)
 
 
 @pytest.mark.slow
