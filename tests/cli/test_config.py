@@ -2,7 +2,6 @@
 
 import json
 import os
-from contextvars import ContextVar
 from pathlib import Path
 
 import pytest
@@ -88,12 +87,13 @@ def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
     assert (code, "--columns" in err) == (0, False)
 
 
-def test_logs_behind_two_dashes_stay_behind_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = config.FileOptions(Path("a"), ("--robot", "ur5"))
-    monkeypatch.setattr(config, "OPTIONS", ContextVar("file_options", default=kept))
-    words = ["report", "--", "-log.csv"]
-    kept = ["--robot", "ur5", "--config", "none"]
-    assert config.effective(words) == ["report", *kept, "--", "-log.csv"]
+def test_logs_behind_two_dashes_stay_behind_them(run, here: Path) -> None:
+    keep(here, 'robot = "ur5"\n')
+    (here / "-log.csv").symlink_to(LOG)
+    code, out, err = run("inspect", "--json", "--", "-log.csv")
+    assert (code, "note: vftcli.toml gives --robot ur5" in err) == (0, True)
+    command = "vftcli inspect --json --robot ur5 --config none -- -log.csv"
+    assert json.loads(out)["command"] == command
 
 
 @pytest.mark.parametrize(

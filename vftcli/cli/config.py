@@ -1,7 +1,7 @@
 """Options kept in a TOML file: ``--config FILE``, or `vftcli.toml` in the working folder.
 
-Its values are handed to typer as defaults, so that they are read and checked as if they were typed,
-and typed ones go before them. What is used is said, and is in the command line of `run.json`.
+Its values become words behind the typed ones, which go before them, so that they are read and
+checked as if they were typed. What is used is said, and is in the command line of `run.json`.
 """
 
 import shlex
@@ -10,8 +10,7 @@ from contextlib import suppress
 from contextvars import ContextVar
 from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import typer
 from typer.core import TyperOption
@@ -37,30 +36,10 @@ Table = dict[str, Any]  #: A table of TOML.
 FILE = "file:"  #: What a reference's file begins with.
 
 
-class FileOptions(NamedTuple):
-    """What a command took from a file."""
-
-    path: Path | None = None  #: The file, None where none was read.
-    words: tuple[str, ...] = ()  #: The options as they would be typed.
-    settings: Mapping[str, str] = MappingProxyType({})  #: Name → value of the settings.
-
-
-NOTHING = FileOptions()  #: The options of a command that reads no file.
-
-#: The words of this call, former ones by what they are now.
+#: The words of this call: former ones by what they are now, and what a file of options gave it.
 WORDS: ContextVar[Sequence[str]] = ContextVar("words", default=())
-#: What this command took from a file.
-OPTIONS: ContextVar[FileOptions] = ContextVar("file_options", default=NOTHING)
-
-
-def effective(words: list[str]) -> list[str]:
-    """The words of a command line that does the same without a file of options."""
-    kept = OPTIONS.get().words
-    if not kept:
-        return words
-    # What follows -- are logs.
-    end = words.index("--") if "--" in words else len(words)
-    return [*words[:end], *kept, "--config", NONE, *words[end:]]
+#: The file of options that this call reads, None for none.
+READ: ContextVar[Path | None] = ContextVar("read", default=None)
 
 
 def config_option() -> TyperOption:
@@ -68,9 +47,7 @@ def config_option() -> TyperOption:
     return TyperOption(
         param_decls=["--config"],
         metavar="FILE",
-        is_eager=True,
         expose_value=False,
-        callback=take,
         help="Read options from FILE; none: from no file.",
         type=str,
     )
@@ -81,58 +58,46 @@ def is_configured(command: Any) -> bool:  # noqa: ANN401 - typer carries its own
     return any("--columns" in param.opts for param in command.params)
 
 
-def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
-    """Make what the file holds the defaults of a command."""
-    unasked = Path(NAME)
-    # Who writes such a file does not read the one that is there; only `inspect` -o is known here.
-    absent = ctx.params.get("output") is not None or not unasked.is_file()
-    if ctx.resilient_parsing or named == NONE or (named is None and absent):
-        return
-    path = unasked if named is None else Path(named)
-    options, keys = options_of(ctx.command), keys_for(ctx.command, path)
-    kept = {
-        options[key].name: value_of(ctx, options[key], key, value, path)
-        for key, value in keys.items()
-        if key in options
-    }
-    ctx.default_map = {name: value for name, value in kept.items() if value is not None}
-    choices = vars(ctx.command.callback).get("choices", ())
-    settings = {
-        key: value
-        for key, value in keys.items()
-        if "." in key and any(kind.takes(key) for kind in choices)
-    }
-    OPTIONS.set(FileOptions(path, settings=settings))
+def kept_words(ctx: Any, args: Sequence[str]) -> tuple[Path, list[str]] | None:  # noqa: ANN401
+    """The file that is read beside these words, and what it gives as words; None for no file.
 
-
-def settle(ctx: Any) -> None:  # noqa: ANN401
-    """Say what a command, its words parsed, takes from the file and not from what was typed.
-
-    What cannot be meant for its logs is left away.
+    What is typed is left away, and what cannot be meant for the logs that are.
     """
-    path = OPTIONS.get().path
-    if path is None:
-        return
-    arguments = [p for p in ctx.command.params if p.param_type_name == "argument"]
-    given = [ctx.params[argument.name] for argument in arguments]
-    each_log = (log for one in given for log in (one if isinstance(one, tuple) else (one,)))
-    logs = [Path(log) for log in each_log if log is not None]
-    typed = [word.partition("=")[0].strip() for word in ctx.params.get("set") or ()]
-    settings = {name: text for name, text in OPTIONS.get().settings.items() if name not in typed}
-    words = [word for name, text in settings.items() for word in ("--set", f"{name}={text}")]
-    for param in ctx.command.params:
-        source = ctx.get_parameter_source(param.name)
-        if source is None or source.name != "DEFAULT_MAP":
+    command = ctx.command
+    opts, _, params = command.make_parser(ctx).parse_args(list(args))
+    named: str | None = opts.get("config")
+    # Who writes such a file does not read the one that is there.
+    writes = command.name == "inspect" and any(param.name == "output" for param in params)
+    unread = named == NONE or (named is None and (writes or not Path(NAME).is_file()))
+    if ctx.resilient_parsing or unread or "help" in opts:
+        return None
+    path = Path(named or NAME)
+    given = [opts[param.name] for param in params if param.param_type_name == "argument"]
+    each_log = (log for one in given for log in (one if isinstance(one, list | tuple) else (one,)))
+    logs = [Path(log) for log in each_log if isinstance(log, str)]
+    keys, typed = keys_for(command, path), [param.name for param in params]
+    asked = [word.partition("=")[0].strip() for word in opts.get("set") or ()]
+    choices = vars(command.callback).get("choices", ())
+    words = [
+        word
+        for key, text in keys.items()
+        if "." in key and key not in asked and any(kind.takes(key) for kind in choices)
+        for word in ("--set", f"{key}={text}")
+    ]
+    for key, option in options_of(command).items():
+        if key not in keys or option.name in typed:
             continue
-        key, kept = key_of(param), ctx.default_map[param.name]
-        if (value := fitting(key, kept, logs)) != kept:
-            ctx.params[param.name] = value
+        value = fitting(key, value_of(ctx, option, key, keys[key], path), logs)
         for one in value if isinstance(value, list) else [value]:
             if one is True:
                 words.append(f"--{key}")
             elif one is not None:  # what begins with a dash follows =
                 words += [f"--{key}={one}"] if one.startswith("-") else [f"--{key}", one]
-    OPTIONS.set(FileOptions(path, tuple(words), settings))
+    return path, words
+
+
+def say_kept(path: Path, words: Sequence[str]) -> None:
+    """Say what a file gives a command."""
     said = shlex.join(words) or "nothing that this command takes and is not typed"
     echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
 

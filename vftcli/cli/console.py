@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from vftcli.cli.config import WORDS, effective
+from vftcli.cli.config import WORDS
 from vftcli.cli.progress import STAGES, is_terminal, is_watched
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import check_installed
@@ -51,7 +51,7 @@ PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
 
 def command_line() -> str:
     """The command for `run.json` and the report: as typed, with what a file of options gave it."""
-    return printable(shlex.join(["vftcli", *effective(list(WORDS.get()))]))
+    return printable(shlex.join(["vftcli", *WORDS.get()]))
 
 
 def say(text: str) -> None:

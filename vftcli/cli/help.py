@@ -15,7 +15,15 @@ from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS, former, renewed, with_command
-from vftcli.cli.config import NOTHING, OPTIONS, WORDS, config_option, is_configured, settle
+from vftcli.cli.config import (
+    NONE,
+    READ,
+    WORDS,
+    config_option,
+    is_configured,
+    kept_words,
+    say_kept,
+)
 from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
@@ -32,22 +40,26 @@ class GroupedCommand(TyperCommand):
     def __init__(self, *words: Any, **more: Any) -> None:  # noqa: ANN401 - typer's own
         super().__init__(*words, **more)
         if is_configured(self):
-            for param in self.params:
-                param.is_eager = (self.name, param.name) == ("inspect", "output")
             self.params.append(config_option())
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words; of an option that there is not, name the nearest if it is near."""
-        OPTIONS.set(NOTHING)
         try:
+            kept = kept_words(ctx, args) if is_configured(self) else None
+            READ.set(kept[0] if kept else None)
+            if kept:
+                # What follows -- are logs.
+                end = args.index("--") if "--" in args else len(args)
+                args = [*args[:end], *kept[1], "--config", NONE, *args[end:]]
+                WORDS.set([*WORDS.get()[:1], *args])
             rest = super().parse_args(ctx, args)
         except Exception as error:
             if found := getattr(error, "possibilities", None):
                 near = nearest(getattr(error, "option_name", ""), found)
                 vars(error)["possibilities"] = [near] if near else None
             raise
-        if is_configured(self):
-            settle(ctx)
+        if kept:
+            say_kept(*kept)
         return rest
 
     def option(self, param: Any) -> Option:  # noqa: ANN401

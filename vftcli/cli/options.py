@@ -16,7 +16,7 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar, get_args, get_o
 
 import typer
 
-from vftcli.cli.config import OPTIONS
+from vftcli.cli.config import READ
 from vftcli.cli.console import speaking
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
@@ -191,11 +191,9 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     def called(**values: Any) -> None:  # noqa: ANN401
         from vftcli.outputs.files import protected
 
-        kept = OPTIONS.get()
         if part.choices:
-            typed = settings_of(values.get("set") or (), part.choices)
-            values["settings"] = {**kept.settings, **typed}
-        inputs = [*inputs_of(values), *([kept.path] if kept.path is not None else [])]
+            values["settings"] = settings_of(values.get("set") or (), part.choices)
+        inputs = [*inputs_of(values), *filter(None, [READ.get()])]
         # How much it says: what its -v and -q ask, as usual where it has none.
         asked = {name.rpartition("_")[2]: value for name, value in values.items()}
         loud = speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
