@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -257,46 +258,6 @@ LOGS = (".csv", ".tsv", ".txt", ".gz", ".zst", ".npy", ".npz", ".parquet", ".bag
         ".arrow")  # fmt: skip
 
 SHOWN = 4  #: Names of files that a message shows.
-#: How files begin that users give by mistake → what they are, and what to do.
-KINDS = (
-    (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
-    (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI", "a video; give the log that was recorded with it"),
-    (rb"%PDF", "a PDF; give the log that it is about"),
-    (rb"RIFF....WAVE|ID3|OggS|fLaC", "a sound; give the log that was recorded with it"),
-    (rb"RRF2|RRIO", "a Rerun recording, which vftcli writes and does not read; give the log"),
-    (rb"\x7fELF|MZ[^\r\n]{0,60}\0", "a program; give the log that it wrote"),
-    (
-        rb"\s*(<\?xml[^>]*>\s*)?(<!--.*?-->\s*)*<(robot|mujoco|sdf)\b",
-        "a robot's description, no log; give it with --robot, beside a log",
-    ),
-    (rb"\s*<(!DOCTYPE|html|svg|\?xml)", "a page or document in XML; give the log that it is about"),
-    (rb"ULog\x01\x12\x35", "a PX4 ULog of a drone, which has no arm to estimate torques of"),
-    (rb"PK\x03\x04", "a zip archive; unpack it and give the log inside"),
-    (rb"(7z\xbc\xaf|Rar!|BZh|\xfd7zXZ)", "an archive; unpack it and give the log inside"),
-    (rb".{257}ustar", "a tar archive; unpack it and give the log inside"),
-    (rb"\xff\xfe|\xfe\xff", "a text in UTF-16; save it as UTF-8 (plain CSV)"),
-    (
-        rb"(#[^\n]*\n|\s)*(\[\[?[\w.-]+\]\]?\s*\n|[\w-]+\s*=\s*\"|schema\s*=)",
-        "a TOML file; a robot file goes to --robot, one of options to --config",
-    ),
-    (
-        rb"(#[^\n]*\n|---\s)*[A-Za-z_]\w*:( [^\n,;\t]*)?\r?\n(\s*-?\s*[A-Za-z_]\w*:|- )",
-        "a text in YAML; what rostopic or ros2 topic echo printed is read with their options "
-        "-p and --csv, a recorded bag as it is",
-    ),
-    (
-        rb"\s*(%[^\n]*\n\s*)*\\(documentclass|documentstyle|begin|input|section)\b",
-        "a LaTeX text; give the log that its numbers are from",
-    ),
-    (rb"version https://git-lfs", "a pointer of Git LFS; fetch the file itself: git lfs pull"),
-    (rb"\xd0\xcf\x11\xe0", "an old Office document; save the sheet as CSV and give that"),
-)
-#: File inside a zip archive → what the archive is.
-OFFICE = {
-    b"xl/workbook": "an Excel workbook; save the sheet as CSV and give that",
-    b"word/document": "a Word document; give the log that it is about",
-    b"META-INF/manifest": "an OpenDocument; save the sheet as CSV and give that",
-}
 
 
 def description(file: LogFile) -> str:
@@ -319,13 +280,16 @@ def description(file: LogFile) -> str:
 
 def known_kind(file: LogFile) -> str | None:
     """What a file is that begins as no log does, and what to do; None of any other."""
+    mistakes = tables_beside(__file__, "mistakes.toml")
     # The end of a zip archive names what it holds.
-    if file.head.startswith(b"PK\x03\x04"):
-        end = bytes(file.content[-HEAD_BYTES:])
-        for name, words in OFFICE.items():
-            if name in end:
-                return words
-    return next((words for begins, words in KINDS if re.match(begins, file.head, re.DOTALL)), None)
+    end = bytes(file.content[-HEAD_BYTES:]) if file.head.startswith(b"PK\x03\x04") else b""
+    named = (words for name, words in mistakes["zip"].items() if name.encode() in end)
+    begun = (
+        words
+        for begins, words in mistakes["begins"].items()
+        if re.match(begins.encode("latin-1"), file.head, re.DOTALL)
+    )
+    return next(chain(named, begun), None)
 
 
 def of_folder(path: Path, entries: Sequence[str]) -> str:
