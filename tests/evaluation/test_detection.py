@@ -3,7 +3,7 @@
 import pytest
 
 from vftcli.evaluation.detection import rate_interval, score_list, share_interval
-from vftcli.readers.outside import ListedRow
+from vftcli.readers.references import ListedRow
 
 NAN = float("nan")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers.outside import read_list, read_outside
+from vftcli.readers.references import read_list, read_outside
 from vftcli.signals.errors import LogError
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from vftcli.evaluation.scores import LAGS
 from vftcli.pipeline import AnalysisChoice
-from vftcli.readers.outside import ListedRow
+from vftcli.readers.references import ListedRow
 from vftcli.reproduction import scoring
 from vftcli.reproduction.manifest import BenchmarkLog, Declaration, Rival
 from vftcli.reproduction.scoring import (

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.outside import ListedRow
+from vftcli.readers.references import ListedRow
 
 SLACK = 0.1  #: How far a row may be from a true contact that it finds. [s]
 NORMAL = 1.959964  #: Quantile .975 of the normal distribution.

@@ -1,5 +1,10 @@
-"""Reference files: a table with a clock and one external torque a joint, but no positions."""
+"""What lies beside logs: reference torques, others' estimates and lists, torques by a Jacobian.
 
+They are tables with a clock and one external torque a joint, but no positions.
+"""
+
+from collections.abc import Iterable, Mapping
+from itertools import count, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +16,7 @@ from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.opening import open_log, sha256_of
 from vftcli.readers.parquet import ParquetTable
-from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import (
     JACOBIAN,
     Cell,
@@ -26,8 +31,9 @@ from vftcli.readers.table import (
 from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.option import interval_text
-from vftcli.signals.wrench import WrenchFrame
+from vftcli.signals.wrench import AXES, WrenchFrame
 
 TORQUE = "tau_ext"
 
@@ -42,15 +48,25 @@ class ReferenceTable(NamedTuple):
     wrench_frame: WrenchFrame | None
 
 
+def table_at(path: Path) -> Table:
+    """The table of a file: Parquet, text or compressed text."""
+    file = open_log(path)
+    return ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)
+
+
+def program_clock(raw: RawLog, path: Path) -> Array:
+    """The stamps of a table that a program made, which must be whole. (T,) [s]"""
+    t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
+    check_clock(t, str(path))
+    return t
+
+
 def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     """Read a reference file: text, compressed text or Parquet."""
-    file = open_log(path)
-    table: Table = ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)
+    table = table_at(path)
     picks = _stated(table, columns) if columns else _found(table)
     raw = load_signals(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
-    t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
-    # No cleaning here: a reference is made by a program, and must be whole.
-    check_clock(t, str(path))
+    t = program_clock(raw, path)
     for name, values in raw.signals.items():
         if not np.all(np.isfinite(values)):
             row, column = np.argwhere(~np.isfinite(values))[0]
@@ -93,6 +109,84 @@ def _found(table: Table) -> Picks:
     picks = [Pick(TORQUE, columns.cells(name)) for name in groups]
     picks += [] if wrench is None else [wrench]
     return Picks(tuple(picks), columns.find("t"))
+
+
+def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
+    """Torque and wrench (T, 6) or None of another program's file, at its own stamps.
+
+    Its columns are t, tau_ext/1…, band/1… (one standard deviation), wrench/fx… (force and
+    moment on the robot, base axes); a file of `vftcli estimate` has them as
+    tau_ext/NAME/1…. NaN is no answer.
+    """
+    table = table_at(path)
+    inner = f"/{name}/" if f"{TORQUE}/{name}/1" in table.names else "/"
+    columns = {column: Cell(k) for k, column in enumerate(table.names)}
+
+    def cells(kind: str, ends: Iterable[object]) -> tuple[Cell, ...]:
+        wanted = (f"{kind}{inner}{end}" for end in ends)
+        return tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
+
+    found = {kind: cells(kind, count(1)) for kind in (TORQUE, "band")}
+    found["wrench"] = cells("wrench", AXES)
+    if "t" not in columns or not found[TORQUE]:
+        raise LogError(
+            f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
+            f"{listed(table.names)}"
+        )
+    picks = [Pick(kind, each) for kind, each in found.items() if each]
+    clock = Pick("t", (columns["t"],), unit="s")
+    raw = load_signals(table, Picks(tuple(picks), clock), ReadChoice())
+    wrench = raw.signals.get("wrench") if len(found["wrench"]) == len(AXES) else None
+    t, tau, sd = program_clock(raw, path), raw.signals[TORQUE], raw.signals.get("band")
+    return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), wrench
+
+
+class ListedRow(NamedTuple):
+    """One row of a list of contacts."""
+
+    start: float  #: [s]
+    stop: float  #: [s]
+    peak: float = 0.0  #: Its largest force, 0 where it has none. [N]
+    band: float = 0.0  #: Half width of its 95 % band. [N]
+    is_load: bool = False  #: Whether it is called a load.
+
+
+def read_list(path: Path) -> list[ListedRow]:
+    """A list of contacts from CSV."""
+    import polars as pl
+
+    try:
+        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
+        return [
+            ListedRow(
+                start=float(row["start_s"]),
+                stop=float(row["stop_s"]),
+                peak=float(row.get("peak_force_N") or 0.0),
+                band=float(row.get("peak_force_band_N") or 0.0),
+                is_load=row.get("kind") == "load",
+            )
+            for row in rows
+        ]
+    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
+        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
+
+
+def read_parts(files: Mapping[str, Path]) -> dict[str, Array]:
+    """Columns t, q1… of a log in a text file a signal, t first, its numbers row after row."""
+    columns: dict[str, Array] = {}
+    samples = 0
+    for signal, path in files.items():
+        try:
+            values = np.loadtxt(path, ndmin=1).ravel()
+            rows = values.reshape(samples or len(values), -1)
+        except (OSError, UnicodeDecodeError, ValueError):
+            raise LogError(
+                f"{path}: not numbers, as many for each of {samples or 'its'} samples"
+            ) from None
+        samples = len(rows)
+        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
+        columns |= dict(zip(names, rows.T, strict=True))
+    return columns
 
 
 UNIT = 1e-3  #: How far from 1 the axis of a joint may be in the Jacobian.

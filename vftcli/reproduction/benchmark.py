@@ -27,7 +27,7 @@ from vftcli.outputs.quantity import counted
 from vftcli.outputs.run_record import envelope
 from vftcli.pipeline import prepared
 from vftcli.readers.library import Library, absolute
-from vftcli.readers.outside import read_parts
+from vftcli.readers.references import read_parts
 from vftcli.reproduction.manifest import PUSHED, BenchmarkLog, Manifest, Rival, TrainedRobot
 from vftcli.reproduction.scoring import SCHEMA, ScoreTask, planted, score_log
 from vftcli.signals.option import interval

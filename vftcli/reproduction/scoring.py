@@ -19,8 +19,7 @@ from vftcli.observers.table import BEST, OBSERVERS
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.library import Library
-from vftcli.readers.outside import ListedRow, read_list, read_outside
-from vftcli.readers.references import read_reference
+from vftcli.readers.references import ListedRow, read_list, read_outside, read_reference
 from vftcli.reproduction.manifest import BenchmarkLog, Rival
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
