@@ -25,7 +25,7 @@ def test_fast_takes_the_first_seed_of_each() -> None:
 
 def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
     jobs, reported = jobs_of(cheap, tuple(cheap.items), fast=False), []
-    results = run_jobs(jobs, lambda *words: reported.append(words), workers=1)
+    results = run_jobs(jobs, lambda *words: reported.append(words), workers=0)
     assert list(results) == jobs
     assert reported[-1] == (6, 6, "timed, seed 0")  # what takes the time has the machine for itself
     found = gather(cheap, tuple(cheap.items), results)
@@ -49,7 +49,7 @@ def test_numbers_do_not_depend_on_how_many_run_at_once() -> None:
     def nobody(done: int, of: int, what: str) -> None:
         pass
 
-    one, two = (run_jobs(jobs, nobody, workers=count) for count in (1, 2))
+    one, two = (run_jobs(jobs, nobody, workers=n) for n in (0, 2))
     assert list(one) == list(two)
     for job in jobs:
         assert one[job].values == two[job].values

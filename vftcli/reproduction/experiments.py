@@ -1,17 +1,13 @@
-"""Experiments of a paper, each once a seed, two at a time, and what they gave beside its print.
+"""Experiments of a paper, each once a seed, and what they gave beside its print.
 
 A run has its own seed and nothing in common with another, so that the numbers do not
 depend on how many run beside one another. They are shown as a page, its Markdown, and
 figures.
 """
 
-import multiprocessing
-import os
-import signal
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from html import escape
@@ -20,6 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.cluster import perform, run_tasks
 from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.page.shell import page
@@ -30,9 +28,7 @@ from vftcli.reproduction.control import closed_loop, latest_turns, released
 from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle
 from vftcli.reproduction.paper import FLOOR, Paper, RunResult, ShownItem, paper_of
 from vftcli.reproduction.timing import computing_time
-from vftcli.signals.errors import VftError
 
-MOST_WORKERS = 2  #: Processes beside one another: what a full run was measured with.
 #: Name of an experiment's `run` → what it gives of a seed and the experiment's own
 #: arguments.
 RUNS: dict[str, Callable[..., RunResult]] = {
@@ -79,57 +75,25 @@ def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
     ]
 
 
-def perform(job: Job) -> Result:
-    """Run a job; what it cannot do is one line."""
+def run_job(job: Job) -> RunResult:
+    """What a job gives; traces are those of the first seed, the others would only be carried."""
     experiment = paper_of(job.paper).experiments[job.experiment]
-    try:
-        made = RUNS[experiment.run](job.seed, **experiment.given)
-    except (VftError, ArithmeticError) as error:
-        return f"{experiment.title}, seed {job.seed}: {error}"
-    # Traces are those of the first seed: the others' would only be carried about.
+    made = RUNS[experiment.run](job.seed, **experiment.given)
     return made if job.seed == experiment.seeds[0] else replace(made, charts={})
 
 
-def run_jobs(
-    jobs: Sequence[Job],
-    tell: Hearer,
-    workers: int | None = None,
-) -> dict[Job, Result]:
-    """Run jobs, those that take the time last and by themselves."""
-    alone = [job for job in jobs if paper_of(job.paper).experiments[job.experiment].alone]
-    beside = [job for job in jobs if job not in alone]
-    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    count = min(workers or min(own or 1, MOST_WORKERS), len(beside))
+def run_jobs(jobs: Sequence[Job], tell: Hearer, workers: int | None = None) -> dict[Job, Result]:
+    """Run jobs, those that take the time last and by themselves; what fails is one line."""
+    experiments = {job: paper_of(job.paper).experiments[job.experiment] for job in jobs}
+    alone = [job for job in jobs if experiments[job].alone]
+    beside = ([job] for job in jobs if job not in alone)
     found: dict[Job, Result] = {}
-    for job, result in chain(pooled(beside, count), ((job, perform(job)) for job in alone)):
-        found[job] = result
-        tell(len(found), len(jobs), f"{job.experiment}, seed {job.seed}")
+    with closing(run_tasks(beside, run_job, WorkersChoice(jobs=workers), lambda _: None)) as ended:  # type: ignore[type-var]
+        for job, value, failure, _ in chain(ended, (perform(run_job, job) for job in alone)):
+            where = f"{experiments[job].title}, seed {job.seed}"
+            found[job] = value if failure is None else f"{where}: {failure.line}"
+            tell(len(found), len(jobs), f"{job.experiment}, seed {job.seed}")
     return {job: found[job] for job in jobs}
-
-
-def pooled(jobs: Sequence[Job], count: int) -> Iterator[tuple[Job, Result]]:
-    """Jobs in order of their end, in so many processes; one: this one."""
-    if count <= 1:
-        yield from ((job, perform(job)) for job in jobs)
-        return
-    context = multiprocessing.get_context("spawn")
-    # A worker ends without a word when Ctrl-C ends the command.
-    silent = signal.SIGINT, signal.SIG_DFL
-    pool = ProcessPoolExecutor(count, context, initializer=signal.signal, initargs=silent)
-    try:
-        futures: dict[Future[Result], Job] = {pool.submit(perform, job): job for job in jobs}
-        for future in as_completed(futures):
-            job = futures[future]
-            try:
-                yield job, future.result()
-            except BrokenProcessPool:
-                yield job, f"{job.experiment}, seed {job.seed}: its process was ended"
-    except BaseException:
-        for child in multiprocessing.active_children():
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def gather(paper: Paper, names: Sequence[str], results: dict[Job, Result]) -> dict[str, ShownItem]:
