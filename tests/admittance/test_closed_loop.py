@@ -160,6 +160,11 @@ def test_the_arm_goes_where_it_is_pushed_once_the_zero_is_known(loop: ClosedLoop
 def test_a_period_that_the_inner_step_does_not_divide_gets_one_that_does() -> None:
     loop = run("panda-bearing", "density", duration=0.05, zero=(0.0, 0.01))
     assert np.diff(loop.t) == pytest.approx(0.0025)
+    assert loop.simulation.scenario.step == pytest.approx(0.0005)  # a fifth of the period
+
+
+def test_a_step_that_divides_the_period_stays(loop: ClosedLoop) -> None:
+    assert loop.simulation.scenario.step == 0.001
 
 
 def test_wrong_torque_is_refused() -> None:

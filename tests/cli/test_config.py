@@ -104,6 +104,7 @@ def test_logs_behind_two_dashes_stay_behind_them(run, here: Path) -> None:
         ('[compare]\nrobt = "ur5"', "'robt' is no option of compare. Did you mean robot?"),
         ("[compre]\nwrench = true", "compre.wrench is no setting; vftcli help settings lists them"),
         ("force = true", "force is not kept in a file; type --force"),
+        ("workers = [2]", "'workers' is no option of a command that reads a log"),
         ("robot = ", "not valid TOML"),
         ("robot = true", "robot = True is not a text or a number"),
         ('robot = ["ur5", "ur3"]', "is not a text or a number"),

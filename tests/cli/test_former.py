@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from vftcli.cli import make_app
-from vftcli.cli.commands import former
+from vftcli.cli.commands import former, with_command
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -53,6 +53,19 @@ def test_what_a_former_command_is_now_exists(name: str) -> None:
     assert now[0] in commands()
     options = {option for param in commands()[now[0]].params for option in param.opts}
     assert {word for word in now if word.startswith("-")} <= options
+
+
+@pytest.mark.parametrize(
+    ("words", "now"),
+    [
+        ("init a.csv", "inspect -o vftcli.toml a.csv"),
+        ("init a.csv -o b.toml", "inspect a.csv -o b.toml"),
+        ("init --output=b.toml a.csv", "inspect --output=b.toml a.csv"),
+        ("tune a.csv -o b.toml", "identify --method gains a.csv -o b.toml"),
+    ],
+)
+def test_a_former_command_is_called_with_its_words(words: str, now: str) -> None:
+    assert with_command(words.split()) == now.split()
 
 
 def test_no_former_word_is_a_word_of_today() -> None:

@@ -82,8 +82,9 @@ def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_t
     remark = many.remarks(64)[1]
     assert (remark.code, remark.values["free"]) == ("free-cycles-drawn", 59)
     assert remark.values["wider"] == pytest.approx(0.0518, abs=1e-4)  # √((1 + 1/8)/(1 + 1/59)) − 1
-    few = FreeCycles(tuple(range(8)), None)
-    assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)
+    for count in (3, 8):
+        few = FreeCycles(tuple(range(count)), None)
+        assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)
 
 
 def test_the_only_whole_cycle_is_the_free_one(pushed: Callable[..., Run]) -> None:
