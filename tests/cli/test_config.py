@@ -131,17 +131,6 @@ def test_what_is_wrong_with_a_file_is_said_in_one_line(
     assert not (here / "out").exists()
 
 
-@pytest.mark.usefixtures("here")
-@pytest.mark.parametrize(("more", "refused"), [(0, False), (1, True)])
-def test_a_file_of_options_has_a_mebibyte_at_most(
-    run, here: Path, more: int, refused: bool
-) -> None:
-    text = 'robot = "ur5"\n' + 1100 * ("#".ljust(999, "x") + "\n")
-    keep(here, text[: (1 << 20) + more])
-    code, _, err = run("inspect", LOG)
-    assert (code, "too large for a file of options" in err) == (int(refused), refused)
-
-
 def test_a_file_in_another_encoding_is_refused_in_words(run, here: Path) -> None:
     (here / "odd.toml").write_bytes("robot = 'ur5'".encode("utf-16"))
     code, _, err = run("report", LOG, "-o", "out", "--config", "odd.toml")

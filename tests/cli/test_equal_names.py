@@ -57,24 +57,6 @@ def test_csv_has_the_rows_of_both_logs(logs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("option", [None, "--markdown", "--latex"])
-def test_every_table_shows_both_logs(logs, option):
-    text = compared(logs, *([option] if option else []))
-    for name, rows in ROWS.items():
-        assert (
-            f"{name}/log.csv against file:{FIXTURE.name}.truth.parquet, {rows - 1} samples"
-            in text.replace("\\_", "_")
-        )
-
-
-@pytest.mark.slow
-def test_significance_names_both_logs(logs):
-    text = compared(logs, "--details")
-    assert "a/log.csv" in text
-    assert "b/log.csv" in text
-
-
-@pytest.mark.slow
 def test_a_report_of_both_has_both_in_its_table(logs, tmp_path):
     both = [logs / name / "log.csv" for name in ROWS]
     result = invoke("report", *both, "--robot", "ur5", "--reference", TRUTH, "-o", tmp_path / "out")

@@ -4,12 +4,10 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
-from vftcli.cli import check_room
 from vftcli.signals.errors import ParameterError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
@@ -148,19 +146,6 @@ def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> 
         "error: the memory limit of 0.7 GB (ulimit -v) is less than the 3 GB that the libraries "
         "reserve; raise it\n"
     )
-
-
-@pytest.mark.parametrize(
-    ("limit", "refused"), [(2_999_999_999, True), (3_000_000_000, False), (-1, False)]
-)
-def test_three_gigabytes_are_room_enough(
-    monkeypatch: pytest.MonkeyPatch, limit: int, refused: bool
-) -> None:
-    resource = pytest.importorskip("resource")
-    assert resource.RLIM_INFINITY == -1
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (limit, limit))
-    with pytest.raises(SystemExit) if refused else nullcontext():
-        check_room()
 
 
 @pytest.mark.parametrize(

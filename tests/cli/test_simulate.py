@@ -63,8 +63,6 @@ def test_lists_the_scenarios() -> None:
         (["ur5-cirle", "-o", "x.csv"], "Did you mean ur5-circle"),
         (["ur5-circle", "-o", "none/x.csv"], "no such folder"),
         (["ur5-circle", "-o", "."], "-o"),
-        (["ur5-circle", "-o", "x.csv", "--set", "payload.mass=-2"], "mass is -2 kg"),
-        (["ur5-circle", "-o", "x.csv", "--set", "trajectory.radius=0.7"], "cannot reach"),
         (["ur5-circle", "-o", "x.csv", "--as", "csv"], "log format 'csv'"),
         (["ur5-circle", "-o", "x.csv", "--as", "libfranka"], "--as"),
     ],

@@ -13,7 +13,6 @@ from vftcli.reproduction.timing import (
     dense_kalman_loop,
     first_order_loops,
     held_matrices,
-    jittering,
     taylor_exponential,
 )
 from vftcli.robots import load_robot
@@ -47,21 +46,6 @@ def test_every_observer_has_its_time_with_the_dynamics_in_it(
             ratio = (dynamics + own["kfo-zoh"]) / (dynamics + own[name])
             assert values[f"zoh/{name}"][variant] == pytest.approx(ratio)
     assert next(ticks) == 3 * 2 * (5 + 5)  # three rounds
-
-
-def test_the_timed_motion_is_a_round_of_4_s_and_its_clock_may_jitter() -> None:
-    """.4 rad to each side at 125 Hz, joint by joint at other phases; the clock by half of 5 %."""
-    log = circle(UR5, 2000)
-    np.testing.assert_allclose(log.t, np.arange(2000) / 125.0)
-    np.testing.assert_allclose(log.q[500:], log.q[:-500], atol=1e-12)
-    np.testing.assert_allclose(abs(log.q).max(axis=0), 0.4, rtol=1e-4)  # cos of half a step
-    assert np.ptp(log.q[0]) > 0.1
-    # central differences: (2π/4)³·.4·h²/6
-    slope = (log.q[2:] - log.q[:-2]) / 0.016
-    np.testing.assert_allclose(log.require("dq")[1:-1], slope, atol=2e-5)
-    strayed = (jittering(log).t - log.t) / log.median_step
-    # the ends of 2000 even draws
-    assert (strayed.min(), strayed.max()) == pytest.approx((-0.025, 0.025), rel=0.01)
 
 
 def test_the_first_order_loop_is_the_momentum_observer() -> None:

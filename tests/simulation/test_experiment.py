@@ -1,13 +1,10 @@
 """Whole experiments: repeatable, true to themselves, and as hard as the real thing."""
 
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from vftcli.observers.paper import MomentumObserver
-from vftcli.outputs.conversion import save
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
@@ -64,19 +61,6 @@ def many(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
 def rms(values: Array) -> Array:
     result: Array = np.sqrt(np.mean(values**2, axis=0))
     return result
-
-
-@pytest.mark.slow
-def test_same_seed_same_bytes_another_seed_another_log(tmp_path: Path) -> None:
-    scenario = load_scenario("ur5-circle", ["duration=3.0", "contacts.hand.begin=0.0"])
-    contents = []
-    for k, seed in enumerate((7, 7, 8)):
-        (tmp_path / str(k)).mkdir()
-        files = save({tmp_path / str(k) / "log.csv": simulate(scenario, seed)})
-        contents.append([file.read_bytes() for file in files])
-    assert contents[0] == contents[1]
-    assert contents[0][0] != contents[2][0]
-    assert contents[0][1] != contents[2][1]
 
 
 def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:

@@ -12,28 +12,6 @@ from vftcli.simulation.plant import true_friction
 from vftcli.simulation.scenario import FrictionSpec
 
 
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_a_sliding_joint_rubs_as_the_profile_says(name):
-    robot = load_robot(name)
-    friction = true_friction(robot, FrictionSpec())
-    for speed in (-1.5, -0.4, 0.4, 1.5):  # far above the smoothing: tanh is 1 to 1e-30
-        dq = np.full(robot.joints, speed)
-        torque = friction.smooth(dq)[0] + np.sign(speed) * friction.dry(dq)
-        np.testing.assert_allclose(
-            torque, friction_torque(robot.friction, dq[None])[0], rtol=1e-12, atol=1e-12
-        )
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_the_slope_is_the_derivative(name):
-    robot = load_robot(name)
-    friction = true_friction(robot, FrictionSpec())
-    dq, h = np.linspace(-0.3, 0.4, robot.joints), 1e-6
-    difference = (friction.smooth(dq + h)[0] - friction.smooth(dq - h)[0]) / (2 * h)
-    # where it falls, as a quadratic below zero may, the slope used is zero
-    np.testing.assert_allclose(friction.smooth(dq)[1], np.maximum(difference, 0.0), atol=1e-7)
-
-
 def test_the_stribeck_peak_fades_over_its_velocity():
     robot = load_robot("ur5")
     spec = FrictionSpec(stribeck=0.3, stribeck_velocity=0.05)
@@ -83,32 +61,39 @@ LINE = JointFriction(
 )
 
 
-def test_a_bent_line_is_the_models_and_bends_where_it_does():
-    """The share of the plant's friction by velocity and load, against the model's function."""
-    robot = load_robot("ur5").without_friction()
-    short = JointFriction(model="points", speeds=(0.1, 1.0), torques=(1.0, 3.0))
-    flat = JointFriction(
-        model="coulomb-logarithmic",
-        parameters={"coulomb": 2.0, "logarithmic": 3.0, "logarithmic_velocity": 1.2},
-    )
-    square = JointFriction(
-        model="coulomb-viscous-quadratic",
-        parameters={"coulomb": 2.0, "viscous": 1.0, "quadratic": 0.5},
-    )
-    robot = replace(robot, friction=(LINE, short, flat, square, LINE, JointFriction()))
+SHORT = JointFriction(model="points", speeds=(0.1, 1.0), torques=(1.0, 3.0))
+FLAT = JointFriction(
+    model="coulomb-logarithmic",
+    parameters={"coulomb": 2.0, "logarithmic": 3.0, "logarithmic_velocity": 1.2},
+)
+SQUARE = JointFriction(
+    model="coulomb-viscous-quadratic",
+    parameters={"coulomb": 2.0, "viscous": 1.0, "quadratic": 0.5},
+)
+MADE = replace(load_robot("ur5"), friction=(LINE, SHORT, FLAT, SQUARE, LINE, JointFriction()))
+
+
+@pytest.mark.parametrize("robot", [MADE, load_robot("ur5"), load_robot("panda")])
+def test_a_sliding_joint_rubs_as_the_model_says_and_its_slope_is_the_derivative(robot):
+    """The plant's friction by velocity and load, bends included, against the model's function."""
     friction = true_friction(robot, FrictionSpec())
-    load = np.array([-30.0, 20.0, 5.0, 0.0, 1.0, 2.0])
+    load = np.resize([-30.0, 20.0, 5.0, 0.0, 1.0, 2.0], robot.joints)
     for speed in (-4.0, -1.0, -0.3, -0.05, 0.05, 0.3, 1.0, 4.0):
         # five times the smoothing: tanh is 1 to 1e-4 of the Coulomb torque
-        dq = np.full(6, speed)
+        dq = np.full(robot.joints, speed)
         torque = friction.smooth(dq)[0] + np.sign(speed) * friction.dry(dq, load)
         model = friction_torque(robot.friction, dq[None], load[None])[0]
         np.testing.assert_allclose(torque, model, rtol=2e-4)
         h = 1e-6
         rise = (friction.smooth(dq + h)[0] - friction.smooth(dq - h)[0]) / (2 * h)
-        # differences of 20 N·m over 2e-6 rad/s: rounding
-        np.testing.assert_allclose(friction.smooth(dq)[1], rise, atol=1e-8)
-    np.testing.assert_array_equal(friction.presliding, [0.5, 0, 0, 0, 0.5, 0])
+        # where it falls, as a quadratic below zero may, the slope used is zero; differences of
+        # 20 N·m over 2e-6 rad/s: rounding
+        np.testing.assert_allclose(friction.smooth(dq)[1], np.maximum(rise, 0.0), atol=2e-8)
+
+
+def test_presliding_of_the_model_is_the_plants():
+    found = true_friction(MADE, FrictionSpec()).presliding
+    np.testing.assert_array_equal(found, [0.5, 0, 0, 0, 0.5, 0])
 
 
 def test_a_share_of_the_coulomb_torque_gives_before_it_slides():
