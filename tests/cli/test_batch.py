@@ -224,6 +224,11 @@ def test_a_batch_that_nobody_watches_is_told_every_two_seconds(
     assert told(104.2, count._replace(done=0)) == "3/10 logs, 1 failed\n"
     assert told(106.3, count._replace(seconds=0.0)) == "6/10 logs, 1 failed\n"
     assert told(109.0, count._replace(done=7)) == ""  # the end has its own line
+    shown: list[object] = []
+    monkeypatch.setattr("vftcli.cli.batch.is_watched", lambda: True)
+    monkeypatch.setattr("vftcli.cli.batch.STAGES.begin", lambda *step: shown.append(step))
+    progress_line()(count)
+    assert shown == [("6/10 logs, 1 failed", 0.6)]
 
 
 @pytest.mark.statistical
