@@ -156,8 +156,7 @@ def test_the_table_is_that_of_ten_lines(run, manifest: Path) -> None:
 
 
 @pytest.mark.slow
-def test_planted_pushes_are_found_in_drive_torque_and_truth(run, tmp_path: Path) -> None:
-    """What a current lacks is Jᵀ F/K: beside the tool's own reading of it."""
+def test_planted_pushes_are_scored_against_their_truth(run, tmp_path: Path) -> None:
     shutil.copy(CIRCLE, tmp_path / "log.csv")
     (tmp_path / "my.toml").write_text(
         '[[log]]\nname = "a"\narm = "UR5"\nfile = "log.csv"\nrobot = "ur5"\ntruth = "free"\n'
@@ -169,16 +168,6 @@ def test_planted_pushes_are_found_in_drive_torque_and_truth(run, tmp_path: Path)
     assert code == 0, err
     (pushed,) = tmp_path.glob("out/made/*/a-pushed.parquet")
     truth = pl.read_parquet(f"{pushed}.truth.parquet")
-    fy = truth["wrench/fy"].to_numpy()
-    assert fy.max() == pytest.approx(30.0, rel=1e-3)
-    assert not fy[(truth["t"] < 10) | (truth["t"] > 12)].any()
-    before, after = (Library().open(p) for p in (tmp_path / "log.csv", pushed))
-    # K of the UR5 profile's two sizes of joints, N·m/A.
-    constant = np.repeat([12.625, 9.3122], 3)
-    tau = truth.select(pl.col("^tau_ext/.*$")).to_numpy()
-    missing = (before.require("current") - after.require("current")) * constant
-    assert missing == pytest.approx(tau, abs=1e-9)
-    assert abs(tau[:, 1]).max() > 5.0
     # It is scored against this truth, of the pushed log alone in contact, of the other when free.
     rows = pl.read_parquet(tmp_path / "out" / "scores.parquet").drop_nulls("joint")
     parts = rows.group_by("log", maintain_order=True).agg(pl.col("part").unique().sort())

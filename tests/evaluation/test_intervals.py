@@ -100,15 +100,6 @@ def test_an_interval_does_not_depend_on_who_else_is_asked() -> None:
     assert evaluate("log", both, zero).select(ends).row(0) == alone
 
 
-def test_white_noise_has_the_textbook_interval() -> None:
-    """RMSE of N white samples: relative standard deviation 1/√(2N)."""
-    squares = np.random.default_rng(3).standard_normal((20_000, 1)) ** 2
-    drawn = drawn_from(squares)
-    low, high = interval(float(squares.mean()), drawn.draws[:, 0], drawn.blocks)
-    width = (high - low) / np.sqrt(squares.mean())
-    assert width == pytest.approx(2.0 * 1.96 / np.sqrt(2.0 * 20_000), rel=0.15)
-
-
 def test_a_perfect_estimate_has_no_interval() -> None:
     drawn = drawn_from(np.zeros((100, 1)))
     assert np.isnan(interval(0.0, drawn.draws[:, 0], drawn.blocks)).all()

@@ -34,12 +34,6 @@ def test_a_simulated_push_is_found_where_it_was() -> None:
     assert touched_remarks(free) == ()
 
 
-def test_the_span_that_is_offered_is_free() -> None:
-    (warned,) = touched_remarks(Run(recording=FIXTURE, robot=UR5))
-    span = (float(warned.values[name]) for name in ("begin_s", "end_s"))  # type: ignore[arg-type]
-    assert touches(Run(recording=FIXTURE.between(*span), robot=UR5)) == ()
-
-
 def test_two_planted_torques_are_where_they_were_planted() -> None:
     """30 N·m on J3 and 12 N·m on J5 of a free motion, as the current that they need.
 

@@ -36,6 +36,15 @@ MORE = [
 ]
 
 
+SENSOR = Payload(mass=0.35, com=np.array([0.0, 0.01, 0.03]), inertia=np.zeros((3, 3)))
+
+
+def load(scale):
+    """The payload of `MORE`, scaled."""
+    tensor = scale * np.diag([0.01, 0.02, 0.03])
+    return Payload(mass=2.0 * scale, com=np.array([0.01, 0.02, 0.03]), inertia=tensor)
+
+
 @pytest.mark.parametrize("off", [None, "all", *SIZES])
 def test_an_arm_is_its_profile_with_what_the_seed_draws(off):
     """The draws of NumPy's generator, one after another, whatever their sizes are."""
@@ -51,9 +60,6 @@ def test_an_arm_is_its_profile_with_what_the_seed_draws(off):
     dry, wet = 1.0 + draw("friction", 6), 1.0 + draw("friction", 6)
     gain, offset = 1.0 + draw("torque_constant", 6), draw("torque_offset", 6)
     scale = 1.0 + draw("payload", 1)[0]
-    tensor = np.diag([0.01, 0.02, 0.03])
-    load = Payload(mass=2.0 * scale, com=np.array([0.01, 0.02, 0.03]), inertia=scale * tensor)
-    sensor = Payload(mass=0.35, com=np.array([0.0, 0.01, 0.03]), inertia=np.zeros((3, 3)))
     links = replace(
         UR5.chain,
         mass=UR5.chain.mass * mass,
@@ -61,7 +67,7 @@ def test_an_arm_is_its_profile_with_what_the_seed_draws(off):
         inertia=UR5.chain.inertia * mass[:, None, None],
         rotor_inertia=UR5.chain.rotor_inertia * rotor,
     )
-    same(drawn.chain, links.with_payload(load).with_payload(sensor))
+    same(drawn.chain, links.with_payload(load(scale)).with_payload(SENSOR))
     same(drawn.nominal.chain, UR5.chain)
     own = true_friction(UR5, load_scenario("ur5-circle").friction)
     for name, factor in (("coulomb", dry), ("presliding", dry), ("bend_slopes", wet)):
@@ -82,9 +88,7 @@ def same(chain, other):
 def test_a_controller_knows_payload_and_sensor_if_it_is_told_to():
     """Their stated masses, not the drawn one."""
     drawn = arm(*MORE, "payload.known=true", "force_sensor.known=true", "mismatch.payload=0.4")
-    load = Payload(mass=2.0, com=np.array([0.01, 0.02, 0.03]), inertia=np.diag([0.01, 0.02, 0.03]))
-    sensor = Payload(mass=0.35, com=np.array([0.0, 0.01, 0.03]), inertia=np.zeros((3, 3)))
-    same(drawn.nominal.chain, UR5.chain.with_payload(load).with_payload(sensor))
+    same(drawn.nominal.chain, UR5.chain.with_payload(load(1.0)).with_payload(SENSOR))
     assert drawn.nominal.payload is None
 
 
