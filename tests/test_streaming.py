@@ -2,7 +2,9 @@
 
 import importlib
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,9 +15,15 @@ from typer.testing import CliRunner
 from vftcli import streaming
 from vftcli.cli import app
 from vftcli.doctor import examination
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
+from vftcli.streaming import comes_in_blocks
+from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 
@@ -96,12 +104,34 @@ def test_wrong_robot_is_refused_before_anything_is_written(tmp_path: Path) -> No
     assert not (tmp_path / "o").exists()
 
 
-@pytest.mark.usefixtures("in_blocks")
-def test_what_needs_the_whole_log_has_it(tmp_path: Path) -> None:
-    """A zero span is of the whole log: it is read in one piece, and the numbers are there."""
-    made, record = estimated(tmp_path / "o", "--causal", "--wrench", "--zero", "0:1")
-    assert "wrench/gmo/fx" in made.columns
-    assert record["input"]["samples"] == len(made)
+BASE = WrenchChoice(frame="base")
+
+
+@pytest.mark.parametrize(
+    ("asked", "log", "blocks"),
+    [
+        ({}, {}, True),
+        ({"wrench": BASE}, {}, True),
+        ({}, {"samples": 100_000}, False),  # there is memory for so many
+        ({}, {"dq": None}, False),
+        ({}, {"source": SimpleNamespace(derived=("dq",))}, False),
+        ({"contacts": True}, {}, False),
+        ({"free": FreeChoice(spans=((0.0, 1.0),))}, {}, False),
+        ({"reference": ReferenceChoice(name="zero")}, {}, False),
+        ({"observers": ObserverChoice(names=("gmo", "kfo-rts"))}, {}, False),
+        ({"wrench": replace(BASE, solver="smoother")}, {}, False),
+        ({"wrench": replace(BASE, torque_sd="own")}, {}, False),
+        ({"wrench": replace(BASE, zero=ZeroChoice(start=True))}, {}, False),
+        ({"wrench": replace(BASE, zero=ZeroChoice(spans=((0.0, 1.0),)))}, {}, False),
+    ],
+)
+def test_what_needs_all_of_a_log_at_once_has_it(
+    asked: dict[str, Any], log: dict[str, Any], blocks: bool
+) -> None:
+    source = SimpleNamespace(derived=())
+    long = SimpleNamespace(**{"samples": 100_001, "dq": True, "source": source} | log)
+    plain = AnalysisChoice(observers=ObserverChoice(names=("gmo", "fdo")), contacts=False)
+    assert comes_in_blocks(long, replace(plain, **asked)) == blocks  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
