@@ -55,7 +55,6 @@ def test_an_experiment_that_fails_is_a_row_and_exit_code_one(
     )
     monkeypatch.setitem(paper.PAPERS, "p", declared)
     monkeypatch.setitem(experiments.RUNS, "fail", fail)
-    monkeypatch.setattr(experiments, "MOST_WORKERS", 1)
     result = invoke("reproduce", "p", "-o", tmp_path / "out")
     assert result.exit_code == 1
     assert "the experiment, seed 1: nothing moved with 1" in result.output
