@@ -14,6 +14,12 @@ def test_a_bound_is_no_number() -> None:
     assert PrintedLine("k", "label").number is None
 
 
+def test_a_verdict_is_a_sentence_too() -> None:
+    answers = {item.verdict: item.answer for item in HUANG.items.values()}
+    assert answers["a picture"] == "A picture."
+    assert all(answer[1:] == f"{verdict[1:]}." for verdict, answer in answers.items())
+
+
 def test_items_come_in_the_papers_order() -> None:
     assert HUANG.chosen("fig7, table1") == ("table1", "fig7")
     assert HUANG.chosen(None) == tuple(HUANG.items)
