@@ -87,6 +87,46 @@ def test_currents_beyond_sixty_ampere_may_be_milliamperes(size: float, reported:
         assert findings["milliamperes"].values["typical_A"] == pytest.approx(61.0, rel=2e-3)
 
 
+def straight(x: Array, every: int, bend: float = 0.0) -> Array:
+    """A signal of every such sample, joined by lines whose slope changes by a share within."""
+    knots = np.arange(0, len(T), every)
+    lines = np.column_stack([np.interp(T, T[knots], column[knots]) for column in x.T])
+    rise = np.repeat(np.diff(x[knots], axis=0), every, axis=0)
+    odd = np.arange(len(rise)) % every == every // 2
+    lines[:-1] += 0.5 * bend * rise / every * odd[:, None]
+    return lines
+
+
+@pytest.mark.parametrize(
+    ("q", "torque", "rate"),
+    [
+        (straight(Q, 4), straight(20 * Q, 4), 25.0),
+        (straight(Q, 10), straight(20 * Q, 10), 10.0),
+        (straight(Q, 2), straight(20 * Q, 2), None),  # half of it runs straight, less than .6
+        (straight(Q, 4), 20 * Q, None),
+        (Q, straight(20 * Q, 4), None),
+        # a slope that changes by less than a thousandth of both sides' is the same
+        (straight(Q, 4), straight(20 * Q, 4, bend=0.5e-3), 25.0),
+        (straight(Q, 4), straight(20 * Q, 4, bend=8e-3), None),
+        # what holds does not run straight, and is no motion: lines for 16 s, then steps
+        (
+            straight(Q, 4),
+            np.where(T[:, None] < 16.0, straight(20 * Q, 4), 20 * Q[np.arange(len(T)) // 4 * 4]),
+            25.0,
+        ),
+        # a tenth of the values has to change
+        (straight(Q, 4), straight(20 * Q, 4) * (T[:, None] < 2.0), None),
+        (straight(Q, 4), straight(20 * Q, 4) * (T[:, None] < 6.0), 25.0),
+    ],
+)
+def test_signals_that_run_from_corner_to_corner_are_interpolated(
+    q: Array, torque: Array, rate: float | None
+) -> None:
+    log = Recording(t=T, q=q, dq=DQ, torque=torque)
+    rates = [f.values["rate_Hz"] for f in signal_findings(log) if f.code == "interpolated"]
+    assert rates == ([] if rate is None else [pytest.approx(rate)])
+
+
 @pytest.mark.parametrize(("joint", "reported"), [(6, False), (5, True)])
 def test_the_last_joint_of_an_arm_may_turn_without_end(joint: int, reported: bool) -> None:
     """Wrist 3 of a UR3 has no limit: ten turns of it are 63 rad."""
