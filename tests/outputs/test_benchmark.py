@@ -128,7 +128,7 @@ def test_a_difference_within_the_truth_s_own_error_is_marked() -> None:
 
 
 def test_lists_are_pooled_by_arm() -> None:
-    """95 % intervals: Wilson's of 14 of 15, .70 to .99; Poisson's of 2 in .5 h, .5 to 14.4 an hour."""
+    """95 % intervals: Wilson's of 14 of 15, Poisson's of 2 in .5 h, .5 to 14.4 an hour."""
     (lists,) = made().lists
     ur5, panda = map(list_texts, lists.to_dicts())
     assert (ur5["share"], ur5["rate"]) == ("14/15 (0.70–0.99)", "4 (0–14)")

@@ -144,6 +144,38 @@ def test_every_axis_has_its_unit_and_rows_share_one_below(width: float, rows: in
     assert below == [""] * (6 - columns) + ["Time (s)"] * columns
 
 
+@pytest.mark.parametrize(("width", "height"), [(3.5, 3 * 0.95), (7.16, 2 * 1.15)])
+def test_a_figure_is_as_high_as_its_rows(width: float, height: float) -> None:
+    made = plots_of(chart(series=(ChartLine("a", np.zeros((len(T), 6))),)))
+    assert drawn_lines(width, made).get_figheight() == pytest.approx(height + 0.22)
+    numbered = drawn_lines(width, made, numbers={1: 1.0})
+    assert numbered.get_figheight() == pytest.approx(height + 0.34)
+
+
+def test_letters_and_lines_can_be_read_in_print() -> None:
+    """Letters of 8 pt, 7 in legends and at ticks, 6.5 of numbers; no hair line, no bar."""
+    made = chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")
+    marks = {"a": (np.arange(6.0), np.zeros(6))}
+    lines = drawn_lines(7.16, plots_of(made), numbers={1: 1.0}, marks=marks)
+    for figure in (lines, drawn_dots([plot(), plot("b.csv")])):
+        texts = [text for text in figure.findobj(matplotlib.text.Text) if text.get_text()]
+        assert {text.get_fontsize() for text in texts} <= {6.5, 7.0, 8.0}
+        for line in figure.findobj(matplotlib.lines.Line2D):
+            if line.get_linestyle() != "None":
+                assert 0.4 <= line.get_linewidth() <= 1.8
+            if line.get_marker() not in {"None", "", None}:
+                assert 0.3 <= line.get_markeredgewidth() <= 1.0
+                assert 2.0 <= (line.get_markersize() or 2.0) <= 4.0  # a tick may have none
+        for axes in figure.axes:
+            assert all(spine.get_linewidth() == 0.5 for spine in axes.spines.values())
+            for collection in axes.collections:
+                filled = isinstance(collection, matplotlib.collections.PolyCollection)
+                assert (
+                    (0.0 if filled else 0.5) <= collection.get_linewidth()[0] <= 1.3 * (not filled)
+                )
+            assert all(patch.get_linewidth() == 0.0 for patch in axes.patches)
+
+
 def test_lines_are_reported_apart_without_colour() -> None:
     """By dashes as they are drawn, or, solid both, by width and lightness."""
     from matplotlib.colors import to_rgb
@@ -203,15 +235,11 @@ def test_a_legend_names_lines_bands_and_contacts_but_no_line_alone() -> None:
 
 
 def test_contacts_are_numbered_above_the_first_row_where_there_is_room() -> None:
-    figure = drawn_lines(7.16, plots_of(chart()), numbers={1: 1.0, 2: 1.1, 3: 5.0})
-    assert [[text.get_text() for text in axes.texts] for axes in figure.axes] == [
-        ["1", "3"],
-        ["1", "3"],
-        ["1", "3"],
-        [],
-        [],
-        [],
-    ]
+    """10 s in 1.79 in: a digit takes .26 s, and what is between two .11 s, .37 s in all."""
+    numbers = {1: 1.0, 2: 1.35, 3: 5.0, 4: 5.39}
+    figure = drawn_lines(7.16, plots_of(chart()), numbers=numbers)
+    texts = [[text.get_text() for text in axes.texts] for axes in figure.axes]
+    assert texts == [["1", "3", "4"]] * 3 + [[]] * 3
 
 
 def test_frequencies_stand_on_a_logarithmic_axis_without_powers() -> None:
@@ -283,7 +311,10 @@ def test_dots_stand_side_by_side_with_their_intervals_and_the_floor() -> None:
     assert axes.get_xlabel() == "Joint"
     assert [text.get_text() for text in axes.get_xticklabels()] == ["J1", "J2"]
     gmo, best = axes.containers
-    assert gmo.lines[0].get_xdata()[0] < 0.0 < best.lines[0].get_xdata()[0]
+    # Two thirds of a joint's room, nearly, shared by two.
+    assert gmo.lines[0].get_xdata() == pytest.approx([-0.165, 0.835])
+    assert best.lines[0].get_xdata() == pytest.approx([0.165, 1.165])
+    assert axes.get_xlim() == (-0.5, 1.5)
     ends = gmo.lines[2][0].get_segments()[0][:, 1]
     assert ends == pytest.approx([4.5, 6.0])
     assert axes.get_yscale() == "log"  # 5 is more than ten times .4
@@ -302,6 +333,9 @@ def test_numbers_of_one_size_stand_on_an_axis_from_zero() -> None:
     (axes,) = drawn_dots([alone]).axes
     assert axes.get_yscale() == "linear"
     assert axes.get_ylim()[0] == 0.0
+    for least, scale in ((0.51, "linear"), (0.49, "log"), (0.0, "linear")):
+        (axes,) = drawn_dots([alone._replace(floor=np.full(2, least))]).axes
+        assert axes.get_yscale() == scale
 
 
 def test_several_logs_bear_their_names_and_a_dagger_its_meaning() -> None:

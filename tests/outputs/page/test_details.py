@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
@@ -62,6 +63,16 @@ def test_the_details_hold_every_number(found: ContactList) -> None:
     assert pairs["free motion"].endswith(" s")
     unknown = replace(found.model, noise_sd=np.full(6, np.nan), prior=None)
     assert "nan" not in str(model_pairs(replace(found, model=unknown)))
+
+
+def test_the_wrench_of_a_row_is_force_moment_mean_and_impulse() -> None:
+    """Each the numbers of `contact`, with their deviations behind them."""
+    wrench, torque = (grid.rows[0] for grid in contact_details(contact_list(contact())))
+    assert wrench == (
+        "1", "4.60 – 4.78", "57–78", "0.4, 51.9, −38.8", "1.9, 3.1, 2.8", "0.2, 0.1, 0.0",
+        "0.5, 0.5, 0.5", "0.3, 32.0, −24.0", "0.1, 5.6, −4.1", 412.0, 44.0, None, None,
+    )  # fmt: skip
+    assert torque == ("1", *(f"{joint}.00 ± 1.00" for joint in range(6)), False)
 
 
 def test_joints_that_agree_share_a_line() -> None:
