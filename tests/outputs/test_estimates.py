@@ -98,3 +98,22 @@ def test_a_long_table_is_written_in_groups_that_hold_the_same(
     assert files[1].num_row_groups == -(-len(whole) // 300)
     described = [[field.metadata for field in file.schema_arrow] for file in files]
     assert described[0] == described[1]
+
+
+def test_a_log_in_blocks_gives_the_folder_of_a_whole_one(
+    analysis: Analysis, tmp_path: Path
+) -> None:
+    choice = OutputChoice(extras=("csv",))
+    write_estimate_folder(tmp_path / "whole", analysis, "", choice)
+    blocks = [slice(start, start + 250) for start in range(0, len(analysis.t), 250)]
+    groups = ((analysis, rows) for rows in (None, *blocks))
+    last, _ = write_estimate_folder(tmp_path / "blocks", groups, "", choice)
+    assert last is analysis
+    one, other = (tmp_path / folder for folder in ("whole", "blocks"))
+    assert (one / "estimates.csv").read_bytes() == (other / "estimates.csv").read_bytes()
+    tables = (pl.read_parquet(folder / "estimates.parquet") for folder in (one, other))
+    assert next(tables).equals(next(tables), null_equal=True)
+    groups = ((analysis, rows) for rows in blocks)
+    write_estimate_folder(tmp_path / "bare", groups, "")
+    names = {path.name for path in (tmp_path / "bare").iterdir()}
+    assert names == {"estimates.parquet", "run.json"}
