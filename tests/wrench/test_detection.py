@@ -114,10 +114,49 @@ def push(height: float, start: float = 5.0, stop: float = 7.0) -> np.ndarray:
     return np.where((start <= T) & (stop > T), height, 0.0)
 
 
-def test_a_score_beyond_one_is_a_contact_and_one_below_is_none() -> None:
-    """The default threshold is 1: 1.3 half widths of the free band are one contact."""
-    assert len(find_contacts(T, push(1.3))) == 1
-    assert find_contacts(T, push(0.99)) == ()
+@pytest.mark.parametrize(
+    ("score", "count"),
+    [
+        (push(1.01), 1),
+        (push(1.0), 0),
+        # Below .6 it ends, and what follows within a quarter of a second belongs to it.
+        (np.where((T > 5.5) & (T < 6.0), 0.61, push(1.3)), 1),
+        (np.where((T > 5.5) & (T < 6.0), 0.59, push(1.3)), 2),
+        (np.where((T > 5.5) & (T < 5.74), 0.0, push(1.3)), 1),
+        (np.where((T > 5.5) & (T < 5.77), 0.0, push(1.3)), 2),
+        # It lasts 20 ms at least: three samples do.
+        (push(1.3, 4.995, 5.015), 0),
+        (push(1.3, 4.995, 5.025), 1),
+    ],
+)
+def test_a_contact_is_a_score_beyond_one_that_lasts(score: np.ndarray, count: int) -> None:
+    assert len(find_contacts(T, score)) == count
+
+
+@pytest.mark.parametrize(
+    ("start", "false", "split"),
+    [(1.88, 1, 0), (1.92, 0, 0), (3.05, 0, 0), (3.15, 0, 1), (3.95, 0, 1), (4.05, 1, 0)],
+)
+def test_what_begins_too_early_or_late_is_false(start: float, false: int, split: int) -> None:
+    """A true contact from 2 to 3 s: .1 s before it to 1 s behind its end are its own."""
+    found = [ContactInterval(start, start + 0.5)]
+    reported = match_contacts(found, [ContactInterval(2.0, 3.0)], 10.0)
+    assert (reported.false_alarms, reported.split) == (false, split)
+    assert reported.found == (start < 3.1)
+    assert reported.delay == (pytest.approx(max(start - 2.0, 0.0)),) or not reported.found
+
+
+@pytest.mark.parametrize(
+    ("pause", "floor", "count"), [(0.10, None, 1), (0.13, None, 2), (0.23, 0.1, 1), (0.26, 0.1, 2)]
+)
+def test_contacts_of_an_exact_reference_are_parted_by_a_shorter_pause(
+    pause: float, floor: float | None, count: int
+) -> None:
+    tau = np.column_stack([push(2.0, 5.0, 6.0) + push(2.0, 6.0 + pause, 7.0), np.zeros(len(T))])
+    floors = None if floor is None else np.full(2, floor)
+    known = ExternalTorque(name="truth", t=T, tau=tau, floor=floors)
+    (one,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, known)
+    assert one.detection.contacts == count
 
 
 def test_true_contacts_exceed_their_limits_on_any_axis() -> None:
