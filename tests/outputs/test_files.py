@@ -7,7 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.outputs.files import OutputFolder, atomic, digest, digests, numbered, write_text
+from vftcli.outputs.files import (
+    OutputFolder,
+    atomic,
+    digest,
+    digests,
+    numbered,
+    protected,
+    refuse_existing,
+    write_text,
+)
 from vftcli.signals.errors import OutputError
 
 
@@ -207,6 +216,39 @@ def test_a_seal_is_not_believed_outside_its_folder(tmp_path: Path) -> None:
         (tmp_path / "out" / "run.json").write_text(json.dumps({"files": files}))
         sealed(tmp_path / "out", {"a.txt": "a"})
     assert (tmp_path / "precious.txt").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("given", "written", "refused"),
+    [
+        ("log.csv", "log.csv", True),
+        ("log.csv", "other.csv", False),
+        ("log.csv", "link.csv", True),
+        (".", "log.csv", True),
+        (".", "sub/inner.csv", True),
+        (".", "run.json", False),  # a report may be in the folder of its log
+        (".", "made.csv", False),
+        (".", "batch.run.json", False),
+        ("sub", "log.csv", False),
+        ("gone", "log.csv", False),
+    ],
+)
+def test_what_a_command_reads_is_not_overwritten(
+    tmp_path: Path, given: str, written: str, refused: bool
+) -> None:
+    """By whatever name; but what an earlier run wrote into a folder that is read."""
+    sealed(tmp_path, {"made.csv": "made"})
+    (tmp_path / "sub").mkdir()
+    for name in ("log.csv", "other.csv", "sub/inner.csv", "batch.run.json"):
+        (tmp_path / name).write_text(name)
+    (tmp_path / "link.csv").symlink_to(tmp_path / "log.csv")
+    with protected([tmp_path / given]):
+        if refused:
+            with pytest.raises(OutputError, match="is what this command reads"):
+                refuse_existing(tmp_path / written, force=True)
+        else:
+            refuse_existing(tmp_path / written, force=True)
+    refuse_existing(tmp_path / written, force=True)
 
 
 def test_the_seal_goes_first_and_comes_last(

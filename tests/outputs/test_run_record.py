@@ -17,7 +17,10 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
     assert record["versions"]["vftcli"] == vftcli.__version__
     assert record["versions"]["numpy"] == np.__version__
     assert record["input"]["sha256"] == "ab" * 32
-    assert record["input"]["samples"] == 600
+    t, source = analysis.recording.t, record["input"]
+    assert (source["samples"], source["joints"], source["duplicates"]) == (600, 6, 0)
+    assert (source["start_s"], source["end_s"]) == (t[0], t[-1])
+    assert source["rate_hz"] == pytest.approx(1.0 / np.median(np.diff(t)))
     assert len(record["robot"]["sha256"]) == 64
     assert "ON the robot" in record["conventions"]["sign"]
     assert [r["message"] for r in record["repairs"]] == [
