@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from vftcli.readers.cleaning import cleaned, without_leading_garbage
-from vftcli.readers.reader import RawLog
+from vftcli.readers.library import Library
+from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.errors import ClockError, LogError
 
 STEP_NS = 2_000_000
@@ -120,3 +121,31 @@ def test_a_log_of_more_years_than_nanoseconds_count_is_refused() -> None:
     log = RawLog(stamps=stamps, clock="test", signals={"q": np.zeros((10, 6))})
     with pytest.raises(ClockError, match="over 3e\\+08 s, which no robot's log is"):
         cleaned(log, Path("log"), "test")
+
+
+@pytest.mark.parametrize(
+    ("empty", "first", "samples"),
+    [
+        ([(12, 1), (14, 0)], 13, 18),  # a cell of q1, and a stamp
+        ([(18, 3), (19, 1), (19, 3)], 19, 18),
+        ([], None, 20),
+    ],
+)
+def test_rows_with_an_unknown_value_are_left_out_and_counted(
+    tmp_path: Path, empty: list[tuple[int, int]], first: int | None, samples: int
+) -> None:
+    cells = [[f"{0.01 * k:.2f}", f"{0.1 * k:.1f}", "0.2", f"{k}"] for k in range(20)]
+    for row, column in empty:
+        cells[row][column] = "nan"
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["t,q1,q2,tau1", *map(",".join, cells)]) + "\n")
+    choice = ReadChoice.parsed(columns="t=t,q=q1,tau=tau1")
+    (log,) = Library().open_each([path], replace(choice, skips_unknown=True))
+    kept = [k for k in range(20) if k not in {row for row, _ in empty}]
+    np.testing.assert_allclose(log.torque[:, 0], kept)
+    assert log.samples == samples == len(kept)
+    said = [r.values for r in log.source.remarks if r.code == "rows-unknown"]
+    assert said == ([] if first is None else [{"rows": 20 - samples, "first": first}])
+    rows = log.source.row_samples
+    expected = [kept.index(k) if k in kept else -1 for k in range(20)]
+    assert (list(range(20)) if rows is None else rows.tolist()) == expected

@@ -1,6 +1,9 @@
 """Words of the command line: spans, lists of numbers, assignments."""
 
 import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -9,7 +12,19 @@ from hypothesis import strategies as st
 
 from vftcli.robots.robot_file import NUMBER, PER_JOINT, SWITCH, TEXT, WHOLE, spread, vector
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import assignment, interval, interval_text, numbers, set_value
+from vftcli.signals.option import (
+    Choice,
+    Option,
+    assignment,
+    interval,
+    interval_text,
+    is_yes,
+    numbers,
+    set_value,
+    setting,
+    settings_as_typed,
+    settings_by_name,
+)
 from vftcli.signals.parsing import (
     check_kind,
     check_known,
@@ -145,3 +160,109 @@ def test_a_list_is_spread_where_it_has_one_or_one_for_each(
 def test_an_integer_beyond_every_float_is_no_number() -> None:
     assert NUMBER.broken("mass", 10**400).endswith("it must be a finite number")
     assert PER_JOINT.broken("gain", []) == "gain is []; it must be a number or one a joint"
+
+
+RATE = setting("a.rate", "HZ", "How fast.", least=2.0)
+DETAILS = Option("-v/--details", "", "All of it.")
+FORM = Option("--form-of-it", "svg|PDF|png", "Its form.", reads=str.upper)
+NAMES = Option("--name", "NAME", "A name.", several=True, completes=lambda: ("one", "two"))
+
+
+def test_an_option_has_a_word_a_name_in_complaints_and_values() -> None:
+    options = (RATE, DETAILS, FORM, NAMES)
+    assert [option.word for option in options] == ["a.rate", "details", "form_of_it", "name"]
+    assert [option.typed for option in options] == ["a.rate", "--details", "--form-of-it", "--name"]
+    assert [option.is_setting for option in options] == [True, False, False, False]
+    assert [option.values() for option in options] == [[], [], ["svg", "png"], ["one", "two"]]
+    assert (FORM.read("svg"), FORM.read(None), NAMES.read(("a",))) == ("SVG", None, ("a",))
+    assert not Option("", "FILE", "An argument.").is_setting
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "typed"),
+    [
+        (RATE, 2.5, "2.5"),
+        (RATE, "2.5", "2.5"),
+        (RATE, None, None),
+        (RATE, True, "yes"),
+        (RATE, False, "no"),
+        (RATE, (1, 2.0), "1,2.0"),
+        (DETAILS, True, True),
+        (DETAILS, False, False),
+        (NAMES, "one", ["one"]),
+        (NAMES, ("one", "two"), ["one", "two"]),
+        (FORM, Path("a"), "a"),
+        (DETAILS, 1, r"details is 1; expected True or False"),
+        (RATE, [], r"a.rate is \[\]; expected a text or a number"),
+        (RATE, [True, 1], r"a.rate is \[True, 1\]; expected"),
+        (NAMES, [{}], r"name is {}; expected"),
+    ],
+)
+def test_a_keyword_is_as_it_would_be_typed(option: Option, value: object, typed: object) -> None:
+    if isinstance(typed, str) and "expected" in typed:
+        with pytest.raises(ParameterError, match=typed):
+            option.keyword(value)
+    else:
+        assert option.keyword(value) == typed
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "value"),
+    [
+        ("2", int, 2),
+        ("2.0", float, 2.0),
+        ("1.9", float, "--set a.rate=1.9 is not a number of 2 or more"),
+        ("2.5", int, "is not a whole number of 2 or more"),
+        ("fast", float, "is not a number of 2 or more"),
+    ],
+)
+def test_a_setting_s_number_is_in_its_range(text: str, kind: type, value: object) -> None:
+    if isinstance(value, str):
+        with pytest.raises(ParameterError, match=value):
+            RATE.number(text, kind)
+    else:
+        assert RATE.number(text, kind) == value
+    with pytest.raises(ParameterError, match=r"is not a number$"):
+        RATE._replace(least=None).number("fast", float)
+    assert RATE._replace(least=None).number("-5", float) == -5.0
+
+
+@dataclass(frozen=True)
+class Chosen(Choice):
+    """Two settings, an option that may be repeated, and numbers with names of their own."""
+
+    rate: Annotated[float | None, RATE] = None
+    count: Annotated[int, setting("b.count", "N", "How many.")] = 3
+    names: Annotated[tuple[str, ...], NAMES] = ()
+    numbers: Annotated[tuple[str, ...], setting("numbers", "N", "Any.", several=True)] = ()
+
+
+@pytest.mark.parametrize(
+    ("words", "settings", "chosen"),
+    [
+        ({}, {}, Chosen()),
+        ({"name": []}, {}, Chosen()),
+        ({"name": ["one"]}, {"a.rate": "4"}, Chosen(rate=4.0, names=("one",))),
+        ({}, {"b.count": "5", "other.room": "1"}, Chosen(count=5)),
+        ({"a.rate": 7.0}, {}, Chosen(rate=7.0)),
+        ({"name": None}, {"b.count": "5"}, Chosen(count=5)),
+    ],
+)
+def test_words_and_settings_make_a_choice(
+    words: dict[str, object], settings: dict[str, str], chosen: Chosen
+) -> None:
+    assert Chosen.parsed(settings=settings, **words) == chosen
+
+
+def test_settings_are_named_with_their_defaults() -> None:
+    found = settings_by_name([Chosen])
+    assert {name: default for name, (_, default) in found.items()} == {
+        "a.rate": None, "b.count": 3, "numbers": (),
+    }  # fmt: skip
+    assert not Chosen.takes("numbers")
+    assert settings_as_typed({"b.count": 5}, [Chosen]) == {"b.count": "5"}
+    with pytest.raises(ParameterError, match=r"--set a.rat: .* no such setting; .* mean a.rate\?"):
+        settings_as_typed({"a.rat": 5}, [Chosen], "--set ")
+    assert (is_yes("yes"), is_yes("no")) == (True, False)
+    with pytest.raises(ParameterError, match="'maybe' is neither yes nor no"):
+        is_yes("maybe")
