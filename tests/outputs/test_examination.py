@@ -19,6 +19,7 @@ from vftcli.outputs.page.shell import part
 from vftcli.outputs.run_record import to_json
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, fact, warning
+from vftcli.signals.wrench import WrenchFrame
 
 LOG = Recording(t=np.arange(4.0), q=np.zeros((4, 6)), source=Source(label="a.csv"))
 SLOW = warning("slow-rate", rate_Hz=10.0)
@@ -99,3 +100,26 @@ def test_the_page_shows_warnings_first_and_escapes_names(sound: bool) -> None:
     assert notes.count("<strong>short</strong>") == 1  # the second log's
     assert page.startswith('<p class="alarm">MEANINGLESS') == (not sound)
     assert part("parts/health", []) == ""
+
+
+def test_a_log_is_told_with_what_it_holds() -> None:
+    """Four samples a second apart, of nine rows."""
+    source = replace(LOG.source, rows=9, t0=12.5, clock="stamps")
+    frame = WrenchFrame("base", "flange")
+    held = replace(
+        LOG, source=source, wrench=np.ones((4, 6)), wrench_frame=frame, payload_mass=0.73456,
+        joint_names=tuple("abcdef"),
+    )  # fmt: skip
+    assert examination_text(replace(examination(), recording=held)).splitlines() == [
+        "None: memory",
+        "  joints    6 (a, b, c, d, e, f)",
+        "  samples   4 of 9 rows, 3.000 s, 1 Hz, longest step 1000 ms",
+        "  clock     stamps; first stamp 12.500000 s",
+        "  signals   q, wrench",
+        f"  wrench    {frame}",
+        "  payload   0.735 kg, as the controller assumes",
+        "  robot     not settled by the log",
+        "",
+        "nothing suspicious found",
+    ]
+    assert "nothing suspicious" not in examination_text(examination(SLOW))

@@ -3,7 +3,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.outputs.grid import terminal
-from vftcli.outputs.grids import joints_grid, robots_grid, tuned_grid
+from vftcli.outputs.grids import bench_grid, joints_grid, robot_text, robots_grid, tuned_grid
 from vftcli.robots import load_robot
 
 
@@ -50,3 +50,36 @@ def test_gains_that_were_found() -> None:
     ]
     quiet = terminal(tuned_grid([line], with_alarms=False))  # type: ignore[list-item]
     assert "alarms" not in quiet
+
+
+def test_a_robot_in_full_has_its_gains_notes_sources_and_payloads() -> None:
+    panda = load_robot("panda")
+    head, _, *lines = robot_text(panda).splitlines()
+    assert head == "Franka Emika Panda (FER) (panda): 7 joints, torque from link_torque"
+    assert lines[:9] == terminal(joints_grid(panda)).splitlines()
+    (note,) = panda.remarks
+    assert lines[9:15] == [
+        "",
+        "kfo.r_diag = [0.08, 0.08, 0.08, 0.08, 0.01, 0.01, 0.01]",
+        "kfo.q_p_diag = [0.05, 0.05, 0.05, 0.05, 0.02, 0.02, 0.02]",
+        f"kfo.q_tau_diag = {[100000.0] * 7}",
+        "",
+        f"note: {note}",
+    ]
+    assert [line.partition(":")[0] for line in lines[15:]] == [
+        "source gaz2019", "source franka_description", "source fci", "payloads",
+    ]  # fmt: skip
+    assert lines[-1] == "payloads: franka_hand (--payload NAME)"
+    assert repr(panda) == "<Robot panda: 7 joints, logs link torque, friction sigmoid>"
+    hand = panda.with_payload(panda.payloads["franka_hand"])
+    assert repr(hand).endswith("friction sigmoid, payload 0.73 kg>")
+
+
+def test_times_are_in_milliseconds_and_microseconds() -> None:
+    one = {"total_s": 0.0123456, "per_sample_us": 1.23456, "paper_s": None}
+    found = {"dynamics": one, "observers": [{**one, "name": "gmo", "paper_s": 0.5}]}
+    assert terminal(bench_grid({**found, "complete_log": []})).splitlines() == [
+        "                 total [ms]  per sample [µs]  paper, its laptop [s]",
+        "dynamics              12.35            1.235                      –",
+        "gmo                   12.35            1.235                  0.500",
+    ]

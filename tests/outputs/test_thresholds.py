@@ -12,14 +12,14 @@ import pytest
 from vftcli.contacts.threshold_check import CheckedContact, CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds, tail_of
 from vftcli.outputs.grid import terminal
+from vftcli.outputs.quantity import significant
 from vftcli.outputs.run_record import jsonable
 from vftcli.outputs.thresholds import (
     calls,
-    check_grid,
     check_line,
-    left_out_grid,
     thresholds_grid,
     thresholds_record,
+    thresholds_text,
 )
 
 NAN = float("nan")
@@ -163,13 +163,47 @@ def test_what_has_no_tail_has_no_upper_end_either() -> None:
 
 
 def test_the_tables_name_every_signal_and_log() -> None:
-    table = terminal(thresholds_grid(made(6)))
-    lines = table.splitlines()[2:]
-    assert [line.split()[0] for line in lines] == [
-        "J1", "J2", "J3", "J4", "J5", "J6", "fx", "fy", "fz", "mx", "my", "mz", "|F|",
-    ]  # fmt: skip
-    assert "a.csv" in terminal(left_out_grid((CountedAlarms("a.csv", 0.5, 0.5, (0,) * 6, 3, 1),)))
-    assert "missed" in terminal(check_grid(check()))
+    """k = 30 of 900 readings of a second, the 31st largest of 0 … 899 on."""
+    counted = (CountedAlarms("a.csv", 0.5, 0.5, (0, 1, 2, 3, 4, 5), 7, 6),)
+    text = thresholds_text(made(6), counted, [check()])
+    table, counts, checked, *texts = text.split("\n\n")
+    title, heads, *rows = table.splitlines()
+    assert title == "exceeded without contact 1 × an hour by any joint, or any axis"
+    assert heads.split() == [
+        "threshold",
+        "95",
+        "%",
+        "tail",
+        "from",
+        "λ",
+        "[1/h]",
+        "k",
+        "log",
+        "[h]",
+        "needed",
+        "by",
+    ]
+    units = dict.fromkeys(["J1", "J2", "J3", "J4", "J5", "J6", "mx", "my", "mz"], "N·m")
+    values = [*range(1, 7), *range(10, 16), 30]
+    names = ["J1", "J2", "J3", "J4", "J5", "J6", "fx", "fy", "fz", "mx", "my", "mz", "|F|"]
+    for row, name, value in zip(rows, names, values, strict=True):
+        shown, low, high = (significant(x) for x in (value + 1e-3, value - 1.0, value + 1.0))
+        tail = ["869", "120", "30", "0.250", "free.csv"]
+        assert row.split() == [name, shown, units.get(name, "N"), f"{low}–{high}", *tail]
+    assert counts.splitlines()[1:] == [
+        "log      [h]    due  any joint  J1  J2  J3  J4  J5  J6  any axis",
+        "a.csv  0.500  0.500          7   0   1   2   3   4   5         6",
+    ]
+    *lines, line = checked.splitlines()
+    assert lines == [
+        "pushed.csv: what they would have detected",
+        "#  from [s]  to [s]  |F| [N]  delay [ms]  by",
+        "1      1.00    2.00     40.0          50  J2",
+        "2      4.00    5.00     12.0           –  missed",
+        "3      7.00    8.00     20.0         150  fz",
+    ]
+    assert line == check_line(check())
+    assert [text.partition(":")[0] for text in texts] == ["ur_script", "toml"]
 
 
 def test_the_line_on_a_check_counts_and_sizes() -> None:
@@ -180,3 +214,5 @@ def test_the_line_on_a_check_counts_and_sizes() -> None:
     assert "hardest missed 12.0 N" in line
     assert "2 false in 0.500 h" in line
     assert check_line(check(None)) == "pushed.csv: 3 alarms, the weakest at 20.0 N"
+    on = replace(check(), contacts=(check().contacts[0]._replace(already_above=True),))
+    assert ", 1 while an alarm was on already, 2 false" in check_line(on)

@@ -164,3 +164,11 @@ def test_a_smoothed_wrench_turns_with_the_flange() -> None:
     for part in (slice(0, 3), slice(3, 6)):
         expected = np.einsum("tji,tj->ti", turn, base.values[:, part])
         np.testing.assert_allclose(flange.values[:, part], expected, atol=1e-9)  # rounding of 100 N
+
+
+def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value() -> None:
+    sigma, hidden = np.array([0.2, 0.03, 0.04, 0.1]), np.array([False, True, True, False])
+    (said,) = mask_remark(hidden, sigma)
+    assert said.code == "pose-hides-wrench"
+    assert said.values == {"masked": 2, "samples": 4, "share": 0.5, "sigma_min_m": 0.03}
+    assert mask_remark(np.zeros(4, bool), sigma) == mask_remark(hidden, None) == ()
