@@ -5,7 +5,6 @@ A row is an observer, a column a joint or an axis; forces are in newtons, moment
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from html import escape
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -45,9 +44,6 @@ AT_FLOOR = 1.2
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
 OVERRIDDEN = "overridden"  #: Column of the codes with which results were wanted anyway.
 RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
-
-#: What the page writes behind a number where the terminal has a star.
-ON_PAGE = ' <span class="mark">at the floor</span>'
 
 
 class Block(NamedTuple):
@@ -161,7 +157,7 @@ def rmse_grid(table: Block) -> Grid:
     ):
         # A star where the reference is no more accurate than that.
         cells = [
-            GridCell(text, bool(best), *(("*", text + ON_PAGE) if at_floor else ()))
+            GridCell(text, bool(best), "*" * bool(at_floor))
             for text, best, at_floor in zip(map(significant, values), bests, floors, strict=True)
         ]
         means = (known.get(name) for _, known in beside)
@@ -232,36 +228,14 @@ def marks_in_words(found: Sequence[Block]) -> str:
     if any(table.untrusted for table in found):
         lines.append(f"{DAGGER}: {RESTS}")
     lines += dict.fromkeys(f"mean:{t.means.left_out}" for t in found if t.means.without)
-    lines += without_answer(found)
-    if not all(np.all(np.isfinite(table.rmse)) for table in found):
-        lines.append("–: no sample where the reference is known")
-    return "".join(f"{text}\n" for text in lines)
-
-
-def without_answer(found: Sequence[Block]) -> Iterable[str]:
-    """Observers that leave samples without an answer, and their share of a joint's samples."""
-    return dict.fromkeys(
+    lines += dict.fromkeys(
         f"{name}: no answer in up to {100.0 * share:.2g} % of a joint's samples, each counted as 0"
         for table in found
         for name, share in table.missing.items()
     )
-
-
-def marks_on_page(found: Sequence[Block]) -> str:
-    """Meaning of the RMSE table's marks, as HTML."""
-    text = (
-        "Torque on the robot about each joint's own axis; bold is the best of its joint; "
-        "the mean is over the joints with a reference to be trusted."
-    )
-    if any(block.has_floor for block in found):
-        text += (
-            " The floor is the error the reference itself is known to have: an RMSE within "
-            f"{AT_FLOOR:g} × the floor is <em>at the floor</em>; the reference is no more accurate "
-            "than that."
-        )
-    if any(block.untrusted for block in found):
-        text += f" {DAGGER}: {RESTS}."
-    return " ".join([text, *(f"{escape(line)}." for line in without_answer(found))])
+    if not all(np.all(np.isfinite(table.rmse)) for table in found):
+        lines.append("–: no sample where the reference is known")
+    return "".join(f"{text}\n" for text in lines)
 
 
 def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Iterator[Grid]:

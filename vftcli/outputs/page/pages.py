@@ -14,7 +14,6 @@ from vftcli.outputs.contacts import by_force, hardest_words, otherwise
 from vftcli.outputs.error_tables import (
     axis_grids,
     blocks,
-    marks_on_page,
     nothing_to_compare,
     rmse_grid,
 )
@@ -149,7 +148,6 @@ def errors_view(analysis: Analysis) -> dict[str, Any]:
     return {
         "state": state,
         "first": [rmse_grid(block) for block in found],
-        "marks": marks_on_page(found),
         "axes": axis_grids(table, [analysis]),
         "missing": nothing_to_compare(table),
     }
