@@ -52,7 +52,7 @@ def batched(messages: Iterable[Message], budget: "ReadBudget") -> Iterator[Batch
     held = 0
     for channel, time, content in messages:
         if channel is None:
-            raise LogError(f"{budget.path}: messages of an unknown topic; the file is damaged.")
+            raise budget.error("messages of an unknown topic; the file is damaged.")
         _, times, contents = found.setdefault(id(channel), (channel, [], []))
         times.append(time)
         contents.append(content)
@@ -87,8 +87,8 @@ class MessageCount:
         """Say so if the container is cut, and how much of it was kept."""
         kept, chunks, missing = self.kept, self.chunks, self.missing
         if self.counted is not None and kept > self.counted:
-            raise LogError(
-                f"{budget.path}: {counter} counts {self.counted} messages, the chunks hold {kept}; "
+            raise budget.error(
+                f"{counter} counts {self.counted} messages, the chunks hold {kept}; "
                 "the file is damaged."
             )
         if self.counted is not None and kept < self.counted:
@@ -129,15 +129,19 @@ class ReadBudget:
         """Count pieces that are about to be read."""
         self.pieces -= pieces
         if self.pieces < 0:
-            raise LogError(
-                f"{self.path}: its chunks hold more records than a log of this size can. It is "
-                "damaged or made to fill time."
+            raise self.error(
+                "its chunks hold more records than a log of this size can. It is damaged or made "
+                "to fill time."
             )
 
     def claim(self, size: int) -> None:
         """Count bytes that are about to be unpacked."""
         self.unpacked += size
         check_unpacked(self.path, self.unpacked if size >= 0 else size, self.size)
+
+    def error(self, text: str) -> LogError:
+        """An error that names the file."""
+        return LogError(f"{self.path}: {text}")
 
     def note(self, remark: Remark) -> None:
         """Remember a remark once."""
@@ -181,15 +185,12 @@ def batches(files: Sequence[LogFile], budget: ReadBudget) -> Iterator[Batch]:
         except LogError:
             raise
         except MemoryError:
-            raise LogError(
-                f"{budget.path}: a part of it claims more memory than the file holds; it is "
-                "damaged."
+            raise budget.error(
+                "a part of it claims more memory than the file holds; it is damaged."
             ) from None
         except Exception as error:  # noqa: BLE001 - libraries document none of what damage raises
             reason = printable(f"{type(error).__name__}: {error}")[:100]
-            raise LogError(
-                f"{budget.path}: not a readable bag; it is damaged ({reason})."
-            ) from None
+            raise budget.error(f"not a readable bag; it is damaged ({reason}).") from None
         if file.path != budget.path:
             for remark in file.remarks:
                 budget.note(replace(remark, where=Where(about=file.path.name)))
@@ -240,9 +241,9 @@ def unpacked(budget: ReadBudget, name: str, packed: bytes, size: int) -> bytes:
     elif name == "zstd":
         content = zstandard.ZstdDecompressor().stream_reader(packed).read(size + 1)
     else:
-        raise LogError(f"{budget.path}: unknown chunk compression {name[:20]!r}.")
+        raise budget.error(f"unknown chunk compression {name[:20]!r}.")
     if len(content) != size:
-        raise LogError(f"{budget.path}: a {name} chunk is damaged; it does not unpack to {size} B.")
+        raise budget.error(f"a {name} chunk is damaged; it does not unpack to {size} B.")
     return content
 
 

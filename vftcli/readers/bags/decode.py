@@ -12,7 +12,6 @@ from vftcli.readers.bags.container import Batch, Channel, Integers, ReadBudget
 from vftcli.readers.bags.ros_messages import LayoutError, MessageLayout, Types, types_for
 from vftcli.readers.table import Column, Columns, JoinedRows, Names, Signals
 from vftcli.signals.arrays import Array
-from vftcli.signals.errors import LogError
 
 
 def _paths_by_name(text: str) -> dict[str, Names]:
@@ -145,8 +144,8 @@ class Decoder:
                     series[name].add(value)
             topic.parts.clear()
         except LayoutError as error:
-            raise LogError(
-                f"{self.budget.path}: a message of {channel.topic} does not fit the definition of "
+            raise self.budget.error(
+                f"a message of {channel.topic} does not fit the definition of "
                 f"{channel.type} ({error}). The bag is damaged, or its definition is another's."
             ) from None
 

@@ -34,7 +34,6 @@ from vftcli.readers.bags.container import (
     unpacked,
 )
 from vftcli.readers.opening import LogFile
-from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import warning
 
 BAG_MAGIC = 13  #: Bytes before the first record of a ROS 1 bag.
@@ -110,13 +109,13 @@ class BagMessages:
             counts.counted = self.counted if self.listed == counts.counted_chunks else None
         elif op == RecordType.BAGHEADER:
             if header.get(b"encryptor"):
-                raise LogError(f"{self.budget.path}: the bag is encrypted. Decrypt it first.")
+                raise self.budget.error("the bag is encrypted. Decrypt it first.")
             # The place of the index is written when the bag is closed.
             counts.closed = any(header[b"index_pos"])
             chunks = int.from_bytes(header[b"chunk_count"], "little")
             counts.counted_chunks = chunks if counts.closed else None
         else:
-            raise LogError(f"{self.budget.path}: an unknown record; the bag is damaged.")
+            raise self.budget.error("an unknown record; the bag is damaged.")
 
     def _connect(self, header: Header, data: bytes) -> None:
         about = {name: value.decode("utf-8", "replace") for name, value in _fields(data).items()}
@@ -140,14 +139,12 @@ class BagMessages:
             elif inner[b"op"] == CONNECTION:
                 self._connect(inner, content)
             else:
-                raise LogError(f"{self.budget.path}: an unknown record; the bag is damaged.")
+                raise self.budget.error("an unknown record; the bag is damaged.")
         self.counts.kept += len(self.starts)
 
     def _check_index(self) -> None:
         if self.indexed and sorted(self.indexed) != self.starts:
-            raise LogError(
-                f"{self.budget.path}: a chunk and its index count differently; it is damaged."
-            )
+            raise self.budget.error("a chunk and its index count differently; it is damaged.")
         self.starts, self.indexed = [], []
 
 
@@ -188,9 +185,8 @@ class McapMessages:
                     yield from self._chunk(body)
                 elif op == Opcode.FOOTER:
                     if (left := len(content) - end) != MAGIC_SIZE:
-                        raise LogError(
-                            f"{self.budget.path}: {left} bytes follow its end where {MAGIC_SIZE} "
-                            "should; it is damaged."
+                        raise self.budget.error(
+                            f"{left} bytes follow its end where {MAGIC_SIZE} should; it is damaged."
                         )
                     (summary,) = struct.unpack_from("<Q", body)
                     if summary:  # the messages should end before it
@@ -247,13 +243,13 @@ class McapMessages:
         content, end = unpacked(self.budget, _text(compression), packed, size), 0
         # A checksum of zero means that the writer made none.
         if checksum and zlib.crc32(content) != checksum:
-            raise LogError(f"{self.budget.path}: a chunk does not match its checksum; damaged.")
+            raise self.budget.error("a chunk does not match its checksum; damaged.")
         with suppress(CutError, struct.error):
             for op, inner, place in self._records(content, 0):
                 yield from self._take(op, inner, 0)  # a chunk inside a chunk is none
                 end = place
         if end < len(content):
-            raise LogError(f"{self.budget.path}: a record ends outside its chunk; damaged.")
+            raise self.budget.error("a record ends outside its chunk; damaged.")
 
 
 ZSTD = b"\x28\xb5\x2f\xfd"
@@ -319,7 +315,7 @@ def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Messages
         for row in db.execute(f"SELECT {columns} FROM {table}"):
             left -= 4 + sum(len(value) for value in row if isinstance(value, bytes))
             if left < 0:
-                raise LogError(f"{budget.path}: its rows hold more than the file does; damaged.")
+                raise budget.error("its rows hold more than the file does; damaged.")
             yield row
 
     definitions = {}
@@ -338,9 +334,7 @@ def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Messages
         )
     for number, time, content in rows("messages ORDER BY id", "topic_id, timestamp, data"):
         if not isinstance(content, bytes) or not isinstance(time, int):
-            raise LogError(
-                f"{budget.path}: a message of topic {number!s:.20} is no bytes; damaged."
-            )
+            raise budget.error(f"a message of topic {number!s:.20} is no bytes; damaged.")
         data = content
         if content.startswith(ZSTD):  # on its own
             import zstandard
@@ -357,16 +351,16 @@ def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
     query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND rootpage > 0"
     found = {name for name in TABLES if db.execute(query, (name,)).fetchone() is not None}
     if not found >= {"topics", "messages"}:
-        raise LogError(
-            f"{budget.path}: an SQLite database without plain tables of a ROS 2 bag (topics, "
+        raise budget.error(
+            f"an SQLite database without plain tables of a ROS 2 bag (topics, "
             f"messages; it has {', '.join(sorted(found)) or 'none of them'})."
         )
     for name in sorted(found):
         # The last of a column's traits says whether it is hidden or computed.
         traits = db.execute(f"PRAGMA table_xinfo({name})").fetchall()
         if missing := sorted(TABLES[name] - {_text(row[1]) for row in traits if row[6] == 0}):
-            raise LogError(
-                f"{budget.path}: the table {name} has no stored column {missing[0]}: it is "
+            raise budget.error(
+                f"the table {name} has no stored column {missing[0]}: it is "
                 "computed or not there. No recorder writes such a bag; it was edited."
             )
     return found
