@@ -23,30 +23,38 @@ def examination_record(examination: Examination) -> dict[str, Any]:
     source = recording.source
     read = [remark for remark in source.remarks if remark.level == "warning"]
     return {
-        "format": source.format,
-        "joints": recording.joints,
-        "samples": recording.samples,
+        **recording_record(recording),
         "duration_s": recording.duration,
-        "rate_hz": rate_of(recording),
         "max_gap_s": largest_step(recording),
-        "duplicates": source.duplicates,
-        **({"derived": list(source.derived)} if source.derived else {}),
-        "rows": source.rows,
         "repairs": list(source.repairs),
         "warnings": [
             *source.warnings,
             *(str(in_words(finding)) for finding in examination.warnings),
         ],
-        "signals": list(recording.signals),
-        "clock": source.clock,
-        "t0_s": source.t0,
         "joint_names": list(recording.joint_names),
         "robot": recording.robot_hint,
         "wrench_frame": None if recording.wrench_frame is None else str(recording.wrench_frame),
         "payload_kg": recording.payload_mass,
-        "sha256": source.sha256,
         "robots": [asdict(fit) for fit in examination.robots],
         "findings": [finding_record(finding) for finding in (*read, *examination.findings)],
+    }
+
+
+def recording_record(recording: Recording) -> dict[str, Any]:
+    """What was read of a log: its format, digest, clock, samples and signals."""
+    source = recording.source
+    return {
+        "format": source.format,
+        "sha256": source.sha256 or None,
+        "clock": source.clock,
+        "t0_s": source.t0,
+        "rows": source.rows,
+        "duplicates": source.duplicates,
+        **({"derived": list(source.derived)} if source.derived else {}),
+        "samples": recording.samples,
+        "joints": recording.joints,
+        "rate_hz": rate_of(recording),
+        "signals": list(recording.signals),
     }
 
 

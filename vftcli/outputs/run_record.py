@@ -16,7 +16,7 @@ from vftcli.analysis import Analysis
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.table import BEST
 from vftcli.outputs.contacts import contacts_record
-from vftcli.outputs.examination import health_record, rate_of
+from vftcli.outputs.examination import health_record, recording_record
 from vftcli.outputs.files import OutputFolder, digest
 from vftcli.robots import PROFILES
 from vftcli.robots.robot import Robot
@@ -164,24 +164,10 @@ def versions() -> dict[str, str]:
 
 
 def input_record(recording: Recording) -> dict[str, Any]:
-    """The log by path and digest, and its signals."""
-    source = recording.source
-    return {
-        "path": str(source.path) if source.path is not None else None,
-        "format": source.format,
-        "sha256": source.sha256 or None,
-        "clock": source.clock,
-        "t0_s": source.t0,
-        "rows": source.rows,
-        "duplicates": source.duplicates,
-        **({"derived": source.derived} if source.derived else {}),
-        "samples": recording.samples,
-        "joints": recording.joints,
-        "start_s": float(recording.t[0]),
-        "end_s": float(recording.t[-1]),
-        "rate_hz": rate_of(recording),
-        "signals": list(recording.signals),
-    }
+    """The log by path and digest, its signals, and which part of it was used."""
+    path = recording.source.path
+    ends = {"start_s": float(recording.t[0]), "end_s": float(recording.t[-1])}
+    return {"path": path and str(path), **recording_record(recording), **ends}
 
 
 def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
