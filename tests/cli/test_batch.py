@@ -9,7 +9,7 @@ import pytest
 
 from vftcli.batch.keys import digest_of
 from vftcli.batch.run import BatchCount
-from vftcli.cli.batch import progress_line, say_passed
+from vftcli.cli.batch import say_passed, show_count
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 CIRCLE = FIXTURES / "ur5_circle.csv"
@@ -205,30 +205,12 @@ def test_ten_failures_are_told_the_others_counted(run, tmp_path: Path) -> None:
     assert "… 2 more in failures.parquet\n12 logs: 0 done now, 0 before, 12 failed; " in err
 
 
-def test_a_batch_that_nobody_watches_is_told_every_two_seconds(
-    monkeypatch: pytest.MonkeyPatch, capsys
-) -> None:
-    now = [100.0]
-    monkeypatch.setattr("time.monotonic", lambda: now[0])
-    watch, count = progress_line(), BatchCount(logs=10, before=2, done=3, failed=1, seconds=6.0)
-
-    def told(at: float, count: BatchCount = count) -> str:
-        now[0] = at
-        watch(count)
-        return str(capsys.readouterr().err)
-
-    assert told(102.0) == ""
-    # 4 of 10 are left: at half a log a second 8 s
-    assert told(102.1) == "6/10 logs, 1 failed, 0.5 logs/s, 0:08 left\n"
-    assert told(104.0) == ""
-    assert told(104.2, count._replace(done=0)) == "3/10 logs, 1 failed\n"
-    assert told(106.3, count._replace(seconds=0.0)) == "6/10 logs, 1 failed\n"
-    assert told(109.0, count._replace(done=7)) == ""  # the end has its own line
-    shown: list[object] = []
-    monkeypatch.setattr("vftcli.cli.batch.is_watched", lambda: True)
-    monkeypatch.setattr("vftcli.cli.batch.STAGES.begin", lambda *step: shown.append(step))
-    progress_line()(count)
-    assert shown == [("6/10 logs, 1 failed", 0.6)]
+def test_a_batch_shows_how_many_logs_ended_and_which_share_that_is() -> None:
+    shown: list[tuple[object, ...]] = []
+    count = BatchCount(logs=10, before=2, done=3, failed=1)
+    show_count(lambda *words: shown.append(words), count)
+    show_count(lambda *words: shown.append(words), BatchCount(logs=0))
+    assert shown == [("6/10 logs, 1 failed", 0.6, 1.0), ("0/0 logs, 0 failed", 0.0, 1.0)]
 
 
 @pytest.mark.statistical

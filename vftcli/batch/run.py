@@ -1,6 +1,5 @@
 """A batch: every log of a collection done once, on an engine, and gathered in one table."""
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -32,7 +31,6 @@ class BatchCount(NamedTuple):
     before: int = 0  #: How many of them an earlier run did.
     done: int = 0  #: How many this run did.
     failed: int = 0  #: How many failed.
-    seconds: float = 0.0  #: Time since its start. [s]
 
     @property
     def left(self) -> int:
@@ -65,7 +63,7 @@ class BatchRun:
         self.keys: dict[int, str] = {}
         self.failures: dict[int, Failure] = {}
         self.efforts: dict[str, Effort] = {}
-        self.before, self.began = 0, time.monotonic()
+        self.before = 0
         self.done: set[str] = set()
 
     def groups(self) -> Iterator[list[LogTask]]:
@@ -162,7 +160,6 @@ class BatchRun:
             before=self.before,
             done=len(self.done),
             failed=len(self.failures),
-            seconds=time.monotonic() - self.began,
         )
 
     def gather(self) -> "tuple[pl.DataFrame, BatchCount]":

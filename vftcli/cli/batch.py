@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,15 +11,14 @@ import typer
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
-from vftcli.cli.console import command_line, say
-from vftcli.cli.progress import STAGES, clock, is_watched
+from vftcli.cli.console import command_line, say, stages
+from vftcli.cli.progress import STAGES
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import Option, names_at
 
 if TYPE_CHECKING:
     from vftcli.batch.run import BatchCount
 
-EVERY = 2.0  #: How often a line of progress is printed where nobody watches. [s]
 #: What is asked of logs without comparing them with anything.
 WITHOUT_REFERENCE = ("estimate", "contacts")
 SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
@@ -89,7 +89,7 @@ def batch(
         workers=engine,
         command=command_line(),
         tell=say,
-        progress=progress_line(),
+        progress=partial(show_count, stages()),
     )
     failures, count = asked.run(force=force)
     STAGES.end()
@@ -118,23 +118,7 @@ def say_passed(names: list[str]) -> None:
     say(f"note: {what}: {', '.join(sorted(names)[:3])}{more}")
 
 
-def progress_line() -> "Callable[[BatchCount], None]":
-    """Who shows how far the batch is: a line that changes on a terminal, else one now and then."""
-    import time
-
-    watched, last = is_watched(), time.monotonic()
-
-    def watch(count: "BatchCount") -> None:
-        nonlocal last
-        rate = count.done / count.seconds if count.seconds else 0.0
-        words = f"{count.logs - count.left}/{count.logs} logs, {count.failed} failed"
-        if watched:
-            STAGES.begin(words, (count.logs - count.left) / max(count.logs, 1))
-            return
-        if rate and count.left:
-            words += f", {rate:.2g} logs/s, {clock(count.left / rate)} left"
-        if time.monotonic() - last > EVERY and count.left:
-            last = time.monotonic()
-            say(words)
-
-    return watch
+def show_count(show: Callable[[str, float, float], None], count: "BatchCount") -> None:
+    """Show how far the batch is."""
+    ended = count.logs - count.left
+    show(f"{ended}/{count.logs} logs, {count.failed} failed", ended / max(count.logs, 1), 1.0)
