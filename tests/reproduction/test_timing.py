@@ -13,6 +13,7 @@ from vftcli.reproduction.timing import (
     dense_kalman_loop,
     first_order_loops,
     held_matrices,
+    jittering,
     taylor_exponential,
 )
 from vftcli.robots import load_robot
@@ -46,6 +47,18 @@ def test_every_observer_has_its_time_with_the_dynamics_in_it(
             ratio = (dynamics + own["kfo-zoh"]) / (dynamics + own[name])
             assert values[f"zoh/{name}"][variant] == pytest.approx(ratio)
     assert next(ticks) == 3 * 2 * (5 + 5)  # three rounds
+
+
+def test_the_timed_motion_is_a_round_of_4_s_and_its_clock_may_jitter() -> None:
+    """.4 rad to each side at 125 Hz, each joint at its own phase; the clock by half of 5 %."""
+    log = circle(UR5, 2000)
+    np.testing.assert_allclose(log.t, np.arange(2000) / 125.0)
+    phase = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, 6) + 0.5 * np.pi * log.t[:, None]
+    np.testing.assert_allclose(log.q, 0.4 * np.sin(phase), atol=1e-12)
+    np.testing.assert_allclose(log.require("dq"), 0.2 * np.pi * np.cos(phase), atol=1e-12)
+    strayed = (jittering(log).t - log.t) / log.median_step
+    # the ends of 2000 even draws
+    assert (strayed.min(), strayed.max()) == pytest.approx((-0.025, 0.025), rel=0.01)
 
 
 def test_the_first_order_loop_is_the_momentum_observer() -> None:
