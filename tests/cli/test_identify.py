@@ -1,11 +1,13 @@
 """`vftcli identify` at the command line."""
 
 import json
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import app
+from vftcli.cli.identify import file_for
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ExaminationError, ParameterError
 
@@ -94,3 +96,10 @@ def test_options_that_do_not_go_together_are_refused(words, message, tmp_path):
     assert isinstance(result.exception, ParameterError)
     assert message in str(result.exception)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("robot", "file"), [("ur10e", "my_ur10e.toml"), ("a/b c", "my_a_b_c.toml")]
+)
+def test_what_is_found_of_an_arm_has_its_name(robot, file):
+    assert file_for(robot) == Path(file)
