@@ -8,6 +8,7 @@ import pytest
 from vftcli.free_motion.cycles import Cycles, FreeCycles, find_free_cycles
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.filters import low_pass
 
 T = 0.01 * np.arange(1200)
 
@@ -47,6 +48,10 @@ def test_all_cycles_without_a_push_are_free(
     found = find_free_cycles(pushed(*instants), CYCLES)
     assert found.numbers == free
     assert found.residuals is not None
+    run = pushed(*instants)
+    gap = low_pass(run.t, run.drive_torque - run.model_torque, 5.0)
+    power = [np.mean(part**2, axis=0) for part in np.split(gap, 3)]
+    np.testing.assert_allclose(found.residuals, np.sqrt(power / np.min(power, axis=0)).mean(axis=1))
     # 5 N·m for half a second against noise of 0.1 N·m that is low-passed at 5 Hz: 40 times.
     assert np.all((found.residuals > 10.0) == ~np.isin(np.arange(3), free))
 
