@@ -42,7 +42,7 @@ def made(
         here,
         "x",
         lambda _words: None,
-        no_stage,
+        how.pop("progress", no_stage),
         **how,
     )
 
@@ -125,7 +125,11 @@ def test_joints_are_named_by_the_first_episode_that_is_done() -> None:
 
 def test_the_whole_copy(tmp_path: Path) -> None:
     asked = ForceChoice(wrench=WrenchChoice(frame="base"), sd=True)
-    record = made(FIXTURE, tmp_path / "copy", asked)
+    told: list[tuple[str, float, float]] = []
+    record = made(FIXTURE, tmp_path / "copy", asked, progress=lambda *step: told.append(step))
+    _, begins, ends = zip(*told, strict=True)
+    assert [sorted(set(edges)) for edges in (begins, ends)] == [[0.0, 0.8, 0.9], [0.8, 1.0]]
+    assert sorted(begins) == list(begins)
     assert sorted(p.relative_to(tmp_path / "copy") for p in (tmp_path / "copy").rglob("*.*")) == (
         sorted([
             *(p.relative_to(FIXTURE) for p in FIXTURE.rglob("*.*")),

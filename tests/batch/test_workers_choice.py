@@ -34,6 +34,7 @@ def test_with_dask_the_cores_are_used() -> None:
         {"cluster.address": "tls://host:8786"},
         {"cluster.address": "tcp://host:8786", "jobs": 2},
         {"cluster.address": "tls://host:8786", "cluster.ca": KEY},
+        {"cluster.address": "tls://host:8786", "cluster.ca": KEY, "cluster.key": KEY},
         {
             "cluster.address": "tcp://host:8786",
             "cluster.ca": KEY,

@@ -194,6 +194,14 @@ def test_impossible_circles_are_refused(settings: list[str], words: str) -> None
         plan(scenario.trajectory, load_robot(scenario.robot), np.linspace(0, 4, 50))
 
 
+def test_a_circle_about_the_base_winds_its_joint_up() -> None:
+    robot = load_robot("ur5")
+    x, y, _ = flange_pose(robot.model, check_start(robot, ())).translation
+    about = CircleSpec(radius=float(np.hypot(x, y)), towards=float(np.arctan2(-y, -x)))
+    with pytest.raises(ParameterError, match="winds a joint up"):
+        about.motion(robot)
+
+
 ROW, SHORT = (0.1,) * 6, (0.1,) * 5
 
 
