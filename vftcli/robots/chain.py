@@ -268,7 +268,11 @@ def flange_jacobian(chain: Chain, q: Array) -> Array:
     Velocity [m], then angular velocity; the transpose takes a force and moment ON the
     robot to joint torques. Pinocchio's LOCAL_WORLD_ALIGNED.
     """
-    poses = link_poses(chain, q)
+    return jacobian_of(link_poses(chain, q))
+
+
+def jacobian_of(poses: Pose) -> Array:
+    """The Jacobian of `flange_jacobian` where the poses are known. (T, 6, n)"""
     axes = poses.rotation[:, :-1, :, 2].transpose(2, 1, 0)
     places = poses.translation.transpose(2, 1, 0)
     (a, b, c), (x, y, z) = axes, places[:, -1:] - places[:, :-1]

@@ -109,28 +109,33 @@ def sense(
     log, q, t = motion.log, motion.log.q, motion.log.t
     chain = log.robot.chain
     disturbance = mean_disturbance(log.terms)
-    raw = VirtualSensor(frame="base").wrench(disturbance, q, chain)
+    to_smooth = [torque for torque in estimates if choice.smooths(torque.name)]
+    others = [torque for torque in estimates if not choice.smooths(torque.name)]
+    # The disturbance is solved in base axes, so that --frame moves no zero; beside it, what the
+    # pose says of the estimates that are smoothed.
+    raw, *bare = VirtualSensor(frame="base").wrenches((disturbance, *to_smooth), q, chain)
     mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
     del disturbance  # of a long log it takes the room of an estimate
-    # The disturbance was solved in base axes, so that --frame moves no zero.
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
     spans, unloaded = zero_spans(choice.zero, raw)
     chosen, free = within(t, spans), within(t, unloaded)
     sds, on_sds = torque_error(choice.torque_sd, log, observers, estimates, chosen)
-    wrenches = list(sensor.wrenches(estimates, q, chain, sds))
-    names = [wrench.name for wrench in wrenches if choice.smooths(wrench.name)]
     smoothed = smooth_all(
-        names, plain or as_modelled(motion), own or {}, unloaded=chosen, gate=gate
+        [wrench.name for wrench in bare],
+        plain or as_modelled(motion),
+        own or {},
+        unloaded=chosen,
+        gate=gate,
     )
-    bands: list[Remark] = []
-    for k, wrench in enumerate(wrenches):
-        if wrench.name in smoothed:
-            wrenches[k] = smoothed_wrench(smoothed[wrench.name], wrench, sensor, log)
-            bands += wrenches[k].remarks
+    by_pose = sensor.wrenches(others, q, chain, sds) if others else ()
+    made = {wrench.name: wrench for wrench in by_pose}
+    made |= {w.name: smoothed_wrench(smoothed[w.name], w, sensor, log) for w in bare}
+    wrenches = [made[torque.name] for torque in estimates]
+    bands = [remark for w in wrenches if w.name in smoothed for remark in w.remarks]
     # Beside a smoothed wrench, what is said of the torques' error names those that it is
     # said of.
-    if others := [w.name for w in wrenches if w.name not in smoothed]:
-        where = Where(", ".join(others)) if smoothed else Where()
+    if others:
+        where = Where(", ".join(torque.name for torque in others)) if smoothed else Where()
         bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in on_sds]
     # Drifts span by span: the first of each observer is its zero.
     drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in spans]
@@ -169,7 +174,7 @@ def sense(
 def smoothed_wrench(
     smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, log: Run
 ) -> Wrench:
-    """A wrench with the smoother's values and band in place of its own, nothing of it masked."""
+    """A wrench with the smoother's values and band in the sensor's frame, nothing of it masked."""
     t, values, sd = wrench.t, np.empty((len(wrench.t), 6)), np.empty((len(wrench.t), 6))
     for start in range(0, len(t), CHUNK):
         span = slice(start, start + CHUNK)
@@ -181,6 +186,7 @@ def smoothed_wrench(
     return replace(
         wrench,
         values=handed_over(values),
+        frame=sensor.frame,
         sd=handed_over(sd),
         masked=None,
         remarks=smoothed.remarks(wrench.name),

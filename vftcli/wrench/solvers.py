@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.chain import Chain, flange_jacobian, link_poses
+from vftcli.robots.chain import Chain, jacobian_of, link_poses
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import RobotError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
@@ -198,9 +198,10 @@ class VirtualSensor(Shown):
         # Chunk by chunk, so that memory does not grow with the log.
         for start in range(0, samples, CHUNK):
             span = slice(start, min(start + CHUNK, samples))
-            parts = decompose(flange_jacobian(chain, q[span]))
-            flange = link_poses(chain, q[span]).rotation[:, -1]
-            solve = SOLVERS[self.solver](parts, from_base(self.frame, flange, self.mounting))
+            poses = link_poses(chain, q[span])
+            parts = decompose(jacobian_of(poses))
+            X = from_base(self.frame, poses.rotation[:, -1], self.mounting)
+            solve = SOLVERS[self.solver](parts, X)
             sigma[span] = parts.sigma_min
             for k, torque in enumerate(torques):
                 gain, root = solve(errors[k][span])
