@@ -56,6 +56,9 @@ class AnalysisChoice:
     reference: "ReferenceChoice | None" = None  #: What the estimates are compared with, or None.
     #: Whether what touched the arm is listed, where the complete log may be used.
     contacts: bool = True
+    #: Whether the wrench of `best`, which nobody asked for, is left to `sense`: the screen,
+    #: which comes first, has nothing of it.
+    answers_first: bool = False
     #: Where the logs of the command are read, each once.
     library: Library = field(default_factory=Library, repr=False, compare=False)
     #: Who examines them, each once, and says whether results mean anything.
@@ -183,7 +186,8 @@ def analyse(
     analysis = refine(observe(motion, baselines, choice), baselines, choice)
     remarks = (*analysis.remarks, *unlisted)
     analysis = replace(analysis, contacts=contacts, examinations=examinations, remarks=remarks)
-    analysis = sense(analysis, choice)
+    if choice.wrench is not None or not choice.answers_first:
+        analysis = sense(analysis, choice)
     tell(f"{name}: comparing", 0.5, WRITING)
     analysis.spare()
     return judge(analysis, choice)
@@ -293,6 +297,8 @@ def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
 
 def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     """Turn the estimates into wrenches: those asked for, and that of `best` beside its contacts."""
+    if analysis.virtual_sensor is not None:
+        return analysis
     asked, names = choice.wrench, tuple(o.name for o in analysis.observers)
     if asked is None:
         if analysis.contacts is None or BEST not in names or analysis.robot.joints < 6:
@@ -312,6 +318,7 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         {name: analysis.free_log(name) for name in names},
         gate_of(analysis, asked),
     )
+    analysis.spare()
     return replace(analysis, virtual_sensor=found)
 
 

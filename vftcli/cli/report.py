@@ -56,7 +56,7 @@ def report(
     from vftcli.outputs.estimates import extra_files
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.report import FILES, SUMMARY_FILES, report_files, write_report
-    from vftcli.pipeline import WRITING, analyse_logs
+    from vftcli.pipeline import WRITING, analyse_logs, sense
     from vftcli.readers.library import Library
 
     library, published, written = Library(logs), beside.choice().table, also.choice()
@@ -67,6 +67,9 @@ def report(
     if published is not None:
         check_published(published, reference.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
+    # Of several logs one without a wrench is left out, and details show what is said of it.
+    later = len(logs) == 1 and not (json or analysis.talk.details)
+    choice = replace(choice, answers_first=later)
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
         table = None
@@ -83,7 +86,7 @@ def report(
     choice.progress("writing", WRITING, 1.0)
     record = write_report(
         output,
-        analyses,
+        [sense(made, choice) for made in analyses],
         command=command_line(),
         force=force,
         choice=written,
@@ -139,7 +142,7 @@ def estimate(
     from vftcli.batch.log_work import for_estimates
     from vftcli.outputs.estimates import estimate_files, write_estimate_folder
     from vftcli.outputs.files import OutputFolder
-    from vftcli.pipeline import analyse, prepared
+    from vftcli.pipeline import analyse, prepared, sense
     from vftcli.readers.library import Library
     from vftcli.readers.references import refuse_estimates
     from vftcli.signals.packages import check_installed
@@ -163,9 +166,11 @@ def estimate(
     if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
         found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
     else:
+        choice = replace(choice, answers_first=not (json or analysis.talk.details))
         found = analyse(*prepared(recording, choice), choice)
         if not json:  # the answer first; of blocks it comes with the last of them
             show_short(found)
+        found = sense(found, choice)
     made, record = write_estimate_folder(output, found, command_line(), written, force)
     if not json and made is not found:
         show_short(made)
