@@ -10,7 +10,7 @@ from contact_logs import FIXTURES, true_wrench
 from vftcli.analysis import Analysis
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, sense
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import load_regressor, load_wrench
@@ -82,6 +82,23 @@ def test_the_band_of_best_holds_the_true_wrench_of_every_sample(name: str) -> No
     truth = resample_columns(best.t, *true_wrench(name))
     held = np.abs(best.values - truth) <= 1.96 * best.sd
     assert np.all(held.mean(axis=0) >= 0.88)
+
+
+@pytest.mark.slow
+def test_a_wrench_that_comes_after_the_answer_is_that_of_one_go() -> None:
+    """A command prints its screen in between; what was asked for is there before it."""
+    choice = AnalysisChoice(observers=ObserverChoice(names=("best",)))
+    first = replace(choice, answers_first=True)
+    whole, answer = (analyse_log(FIXTURES / NAMES[0], each) for each in (choice, first))
+    assert answer.virtual_sensor is None
+    made = sense(answer, first).wrench
+    assert whole.wrench is not None
+    assert made is not None
+    np.testing.assert_array_equal(made.values, whole.wrench.values)
+    np.testing.assert_array_equal(made.sd, whole.wrench.sd)
+    asked = analyse_log(FIXTURES / NAMES[0], replace(first, wrench=WrenchChoice()))
+    assert asked.wrench is not None
+    assert sense(asked, first) is asked
 
 
 @pytest.mark.slow

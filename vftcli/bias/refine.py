@@ -62,7 +62,7 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
         sd = stated_band(found, reading)
     else:
         return estimate
-    return replace(estimate, error_sd=handed_over(sd), moving=~run.standing)
+    return replace(estimate, error_sd=handed_over(sd), moving=run.moving)
 
 
 def stated_band(found: Baseline, reading: FreeReading) -> Array:

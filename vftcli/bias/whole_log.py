@@ -181,7 +181,7 @@ def stride_of(t: Array) -> int:
 
 def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
     """No correction, and why."""
-    none = np.zeros((terms.samples, terms.joints))
+    none = handed_over(np.broadcast_to(0.0, terms.p.shape))
     return WholeLogBias(
         weight=np.zeros(terms.joints),
         bias=none,
@@ -204,7 +204,7 @@ def bias_of(
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = motion.t, run.robot.joints
     free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
-    load = np.broadcast_to(0.0, run.q.shape)
+    load = handed_over(np.broadcast_to(0.0, run.q.shape))
     if (carried := fit.rows.loads.torque_of(found.loads)).any():
         load = handed_over(resample_columns(t, t[::stride], -carried))
     if found.solution is None:

@@ -16,6 +16,7 @@ from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, lo
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text
 from vftcli.outputs.paper import figure_files, write_figures
 from vftcli.outputs.run_record import envelope, log_entry, run_record, seal, to_json
+from vftcli.signals.arrays import trim
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
 
@@ -117,6 +118,7 @@ def fill(
     for name in steps(["estimates.parquet", *["recording.rrd"] * recorded, "index.html"]):
         path = folder / f"{place}{name}"
         analysis.recording.release()
+        trim()
         if name == "estimates.parquet":
             write_estimates(path, analysis)
             put_errors(folder, place, analysis.errors, [analysis])

@@ -40,7 +40,7 @@ class Tab(NamedTuple):
     """Plots shown together."""
 
     name: str  #: The tab's name.
-    plots: Sequence[Chart]  #: Of one panel each; lines with places of their own are points.
+    plots: list[Chart]  #: Of one panel each; lines with places of their own are points.
     log: Sequence[LogLine] = ()  #: A text log below them, or none.
 
     def ends(self, plot: Chart) -> Span:
@@ -79,6 +79,7 @@ def rerun_file(
 ) -> Iterator[Stream]:
     """Write a recording with its plots and words; yield its stream, to draw the arm into it.
 
+    The plots leave their tabs as they are sent, so that a long log's have room beside the file.
     `words` holds the Markdown of every document by its name. The eye sees all `poses` of
     the arm, in a space of this name; the time panel marks a span. [s]
     """
@@ -97,8 +98,8 @@ def rerun_file(
     stream.send_blueprint(blueprint(tabs, words, poses, space, marked))
     stream.send_recording_name(drawable(title))
     for tab in tabs:
-        for plot in tab.plots:
-            send_plot(stream, plot)
+        while tab.plots:
+            send_plot(stream, tab.plots.pop(0))
         # Each line to its entity, in the order of time.
         for entity in dict.fromkeys(line.path for line in tab.log):
             own = sorted((line for line in tab.log if line.path == entity), key=lambda line: line.t)

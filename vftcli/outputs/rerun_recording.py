@@ -78,6 +78,7 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
         arrow = force_arrow(analysis, poses, sampled)
     scale, name = newton_per_metre(analysis), analysis.recording.name
     space = f"Arm (arrow: 1 m is {scale:g} N)"
+    analysis.recording.release()
     with rerun_file(path, name, tabs, words, poses, space, marked) as stream:
         send_arm(stream, robot, poses, {} if found is None else painted_links(found, robot.joints))
         if found is not None:

@@ -13,7 +13,7 @@ from vftcli.readers.table import listed
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import check_joints, drive_torque, dynamics_terms
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over, trim
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
@@ -124,6 +124,13 @@ class Run(Shown):
         return standing(self.t, self.dq)
 
     @cached_property
+    def moving(self) -> Mask:
+        """Where a joint is not at rest, read-only: all estimates share it. (T, n)"""
+        moving: Mask = ~self.standing
+        moving.setflags(write=False)
+        return moving
+
+    @cached_property
     def standstill(self) -> Array:
         """Length of the stop that a sample belongs to, 0 where the joint moves. (T, n) [s]"""
         return duration(self.t, self.dq)
@@ -161,6 +168,7 @@ class Run(Shown):
                 vars(terms).pop("d", None)
             for name in (*BULKY, *others):
                 vars(self).pop(name, None)
+            trim()
         if (steadied := vars(self).get("steadied", self)) is not self:
             steadied.spare(*others)
 

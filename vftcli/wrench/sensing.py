@@ -115,10 +115,13 @@ def sense(
     # pose says of the estimates that are smoothed.
     raw, *bare = VirtualSensor(frame="base").wrenches((disturbance, *to_smooth), q, chain)
     mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
-    del disturbance  # of a long log it takes the room of an estimate
+    vendor = vendor_remarks(log.recording, raw, chain)
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
     spans, unloaded = zero_spans(choice.zero, raw)
     chosen, free = within(t, spans), within(t, unloaded)
+    hidden, sigma = raw.hidden, raw.sigma_min
+    del disturbance, raw  # of a long log each takes the room of an estimate
+    log.recording.release()
     sds, on_sds = torque_error(choice.torque_sd, log, observers, estimates, chosen)
     smoothed = smooth_all(
         [wrench.name for wrench in bare],
@@ -154,7 +157,7 @@ def sense(
     return SensorReading(
         sensor=sensor,
         wrenches=tuple(wrenches),
-        masked=raw.hidden,
+        masked=hidden,
         drifts=tuple(chained.from_iterable(drifts)),
         free=free,
         smoothed=smoothed,
@@ -162,10 +165,10 @@ def sense(
             *warnings,
             *fitted,
             *(() if drifts else payload_remark(log.recording, log.robot)),
-            *(mask_remark(raw.hidden, raw.sigma_min) if hides else ()),
+            *(mask_remark(hidden, sigma) if hides else ()),
             *moved,
             *bands,
-            *vendor_remarks(log.recording, raw, chain),
+            *vendor,
             *(remark for w in wrenches for remark in contact_elsewhere(w, free)),
         ),
     )
