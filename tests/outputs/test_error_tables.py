@@ -27,21 +27,21 @@ from vftcli.signals.wrench import AXES
 from vftcli.wrench.sensor_reading import Drift
 
 
+def row(observer: str, joint: int, rmse: float | None, **changed: object) -> dict[str, object]:
+    """A row of errors with a floor of half a newton metre a joint."""
+    known = {"observer": observer, "joint": joint, "rmse_Nm": rmse, "reference": "two-cycle"}
+    known |= {"recording": "a_b.csv", "reference_floor_Nm": 0.5 * joint, "samples": 100}
+    return known | changed
+
+
 def errors_of(*changed: dict[str, object]) -> pl.DataFrame:
     """Two observers on two joints, rows changed one by one."""
     base = [("fdo", 1, 0.6), ("fdo", 2, 2.0), ("gmo", 1, 0.5999), ("gmo", 2, 1.0)]
     rows = []
     for k, (observer, joint, rmse) in enumerate(base):
-        row = {
-            "recording": "run.csv",
-            "observer": observer,
-            "joint": joint,
-            "rmse_Nm": rmse,
-            "reference": "two-cycle",
-            "reference_floor_Nm": 0.5,
-            "samples": 100 + k,
-        }
-        rows.append(row | (changed[k] if k < len(changed) else {}))
+        own = changed[k] if k < len(changed) else {}
+        more = {"recording": "run.csv", "reference_floor_Nm": 0.5, "samples": 100 + k}
+        rows.append(row(observer, joint, rmse, **(more | own)))
     return pl.DataFrame(rows, schema=SCHEMA)
 
 
@@ -141,21 +141,6 @@ def test_a_detail_that_nobody_knows_has_no_table() -> None:
     assert list(detail_grids(errors_of())) == []
 
 
-def row(observer: str, joint: int, rmse: float | None, **changed: object) -> dict[str, object]:
-    return {
-        "recording": "a_b.csv",
-        "observer": observer,
-        "joint": joint,
-        "rmse_Nm": rmse,
-        "bias_Nm": 0.1,
-        "max_Nm": 1.0,
-        "correlation": None,
-        "reference": "two-cycle",
-        "reference_floor_Nm": 0.5 * joint,
-        "samples": 100,
-    } | changed
-
-
 @pytest.fixture
 def errors() -> pl.DataFrame:
     return pl.DataFrame(
@@ -197,19 +182,10 @@ def test_two_logs_of_one_label_stay_two_tables(errors: pl.DataFrame, show: Calla
 
 
 def test_pairs_name_the_better_first() -> None:
-    rows = pl.DataFrame(
-        {
-            "recording": ["a.csv"] * 2,
-            "joint": [1, 2],
-            "observer": ["fdo", "fdo"],
-            "other": ["gmo", "gmo"],
-            "difference_Nm": [0.5, -0.25],
-            "low_Nm": [0.1, -0.5],
-            "high_Nm": [0.9, 0.1],
-            "p": [0.01, 0.2],
-        }
-    )
-    lines = pairs_text(rows).splitlines()
+    names = ["recording", "joint", "observer", "other", "difference_Nm", "low_Nm", "high_Nm", "p"]
+    rows = [("a.csv", 1, "fdo", "gmo", 0.5, 0.1, 0.9, 0.01)]
+    rows += [("a.csv", 2, "fdo", "gmo", -0.25, -0.5, 0.1, 0.2)]
+    lines = pairs_text(pl.DataFrame(rows, names, orient="row")).splitlines()
     assert lines[1].split() == [
         "a.csv",
         "J1",
@@ -302,18 +278,9 @@ def test_a_name_is_no_command_of_latex(errors: pl.DataFrame) -> None:
 @pytest.fixture
 def wrench_errors() -> pl.DataFrame:
     """gmo against a sensor: 1.5 N on every force axis, .25 N·m on every moment axis."""
-    rows = [
-        {
-            "recording": "run.csv",
-            "observer": "gmo",
-            "reference": "sensor",
-            "axis": axis,
-            "rmse_N": 1.5 if k < 3 else None,
-            "rmse_Nm": None if k < 3 else 0.25,
-            "samples": 90,
-        }
-        for k, axis in enumerate(AXES)
-    ]
+    shared = {"recording": "run.csv", "observer": "gmo", "reference": "sensor", "samples": 90}
+    sizes = [{"rmse_N": 1.5}] * 3 + [{"rmse_Nm": 0.25}] * 3
+    rows = [shared | {"axis": axis} | size for axis, size in zip(AXES, sizes, strict=True)]
     return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
 
 
@@ -328,11 +295,8 @@ def test_forces_in_newtons_beside_moments_in_newton_metres(wrench_errors: pl.Dat
 
 def test_a_pose_that_hides_every_wrench_is_said_in_one_line(wrench_errors: pl.DataFrame) -> None:
     """It was a table of dashes over "0 unmasked samples"."""
-    none = wrench_errors.with_columns(
-        samples=pl.lit(0, pl.Int64),
-        rmse_N=pl.lit(None, pl.Float64),
-        rmse_Nm=pl.lit(None, pl.Float64),
-    )
+    nothing = pl.lit(None, pl.Float64)
+    none = wrench_errors.with_columns(samples=pl.lit(0), rmse_N=nothing, rmse_Nm=nothing)
     assert list(axis_grids(none)) == []
     (line,) = nothing_to_compare(none)
     assert line.startswith("run.csv against sensor, wrench: nothing to compare: ")
@@ -365,21 +329,11 @@ def test_the_paper_s_bounds_are_of_a_sensor(
 
 
 def test_contacts_are_counted_in_whole_numbers() -> None:
-    row = {
-        "recording": "run.csv",
-        "observer": "gmo",
-        "signal": "torque",
-        "contacts": 3,
-        "listed_contacts": 4,
-        "found_contacts": 3,
-        "missed_contacts": 0,
-        "merged_contacts": 0,
-        "split_contacts": 1,
-        "false_alarms": 0,
-        "false_alarms_per_h": 0.0,
-        "detection_delay_s": 0.04,
-        "longest_delay_s": None,
-    }
+    counts = {"contacts": 3, "listed": 4, "found": 3, "missed": 0, "merged": 0, "split": 1}
+    row: dict[str, object] = {"recording": "run.csv", "observer": "gmo", "signal": "torque"}
+    row |= {k if k == "contacts" else f"{k}_contacts": count for k, count in counts.items()}
+    row |= {"false_alarms": 0, "false_alarms_per_h": 0.0, "detection_delay_s": 0.04}
+    row |= {"longest_delay_s": None}
     (grid,) = contact_grids(pl.DataFrame([row, row | {"contacts": None}]))
     assert terminal(grid, width=200).splitlines()[2].split() == [
         "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "1", "0", "0", "0.0400", "–",

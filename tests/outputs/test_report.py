@@ -9,7 +9,6 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs import NONE, OutputChoice, report
 from vftcli.outputs.contacts import contacts_latex
-from vftcli.outputs.estimates import write_estimate_folder
 from vftcli.outputs.files import digests
 from vftcli.outputs.report import ERROR_TABLES, FILES, SUMMARY_FILES, write_report
 from vftcli.signals.errors import OutputError
@@ -127,20 +126,6 @@ def test_an_existing_report_needs_force(without_reference: Analysis, tmp_path: P
     assert json.loads((tmp_path / "run.json").read_text())["command"] == "first"
     write_report(tmp_path, [without_reference], command="second", force=True)
     assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
-
-
-def test_estimate_writes_its_extras(analysis: Analysis, tmp_path: Path) -> None:
-    write_estimate_folder(
-        tmp_path / "out", analysis, "vftcli estimate x", OutputChoice(extras=("csv", "mcap", "rrd"))
-    )
-    names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert names == {
-        "estimates.parquet",
-        "run.json",
-        "estimates.csv",
-        "estimates.mcap",
-        "recording.rrd",
-    }
 
 
 def test_a_report_without_a_recording_takes_away_the_one_that_was_there(
