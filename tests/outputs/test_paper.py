@@ -307,6 +307,7 @@ def drawn_dots(plots: list[DotPlot], width: float = 3.5) -> Any:
 def test_dots_stand_side_by_side_with_their_intervals_and_the_floor() -> None:
     figure = drawn_dots([plot()])
     (axes,) = figure.axes
+    assert figure.get_figheight() == pytest.approx(1.7 + 0.22 + 2 * 0.15 + 0.05)  # two of names
     assert axes.get_ylabel() == "RMSE (N·m)"
     assert axes.get_xlabel() == "Joint"
     assert [text.get_text() for text in axes.get_xticklabels()] == ["J1", "J2"]
@@ -341,5 +342,6 @@ def test_numbers_of_one_size_stand_on_an_axis_from_zero() -> None:
 def test_several_logs_bear_their_names_and_a_dagger_its_meaning() -> None:
     figure = drawn_dots([plot(), plot("b.csv", ("J1", "J2†")), plot("c.csv")], 7.16)
     assert [axes.get_title() for axes in figure.axes[:3]] == ["a.csv", "b.csv", "c.csv"]
+    assert figure.get_figheight() == pytest.approx(2 * 1.45 + 0.22 + 0.15 + 0.05)
     assert figure.axes[1].get_xlabel() == "Joint († rests: reference not to be trusted)"
     assert not figure.axes[3].axison

@@ -79,6 +79,7 @@ def test_of_a_long_log_every_stretch_keeps_its_ends(long: tuple[np.ndarray, np.n
     # Half of the stretches are for the 2 s about the contact: each sample has its own.
     about = (times > 344.5) & (times < 346.5)
     assert about.sum() == pytest.approx(2000, abs=2)
+    assert (~about).sum() == pytest.approx(STRETCHES / 2, rel=0.01)
     assert len(rows[second["low"][0]]) == -(-len(times) // 4)
 
 

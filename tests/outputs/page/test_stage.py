@@ -113,6 +113,10 @@ def test_the_touched_links_are_marked(
     parts = sum(len(capsules(pushed.robot.chain)[frame]) for frame in hit)
     assert [kind for _, _, kind in drawn.parts].count("hit") == parts
     assert part("svg/still", drawn, "The arm", "9 N").count('class="shaft"') == 1
+    data = staged(replace(pushed, contacts=replace(listed(pushed), contacts=(contact,))))
+    (row,) = data["contacts"]
+    assert row["frames"] == sorted(hit)
+    assert tuple(row["spot"]) == ((3, 4) if 3 in hit else (7, 7))  # of a link both its ends
 
 
 def test_the_drawing_holds_the_arm_and_its_arrow(pushed: Analysis) -> None:
