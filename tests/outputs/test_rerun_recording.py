@@ -93,6 +93,9 @@ def test_torques_read_back(rows: dict[str, dict[str, list]], analysis: Analysis)
     best, *others = (e.tau[:, 1] for e in analysis.estimates)
     expected = [analysis.reference.tau[:, 1], *others, best]
     np.testing.assert_array_equal(values[:, : len(expected)], np.column_stack(expected))
+    left = np.array([v for v in column(rows, "/residual/J2", "Scalars:scalars") if v])
+    plain = np.column_stack([*others, best]) - analysis.reference.tau[:, 1:2]
+    np.testing.assert_array_equal(left, plain)
 
 
 def test_time_reads_back_in_seconds(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
