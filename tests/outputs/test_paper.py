@@ -157,6 +157,7 @@ def test_letters_and_lines_can_be_read_in_print() -> None:
     made = chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")
     marks = {"a": (np.arange(6.0), np.zeros(6))}
     lines = drawn_lines(7.16, plots_of(made), numbers={1: 1.0}, marks=marks)
+    assert [line.get_ydata()[0] for line in lines.axes[0].lines[:2]] == [1.0, -1.0]  # the band
     for figure in (lines, drawn_dots([plot(), plot("b.csv")])):
         texts = [text for text in figure.findobj(matplotlib.text.Text) if text.get_text()]
         assert {text.get_fontsize() for text in texts} <= {6.5, 7.0, 8.0}

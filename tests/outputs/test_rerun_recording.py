@@ -74,15 +74,9 @@ def test_a_blueprint_is_in_the_file(path: Path) -> None:
 def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> None:
     for j in range(1, 7):
         assert column(rows, f"/tau_ext/J{j}", "SeriesLines:names")[-1] == [
-            "reference (vendor)",
-            "fdo",
-            "gmo",
-            "kfo-fe",
-            "kfo-zoh",
-            "best",
-            "best 95 % upper",
+            "reference (vendor)", "fdo", "gmo", "kfo-fe", "kfo-zoh", "best", "best 95 % upper",
             "best 95 % lower",
-        ]
+        ]  # fmt: skip
         assert f"/residual/J{j}" in rows
     assert {"/q", "/dq", "/drive_torque", "/summary", "/errors"} <= set(rows)
 

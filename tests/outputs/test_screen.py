@@ -74,13 +74,6 @@ def test_never_more_than_forty_lines(analysis: Analysis, count: int) -> None:
     assert len(log_screen(listed(analysis, 60), CANVAS, every=True).splitlines()) > MOST_LINES
 
 
-def test_the_hardest_are_shown_in_the_order_of_time(analysis: Analysis) -> None:
-    text = log_screen(listed(analysis, 60), CANVAS)
-    rows = [line.split()[0] for line in text.splitlines() if line.rstrip().endswith("good")]
-    assert rows == [str(k + 1) for k in range(len(rows))]
-    assert f"the {len(rows)} hardest of 60; --details shows all" in text
-
-
 def test_a_name_that_a_terminal_would_obey_is_shown_as_it_is(analysis: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
     source = replace(analysis.recording.source, label="\x1b[31mred.csv")
     made = as_if(analysis, replace(analysis.recording, source=source))

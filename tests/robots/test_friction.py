@@ -121,10 +121,12 @@ def test_dry_friction_is_half_the_step_whatever_smooths_it(smoothing: float) -> 
     np.testing.assert_allclose(dry_friction(robot, 1), [step], rtol=1e-12)
 
 
+STRIBECK = {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity": 0.1}
+
+
 def test_dry_friction_of_every_model() -> None:
-    stribeck = {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity": 0.1}
     robot = (
-        JointFriction(model="coulomb-viscous-stribeck", parameters=stribeck),
+        JointFriction(model="coulomb-viscous-stribeck", parameters=STRIBECK),
         JointFriction(model="sigmoid", parameters={"amplitude": -1.5, "slope": 10.0, "shift": 0.1}),
         JointFriction(),
     )
@@ -238,11 +240,7 @@ def test_a_parabola_turns_down_where_its_slope_is_zero() -> None:
         ("coulomb-viscous", {"coulomb": -1.0, "viscous": 5.0}, True),
         ("coulomb-viscous", {"coulomb": 0.0, "viscous": -1.0}, True),
         ("coulomb-viscous-offset", {"coulomb": 1.0, "viscous": 0.0, "offset": -3.0}, False),
-        (
-            "coulomb-viscous-stribeck",
-            {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity": 0.1},
-            False,
-        ),
+        ("coulomb-viscous-stribeck", STRIBECK, False),
         ("sigmoid", {"amplitude": 1.0, "slope": 9.0, "shift": 0.1}, False),
         ("sigmoid", {"amplitude": 1.0, "slope": -9.0, "shift": 0.1}, True),
         ("none", {}, False),
@@ -288,13 +286,8 @@ def test_they_are_read_and_written_back(tmp_path: Path) -> None:
     assert joint.torques == (5.73, 9.32, 13.58, 18.72)
     assert joint.temperature == (3.637679, -0.011074, 1.362321, -0.085741)
     assert joint.temperature_at == 44.6
-    assert joint.parameters == {
-        "load_coulomb": 0.067,
-        "smoothing": 0.003,
-        "offset": -0.2,
-        "presliding": 2.0,
-        "presliding_length": 3e-4,
-    }
+    values = {"load_coulomb": 0.067, "smoothing": 0.003, "offset": -0.2}
+    assert joint.parameters == values | {"presliding": 2.0, "presliding_length": 3e-4}
     again = tmp_path / "again.toml"
     again.write_text(robot_toml(robot), encoding="utf-8")
     assert load_robot(again).friction == robot.friction
@@ -341,22 +334,13 @@ LOADED = JointFriction(
 PLAIN = JointFriction(model="coulomb-viscous", parameters={"coulomb": 2.0, "viscous": 1.0})
 
 
-def test_the_load_adds_to_the_coulomb_torque_whatever_its_sign():
-    dq = np.array([[0.5, -0.5]])
+def test_the_load_adds_to_the_coulomb_torque_of_its_own_joints_whatever_its_sign():
+    dq, friction = np.array([[0.5, -0.5, 0.5]]), (LOADED, LOADED, PLAIN)
     for load in (30.0, -30.0):
-        torque = friction_torque((LOADED, LOADED), dq, np.full((1, 2), load))
+        torque = friction_torque(friction, dq, np.full((1, 3), load))
         # 2 + 0.1·30 + 1·0.5; tanh(50) is 1 to rounding
-        np.testing.assert_allclose(torque, [[5.5, -5.5]], rtol=1e-14)
-
-
-def test_only_the_joints_with_the_model_feel_the_load():
-    torque = friction_torque((LOADED, PLAIN), np.full((1, 2), 0.5), np.full((1, 2), 30.0))
-    np.testing.assert_allclose(torque, [[5.5, 2.5]], rtol=1e-14)
-
-
-def test_without_a_load_it_is_the_plain_model():
-    dq = np.linspace(-1, 1, 7)[:, None]
-    assert np.array_equal(friction_torque((LOADED,), dq), friction_torque((PLAIN,), dq))
+        np.testing.assert_allclose(torque, [[5.5, -5.5, 2.5]], rtol=1e-14)
+    assert np.array_equal(friction_torque(friction, dq), friction_torque((PLAIN,) * 3, dq))
 
 
 def test_the_stribeck_term_fades():

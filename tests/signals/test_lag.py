@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from vftcli.signals.lag import (
     LEAD,
     LONGEST,
+    LagFit,
     lag_fit,
     lags_of_each,
     parabola,
@@ -82,6 +83,17 @@ def test_the_offset_is_that_of_the_best_normalised_correlation(seed: int) -> Non
     found = time_offset(t, late, early)
     assert found.correlation == pytest.approx(max(value.values()), rel=1e-9)
     assert abs(found.lag / step - max(value, key=lambda lag: value[lag])) <= 0.5
+
+
+def test_rivals_of_the_closest_lag_are_valleys_that_overlap_longer() -> None:
+    """Valleys at −3, −1, 1 and 3, the last the deepest; the longest overlap comes first."""
+    difference = np.array([9.0, 1.0, 9.0, 3.0, 9.0, 2.0, 9.0, 0.5, 9.0])
+    overlap = np.array([5, 7, 8, 9, 10, 9, 8, 6, 5])
+    fit = LagFit(np.arange(-4, 5), difference, overlap)
+    assert fit.closest == 3.0
+    assert fit.rivals(2.5) == [1.0, -3.0]
+    assert fit.rivals(3.0) == [-1.0, 1.0, -3.0]
+    assert fit._replace(overlap=overlap[::-1]).rivals(2.5) == [1.0]  # −3 overlaps less, 6 < 7
 
 
 @pytest.mark.parametrize(
