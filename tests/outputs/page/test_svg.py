@@ -16,12 +16,16 @@ from vftcli.outputs.page.shell import (
     ticks,
 )
 
-SCALES = Scales(Box(100, 100, 0, 0, 0, 0), Span(0.0, 10.0), Span(0.0, 5.0))
+SCALES = Scales(Box(128, 112, left=20, bottom=5, top=7, right=8), Span(2.0, 12.0), Span(-1.0, 4.0))
+"""A plot of 100 by 100 with another room on each side."""
 
 
 def test_values_have_their_places() -> None:
-    np.testing.assert_allclose(SCALES.across(np.array([0.0, 5.0, 10.0])), [0, 50, 100])
-    np.testing.assert_allclose(SCALES.up(np.array([0.0, 5.0])), [100, 0])
+    np.testing.assert_allclose(SCALES.across(np.array([2.0, 7.0, 12.0])), [20, 70, 120])
+    np.testing.assert_allclose(SCALES.up(np.array([-1.0, 4.0])), [107, 7])
+    # Of a span without width all have one place.
+    flat = SCALES._replace(x=Span(3.0, 3.0), y=Span(1.0, 1.0))
+    assert (flat.across(3.0), flat.up(1.0)) == (20.0, 107.0)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +61,9 @@ def test_a_line_breaks_where_nothing_is_known() -> None:
 
 
 def test_what_is_far_outside_stays_near() -> None:
-    assert path_of(SCALES, np.array([0.0, 1.0]), np.array([0.0, 1e9])) == "M0 100l10-200"
+    t = np.array([2.0, 3.0])
+    assert path_of(SCALES, t, np.array([-1.0, 1e9])) == "M20 107l10-200"
+    assert path_of(SCALES, t, np.array([-1.0, -1e9])) == "M20 107l10 100"
 
 
 def test_a_path_is_drawn_to_a_tenth_without_its_errors_adding_up() -> None:
@@ -70,12 +76,12 @@ def test_a_path_is_drawn_to_a_tenth_without_its_errors_adding_up() -> None:
 
 
 def test_a_stripe_stays_in_the_plot() -> None:
-    assert SCALES.inside((5.0, 99.0)).tolist() == [50.0, 100.0]
+    assert SCALES.inside((7.0, 99.0)).tolist() == [70.0, 120.0]
 
 
 def test_many_stripes_are_one_path() -> None:
-    found = stripes(SCALES, [(0.0, 1.0), (5.0, 5.0)])
-    assert found == "M0.0 0h10.0v100h-10.0zM50.0 0h0.5v100h-0.5z"
+    found = stripes(SCALES, [(2.0, 3.0), (7.0, 7.0)])
+    assert found == "M20.0 7h10.0v100h-10.0zM70.0 7h0.5v100h-0.5z"
 
 
 def test_the_title_is_words() -> None:
