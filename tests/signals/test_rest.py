@@ -99,3 +99,4 @@ def test_a_pose_is_held_where_no_joint_travels_over_the_window() -> None:
     assert not found[:10].any()
     assert not found[200:].any()
     assert not held(q[:20], STEP).any()
+    assert np.flatnonzero(held(q[:21], STEP)).tolist() == [10]
