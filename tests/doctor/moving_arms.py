@@ -22,7 +22,12 @@ def carrying(robot: Robot, load: float) -> Robot:
 
 
 def moving(
-    name: str = "ur10e", *, load: float = 0.0, seconds: float = 12.0, up: Array | None = None
+    name: str = "ur10e",
+    *,
+    load: float = 0.0,
+    seconds: float = 12.0,
+    up: Array | None = None,
+    seed: int = 0,
 ) -> Recording:
     """An arm that moves by its own dynamics, with Coulomb friction, measured by its own signal.
 
@@ -33,7 +38,7 @@ def moving(
     chain = arm.loaded_chain
     if up is not None:
         chain = replace(chain, gravity=-9.81 * up)
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     t = np.arange(0, seconds, 0.008)
     n = arm.joints
     rate, phase = rng.uniform(1, 2, n), rng.uniform(0, 6, n)

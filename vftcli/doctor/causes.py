@@ -46,6 +46,13 @@ READ_RIGHT, UPRIGHT = 0.1, 0.05
 SUSPECT = 0.35  #: Least misfit of a joint to try its sign and place.
 #: Most of the misfit after one joint's sign change, and after two joints' exchange.
 TURNED, SWAPPED = 0.5, 0.7
+#: Causes on single joints' efforts, or on what a rough description may get wrong too: its
+#: links' masses.
+ON_JOINTS = frozenset({"joint-sign", "effort-order", "effort-offset", "drive-scale"})
+#: Largest share of what errors of a rough description leave that any other cause leaves.
+#:
+#: True ones leave .02–.76 of it, those that a rough description made up .94 and more.
+EVIDENT = 0.8
 FEW = 60  #: Windows for every pair of joints: each pair evaluates the model again.
 CARRIES = 0.25  #: Least share of gravity in an effort that shows the joint's place.
 OFFSET = 0.1  #: Least offset of a joint's effort, relative to the effort.
@@ -287,7 +294,8 @@ def scaled(case: Case) -> Iterator[Cause]:
 
 def swapped(case: Case) -> Iterator[Cause]:
     """Two joints with all signals exchanged: each pair evaluates the model."""
-    far = case.by_joint > SUSPECT
+    moving = np.ptp(case.windows.q, axis=(0, 1)) > TRAVEL
+    far = (case.by_joint > SUSPECT) & moving
     gravity = root_mean_squares(case.gravity)
     if not np.any(far & (gravity > CARRIES * case.effort_sizes)):
         return  # gravity loads none of the joints with a large misfit
@@ -307,8 +315,8 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
 
     def explains(cause: Cause) -> bool:
         limit = SLIGHT if cause.code == "effort-offset" else EXPLAINED
-        little = cause.misfit < limit * case.misfit or is_plain(case, cause)
-        return cause.misfit <= OPEN and little
+        little = cause.misfit < limit * case.misfit and is_evident(case, cause)
+        return cause.misfit <= OPEN and (little or is_plain(case, cause))
 
     found = sorted(filter(explains, found), key=lambda cause: cause.misfit)
     if not found:
@@ -324,12 +332,22 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
     return Diagnosis(case, best, next(near, None))
 
 
+def is_evident(case: Case, cause: Cause) -> bool:
+    """Whether no errors of a rough description explain as much as a cause does."""
+    if case.misfit > OPEN or cause.code in ON_JOINTS:
+        return True
+    return cause.misfit < EVIDENT * case.rough.size / case.size
+
+
 def is_plain(case: Case, cause: Cause) -> bool:
     """Whether a single-joint cause explains these, however little the rest changes."""
     if cause.code not in {"joint-sign", "effort-order"} or cause.misfit > case.misfit:
         return False
-    after, before = (x.bare.by_joint[list(cause.joints)] for x in (cause.case, case))
-    return bool(np.linalg.norm(after) < TURNED * np.linalg.norm(before))
+    before, after, rough = (
+        np.linalg.norm(fit.by_joint[list(cause.joints)])
+        for fit in (case.bare, cause.case.bare, case.rough)
+    )
+    return bool(after < TURNED * before < rough)
 
 
 def is_modelled(case: Case) -> bool:

@@ -196,9 +196,10 @@ def arm_findings(
     refuted = cause is not None and cause.code != "effort-offset"
     others = list[RobotMatch]()
     if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
-        arms = (other for name, other in profiles().items() if name != robot.name)
+        arms = (other for other in profiles().values() if other.path != robot.path)
         others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
-        if others and is_rather(others[0], own, diagnosis):
+        # The profile of the same name fits best: the file is rough, the arm is right.
+        if others and others[0].robot != robot.name and is_rather(others[0], own, diagnosis):
             best, *more = others
             # A user's own file may be nearer to the arm than its maker's model.
             arm = load_robot(best.robot)
@@ -208,7 +209,8 @@ def arm_findings(
             ):
                 remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
                 return ArmFindings((remark,), (best, replace(own, fits=False), *more))
-    robots = (own, *(replace(other, fits=False) for other in others))
+    others = [replace(other, fits=False) for other in others if other.robot != robot.name]
+    robots = (own, *others)
     return ArmFindings(tuple(explained(diagnosis, robots)), robots)
 
 

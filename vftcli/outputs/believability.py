@@ -181,7 +181,7 @@ def robot_ground(analysis: Analysis) -> Ground:
             "bad" if own.misfit > MOST_UNEXPLAINED else "caution",
             subject,
             f"{name} leaves {left} of {own.evidence} unexplained{load}",
-            command("inspect", analysis.recording, "--robot", name),
+            command("inspect", analysis.recording, "--robot", robot_option(analysis)),
         )
     who = f"{own.evidence} agrees" if own.by_maker else f"the {own.evidence} agrees with the model"
     return Ground("good", subject, f"{who} to {left}{load}")
