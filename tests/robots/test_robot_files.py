@@ -10,7 +10,7 @@ import pytest
 from vftcli.robots import PROFILES, JointFriction, Payload, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.profile import robot_toml
-from vftcli.robots.robot_file import lines_of, value_text
+from vftcli.robots.robot_file import BOUNDS, lines_of, value_text
 from vftcli.signals.errors import RobotError
 
 HEAD = """schema = 1
@@ -59,6 +59,13 @@ def test_a_planar_arm_weighs_what_the_textbook_says(tmp_path: Path) -> None:
     first = (2.0 * 0.25 + 1.0 * 0.5) * 9.81 * np.cos(0.3) + second
     np.testing.assert_allclose(gravity, [first, second], rtol=1e-14)
     assert [f.model for f in robot.friction] == ["none", "coulomb-viscous"]
+
+
+def test_limits_of_numbers_are_round() -> None:
+    """Powers of ten, but for two turns; as far below zero, or zero, or a hair above it."""
+    for key, bound in BOUNDS.items():
+        assert bound.high == 4.0 * np.pi or np.log10(bound.high) % 1.0 == 0.0, key
+        assert bound.low in {-bound.high, 0.0, 1e-9, 1e-7, 1.0}, key
 
 
 @pytest.mark.parametrize(

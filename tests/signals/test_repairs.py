@@ -104,6 +104,15 @@ def test_one_bad_sample_is_drawn_to_its_neighbours(signal, off, left, row, joint
         np.testing.assert_allclose(getattr(found, name), getattr(log, name), rtol=0, atol=size)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_sample_a_little_too_far_off_is_drawn_to_the_limit_on_its_own_side(sign: float) -> None:
+    log, sizes = moving(), np.linspace(0.2, 3.0, 15)
+    found = (without_isolated(with_sample(log, "torque", 400, 1, sign * s)) for s in sizes)
+    left = np.array([sign * (one.torque[400, 1] - log.torque[400, 1]) for one in found])
+    assert left.min() > -0.15  # 3 sd of the noise
+    assert left.max() > 0.5
+
+
 @pytest.mark.slow
 def test_what_a_sample_is_worth_falls_back_without_a_jump() -> None:
     """The larger a fault, the less is left of it; between two sizes next to each other no step."""
