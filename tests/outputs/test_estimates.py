@@ -1,4 +1,5 @@
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,30 @@ def test_every_sample_says_which_contact_it_lies_in(analysis: Analysis) -> None:
         assert number.filter(inside).to_list() == [contact.number] * inside.sum()
     within = [(t >= c.start) & (t <= c.stop) for c in analysis.contacts.contacts]
     assert number.is_null().sum() == len(t) - sum(part.sum() for part in within)
+
+
+def test_what_the_pose_hides_is_apart(analysis: Analysis) -> None:
+    """By plain least squares nothing is: it would be anything."""
+    sensed, reference, count = analysis.virtual_sensor, analysis.reference, len(analysis.t)
+    assert sensed is not None
+    assert reference is not None
+    rising, first = np.arange(float(count)), np.arange(count) < 5
+    sd = np.tile(rising[:, None], 6)
+    wrench = replace(sensed.wrenches[0], masked=first, null_space=rising, sigma_min=2.0 * rising)
+    for solver, apart in (("map", True), ("pinv", False)):
+        sensing = replace(sensed, wrenches=(wrench,), sensor=replace(sensed.sensor, solver=solver))
+        made = replace(analysis, virtual_sensor=sensing, reference=replace(reference, sd=sd))
+        table = estimates_table(made)
+        name = wrench.name
+        assert table[f"wrench/{name}/fx"].is_null().to_numpy().tolist() == first.tolist()
+        assert (f"wrench_masked/{name}/fx" in table.columns) == apart
+        if apart:
+            found = table[f"wrench_masked/{name}/fx"]
+            assert found.is_null().to_numpy().tolist() == (~first).tolist()
+            assert found[:5].to_list() == wrench.values[:5, 0].tolist()
+        assert table[f"null_space/{name}"].to_list() == rising.tolist()
+        assert table["sigma_min"].to_list() == (2.0 * rising).tolist()
+        assert table["sd/reference/6"].to_list() == rising.tolist()
 
 
 def test_the_columns_say_unit_sign_and_frame(analysis: Analysis, tmp_path: Path) -> None:
