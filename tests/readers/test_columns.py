@@ -119,6 +119,8 @@ def test_one_of_several_recordings(tmp_path: Path) -> None:
     second = read(path, columns="segment=2")
     assert second.samples == 30
     assert second.q[0, 0] == 1.0
+    expected = [-1] * 30 + list(range(30)) + [-1] * 30  # the sample that each row is
+    assert second.source.row_samples.tolist() == expected
     assert "read recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
     reported, *_ = read_first_recording(path).source.remarks
     assert (reported.code, reported.level) == ("time-reset", "warning")
