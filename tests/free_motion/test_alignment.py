@@ -159,7 +159,9 @@ def test_of_equal_fits_the_longest_overlap_counts(
 def test_a_uniform_clock_ends_with_the_log() -> None:
     """On its own step a log keeps its samples, the last one too; on half the step one between."""
     log = wandering()
-    np.testing.assert_allclose(uniform(log, 0.01), log.q, atol=1e-12)
+    for begin in (0.0, 3.0):
+        shifted = replace(log, t=log.t + begin)
+        np.testing.assert_allclose(uniform(shifted, 0.01), log.q, atol=1e-12)
     half = uniform(log, 0.005)
     assert len(half) == 2 * log.samples - 1
     np.testing.assert_allclose(half[1::2], 0.5 * (log.q[1:] + log.q[:-1]), atol=1e-12)

@@ -77,11 +77,33 @@ def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
         np.testing.assert_allclose(
             truth.tau_ext[k], there + truth.walks["drift"][k], rtol=0, atol=1e-9
         )
+    # the force along the profile of the file: half a cosine of .2 s up and down, read off between
+    # the middles of steps of 1 ms, (π/.2)²·12 N/8 of them
+    up, down = (np.clip(each / 0.2, 0.0, 1.0) for each in (truth.t - 0.2, 1.4 - truth.t))
+    size = 0.25 * (1.0 - np.cos(np.pi * up)) * (1.0 - np.cos(np.pi * down))
+    np.testing.assert_allclose(truth.wrench[:, :3], np.outer(size, [5, -3, 8]), atol=5e-4)
     assert np.max(np.abs(truth.wrench)) > 5.0
     assert np.max(np.abs(truth.contacts["elbow"])) > 5.0
     assert np.max(np.abs(truth.walks["drift"])) > 0.5
     before = truth.t < 0.49
     np.testing.assert_array_equal(truth.walks["drift"][before], 0.0)
+
+
+def test_the_flange_is_where_pinocchio_has_it(many: Simulation) -> None:
+    """By measured and by commanded positions, its twist through Pinocchio's Jacobian."""
+    model, seen, samples = load_robot("panda").model, many.measured.signals, many.samples
+    data, frame, axes = model.createData(), model.getFrameId("flange"), pin.LOCAL_WORLD_ALIGNED
+    for flange, q, dq in (
+        (many.actual_flange, seen["q"], seen["dq"]),
+        (many.target_flange, samples.target_q, samples.target_dq),
+    ):
+        for k in (0, 700, 1500):
+            J = pin.computeFrameJacobian(model, data, q[k], frame, axes)
+            np.testing.assert_allclose(flange.jacobian[k], J, atol=1e-12)
+            np.testing.assert_allclose(flange.twist[k], J @ dq[k], atol=1e-12)
+            np.testing.assert_allclose(flange.rotation[k], data.oMf[frame].rotation, atol=1e-12)
+            place = data.oMf[frame].translation
+            np.testing.assert_allclose(flange.position[k], place, atol=1e-12)
 
 
 def test_truth_closes_the_equation_of_motion(many: Simulation) -> None:
