@@ -69,11 +69,22 @@ def test_what_does_not_happen_is_none() -> None:
     assert found.motion is None
 
 
-def test_an_arm_that_moves_already_did_not_rest() -> None:
-    moved = np.zeros((ROWS, 6))
-    moved[:, 0] = np.arange(ROWS) * PERIOD * 0.01  # 10 mm/s, twice what counts as still
-    (found,) = latencies(loop(moved=moved))
-    assert not found.rested
+@pytest.mark.parametrize(
+    ("axis", "speed", "begin", "rested"),
+    # below 5 mm/s and .05 rad/s an arm rests, whatever it does once the force is there
+    [
+        *((0, 0.0045, 0, True), (0, 0.0055, 0, False), (1, 1.0, 300, True)),
+        *((3, 0.045, 0, True), (4, 0.055, 0, False)),
+    ],
+)
+def test_an_arm_that_moves_already_did_not_rest(
+    axis: int, speed: float, begin: int, rested: bool
+) -> None:
+    moved, truth = np.zeros((2, ROWS, 6))
+    moved[:, axis] = np.clip(np.arange(ROWS) - begin, 0, None) * PERIOD * speed
+    truth[300:500, axis] = 2.0 * LIMIT[axis]
+    (found,) = latencies(loop(moved=moved, truth=truth))
+    assert found.rested == rested
 
 
 def test_a_second_push_soon_after_is_the_same_one() -> None:
