@@ -16,12 +16,12 @@ from vftcli.outputs.grid import (
     csv_rows,
     escape_latex,
     joint_columns,
-    json_rows,
     latex,
     markdown,
     terminal,
 )
 from vftcli.outputs.page.shell import part
+from vftcli.outputs.run_record import to_json
 
 HOSTILE = '<b>&_%|*$#"\\{a}'
 
@@ -195,7 +195,7 @@ def test_html_escapes_every_text_and_marks_best_floor_and_observers(grid: Grid) 
 
 def test_rows_for_machines_read_back() -> None:
     rows = [{"a": 1.5e-7, "b": "x,y", "c": True}, {"a": float("nan"), "b": None, "c": False}]
-    assert json.loads(json_rows(rows)) == [
+    assert json.loads(to_json(rows)) == [
         {"a": 1.5e-7, "b": "x,y", "c": True},
         {"a": None, "b": None, "c": False},
     ]

@@ -26,7 +26,7 @@ from vftcli.outputs.admittance_tables import (
 from vftcli.outputs.charts import DASHES, GREY, SPARE, Chart, ChartLine
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
-from vftcli.outputs.grid import csv_rows, json_rows
+from vftcli.outputs.grid import csv_rows
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import NARROW, Drawing, figure_files, line_figure, plots_of, write_figures
 from vftcli.outputs.quantity import counted
@@ -37,6 +37,7 @@ from vftcli.outputs.run_record import (
     log_remarks,
     robot_record,
     seal,
+    to_json,
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -83,7 +84,7 @@ def write_admittance(
         folder.write("index.html", render_admittance(replay, record, title, run, examinations))
         keys = replay.rows[0] if replay.rows else COLUMNS
         folder.write("comparison.csv", csv_rows(replay.rows, keys))
-        folder.write("comparison.json", json_rows(replay.rows))
+        folder.write("comparison.json", to_json(replay.rows))
         with table_file(folder / "motion.parquet") as file:
             motion_table(replay).write_parquet(file, compression="zstd")
         if form is not None:

@@ -22,7 +22,6 @@ from vftcli.outputs.grid import (
     csv_rows,
     escape_markdown,
     joint_columns,
-    json_rows,
     latex,
     markdown,
     terminal,
@@ -30,6 +29,7 @@ from vftcli.outputs.grid import (
 )
 from vftcli.outputs.grids import contact_grids
 from vftcli.outputs.quantity import DASH, minus, significant
+from vftcli.outputs.run_record import to_json
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.parsing import printable
 from vftcli.signals.wrench import AXES, unit_of
@@ -366,7 +366,7 @@ def alike(grids: Sequence[Grid]) -> Sequence[Grid]:
 #: Name of a form → the text of the errors table in it.
 FORMS = {
     "csv": lambda errors, _analyses=(): csv_rows(errors.to_dicts(), errors.columns),
-    "json": lambda errors, _analyses=(): json_rows(errors.to_dicts()),
+    "json": lambda errors, _analyses=(): to_json(errors.to_dicts()),
     "markdown": to_markdown,
     "latex": to_latex,
 }

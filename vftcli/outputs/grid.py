@@ -2,13 +2,12 @@
 
 Whoever has a table to show makes a Grid of it; how a table looks is decided here and, for
 HTML, in the pages' templates, and so is what must be escaped: names and words come from
-files, and may hold any letter. Rows for machines, not rounded, are
-written by `csv_rows` and `json_rows`: what is not known is null or empty.
+files, and may hold any letter. Rows for machines, not rounded, are written by `csv_rows`:
+what is not known is empty.
 """
 
 import csv
 import io
-import json
 import re
 import shutil
 import textwrap
@@ -295,12 +294,6 @@ def escape_latex(text: str) -> str:
     return text.translate(LATEX_LETTERS).replace("$<$ ", r"$<$\,")
 
 
-def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows as a JSON array of objects; what is not known is null."""
-    known = [{k: known_or_none(v) for k, v in row.items()} for row in rows]
-    return json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
 def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> str:
     """Rows as CSV under a line of keys; what is not known is empty, truth in small letters.
 
@@ -309,7 +302,7 @@ def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> str:
     text, keys = io.StringIO(), list(keys)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(keys)
-    writer.writerows([csv_cell(known_or_none(row[key])) for key in keys] for row in rows)
+    writer.writerows([csv_cell(row[key]) for key in keys] for row in rows)
     return text.getvalue()
 
 
@@ -321,12 +314,9 @@ def csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
     """A value as a cell of CSV holds it."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
     if not isinstance(value, str):
         return value
     text = value.replace("\r", r"\r")  # unquoted before Python 3.13: it would end the row
     return f"'{text}" if value.startswith(FORMULA) else text
-
-
-def known_or_none(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
-    """A value, None for a number that is not finite."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value

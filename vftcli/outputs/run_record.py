@@ -121,8 +121,8 @@ def seal(
     return text
 
 
-def to_json(record: Mapping[str, Any]) -> str:
-    """A record as JSON text; what is not a finite number becomes null."""
+def to_json(record: Mapping[str, Any] | Sequence[Any]) -> str:
+    """A record, or rows, as JSON text; what is not a finite number becomes null."""
     text = json.dumps(jsonable(record), indent=2, ensure_ascii=False, allow_nan=False)
     return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
 

@@ -17,7 +17,7 @@ from vftcli.outputs.admittance_tables import (
     parameter_text,
     stability_grid,
 )
-from vftcli.outputs.grid import json_rows
+from vftcli.outputs.run_record import to_json
 
 
 def test_controllers_stand_under_each_other_by_axis_and_drag(release: Replay) -> None:
@@ -38,7 +38,7 @@ def test_an_overshoot_is_printed_in_per_cent_with_a_true_minus(release: Replay) 
 
 
 def test_rows_for_machines_are_not_rounded(release: Replay, tmp_path: Path) -> None:
-    rows = json.loads(json_rows(release.rows))
+    rows = json.loads(to_json(release.rows))
     assert rows == json.loads(json.dumps(list(release.rows)))
     for name, replay in (("full", release), ("empty", replace(release, drags=()))):
         write_admittance(tmp_path / name, replay, None)
