@@ -19,7 +19,8 @@ from vftcli.evaluation import WRENCH_SCHEMA
 from vftcli.observers.table import BEST
 from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.batch_folder import BatchFolder
-from vftcli.outputs.believability import grounds, health
+from vftcli.outputs.believability import grounds, log_line
+from vftcli.outputs.examination import rate_of
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.references import refuse_estimates
@@ -174,15 +175,15 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
 def log_facts(analysis: Analysis) -> dict[str, Any]:
     """Facts of a log as a whole, by the names of `OF_LOG`."""
     recording, found = analysis.recording, analysis.contacts
-    worst = health(grounds(analysis))
+    line = log_line(analysis, grounds(analysis))
     codes = [f.code for one in analysis.examinations[:1] for f in one.warnings]
     facts: dict[str, Any] = {
-        "robot": analysis.robot.name,
+        "robot": line.robot,
         "samples": recording.samples,
-        "duration_s": recording.duration,
-        "rate_hz": 1.0 / recording.median_step if recording.samples > 1 else None,
-        "health": worst.standing,
-        "reason": f"{worst.subject}: {worst.sentence}" if worst.standing != "good" else "sound",
+        "duration_s": line.duration,
+        "rate_hz": rate_of(recording),
+        "health": line.standing,
+        "reason": line.words,
         "findings": list(dict.fromkeys(codes)),
     }
     if found is None:
