@@ -78,6 +78,21 @@ def test_numbers_and_record_of_the_whole(
     assert len(text) == len(made)
 
 
+@pytest.mark.slow
+def test_the_wrench_of_seven_joints_comes_in_blocks_too(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """Before any estimate there is none to take the null space of: it was a traceback."""
+    words = "--robot", "panda", "--causal", "--wrench", "--observer", "gmo", "--anyway"
+    log = FIXTURE.with_name("panda_bearing.csv")
+    whole, _ = estimated(tmp_path / "whole", *words, log=log)
+    request.getfixturevalue("in_blocks")
+    made, _ = estimated(tmp_path / "blocks", *words, log=log)
+    for name in ("null_space/gmo", "wrench/gmo/fz"):
+        np.testing.assert_allclose(made[name], whole[name], rtol=0, atol=1e-9)
+    assert made["null_space/gmo"].max() > 0.0
+
+
 @pytest.mark.usefixtures("in_blocks")
 def test_interruption_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that ends in the middle of a log leaves no folder."""

@@ -178,16 +178,19 @@ def blueprint(
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     """One tab, in two columns if there are many plots; the first one's legend holds for all."""
-    views = []
+    # Plots of a family share their ends; each look at them goes through all samples.
+    families = {plot.families or plot.key: plot for plot in tab.plots}
+    ends_of, views = {family: tab.ends(plot) for family, plot in families.items()}, []
     for k, plot in enumerate(tab.plots):
+        ends = ends_of[plot.families or plot.key]
         # It would cover a corner; of a plot with points the title says it all.
         named = k == 0 and len(lines_of(plot)) == len(plot.series)
         view = rrb.TimeSeriesView(
             origin=plot.key,
-            name=drawable(title_of(tab, plot)),
+            name=drawable(title_of(tab, plot, ends)),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=named),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
-            axis_y=rrb.ScalarAxis(range=tab.ends(plot)),
+            axis_y=rrb.ScalarAxis(range=ends),
         )
         views.append(view)
     plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
@@ -201,11 +204,10 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     return rrb.Vertical(plots, log, row_shares=[2, 1], name=tab.name)
 
 
-def title_of(tab: Tab, plot: Chart) -> str:
+def title_of(tab: Tab, plot: Chart, ends: Span) -> str:
     """A plot's title; in small plots, where few ticks are labelled, with the axis' ends."""
-    low, high = tab.ends(plot)
-    ends = f", {low:.3g} to {high:.3g}" if len(tab.plots) > 3 else ""
-    return f"{plot.title} [{plot.units[0]}]{ends}"
+    span = f", {ends.low:.3g} to {ends.high:.3g}" if len(tab.plots) > 3 else ""
+    return f"{plot.title} [{plot.units[0]}]{span}"
 
 
 def send_plot(stream: Stream, plot: Chart) -> None:
