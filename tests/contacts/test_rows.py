@@ -101,6 +101,15 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
         np.testing.assert_allclose(J.T @ row.wrench, row.joint_torque, atol=1e-9)
         assert row.start < row.peak < row.stop
         assert row.trust == "good"
+    # The first lasts 4.560 to 4.792 s and has 75.2 N in truth. In blocks of 8 ms that is found to
+    # half a block of 24 ms, which would cut its peak to 71.8 N; the band is that of a longer push.
+    tap, _ = found.contacts
+    assert tap.course is not None
+    assert np.diff(tap.course.t) == pytest.approx(0.008)
+    assert (tap.start, tap.stop) == pytest.approx((4.560, 4.792), abs=0.012)
+    assert tap.peak_force == pytest.approx(75.2, abs=1.5)
+    assert tap.peak_band is not None
+    assert 5.0 < tap.peak_band < 12.0
 
 
 def test_a_size_is_as_sure_as_its_place() -> None:
