@@ -381,3 +381,26 @@ def test_bench_is_a_former_word(run) -> None:
     assert code == 0, err
     assert "note: bench is now benchmark speed" in err
     assert "dynamics" in out
+
+
+def test_times_are_printed_in_the_form_that_is_asked_for(
+    run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = {"total_s": 1.5, "per_sample_us": 1250.0}
+    made = {
+        **{"simd": "AVX9", "robot": "ur5", "samples": 30_060, "rounds": 7, "dynamics": row},
+        "observers": [{"name": "gmo", **row, "paper_s": 10.541}],
+        **{"complete_log": [], "ratios": {"even": 1.234, "jittering": 2.345}},
+    }
+    monkeypatch.setattr("vftcli.reproduction.timing.benchmark", lambda *_: made)
+    title = "ur5, 30060 samples, median of 7 rounds, NumPy with AVX9"
+    code, out, _ = run("benchmark", "speed")
+    assert (code, out.splitlines()[0]) == (0, title)
+    assert out.splitlines()[-2].startswith("Dynamics with four observers take 1.23 of the time")
+    assert out.splitlines()[-1].startswith("2.35 on a clock that jitters")
+    assert json.loads(run("benchmark", "speed", "--json")[1])["ratios"] == made["ratios"]
+    for form, begins in (("--markdown", "Computing time: "), ("--latex", "\\begin{table}")):
+        out = run("benchmark", "speed", form)[1]
+        assert begins in out
+        assert title in out.replace("\\_", "_")
+    assert run("benchmark", "speed", "--csv")[0] == 2
