@@ -8,7 +8,14 @@ from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ForceCourse
-from vftcli.outputs.screen import Canvas, column_peaks, force_bars, forces_of_list, seconds
+from vftcli.outputs.screen import (
+    Canvas,
+    column_peaks,
+    force_bars,
+    forces_of_list,
+    placed,
+    seconds,
+)
 from vftcli.signals.arrays import Array
 
 T = np.linspace(2.0, 20.0, 1801)
@@ -89,3 +96,10 @@ def risen(start: float, stop: float, peak: float) -> ForceCourse:
 def test_without_forces_there_are_no_bars(without_reference: Analysis) -> None:
     assert forces_of_list(replace(without_reference, contacts=None)) is None
     assert forces_of_list(replace(without_reference, contacts=contact_list())) is None
+
+
+def test_texts_have_a_blank_between_and_room_to_the_end() -> None:
+    """A line is eight letters longer than what is drawn above it."""
+    texts = [(0, "a"), (2, "b"), (3, "c"), (60, "x" * 9)]
+    assert placed(texts, 60) == "a b"
+    assert placed([(60, "x" * 7)], 60) == " " * 60 + "x" * 7

@@ -295,6 +295,17 @@ def test_a_ground_is_a_mark_a_subject_and_a_sentence_with_its_remedy_below(
     assert list(ground_lines(ground, Canvas(width=72), most, about)) == lines
 
 
+@pytest.mark.parametrize(
+    ("most", "good", "caution"), [(None, 3, 3), (3, 2, 3), (2, 1, 2), (1, 1, 1)]
+)
+def test_a_good_ground_has_a_line_less_than_others_and_one_at_least(
+    most: int | None, good: int, caution: int
+) -> None:
+    for standing, lines in (("good", good), ("caution", caution)):
+        ground = WAITS._replace(standing=standing, remedy=None)
+        assert len(belief_lines([ground], Canvas(width=72), most)) == 1 + lines
+
+
 HEADS = "  #  from – to [s]    |F| [N]  range  direction  where  trust"
 ROW = "  {0}    {0}.00 –   4.78   5{0} ± 7  57–78  +y, down   wrist  fair"
 EACH = [*map(ROW.format, (1, 2, 3))]
