@@ -41,6 +41,8 @@ def test_an_unknown_force_has_no_arrow(tmp_path: Path) -> None:
         [],
         [[0.0, 0.0, -2.0]],
     ]
+    radii = np.concatenate(rows_of(tmp_path / "r.rrd", "/force", "Arrows3D:radii"))
+    assert 0.005 < radii.min() == radii.max() < 0.03  # thinner than a link, seen beside it
 
 
 def test_capsules_point_where_they_should(tmp_path: Path) -> None:

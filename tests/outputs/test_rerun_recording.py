@@ -7,16 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun.chunk
+from contact_rows import contact, contact_list
 from rerun_rows import rows_of
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import FULL, LEVELS
+from vftcli.outputs.contacts import answer
 from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
-from vftcli.outputs.rerun_recording import force_arrow, plot_groups, tabs_of, write_rrd
+from vftcli.outputs.rerun_recording import contact_log, force_arrow, plot_groups, tabs_of, write_rrd
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.choice import RobotChoice
+from vftcli.signals.remarks import Where, caution
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 from vftcli.wrench.frames import frame_pose
@@ -211,3 +214,14 @@ def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_beg
             assert len(plot.x) < len(whole[plot.key].x) == len(t)
             ends = tab.ends(plot._replace(families=()))
             assert ends == tab.ends(whole[plot.key]._replace(families=()))  # no spike is lost
+
+
+def test_a_line_of_the_log_stands_at_the_time_that_it_is_about() -> None:
+    """A contact at its start, a remark at the start of its span, else at the log's."""
+    there = caution("arm-stopped-abruptly", Where(span=(3.0, 4.0)), at_s=3.0)
+    found = contact_list(contact(start=1.5), remarks=(there, caution("contact-is-load")))
+    lines = contact_log(found)
+    assert [line[1] for line in lines] == [1.5, 3.0, 0.0]
+    assert [line[0] for line in lines] == ["/contacts/1", "/remarks", "/remarks"]
+    (nothing,) = contact_log(contact_list(remarks=()))
+    assert nothing[:3] == ("/remarks", 0.0, answer(contact_list()))
