@@ -17,6 +17,7 @@ from vftcli.outputs.figures import (
     TUNED_FIGURES,
     error_figures,
     log_figures,
+    plot,
     tuned_figures,
     write_tuned,
 )
@@ -108,6 +109,17 @@ def test_errors_are_drawn_as_the_table_has_them(pushed: Analysis) -> None:
     order = list(dict.fromkeys(errors["observer"].drop_nulls()))
     dots = axes.containers[order.index("fdo")].lines[0].get_ydata()
     np.testing.assert_array_equal(dots, rows.sort("joint")["rmse_Nm"].to_numpy())
+
+
+@pytest.mark.parametrize(
+    ("joints", "observers", "dots", "ticks"),
+    [(None, "fdo", 1, 6), ([2], None, 5, 1), (3, ["fdo", "gmo"], 2, 1)],
+)
+def test_errors_of_chosen_joints_and_observers_alone_are_plotted(
+    analysis: Analysis, joints: object, observers: object, dots: int, ticks: int
+) -> None:
+    (axes,) = plot(analysis, "errors", joints, observers).axes  # type: ignore[arg-type]
+    assert (len(axes.containers), len(axes.get_xticks())) == (dots, ticks)
 
 
 def test_of_many_logs_only_what_stands_for_all_is_drawn(pushed: Analysis) -> None:
