@@ -8,6 +8,8 @@ from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
+from vftcli.wrench.frames import Mounting
 from vftcli.wrench.solvers import (
     LEAST_SIGMA,
     PRIOR,
@@ -222,3 +224,18 @@ def test_a_five_joint_arm_is_refused() -> None:
 def test_an_unknown_solver_lists_those_there_are() -> None:
     with pytest.raises(ParameterError, match=r"no solver 'svd'.*pinv, map"):
         VirtualSensor(solver="svd")
+
+
+@pytest.mark.parametrize("frame", ["base", "flange", "tool"])
+def test_a_force_acts_at_the_point_of_its_frame_along_its_axes(frame: str) -> None:
+    """A tool of 3-4-0 cm that is turned by a quarter about the flange's z axis."""
+    tool = Pose(rpy_matrix((0.0, 0.0, 0.5 * np.pi)), np.array([0.03, 0.04, 0.0]))
+    chain, q = load_robot("ur5").chain, np.random.default_rng(4).uniform(-2.0, 2.0, (3, 6))
+    force, poses = np.tile([1.0, 2.0, 3.0], (3, 1)), link_poses(chain, q)
+    found = VirtualSensor(frame=frame, mounting=Mounting(tool=tool)).arrow(force, q, chain)
+    fixed = tool if frame == "tool" else IDENTITY
+    for k, (R, p) in enumerate(zip(poses.rotation[:, -1], poses.translation[:, -1], strict=True)):
+        there = Pose(R, p) @ fixed
+        np.testing.assert_allclose(found[0][k], there.translation, atol=1e-14)
+        along = force[k] if frame == "base" else there.rotation @ force[k]
+        np.testing.assert_allclose(found[1][k], along, atol=1e-14)
