@@ -125,12 +125,13 @@ class Losing:
     """A client of a cluster of two workers that loses them: what `Workers` sees of one."""
 
     def __init__(self, *, own: bool) -> None:
-        self.there, self.specified = 2, [0, 1]
+        self.there, self.specified, self.asked = 2, [0, 1], 0
         self.cluster = self if own else None
 
     worker_spec = property(lambda self: self.specified)
 
     def nthreads(self) -> dict[int, int]:
+        self.asked += 1
         return dict.fromkeys(range(self.there), 1)
 
     def scale(self, size: int) -> None:
@@ -145,6 +146,9 @@ def test_workers_that_stay_away_are_replaced_so_often_and_only_on_this_machine(
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     client = Losing(own=own)
     workers = Workers(client)  # type: ignore[arg-type]
+    for now[0] in (1.0, 4.9):  # they were counted when it began
+        workers.look()
+    assert client.asked == 1
     client.there = 1
     for now[0] in range(0, 600, 5):
         workers.look()
