@@ -11,6 +11,7 @@ from vftcli.signals.external_torque import DynamicsTerms
 
 R, Q_P, Q_TAU = np.array([0.5, 1.3]), np.array([0.01, 0.02]), np.array([5000.0, 5000.0])
 STEP = 0.008
+WIDE = 1e9  # [(N·m·s)², (N·m)²]
 
 MakesTerms = Callable[..., DynamicsTerms]
 
@@ -21,11 +22,16 @@ def smoother(scheme: str = "fe", convention: str = "density", **more: object) ->
 
 
 def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
-    """Forward filter and backward smoother with full 2n-state matrices, as in any textbook."""
+    """Forward filter and backward smoother with full 2n-state matrices, as in any textbook.
+
+    Without a covariance of the user's the first state may be anything: `WIDE` is its variance.
+    """
     f, n, clock = smooth.filter, log.joints, log.clock
     eye, zero = np.eye(n), np.zeros((n, n))
     C, whole = np.hstack([eye, zero]), np.eye(2 * n)
     prior = f.first_prior(clock.step, n)
+    if f.initial_covariance is None:
+        prior = prior._replace(p11=prior.p11 + WIDE, p22=prior.p22 + WIDE)
     P = np.block(
         [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
     )
@@ -62,12 +68,19 @@ def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, n
 def test_agrees_with_a_dense_textbook_smoother(
     scheme: str, convention: str, jitter: float, wandering: MakesTerms
 ) -> None:
-    smooth, log = smoother(scheme, convention), wandering(700, jitter, joints=2)
-    tau, sd = dense_rts(smooth, log)
-    estimate = smooth.estimate(log)
+    log = wandering(700, jitter, joints=2)
+    plain = smoother(scheme, convention)
+    start = np.array(plain.filter.first_prior(log.clock.step, 2))
+    given = smoother(scheme, convention, initial_covariance=start)
+    tau, sd = dense_rts(given, log)
+    estimate = given.estimate(log)
     # the same answer through another recursion: rounding at values of some 100 N·m
     np.testing.assert_allclose(estimate.tau, tau, atol=1e-10, rtol=0)
     np.testing.assert_allclose(estimate.sd, sd, rtol=1e-9)
+    wide_tau, wide_sd = dense_rts(plain, log)
+    # the dense one rounds at `WIDE`, 1e-7 (N·m)² beside variances of .001 to 1000
+    np.testing.assert_allclose(plain.estimate(log).tau, wide_tau, atol=2e-6, rtol=0)
+    np.testing.assert_allclose(plain.estimate(log).sd, wide_sd, rtol=5e-4)
 
 
 def test_agrees_with_the_dense_smoother_from_a_users_covariance(wandering: MakesTerms) -> None:
@@ -82,20 +95,37 @@ def test_agrees_with_the_dense_smoother_from_a_users_covariance(wandering: Makes
     assert np.max(np.abs(smooth.estimate(log).tau[:5] - plain.estimate(log).tau[:5])) > 1e-3
 
 
-def test_a_constant_torque_and_a_ramp_are_recovered_without_bias() -> None:
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_a_constant_torque_is_known_from_the_first_sample_to_the_last(
+    scheme: str, jitter: float
+) -> None:
+    """Whatever was there before the log: 3 and 50 N·m at sample 0, none of it wandered."""
+    rng = np.random.default_rng(4)
+    t = STEP * (np.arange(1000) + jitter * rng.uniform(-0.5, 0.5, 1000))
+    truth = np.array([3.0, 50.0])
+    p = (t - t[0])[:, None] * truth
+    estimate = smoother(scheme).estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
+    # no noise, no error: rounding of p, some 100 N·m·s, over the time constant of .1 s
+    np.testing.assert_allclose(estimate.tau, np.tile(truth, (1000, 1)), atol=1e-9, rtol=0)
+    noisy = p + np.sqrt(R / STEP) * rng.standard_normal(p.shape)
+    estimate = smoother(scheme).estimate(DynamicsTerms(t=t, p=noisy, mu=np.zeros_like(p)))
+    assert estimate.sd is not None
+    assert np.all(np.abs(estimate.tau[0] - truth) < 1.96 * estimate.sd[0])
+
+
+def test_a_ramp_is_recovered_without_bias() -> None:
     t = np.arange(4000) * STEP
-    for p, truth in ((t * 3.0, np.full_like(t, 3.0)), (0.5 * t**2, t)):
-        log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((4000, 2)))
-        estimate = smoother("zoh").estimate(log).tau
-        middle = slice(1500, 2500)
-        # Forward Euler would lead a ramp by half a sample, for want of the hold's Q₁₂. Either end
-        # is 12 s away, more than a hundred time constants of 0.1 s.
-        np.testing.assert_allclose(
-            estimate[middle], np.repeat(truth[middle, None], 2, 1), rtol=1e-9
-        )
+    p = 0.5 * t**2
+    log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((4000, 2)))
+    estimate = smoother("zoh").estimate(log).tau
+    middle = slice(1500, 2500)
+    # Forward Euler would lead a ramp by half a sample, for want of the hold's Q₁₂. Either end
+    # is 12 s away, more than a hundred time constants of 0.1 s.
+    np.testing.assert_allclose(estimate[middle], np.repeat(t[middle, None], 2, 1), rtol=1e-9)
 
 
-def test_in_the_middle_of_a_log_it_is_symmetric_in_time() -> None:
+def test_it_is_symmetric_in_time() -> None:
     """A torque turned round in time gives the estimate turned round: no delay, no lead."""
     samples = 4001
     t = np.arange(samples) * STEP
@@ -104,10 +134,13 @@ def test_in_the_middle_of_a_log_it_is_symmetric_in_time() -> None:
     for series in (tau, tau[::-1]):
         p = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (series[1:] + series[:-1]))])
         log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((samples, 2)))
-        answers.append(smoother("zoh").estimate(log).tau)
-    middle = slice(1000, 3000)
-    # both ends are 8 s away, 80 time constants
-    np.testing.assert_allclose(answers[0][middle], answers[1][::-1][middle], atol=1e-9)
+        answers.append(smoother("zoh").estimate(log))
+    ahead, back = answers
+    assert ahead.sd is not None
+    assert back.sd is not None
+    # At either end too: neither side of a log is known.
+    np.testing.assert_allclose(ahead.tau, back.tau[::-1], atol=1e-9)
+    np.testing.assert_allclose(ahead.sd, back.sd[::-1], rtol=1e-9)
 
 
 def test_frequency_response_is_that_of_the_two_sided_filter() -> None:

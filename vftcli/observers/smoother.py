@@ -8,7 +8,8 @@ the innovations ν and inverts only numbers:
 
 with P the filter's posterior and S its innovation variance. In the long run it is the
 two-sided filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap: it
-knows the future.
+knows the future. Nothing is known before the first sample, as nothing is behind the last: of the
+forward filter, which starts at rest, the start is estimated too, x̂ₛ⁰ = x̂⁰ − M⁻¹λ̃⁰.
 
 References:
     H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
@@ -58,12 +59,18 @@ class KalmanSmoother(Shown):
         # νᵗ = dᵗ + eᵗ⁻¹ − A₁₂ᵗτ̂ᵗ⁻¹
         ahead = a12 if even else np.roll(a12, -1, axis=0)
         wanted = [TORQUE, np.array([np.ones_like(a12), -ahead])]
-        (tau, late), _ = filtered(*error_filter(gains, model), d, np.zeros((2, n)), wanted)
-        nu = d.copy(order="K")
-        nu[1:] += late[:-1]
-        F = closed_loop(gains, model)
+        F, (of_error, g) = closed_loop(gains, model), error_filter(gains, model)
         b = -np.array([np.ones_like(a12), a12])
-        tau -= from_the_end(F.swapaxes(0, 1), b, nu / S, np.array([p12, p22]))
+
+        def smoothed(d: Array, start: Array) -> tuple[Array, Array]:
+            """Torque (T, n) after e, τ̂ before the first sample, and λ̃ at that. (2, n) each"""
+            (tau, late), _ = filtered(of_error, g, d, start, wanted)
+            nu = d.copy(order="K")
+            nu[1:] += late[:-1]
+            later, first = from_the_end(F.swapaxes(0, 1), b, nu / S, np.array([p12, p22]))
+            return tau - later, first
+
+        tau, score = smoothed(d, np.zeros((2, n)))
         # Λ̃ᵗ = Fᵀ(Λ̃ᵗ⁺¹)F + AᵀCᵀCA/S of its entries 11, 12, 22; P₂₂ less [P₁₂ P₂₂] Λ̃
         # [P₁₂ P₂₂]ᵀ
         (f11, f12), (f21, f22) = F
@@ -74,10 +81,21 @@ class KalmanSmoother(Shown):
                 [f12 * f12, 2.0 * f12 * f22, f22 * f22],
             ]
         )
-        g = np.array([np.ones_like(a12), a12, a12**2]) / S
+        shown = np.array([np.ones_like(a12), a12, a12**2]) / S
         weights = np.array([p12**2, 2.0 * p12 * p22, p22**2])
-        gained = from_the_end(information, g, np.ones_like(tau), weights)
-        sd = handed_over(np.sqrt(p22 - gained))
+        gained, known = from_the_end(information, shown, np.ones_like(tau), weights)
+        variance = p22 - gained
+        if kalman.initial_covariance is None and len(d) > 1 and model.a22.all():
+            # Whatever was before the log: x⁰ is x̂⁰ − M⁻¹λ̃⁰ ± M⁻¹, M = Λ̃⁰ + S/R² of p⁰ alone.
+            first = np.s_[...] if even else np.s_[..., 0, :]
+            known[0] += (S / model.r**2)[first]
+            spread = np.linalg.inv(known[[[0, 1], [1, 2]]].T)
+            # e = p − p̂
+            start = np.linalg.inv(of_error[first].T).T * np.array([[[-1.0], [1.0]]])
+            units = np.array([smoothed(np.zeros_like(d), start[:, k])[0] for k in range(2)])
+            tau -= np.einsum("itn,nij,jn->tn", units, spread, score)
+            variance = variance + np.einsum("itn,nij,jtn->tn", units, spread, units)
+        sd = handed_over(np.sqrt(variance))
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=sd)
 
     def tuning(self, step: float, joints: int) -> Tuning:
@@ -100,13 +118,13 @@ class KalmanSmoother(Shown):
         return (1.0 / (1.0 + c * x**2 + x**4)).astype(np.complex128)
 
 
-def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> Array:
-    """weights·y_{t+1} of y_t = F_t y_{t+1} + g_t d_t, from zero at a log's end. (T, n)"""
+def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, Array]:
+    """weights·y_{t+1} of y_t = F_t y_{t+1} + g_t d_t, zero at the end; y_1. (T, n), (m, n)"""
     if F.ndim == 4:
-        F, g, weights = F[:, :, ::-1], g[:, ::-1], np.roll(weights, 1, axis=1)[:, ::-1]
-    (found,), _ = filtered(F, g, d[::-1], np.zeros((len(F), d.shape[1])), [weights])
-    found[-1] = 0.0
-    return np.roll(found[::-1], -1, axis=0)
+        F, g, weights = F[:, :, :0:-1], g[:, :0:-1], weights[:, -2::-1]
+    start = np.zeros((len(F), d.shape[1]))
+    (found,), first = filtered(F, g, d[:0:-1], start, [weights])
+    return np.concatenate([found[::-1], start[:1]]), first
 
 
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
