@@ -1,7 +1,7 @@
 """The closed loop: the online filter is the batch one; latencies; aliasing; the bearing.
 
-The quick tests push for a moment, the slow ones run the first drag of one seed, the statistical one
-the Panda's assembly; all seeds of drags and twists are in the document of the reproduction.
+The quick tests push for a moment, the slow ones run the first drag of one seed; all five seeds and
+the Panda's assembly are marked statistical.
 """
 
 from dataclasses import replace
@@ -170,6 +170,26 @@ def test_a_step_that_divides_the_period_stays(loop: ClosedLoop) -> None:
 def test_wrong_torque_is_refused() -> None:
     with pytest.raises(ParameterError, match="average or instant"):
         run("ur5-drag", "density", duration=0.1, torque="guessed")
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("convention", WINDOWS)
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_five_seeds_are_stable_and_inside_the_windows(convention: str, seed: int) -> None:
+    loop = run("ur5-drag", convention, seed=seed)
+    assert loop.stable
+    low, high = WINDOWS[convention]
+    entry = latencies(loop)[0]
+    assert entry.motion is not None
+    assert low <= entry.motion <= high
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("convention", WINDOWS)
+def test_twist_is_stable_and_returns(convention: str) -> None:
+    loop = run("ur5-twist", convention)
+    assert loop.stable
+    assert np.nanmax(np.abs(loop.commanded[:, 3:])) > 0.1
 
 
 @pytest.mark.statistical

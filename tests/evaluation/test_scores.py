@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import vftcli as vft
 from vftcli.evaluation.errors import evaluate, joint_means
 from vftcli.evaluation.scores import LAGS, Score, episodes, lag_sums, parts_of
 from vftcli.signals.arrays import Array
@@ -90,6 +91,18 @@ def test_scores_are_those_of_plain_loops(banded: bool) -> None:
     inside = estimate.t > 3.0
     expected = oracle(estimate.t, estimate.tau, truth, inside, estimate.error_sd)
     assert scored(estimate, truth, inside) == pytest.approx(expected, nan_ok=True, **CLOSE)
+
+
+@pytest.mark.slow
+def test_scores_of_what_a_log_gives() -> None:
+    """Every observer's torque and band, against another's torque."""
+    estimates = {e.name: e for e in vft.estimate(FIXTURE, "ur5").estimates}
+    truth = estimates["fdo"].tau
+    for name in ("best", "gmo", "kfo-fe"):
+        each = estimates[name]
+        expected = oracle(each.t, each.tau, truth, each.t >= 1.0, each.error_sd)
+        found = scored(each, truth, each.t >= 1.0)
+        assert found == pytest.approx(expected, nan_ok=True, **CLOSE)
 
 
 def test_the_truth_is_perfect_and_nothing_is_zero() -> None:

@@ -9,7 +9,7 @@ import pytest
 from vftcli.robots import Payload, load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.arm import build_arm
+from vftcli.simulation.arm import build_arm, deviate
 from vftcli.simulation.plant import true_friction
 from vftcli.simulation.scenario import MismatchSpec
 
@@ -19,6 +19,14 @@ UR5 = load_robot("ur5")
 def arm(*settings):
     """The arm of a UR5 scenario with these settings."""
     return build_arm(load_scenario("ur5-circle", settings), UR5, np.random.default_rng(1))
+
+
+def test_deviates_are_normal_and_cut_at_two():
+    draw = deviate(np.random.default_rng(0), 0.1, (20000,))
+    assert np.max(np.abs(draw)) == pytest.approx(0.2)
+    # cutting at 2σ takes σ to 0.96 of itself; 20000 draws tell 0.5 % of it
+    assert np.std(draw) == pytest.approx(0.096, rel=0.02)
+    assert np.mean(draw) == pytest.approx(0.0, abs=0.002)
 
 
 SIZES = {

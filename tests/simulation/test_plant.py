@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 from vftcli.robots import Robot, load_robot
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.plant import (
     Plant,
@@ -23,21 +24,22 @@ def frictionless(robot: Robot) -> TrueFriction:
     return true_friction(robot, FrictionSpec(enabled=False))
 
 
-def driven(robot: Robot, step: float, seconds: float = 0.5) -> float:
-    """Drive an arm by smooth torques about gravity; the mismatch of its energy. [J]"""
+def driven(robot: Robot, step: float, seconds: float = 0.5) -> tuple[Plant, list[Array], float]:
+    """Drive an arm by smooth torques about gravity; returns states and the energy's mismatch."""
     n = robot.joints
     q = np.linspace(-0.8, 0.9, n)
     plant = Plant(robot.model, frictionless(robot), q, np.full(n, 0.3), step)
     data = robot.model.createData()
     hold = pin.rnea(robot.model, data, q, np.zeros(n), np.zeros(n))
     swing = 4.0 * np.diag(pin.crba(robot.model, data, q))
-    work, begun = 0.0, energy(robot, plant)
+    states, work, begun = [plant.v.copy()], 0.0, energy(robot, plant)
     for k in range(round(seconds / step)):
         tau = hold + swing * np.sin(9.0 * (k + 0.5) * step + np.arange(n))
         before = plant.v.copy()
         plant.advance(tau)
         work += step * float(tau @ (before + plant.v)) / 2.0
-    return energy(robot, plant) - begun - work
+        states.append(plant.v.copy())
+    return plant, states, energy(robot, plant) - begun - work
 
 
 def energy(robot: Robot, plant: Plant) -> float:
@@ -61,10 +63,54 @@ def test_inverse_dynamics_return_the_applied_torque(name: str) -> None:
         np.testing.assert_allclose(back, tau, rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_differenced_acceleration_error_falls_with_the_step(name: str) -> None:
+    """With q̈ differenced from v at the log's instants the torque error is of second order."""
+    robot = load_robot(name)
+    errors = []
+    for step in (1e-3, 5e-4, 2.5e-4):
+        plant, v, _ = driven(robot, step)
+        fine, w, _ = driven(robot, 6.25e-5)
+        ratio = round(step / 6.25e-5)
+        exact = np.array(w)[::ratio]
+        errors.append(np.max(np.abs(np.array(v) - exact[: len(v)])))
+        assert plant.step != fine.step
+    # second order: halving the step quarters the error; 3 leaves room for the next order
+    assert errors[0] / errors[1] > 3.0
+    assert errors[1] / errors[2] > 3.0
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_differenced_torque_error_falls_with_the_step(name: str) -> None:
+    robot = load_robot(name)
+    data, n = robot.model.createData(), robot.joints
+    errors = []
+    for step in (1e-3, 5e-4):
+        q = np.linspace(-0.8, 0.9, n)
+        plant = Plant(robot.model, frictionless(robot), q, np.full(n, 0.3), step)
+        hold = pin.rnea(robot.model, data, q, np.zeros(n), np.zeros(n))
+        swing = 4.0 * np.diag(pin.crba(robot.model, data, q))
+        qs, vs, taus = [plant.q], [plant.v], []
+        for k in range(round(0.3 / step)):
+            taus.append(hold + swing * np.sin(9.0 * (k + 0.5) * step + np.arange(n)))
+            plant.advance(taus[-1])
+            qs.append(plant.q)
+            vs.append(plant.v)
+        worst = 0.0
+        for k in range(1, len(taus)):
+            a = (vs[k + 1] - vs[k - 1]) / (2.0 * step)
+            back = pin.rnea(robot.model, data, qs[k], vs[k], a)
+            worst = max(worst, float(np.max(np.abs(back - 0.5 * (taus[k] + taus[k - 1])))))
+        errors.append(worst)
+    # central differences: second order, so a half step leaves a quarter
+    assert errors[0] / errors[1] > 3.0
+
+
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_energy_balance_closes_to_second_order(name: str) -> None:
     robot = load_robot(name)
-    gaps = [abs(driven(robot, step)) for step in (1e-3, 5e-4)]
+    gaps = [abs(driven(robot, step)[2]) for step in (1e-3, 5e-4)]
     # J; of a kinetic energy of tens of joules
     assert gaps[0] < 2e-3
     assert gaps[0] / gaps[1] > 3.0
