@@ -258,3 +258,11 @@ def test_gaps_are_counted_over_all_blocks(in_blocks: InBlocks) -> None:
     whole = MomentumObserver(gain=10.0).estimate(log)
     assert remarks == whole.remarks
     np.testing.assert_allclose(tau, whole.tau, atol=1e-12)
+
+
+def test_the_filter_loses_three_decibels_at_its_bandwidth() -> None:
+    """The bilinear transform warps it: tan(π f Ts) = K·Ts/2; for short steps it is K/2π."""
+    slow, fine = (MomentumObserver(gain=10.0).tuning(step, 2) for step in (0.008, 1e-6))
+    np.testing.assert_allclose(np.tan(np.pi * slow.bandwidth * 0.008), 0.04, rtol=1e-12)
+    np.testing.assert_allclose(fine.bandwidth, 10.0 / (2.0 * np.pi), rtol=1e-9)
+    np.testing.assert_allclose(slow.delay, 0.1, rtol=1e-15)

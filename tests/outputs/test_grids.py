@@ -71,6 +71,7 @@ def test_a_robot_in_full_has_its_gains_notes_sources_and_payloads() -> None:
     ]  # fmt: skip
     assert lines[-1] == "payloads: franka_hand (--payload NAME)"
     assert repr(panda) == "<Robot panda: 7 joints, logs link torque, friction sigmoid>"
+    assert "<td>J1 joint1</td>" in panda._repr_html_()
     hand = panda.with_payload(panda.payloads["franka_hand"])
     assert repr(hand).endswith("friction sigmoid, payload 0.73 kg>")
 
