@@ -73,6 +73,13 @@ def test_velocities_far_off_refuse_and_nearer_ones_are_not_relied_on(
     assert made.distrusts == distrusts
 
 
+def test_beside_a_joint_without_effort_no_size_is_relied_on() -> None:
+    log = moving()
+    made = examine(replace(log, current=log.require("current") * [1, 1, 0, 1, 1, 1]), UR10E)
+    assert made.distrusts
+    assert not made.refusals()
+
+
 def test_a_clock_of_another_rate_refuses() -> None:
     log = moving()
     made = examine(replace(log, t=1.05 * log.t), UR10E)

@@ -214,6 +214,7 @@ def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
     ("name", "text", "words"),
     [
         ("arm.sdf", "<sdf version='1.9'/>", "an SDF; take the robot's URDF, or convert it"),
+        ("arm.xml", '<mujoco><body quat="0 0 0 0"/></mujoco>', "body quat is of zeros only"),
         ("arm.xml", "<mujocoinclude/>", "a part of an MJCF; take the file that includes it"),
         ("arm.urdf", "<COLLADA/>", "a mesh; take the URDF that names it"),
     ],

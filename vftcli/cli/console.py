@@ -174,11 +174,13 @@ class LeftOut:
 
 def say_recording(recording: "Recording") -> None:
     """In details: one line on what was read, then what was repaired or looks odd."""
+    from vftcli.outputs.quantity import counted
+
     source = recording.source
     rate = f", {1.0 / recording.median_step:.4g} Hz" if recording.samples > 1 else ""
     detail(
         f"{recording.name}: {source.format}, {recording.joints} joints, "
-        f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
+        f"{counted(recording.samples, 'sample')}, {recording.duration:.1f} s{rate}"
     )
     # Which part of a file is read is said with the health of the log.
     others = [remark for remark in source.remarks if remark.code not in PARTS]

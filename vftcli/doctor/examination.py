@@ -78,8 +78,8 @@ class Examination(Shown):
 
     @property
     def distrusts(self) -> bool:
-        """Whether the velocities are not the motion's, so no contact's size is reliable."""
-        return any(finding.code in MISTIMED for finding in self.warnings)
+        """Whether velocities are not the motion's or an effort is none: no size is reliable."""
+        return any(f.code in MISTIMED | {"zero-effort", "stuck-effort"} for f in self.warnings)
 
     @property
     def load(self) -> tuple[float, float] | None:

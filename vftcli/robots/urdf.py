@@ -191,6 +191,10 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
             f"{path}: includes {part.get('file')!r}, which Pinocchio would leave out; have MuJoCo "
             "write it as one file (mj_saveLastXML)"
         )
+    for part in root.iter():
+        words = part.get("quat", "").split()
+        if words and all(NUMBER.fullmatch(word) and float(word) == 0.0 for word in words):
+            raise RobotError(f"{path}: {part.tag} quat is of zeros only, which is no rotation")
     pin = needed(
         "pinocchio",
         f"{path}: an MJCF",
