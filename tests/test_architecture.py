@@ -269,14 +269,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 54_688,
-    "files": 241,
-    "functions": 2933,
+    "lines of Python": 54_414,
+    "files": 240,
+    "functions": 2925,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 391_240,
+    "names, operators, numbers": 389_658,
     "characters a line that is not blank": 50.92,
     "noqa": 95,
-    "lines of TOML, JavaScript, CSS": 7464,
+    "lines of TOML, JavaScript, CSS": 7463,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 

@@ -1,9 +1,10 @@
 """One call a question, for notebooks: what a command answers, as objects.
 
-A log is a file, a bag's folder or a `Recording`; a robot is a profile's name, a file, or a `Robot`.
-Keywords are the options of the command without their dashes, made of the fields that own them;
-``settings={"two-cycle.low-pass": 5}`` takes every setting. What comes back shows itself as one line
-and as a small table. Nothing is printed, and nothing is written without ``output=``.
+A log is a file, a bag's folder or a `Recording`; a robot is a profile's name, a file, or
+a `Robot`. Keywords are the options of the command without their dashes, made of the
+fields that own them; ``settings={"two-cycle.low-pass": 5}`` takes every setting. What
+comes back shows itself as one line and as a small table. Nothing is printed, and nothing
+is written without ``output=``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -195,9 +195,10 @@ def reasons(recording: Recording) -> dict[str, str]:
 
 #: Begins a file of options.
 HEADING = """\
-# Options of every command that reads a log, as they are typed, without their dashes. What is typed
-# goes before them; --config none leaves them out. Files are named from this file's folder on.
-# Tables hold what is for one command, as [compare], or settings. More: vftcli help config
+# Options of every command that reads a log, as they are typed, without their dashes. What
+# is typed goes before them; --config none leaves them out. Files are named from this
+# file's folder on. Tables hold what is for one command, as [compare], or settings. More:
+# vftcli help config
 """
 WIDTH = 98  #: Letters of a reason's line.
 

@@ -72,7 +72,8 @@ class AxisMotion:
 class Recursion:
     """The state of N controllers and one step of their motion, semi-implicit Euler (49)–(51).
 
-    Deviations x [m, rad], velocities v [m/s, rad/s] and where the speed limit acted are (N, 6).
+    Deviations x [m, rad], velocities v [m/s, rad/s] and where the speed limit acted are
+    (N, 6).
     """
 
     def __init__(

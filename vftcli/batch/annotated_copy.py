@@ -150,7 +150,8 @@ def planned(
 ) -> Iterator[list[EpisodesTask]]:
     """The episodes in groups that go to a worker together, while workers do the first of them.
 
-    Puts down in `rows` the files in which a data file's columns are, in `sources` its sha256.
+    Puts down in `rows` the files in which a data file's columns are, in `sources` its
+    sha256.
     """
     group: list[EpisodesTask] = []
     for file in dataset.files():

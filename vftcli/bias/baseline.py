@@ -52,7 +52,8 @@ class Baseline:
     def of(self, run: Run) -> Run:
         """The log or one of its free runs, as the observers have it. Made once.
 
-        Where a correction was looked for, an observer has no samples that stand alone either.
+        Where a correction was looked for, an observer has no samples that stand alone
+        either.
         """
         if not self.on_correction:
             return run

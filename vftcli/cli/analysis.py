@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
 #: Arrays from this size on have memory of their own, which goes back with them. [bytes]
 #:
-#: Each page of such memory has to be found and cleared anew: of smaller arrays, which come by the
-#: thousand, that took a third of the time of an hour's report and made its peak no lower.
+#: Each page of such memory has to be found and cleared anew: of smaller arrays, which
+#: come by the thousand, that took a third of the time of an hour's report and made its
+#: peak no lower.
 LARGE = 1 << 24
 
 #: The number by which the C library knows the size from which memory is mapped.

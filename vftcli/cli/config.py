@@ -1,7 +1,8 @@
 """Options kept in a TOML file: ``--config FILE``, or `vftcli.toml` in the working folder.
 
-Its values become words behind the typed ones, which go before them, so that they are read and
-checked as if they were typed. What is used is said, and is in the command line of `run.json`.
+Its values become words behind the typed ones, which go before them, so that they are read
+and checked as if they were typed. What is used is said, and is in the command line of
+`run.json`.
 """
 
 import shlex
@@ -36,7 +37,8 @@ Table = dict[str, Any]  #: A table of TOML.
 FILE = "file:"  #: What a reference's file begins with.
 
 
-#: The words of this call: former ones by what they are now, and what a file of options gave it.
+#: The words of this call: former ones by what they are now, and what a file of options
+#: gave it.
 WORDS: ContextVar[Sequence[str]] = ContextVar("words", default=())
 #: The file of options that this call reads, None for none.
 READ: ContextVar[Path | None] = ContextVar("read", default=None)

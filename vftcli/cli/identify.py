@@ -105,8 +105,8 @@ def identify_robot(
         find_gains(logs[0], output, logged, goal.choice(), made, **also)
         return
     library = Library([*logs, *(check or ()), *without_load.logs])
-    # That the profile is not the arm's is what this command is there to change; but the friction
-    # method keeps the profile's links, and the default begins with it.
+    # That the profile is not the arm's is what this command is there to change; but the
+    # friction method keeps the profile's links, and the default begins with it.
     examiner = health_of(library, anyway=anyway, fitting=task.keeps_links)
     choice = replace(logged.asked(library, free=without_load), examiner=examiner)
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)

@@ -110,7 +110,8 @@ LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).")
 SEED = Option("--seed", "N", "Seed everything random.", least=0)
 
 
-#: What a log's name ends with and its folder's does not; of `run_1.5` the number belongs to it.
+#: What a log's name ends with and its folder's does not; of `run_1.5` the number belongs
+#: to it.
 ENDING = re.compile(r"(?<=.)(\.[A-Za-z]\w*)?(\.(gz|zst|zstd|bz2|xz))?$")
 
 
@@ -309,7 +310,8 @@ def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
     for name, value in values.items():
         for word in value if isinstance(value, list | tuple) else (value,):
             path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
-            # A word without an ending is a name of ours, as of a robot, where no log is asked for.
+            # A word without an ending is a name of ours, as of a robot, where no log is
+            # asked for.
             named = (
                 path is word or (isinstance(path, Path) and path.suffix) or name.endswith("free")
             )

@@ -158,7 +158,8 @@ def estimate(
         refuse_estimates(log)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library)
-    # Of a large log only the columns that are looked at are read; outputs show the others too.
+    # Of a large log only the columns that are looked at are read; outputs show the others
+    # too.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = for_estimates(choice)
     recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))

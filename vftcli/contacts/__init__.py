@@ -1,6 +1,7 @@
 """Contacts: what touched the arm, when, how hard, where, and how sure that is.
 
-The room can be called: ``vft.contacts("log.csv", robot="ur5")`` is `vftcli.notebook.contacts`.
+The room can be called: ``vft.contacts("log.csv", robot="ur5")`` is
+`vftcli.notebook.contacts`.
 """
 
 import sys

@@ -346,7 +346,8 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
     """One row for contacts that are a load: the mean of the ungated wrench, with its band.
 
-    The mean's standard deviation is √(s²/m + (3 % of the mean)²), s the spread of m means over 5 s.
+    The mean's standard deviation is √(s²/m + (3 % of the mean)²), s the spread of m means
+    over 5 s.
     """
     part = free_part(motion)
     wrench = smooth_wrench(motion.log, () if part is None else part.pieces)

@@ -108,7 +108,8 @@ class Candidates(NamedTuple):
 def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candidates:
     """What may be contacts along a log, in blocks of a length [s].
 
-    Free motion has this noise, and the momentum observer's torque this level in it. (n,) [N·m]
+    Free motion has this noise, and the momentum observer's torque this level in it. (n,)
+    [N·m]
     """
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)
@@ -253,7 +254,8 @@ def imm_predict(
 ) -> ImmState:
     """The states of each mode a block later, moments matched.
 
-    B keeps the share f and gains variance; x keeps the share g and wanders within its variance.
+    B keeps the share f and gains variance; x keeps the share g and wanders within its
+    variance.
     """
     f, added, g = moves
     p1 = 1.0 / (1.0 + np.exp(-state.odds))

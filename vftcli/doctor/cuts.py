@@ -184,7 +184,8 @@ def frozen_rows(recording: Recording) -> Mask:
 def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     """Changes of position beyond the velocities, and the jumps among them.
 
-    The sample before each (K,), sizes (K, n) [rad] and jumps (K, n); steps of time may be off.
+    The sample before each (K,), sizes (K, n) [rad] and jumps (K, n); steps of time may be
+    off.
     """
     q, dq = recording.q, recording.require("dq")
     steps, usual = np.diff(recording.t), recording.median_step

@@ -195,7 +195,8 @@ class Examiner:
     ) -> Recording:
         """A log in its robot's joints; an open effort is read by the model's best fit.
 
-        Joints go by name, endless ones are unwound, samples that no arm can have made are cut out.
+        Joints go by name, endless ones are unwound, samples that no arm can have made are
+        cut out.
 
         Raises:
             RobotError: If the names of its joints are not the robot's.

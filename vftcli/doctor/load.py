@@ -45,7 +45,8 @@ RATIO = 0.05
 def drive_constants(recording: Recording) -> Array:
     """Controller's torque per current, target_torque/target_current. (n,) [N·m/A]
 
-    Of resting samples, as friction is fed forward in motion; NaN where they carry too little.
+    Of resting samples, as friction is fed forward in motion; NaN where they carry too
+    little.
     """
     current, torque = recording.target_current, recording.target_torque
     constants = np.full(recording.joints, np.nan)

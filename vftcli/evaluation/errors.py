@@ -184,7 +184,8 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
 def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> Array:
     """Samples within ±1.96 `error_sd` of the estimate, and samples that were asked. (2, n)
 
-    Where the joint rests, or without a band, none counts; one without an answer is in no band.
+    Where the joint rests, or without a band, none counts; one without an answer is in no
+    band.
     """
     if estimate.error_sd is None:
         return np.zeros((2, estimate.joints))
@@ -262,7 +263,8 @@ class PoolMember(NamedTuple):
 def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
     """Rows over all samples of several logs together, each log resampled on its own.
 
-    Logs of two arms, or of other observers, are not pooled, nor fewer than two: the table is empty.
+    Logs of two arms, or of other observers, are not pooled, nor fewer than two: the table
+    is empty.
     """
     kinds = {(m.robot, m.reference.joints, tuple(e.name for e in m.estimates)) for m in members}
     if len(members) < 2 or len(kinds) != 1:

@@ -124,7 +124,8 @@ def differences(
 ) -> Iterator[Difference]:
     """The difference on every rung that has its clock, at every low-pass [Hz], one by one.
 
-    Clocks are "found" and, where a period is stated, "commanded", with one pairing a free run.
+    Clocks are "found" and, where a period is stated, "commanded", with one pairing a free
+    run.
     """
     way, pair = None, None
     for name in rungs:
@@ -200,7 +201,8 @@ def error_model(
     - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after
       a stop shorter than `STUCK` by its share, by `REPEATED_STOP` where the whole arm rests.
 
-    The signal is the difference where it is known, and smooth what is low-passed. (S, n) [N·m]
+    The signal is the difference where it is known, and smooth what is low-passed. (S, n)
+    [N·m]
     """
     motion, known = pair.motion, pair.known
     t, step = motion.t[known], motion.step

@@ -202,7 +202,8 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
 def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     """Base parameters by weighted least squares, as rows of `BASE`.
 
-    Directions without data keep the start; a parameter mostly in them has infinite deviation.
+    Directions without data keep the start; a parameter mostly in them has infinite
+    deviation.
     """
     layout = triangles.layout
     grouping = group_parameters(layout)

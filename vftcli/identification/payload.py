@@ -130,7 +130,8 @@ class JointsFit(NamedTuple):
     def motion_covariance(self, y: Array, gain: float) -> Array:
         """Covariance of x of a motion, by `STRETCHES` and drives. (k, k)
 
-        Friction of another temperature outlasts residuals: it holds while a motion goes one way.
+        Friction of another temperature outlasts residuals: it holds while a motion goes
+        one way.
         """
         stretches = folds(len(self.A), STRETCHES)
         return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)

@@ -166,7 +166,8 @@ class ObserverChoice(Choice):
     ) -> "tuple[tuple[Observer, ...], tuple[Remark, ...]]":
         """Observers for one robot and sample time [s], with remarks on unset gains.
 
-        `shown` is what the complete log shows of noise and contact, None without a free part.
+        `shown` is what the complete log shows of noise and contact, None without a free
+        part.
 
         Raises:
             ParameterError: If a gain is out of range, or a match cannot be reached.

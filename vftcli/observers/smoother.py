@@ -86,7 +86,8 @@ class KalmanSmoother(Shown):
         gained, known = from_the_end(information, shown, np.ones_like(tau), weights)
         variance = p22 - gained
         if kalman.initial_covariance is None and len(d) > 1 and model.a22.all():
-            # Whatever was before the log: x⁰ is x̂⁰ − M⁻¹λ̃⁰ ± M⁻¹, M = Λ̃⁰ + S/R² of p⁰ alone.
+            # Whatever was before the log: x⁰ is x̂⁰ − M⁻¹λ̃⁰ ± M⁻¹, M = Λ̃⁰ + S/R² of p⁰
+            # alone.
             first = np.s_[...] if even else np.s_[..., 0, :]
             known[0] += (S / model.r**2)[first]
             spread = np.linalg.inv(known[[[0, 1], [1, 2]]].T)
@@ -130,7 +131,8 @@ def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, A
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
     """The gains and covariances of a whole log by its samples' models. (T, n) each
 
-    `prior` is the covariance before the first sample's update, `guess` the stationary one. (n,)
+    `prior` is the covariance before the first sample's update, `guess` the stationary
+    one. (n,)
     """
     first = update(prior, model.r[0])
     rows = [np.array(first)[:, None]]

@@ -82,7 +82,8 @@ class Spectra:
     def excess(self) -> Array:
         """(S_d − S_n)₊, what the loaded part has beyond the free one. (F, n) [(N·m)²/Hz]
 
-        The difference is averaged over neighbouring frequencies first: chance counts both ways.
+        The difference is averaged over neighbouring frequencies first: chance counts both
+        ways.
         """
         return handed_over(np.maximum(neighbour_mean(self.loaded - self.free), 0.0))
 
@@ -147,7 +148,8 @@ def neighbour_mean(spectrum: Array) -> Array:
 def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
     """Spectra of a loaded part and a free one, by one estimator.
 
-    Short impacts are widened to a second in a row, and their excess, thinned by that, set right.
+    Short impacts are widened to a second in a row, and their excess, thinned by that, set
+    right.
     """
     t = loaded.run.t
     nominal = median_step(t) if len(t) > 1 else 0.0

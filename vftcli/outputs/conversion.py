@@ -177,7 +177,8 @@ def write_topics(
 ) -> None:
     """Write a ros2-profile MCAP with zstd chunks, sample by sample, all topics side by side.
 
-    An existing file is replaced. Each sample has a stamp [ns], (T,); events are in order of time.
+    An existing file is replaced. Each sample has a stamp [ns], (T,); events are in order
+    of time.
     """
     from mcap.writer import CompressionType, Writer
 

@@ -1,6 +1,7 @@
 """Errors of torques and wrenches as tables for people, and as tidy rows for machines.
 
-A row is an observer, a column a joint or an axis; forces are in newtons, moments in newton-metres.
+A row is an observer, a column a joint or an axis; forces are in newtons, moments in
+newton-metres.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -71,7 +72,8 @@ class Block(NamedTuple):
     def best(self) -> Mask:
         """Smallest RMSE of each joint, and equals in print. (observers, joints)
 
-        None where the reference cannot tell: of a joint that rests, and of several at the floor.
+        None where the reference cannot tell: of a joint that rests, and of several at the
+        floor.
         """
         # Compared as printed, so that two equal texts in one column are both bold.
         least = np.where(np.isfinite(self.rmse), self.rmse, np.inf).min(axis=0)

@@ -193,7 +193,8 @@ def numbers_of(contacts: ContactList | None) -> dict[int, float]:
 def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
     """RMSE with its interval, joint by joint and observer by observer, a plot a log.
 
-    Empty where no joint has an error, or where more than `MOST` logs have no rows for all of them.
+    Empty where no joint has an error, or where more than `MOST` logs have no rows for all
+    of them.
     """
     import polars as pl
 
@@ -244,7 +245,8 @@ def tuning_drawing(
 ) -> Drawing:
     """Expected error over the natural frequency, and what was chosen.
 
-    That is of an observer its rates [rad/s] and errors [N·m], None for each curve's least. 2 × (n,)
+    That is of an observer its rates [rad/s] and errors [N·m], None for each curve's
+    least. 2 × (n,)
     """
     if chosen is None:
         chosen = {name: (curve.best, curve.least) for name, curve in curves.items()}

@@ -45,7 +45,8 @@ def protected(inputs: Iterable[Path]) -> Iterator[None]:
 def atomic(path: Path, force: bool = False) -> Iterator[Path]:
     """Yield a temporary path, which takes the place of `path` when the block ends well.
 
-    A device or pipe (``/dev/stdout``) is yielded as it is. If the block fails nothing is left.
+    A device or pipe (``/dev/stdout``) is yielded as it is. If the block fails nothing is
+    left.
     """
     path = Path(path)
     # A device cannot be replaced: `-o /dev/stdout` is written to as it is.

@@ -297,7 +297,8 @@ def escape_latex(text: str) -> str:
 def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> str:
     """Rows as CSV under a line of keys; what is not known is empty, truth in small letters.
 
-    A text that a spreadsheet would run as a formula, as a file's name may be, begins with "'".
+    A text that a spreadsheet would run as a formula, as a file's name may be, begins with
+    "'".
     """
     text, keys = io.StringIO(), list(keys)
     writer = csv.writer(text, lineterminator="\n")

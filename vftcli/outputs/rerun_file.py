@@ -79,9 +79,9 @@ def rerun_file(
 ) -> Iterator[Stream]:
     """Write a recording with its plots and words; yield its stream, to draw the arm into it.
 
-    The plots leave their tabs as they are sent, so that a long log's have room beside the file.
-    `words` holds the Markdown of every document by its name. The eye sees all `poses` of
-    the arm, in a space of this name; the time panel marks a span. [s]
+    The plots leave their tabs as they are sent, so that a long log's have room beside the
+    file. `words` holds the Markdown of every document by its name. The eye sees all
+    `poses` of the arm, in a space of this name; the time panel marks a span. [s]
     """
     # Equal data make equal recordings: no random id, no time of writing, nor rows put
     # together by how much time has gone by.

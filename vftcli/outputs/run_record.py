@@ -111,7 +111,8 @@ def seal(
 ) -> str:
     """Write a run's record with the digest of every file beside it, the last; return its text.
 
-    That is without digests: those of recordings differ, since Rerun numbers rows by the clock.
+    That is without digests: those of recordings differ, since Rerun numbers rows by the
+    clock.
     """
     place = name.rpartition("/")[0]
     files = folder.digests(place) if files is None else files

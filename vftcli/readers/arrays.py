@@ -1,6 +1,7 @@
 """Named arrays: NumPy's and MATLAB's files, JSON of any shape, dictionaries of panda-py, frankapy.
 
-MATLAB's files are read by SciPy (version 5) or h5py (7.3): variables, or one level of structs.
+MATLAB's files are read by SciPy (version 5) or h5py (7.3): variables, or one level of
+structs.
 """
 
 import warnings
@@ -65,7 +66,8 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The logs of JSON or a pickle: the skills of frankapy's, or the one of whichever shape.
 
-    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py's get_log() is one.
+    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py's
+    get_log() is one.
     """
     packed = file.head.startswith(b"\x80")
     first = file.first_line.strip()

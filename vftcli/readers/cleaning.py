@@ -199,7 +199,8 @@ ABSURD_STAMP = 1e19  #: Nanoseconds since 1970 stay below this for some centurie
 def without_leading_garbage(raw: RawLog) -> RawLog:
     """Drop the rows at the start that a misaligned packet left: absurd values, then a time jump.
 
-    Without an absurd value nothing is dropped, so that a jump of the clock alone is not hidden.
+    Without an absurd value nothing is dropped, so that a jump of the clock alone is not
+    hidden.
     """
     head = slice(0, min(GARBAGE_ROWS, len(raw.stamps)))
     absurd, tiny = np.zeros((2, head.stop), dtype=bool)

@@ -280,7 +280,8 @@ def _is_layout(matches: Mask, table: Array, joints: int) -> bool:
 def _derivatives(t: Array, table: Array) -> Mask:
     """Which column (the first index) has which as its derivative. (k, k)
 
-    What the integral of the other column leaves of a position's change over some rows is compared.
+    What the integral of the other column leaves of a position's change over some rows is
+    compared.
     """
     width = table.shape[1]
     steps = np.diff(t)[:, None]

@@ -1,6 +1,7 @@
 """HDF5 logs, read within bounds by h5py: ALOHA's and DROID's layouts, and any other by its paths.
 
-DROID's raw release is a folder of episodes, each a trajectory.h5 with its metadata beside it.
+DROID's raw release is a folder of episodes, each a trajectory.h5 with its metadata beside
+it.
 """
 
 import json

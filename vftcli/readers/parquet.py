@@ -161,7 +161,8 @@ class ColumnarTable(Table):
 def plain(values: Arrow) -> Column:
     """Numbers as an array, NaN where there is none.
 
-    Where none is missing without pyarrow's own way, which imports pandas: 50 MB and half a second.
+    Where none is missing without pyarrow's own way, which imports pandas: 50 MB and half
+    a second.
     """
     if values.null_count or values.type.bit_width < 8:
         return np.asarray(values.to_numpy(zero_copy_only=False))

@@ -217,7 +217,8 @@ def lawless(law: Sequence[float]) -> str:
 def friction_factor(friction: Sequence[JointFriction], temperature: Array) -> Array | None:
     """Factor of each joint's friction, None where none has a law. (T, n) [1]
 
-    Where a joint's temperature [°C] is NaN, not measured, it is 1, as at the reference temperature.
+    Where a joint's temperature [°C] is NaN, not measured, it is 1, as at the reference
+    temperature.
     """
     joints = [j for j, joint in enumerate(friction) if joint.temperature]
     if not joints:

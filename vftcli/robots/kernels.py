@@ -93,7 +93,8 @@ def felt_bodies(chain: Chain) -> tuple[Array, Array]:
 def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
     """Record the equations above. Rows given: q̇ (n), cos q (n), sin q (n).
 
-    The results, one a joint, are ``p``, ``coriolis`` Cᵀq̇, ``gravity`` g, and ``bias`` Cᵀq̇ − g.
+    The results, one a joint, are ``p``, ``coriolis`` Cᵀq̇, ``gravity`` g, and ``bias``
+    Cᵀq̇ − g.
     """
     n, (inertia, moment) = chain.joints, felt_bodies(chain)
     on = Tape(inputs=3 * n)
@@ -273,7 +274,8 @@ def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
 def load_wrench(chain: Chain, q: Array) -> Array:
     """Wrench of a load's weight, by its mass and moment m·c. (N, 6, 4)
 
-    A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange point.
+    A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange
+    point.
     """
     gravity = np.asarray(chain.gravity)
     wrench = np.zeros((len(q), 6, 4))

@@ -108,7 +108,8 @@ def packages_near(path: Path) -> Iterator[tuple[str, str]]:
 def read_mesh(mesh: Mesh) -> Array:
     """Triangles of a mesh on its link, their corners counter-clockwise from outside. (F, 3, 3) [m]
 
-    Raises RobotError where its file is not there, is no STL, OBJ or DAE, or holds no triangle.
+    Raises RobotError where its file is not there, is no STL, OBJ or DAE, or holds no
+    triangle.
     """
     try:
         found = CORNERS[Path(mesh.name).suffix.lower()]((mesh.file or Path()).read_bytes())

@@ -208,7 +208,8 @@ NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
 def paired(recording: Recording, robot: Robot) -> Recording:
     """A log in the robot's order of joints, positions and torques of the links.
 
-    Where both have joint names these alone decide, and joints that the robot has not are left out.
+    Where both have joint names these alone decide, and joints that the robot has not are
+    left out.
     """
     named = recording.joint_names
     tables = robot.document.get("joints", ())
@@ -246,7 +247,8 @@ def paired(recording: Recording, robot: Robot) -> Recording:
 def unwound(recording: Recording, robot: Robot) -> Recording:
     """The recording without jumps of a turn in the positions of endless joints.
 
-    A position that changes by more than half a turn between two samples was wrapped into one.
+    A position that changes by more than half a turn between two samples was wrapped into
+    one.
     """
     columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
     if recording.joints != robot.joints:

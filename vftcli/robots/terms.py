@@ -1,6 +1,7 @@
 """Dynamics terms p and μ of a log, all an observer sees of it, and their raw disturbance.
 
-The raw disturbance is the external torque as p and μ show it unfiltered, with all their noise.
+The raw disturbance is the external torque as p and μ show it unfiltered, with all their
+noise.
 """
 
 from collections.abc import Iterable
@@ -282,7 +283,8 @@ def disturbance_blocks(
 def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> list[Array]:
     """The raw disturbance in unbroken stretches of an even clock. (N, n) each
 
-    On an uneven clock the integral of d is interpolated, which averages d over each new step [s].
+    On an uneven clock the integral of d is interpolated, which averages d over each new
+    step [s].
     """
     t, d = terms.t, raw_disturbance(terms)
     whole = inside[1:] & inside[:-1]

@@ -1,6 +1,7 @@
 """What a process of its own does to expand a xacro: it ends when its time or its memory is used up.
 
-Run by its path with what is asked on standard input, as JSON; nothing of vftcli is loaded here.
+Run by its path with what is asked on standard input, as JSON; nothing of vftcli is loaded
+here.
 """
 
 import io

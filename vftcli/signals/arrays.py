@@ -49,7 +49,8 @@ def release(memory: object) -> None:
 def trim() -> None:
     """Give free memory back to the system, where the C library has a call for it.
 
-    Otherwise it keeps what lies between arrays in use: a long log's report held a tenth more.
+    Otherwise it keeps what lies between arrays in use: a long log's report held a tenth
+    more.
     """
     import ctypes
 

@@ -127,7 +127,8 @@ def refuse_mostly_gap(t: Array, step: float) -> None:
 def butterworth(step: float, cutoff: float | tuple[float, float], order: int = ORDER) -> Array:
     """Second-order sections of a Butterworth filter of even order. (S, 6)
 
-    A low pass has one cutoff, a band pass two edges [Hz]; the order is that of either side. (S, 6)
+    A low pass has one cutoff, a band pass two edges [Hz]; the order is that of either
+    side. (S, 6)
     """
     if not (np.all(np.asarray(cutoff) > 0) and np.all(np.asarray(cutoff) < 0.5 / step)):
         raise ParameterError(

@@ -50,7 +50,8 @@ class Cut(NamedTuple):
 class Awaited:
     """A field that may be given as a function, called when it is first read.
 
-    A digest is computed beside everything else, and nobody waits for it before it is written down.
+    A digest is computed beside everything else, and nobody waits for it before it is
+    written down.
     """
 
     def __set_name__(self, _owner: type, name: str) -> None:

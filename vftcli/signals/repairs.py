@@ -111,7 +111,8 @@ def without_isolated(recording: Recording) -> Recording:
 def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     """Columns without samples that stand alone, and where these are. (T, n) each
 
-    What is off by `least` (n,) never is too far; `peak` is as `PEAK`, 0 where no peak is meant.
+    What is off by `least` (n,) never is too far; `peak` is as `PEAK`, 0 where no peak is
+    meant.
     """
     made = np.array(x)
     if len(x) <= 6 * NEAR:

@@ -54,7 +54,8 @@ def standing(t: Array, dq: Array) -> Mask:
 def resting(t: Array, dq: Array) -> Mask:
     """Where a joint is slower than `REST` in most of the time around. (T, n)
 
-    Unlike `standing` it knows no shortest stop: it tells friction at rest from friction in motion.
+    Unlike `standing` it knows no shortest stop: it tells friction at rest from friction
+    in motion.
     """
     first = t.searchsorted(t - AROUND, side="left")
     last = t.searchsorted(t + AROUND, side="right")

@@ -66,7 +66,8 @@ class WrenchFrame:
     def of_conversion(cls, notation: object) -> "WrenchFrame | None":
         """The frame that a log converted by us holds, None of an unknown one.
 
-        Earlier versions wrote a sentence there; such a file still reads, its frame not stated.
+        Earlier versions wrote a sentence there; such a file still reads, its frame not
+        stated.
         """
         with suppress(ParameterError):
             return cls.parsed(notation) if isinstance(notation, str) else None

@@ -184,7 +184,8 @@ def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
 def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None:
     """Wrench in sensor axes about the sensor's origin, as force ON the robot. (M, 6) [N, N·m]
 
-    Contacts, weight and inertia of what is beyond it, offset, drift, noise; None without one.
+    Contacts, weight and inertia of what is beyond it, offset, drift, noise; None without
+    one.
     """
     import pinocchio as pin
 

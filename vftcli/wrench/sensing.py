@@ -111,8 +111,8 @@ def sense(
     disturbance = mean_disturbance(log.terms)
     to_smooth = [torque for torque in estimates if choice.smooths(torque.name)]
     others = [torque for torque in estimates if not choice.smooths(torque.name)]
-    # The disturbance is solved in base axes, so that --frame moves no zero; beside it, what the
-    # pose says of the estimates that are smoothed.
+    # The disturbance is solved in base axes, so that --frame moves no zero; beside it,
+    # what the pose says of the estimates that are smoothed.
     raw, *bare = VirtualSensor(frame="base").wrenches((disturbance, *to_smooth), q, chain)
     mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
     vendor = vendor_remarks(log.recording, raw, chain)

@@ -1,6 +1,7 @@
 """The templates of every page, their parts as functions, and what page and script draw.
 
-Charts without a script are SVG: here is where values are drawn, with ticks and the text of paths.
+Charts without a script are SVG: here is where values are drawn, with ticks and the text
+of paths.
 """
 
 import json

@@ -156,7 +156,8 @@ STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
 def storage_files(file: LogFile) -> list[str]:
     """The storage files of a bag folder, in the order in which they were recorded.
 
-    Names in metadata.yaml are not followed: only files that lie in the folder itself are read.
+    Names in metadata.yaml are not followed: only files that lie in the folder itself are
+    read.
     """
     names = {n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()}
     plain = {n for n in names if n.removesuffix(".zstd").removesuffix(".zst") not in names - {n}}

@@ -212,7 +212,8 @@ def _described(kind: Described) -> tuple[str, int | None]:
     return name, int(bound) if node == 3 else -1
 
 
-#: The definitions of types that ROS 2 has not, by package/Name: Franka's state, Foxglove's log.
+#: The definitions of types that ROS 2 has not, by package/Name: Franka's state,
+#: Foxglove's log.
 DEFINITIONS: dict[str, str] = tables_beside(__file__, "messages.toml")
 
 
