@@ -75,6 +75,7 @@ def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
         (ENTRY + 'protocols = ["identified"]\n', "identified is missing"),
         (ENTRY + 'protocols = ["both"]\n', "protocol 'both'"),
         (ENTRY + "score = [[20, 10]]\n", "spans end after their start"),
+        (ENTRY + "score = [[10, 10]]\n", "spans end after their start"),
         (ENTRY + "contacts = [[1]]\n", "a contact is [start, end] or [start, end, peak]"),
         (ENTRY + "pushes = [[1, 0, [1, 0, 0]]]\n", "longer than 0 s"),
         (ENTRY.replace('file = "a.csv"', 'parts = ["t"]'), "t=time.txt"),
