@@ -269,11 +269,11 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 54_414,
+    "lines of Python": 54_417,
     "files": 240,
     "functions": 2925,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 389_658,
+    "names, operators, numbers": 389_701,
     "characters a line that is not blank": 50.92,
     "noqa": 95,
     "lines of TOML, JavaScript, CSS": 7463,

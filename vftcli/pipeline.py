@@ -186,8 +186,7 @@ def analyse(
     analysis = refine(observe(motion, baselines, choice), baselines, choice)
     remarks = (*analysis.remarks, *unlisted)
     analysis = replace(analysis, contacts=contacts, examinations=examinations, remarks=remarks)
-    if choice.wrench is not None or not choice.answers_first:
-        analysis = sense(analysis, choice)
+    analysis = sense(analysis, choice, unasked=not choice.answers_first)
     tell(f"{name}: comparing", 0.5, WRITING)
     analysis.spare()
     return judge(analysis, choice)
@@ -295,9 +294,9 @@ def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
     return motion if choice.wrench is None else motion.unloaded(choice.wrench.zero.spans)
 
 
-def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
-    """Turn the estimates into wrenches: those asked for, and that of `best` beside its contacts."""
-    if analysis.virtual_sensor is not None:
+def sense(analysis: "Analysis", choice: AnalysisChoice, *, unasked: bool = True) -> "Analysis":
+    """The analysis with the wrenches asked for, or `unasked` that of `best` beside its contacts."""
+    if analysis.virtual_sensor is not None or (choice.wrench is None and not unasked):
         return analysis
     asked, names = choice.wrench, tuple(o.name for o in analysis.observers)
     if asked is None:

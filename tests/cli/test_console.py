@@ -170,4 +170,4 @@ def test_a_log_of_one_sample_has_no_rate(tmp_path: Path, run: Run) -> None:
     path.write_text("".join(TAPS.read_text().splitlines(keepends=True)[:2]))
     code, _, err = run("identify", path, "--robot", "ur5", "-o", tmp_path / "out.toml", "-v")
     assert code != 0
-    assert "6 joints, 1 samples, 0.0 s\n" in err
+    assert "6 joints, 1 sample, 0.0 s\n" in err

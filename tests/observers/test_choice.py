@@ -203,6 +203,10 @@ def test_a_first_order_observer_settles_in_the_time_of_its_gain():
     assert settling_samples(MomentumObserver(gain=10.0), 0.1, 7) in {4, 5}
 
 
+def test_a_smoother_knows_a_constant_torque_from_the_first_sample():
+    assert settling_samples(observer("kfo-rts", 1 / 25), 1 / 25, 7) == 0
+
+
 def test_the_lead_is_bounded():
     assert lead_samples(MomentumObserver(gain=10.0), 0.1, 7) == LEAD
     assert lead_samples(MomentumObserver(gain=1e-6), 1e-3, 7) == LONGEST

@@ -187,3 +187,15 @@ def test_a_gap_of_days_parts_a_log_into_two() -> None:
     assert np.all(np.isfinite(whole.sd))
     # forgotten at 7 rad/s in 13 s; stamps at 1e6 s are rounded by 1e-10 s, 1e-8 of a step
     np.testing.assert_allclose(whole.tau[1800:], late.tau[1600:], atol=1e-9)
+
+
+@pytest.mark.parametrize("samples", [0, 1, 2])
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+def test_a_part_of_a_log_may_be_a_sample_or_none(samples: int, scheme: str) -> None:
+    """As between two gaps, or of an episode without rows; one sample alone shows no torque."""
+    p = np.arange(samples * 2.0).reshape(samples, 2)
+    log = DynamicsTerms(t=STEP * np.arange(samples), p=p, mu=np.zeros_like(p))
+    estimate = smoother(scheme).estimate(log)
+    assert estimate.tau.shape == (samples, 2)
+    assert np.isfinite(estimate.tau).all()
+    np.testing.assert_array_equal(estimate.tau[: samples == 1], 0.0)

@@ -115,8 +115,10 @@ def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
         f"{record['robot']['name']}, "
         f"{observer}, {kind}",
         *(f"  {name}: {meaning(column)}" for name, column in record["columns"].items()),
-        f"  the first {delay} frames of an episode still show where the observer started",
     ]
+    if delay:
+        shown = f"the first {delay} frames of an episode still show"
+        lines.append(f"  {shown} where the observer started")
     clocks = dict.fromkeys(one["clock"] for one in record["episodes"] if "clock" in one)
     lines += [f"  clock: {clock}" for clock in clocks]
     overridden = sorted({code for one in record["episodes"] for code in one.get("overridden", ())})

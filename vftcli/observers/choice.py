@@ -229,7 +229,7 @@ def estimate_from_rest(observer: "Observer", terms: "DynamicsTerms") -> "Externa
 
 
 def settling_samples(observer: "Observer", step: float, joints: int) -> int:
-    """Samples until `SETTLED` of a start is left at a sample time [s], of the slowest joint."""
+    """Samples until `SETTLED` of a start is left at a sample time [s], 0 of a smoother."""
     import numpy as np
 
     from vftcli.signals.external_torque import DynamicsTerms
@@ -239,7 +239,7 @@ def settling_samples(observer: "Observer", step: float, joints: int) -> int:
     terms = DynamicsTerms(t=step * np.arange(float(samples)), p=zero, mu=zero - 1.0)
     answer = observer.estimate(terms).tau
     left = abs(answer - answer[-1]).max(axis=1)
-    return int(np.flatnonzero(left > SETTLED * abs(answer[-1]).max())[-1]) + 1
+    return int(np.flatnonzero(left > SETTLED * abs(answer[-1]).max()).max(initial=-1)) + 1
 
 
 def lead_samples(observer: "Observer", step: float, joints: int) -> int:

@@ -124,6 +124,8 @@ def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, A
     if F.ndim == 4:
         F, g, weights = F[:, :, :0:-1], g[:, :0:-1], weights[:, -2::-1]
     start = np.zeros((len(F), d.shape[1]))
+    if len(d) < 2:
+        return np.zeros_like(d), start
     (found,), first = filtered(F, g, d[:0:-1], start, [weights])
     return np.concatenate([found[::-1], start[:1]]), first
 
