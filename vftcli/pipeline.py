@@ -144,7 +144,7 @@ def list_touches(
     examinations = examine(motion, choice)
     choice.progress(f"{recording.name}: listing contacts", 0.3, 1.0)
     made = Analysis(motion=motion, observers=(), estimates=(), tunings={})
-    found = list_contacts(motion).weighed(examinations[0].load, examinations[0].distrusts)
+    found = list_contacts(motion).weighed(examinations[0].load, examinations[0].doubts)
     return replace(made, contacts=found, examinations=examinations)
 
 
@@ -284,7 +284,7 @@ def find_contacts(
         bias = None if baselines is None else baselines.best.correction
         referenced = choice.reference is not None
         found = list_contacts(unloaded_motion(motion, choice), bias, referenced=referenced)
-        return found.weighed(health.load, health.distrusts), ()
+        return found.weighed(health.load, health.doubts), ()
     except VftError as error:
         return None, (caution("contacts-not-told", reason=str(error)),)
 

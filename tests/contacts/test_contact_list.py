@@ -36,10 +36,24 @@ def test_trust_goes_by_evidence_band_and_remarks(changed: dict[str, object], tru
     assert contact(**changed).trust == trust
 
 
-def test_no_size_by_velocities_in_doubt_is_good() -> None:
+@pytest.mark.parametrize("doubt", ["velocity-late", "stuck-effort"])
+def test_no_size_in_doubt_is_good(doubt: str) -> None:
     found = contact_list(contact(), contact(number=2))
-    assert [row.trust for row in found.weighed(None, doubted=False)] == ["good", "good"]
-    assert [row.trust for row in found.weighed(None, doubted=True)] == ["weak", "weak"]
+    assert [row.trust for row in found.weighed(None, set())] == ["good", "good"]
+    assert [row.trust for row in found.weighed(None, {doubt})] == ["weak", "weak"]
+
+
+def test_beside_a_joint_without_effort_every_row_is_a_candidate() -> None:
+    """In the order of time, each with the reason; nothing is claimed, nor called untouched."""
+    late, early = (
+        contact(number=1, start=9.0, stop=9.5),
+        contact(number=1, start=2.0, evidence=30.0),
+    )
+    found = replace(contact_list(late), candidates=(early,)).weighed(None, {"zero-effort"})
+    assert not len(found)
+    assert [(row.number, row.start) for row in found.candidates] == [(1, 2.0), (2, 9.0)]
+    assert {row.trust for row in found.candidates} == {"weak"}
+    assert not found.tells_untouched
 
 
 def test_the_hardest_is_the_one_with_the_largest_force() -> None:

@@ -61,22 +61,22 @@ def test_too_short_a_log_is_reported_and_not_judged() -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "refusals", "distrusts"), [(1.0, 0, False), (1.3, 0, True), (1.6, 1, True)]
+    ("factor", "refusals", "doubted"), [(1.0, 0, False), (1.3, 0, True), (1.6, 1, True)]
 )
 def test_velocities_far_off_refuse_and_nearer_ones_are_not_relied_on(
-    factor: float, refusals: int, distrusts: bool
+    factor: float, refusals: int, doubted: bool
 ) -> None:
     log = moving()
     dq = log.require("dq") * np.array([1.0, factor, 1.0, 1.0, 1.0, 1.0])
     made = examine(replace(log, dq=dq), UR10E)
     assert len(made.refusals()) == refusals
-    assert made.distrusts == distrusts
+    assert bool(made.doubts) == doubted
 
 
 def test_beside_a_joint_without_effort_no_size_is_relied_on() -> None:
     log = moving()
     made = examine(replace(log, current=log.require("current") * [1, 1, 0, 1, 1, 1]), UR10E)
-    assert made.distrusts
+    assert made.doubts == {"zero-effort"}
     assert not made.refusals()
 
 

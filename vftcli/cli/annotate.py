@@ -105,20 +105,18 @@ def meaning(column: Mapping[str, str]) -> str:
 def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
     """Lines on what was written, and on what a user of it should know."""
     from vftcli.doctor.examination import doubt
+    from vftcli.outputs.quantity import counted
 
     done, frames = record["status"], sum(one.get("frames", 0) for one in record["episodes"])
     count = ", ".join(f"{n} {status}" for status, n in done.items())
     kind = "causal" if record["causal"] else "NOT causal: it looks ahead, no policy can run on it"
-    delay, episodes = record["transient_frames"], sum(done.values())
     lines = [
-        f"{episodes} episode{'s' * (episodes != 1)} ({count}), {frames} frames, "
-        f"{record['robot']['name']}, "
-        f"{observer}, {kind}",
+        f"{counted(sum(done.values()), 'episode')} ({count}), {frames} frames, "
+        f"{record['robot']['name']}, {observer}, {kind}",
         *(f"  {name}: {meaning(column)}" for name, column in record["columns"].items()),
     ]
-    if delay:
-        shown = f"the first {delay} frames of an episode still show"
-        lines.append(f"  {shown} where the observer started")
+    if delay := record["transient_frames"]:
+        lines.append(f"  the first {delay} frames of an episode still show the observer's start")
     clocks = dict.fromkeys(one["clock"] for one in record["episodes"] if "clock" in one)
     lines += [f"  clock: {clock}" for clock in clocks]
     overridden = sorted({code for one in record["episodes"] for code in one.get("overridden", ())})

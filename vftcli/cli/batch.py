@@ -68,8 +68,8 @@ def batch(
     if do in WITHOUT_REFERENCE and choice.reference is not None:
         say(f"note: --do {do} compares with nothing: --reference is left out")
         choice = replace(choice, reference=None)
-    narrowed = {"estimate": for_estimates, "compare": for_comparison}
-    choice = narrowed[do](choice) if do in narrowed else choice
+    if narrowed := {"estimate": for_estimates, "compare": for_comparison}.get(do):
+        choice = narrowed(choice)
     # These are of each worker.
     choice = replace(choice, library=Library(), examiner=Examiner(), progress=no_stage)
     job = LogJob(do=do, choice=choice, anyway=analysis.anyway, written=also.choice())

@@ -87,7 +87,7 @@ def judged_by_jacobian(log: Path, error: VftError, choice: "AnalysisChoice") -> 
     if not isinstance(error, JacobianError):
         raise error
     read = jacobian_log(log, error, choice.read, choice.library.label(log))
-    reference = choice.reference.name if choice.reference is not None else None
+    reference = choice.reference.name if choice.reference else None
     made = judge_jacobian(read, choice.wrench, reference)
     for remark in (*read.remarks, *made.remarks):
         say(f"note: {read.name}: {remark}")
@@ -103,12 +103,14 @@ def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, detai
     from vftcli.outputs.grids import pairs_text
 
     text = to_terminal(rows, analyses, every=details)
+    if not details:
+        return text + MORE
     pairs = [
         paired_significance(a.recording.name, a.estimates, a.reference)
         for a in analyses
-        if a.reference is not None and details
+        if a.reference is not None
     ]
-    return f"{text}\n{pairs_text(pl.concat(pairs))}" if pairs else text if details else text + MORE
+    return f"{text}\n{pairs_text(pl.concat(pairs))}" if pairs else text
 
 
 @opt.command
@@ -154,8 +156,10 @@ def compare(
         echo(terminal_text(rows, analyses, details=analysis.talk.details))
     elif table.json:
         every = [remark for a in analyses for remark in all_remarks(a)]
-        logged = (made.log for made in judged)
-        about = [{"recording": x.name, "path": str(x.path), "sha256": x.sha256} for x in logged]
+        about = [
+            {"recording": x.log.name, "path": str(x.log.path), "sha256": x.log.sha256}
+            for x in judged
+        ]
         say_json([*(a.recording for a in analyses), *about], every, rows=rows.to_dicts())
     else:
         echo_data(FORMS[table.form](rows, analyses))

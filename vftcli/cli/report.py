@@ -68,14 +68,13 @@ def report(
         check_published(published, reference.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
     # Of several logs one without a wrench is left out, and details show what is said of it.
-    later = len(logs) == 1 and not (json or analysis.talk.details)
-    choice = replace(choice, answers_first=later)
+    choice = replace(choice, answers_first=len(logs) == 1 and not (json or analysis.talk.details))
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
-        table = None
+        analyses.append(made)
         if published is not None and made.errors is not None:
             table = compare_with(published, made.errors, made.observers, made.tunings)
-        analyses.append(replace(made, published=table))
+            analyses[-1] = replace(made, published=table)
         if not json:
             say_analysis(made)
     if not analyses:
@@ -158,8 +157,7 @@ def estimate(
         refuse_estimates(log)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library)
-    # Of a large log only the columns that are looked at are read; outputs show the others
-    # too.
+    # Of a large log only the columns that are looked at are read; outputs show all.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = for_estimates(choice)
     recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))

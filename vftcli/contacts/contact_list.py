@@ -1,6 +1,6 @@
 """Contact and ContactList: the answer to what touched the arm."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -182,6 +182,12 @@ class Contact(Shown):
         return "good" if is_sure and not self.goes_with_place else "fair"
 
 
+def numbered(rows: Sequence[Contact], *, inferred: bool) -> tuple[Contact, ...]:
+    """The rows in the order of time with their numbers, from 1."""
+    ordered = sorted(rows, key=lambda row: row.start)
+    return tuple(replace(row, number=k, inferred=inferred) for k, row in enumerate(ordered, 1))
+
+
 class CarriedLoad(NamedTuple):
     """A load that the arm carries and its model lacks; it is in no row."""
 
@@ -277,12 +283,10 @@ class ContactList(Shown):
 
     def _headline(self) -> str:
         count, hardest = len(self), self.hardest
-        counted = f"{count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
+        every = f"of {self.recording}: {count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
         if hardest is None:
-            return f"of {self.recording}: {counted}"
-        return (
-            f"of {self.recording}: {counted}, the hardest {hardest._size} at {hardest.peak:.2f} s"
-        )
+            return every
+        return f"{every}, the hardest {hardest._size} at {hardest.peak:.2f} s"
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "#", "from – to [s]", "|F| at its peak", "force x y z [N]", "where", "trust"
@@ -304,15 +308,20 @@ class ContactList(Shown):
         figure: Figure = figures.on_paper(figures.force_drawing(self).draw)
         return figure
 
-    def weighed(self, load: tuple[float, float] | None, doubted: bool) -> "ContactList":
-        """The list by the log's examination: its load with deviation [kg], its doubts."""
-        carried, rows = self.load, self.contacts
+    def weighed(self, load: tuple[float, float] | None, doubts: Set[str]) -> "ContactList":
+        """The list by the log's examination: its load with deviation [kg], findings in doubt.
+
+        Without the effort of a joint every row is a candidate.
+        """
+        carried, rows, others = self.load, self.contacts, self.candidates
         if carried is not None and load is not None:
             carried = carried._replace(mass=load[0], sd=load[1])
-        if doubted:
-            why = caution("size-by-wrong-velocity")
+        if doubts:
+            why = caution("size-in-doubt")
             rows = tuple(replace(row, remarks=(*row.remarks, why)) for row in rows)
-        return replace(self, load=carried, contacts=rows)
+        if "zero-effort" in doubts:
+            rows, others = (), numbered((*rows, *others), inferred=True)
+        return replace(self, load=carried, contacts=rows, candidates=others)
 
     def without_forces(self) -> "ContactList":
         """The list of an arm with too few joints for a wrench: times and joint torques."""
@@ -330,10 +339,9 @@ class ContactList(Shown):
 
         Where only candidates are, one of them may be a touch that the model hides.
         """
-        rows = self.contacts or not self.candidates
-        return (
-            self.basis == "free motion" and bool(rows) and not any(c.is_load for c in self.contacts)
-        )
+        if self.basis != "free motion" or (self.candidates and not self.contacts):
+            return False
+        return not any(contact.is_load for contact in self.contacts)
 
     @property
     def detectable_force(self) -> float | None:

@@ -16,6 +16,7 @@ from vftcli.contacts.contact_list import (
     ContactList,
     ContactModel,
     Unexplained,
+    numbered,
 )
 from vftcli.contacts.free_statistics import (
     BLOCK,
@@ -201,12 +202,6 @@ def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
     first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
     speed = abs(run.dq[first:last])
     return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
-
-
-def numbered(rows: Sequence[Contact], *, inferred: bool) -> tuple[Contact, ...]:
-    """The rows in the order of time with their numbers, from 1."""
-    ordered = sorted(rows, key=lambda row: row.start)
-    return tuple(replace(row, number=k, inferred=inferred) for k, row in enumerate(ordered, 1))
 
 
 def fine_rows(

@@ -1,13 +1,13 @@
 """The examination of a log: findings, fit to its arm, and refusals."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.cuts import cut_findings, without_bad_samples
 from vftcli.doctor.fit import RobotMatch, arm_findings, guess_robot, profiles
-from vftcli.doctor.lateness import LAGLESS, MISTIMED, effort_lag
+from vftcli.doctor.lateness import LAGLESS, effort_lag
 from vftcli.doctor.load import controller_findings, temperature_findings
 from vftcli.doctor.signals import signal_findings, stuck_findings, unusable_findings
 from vftcli.doctor.velocity import clock_findings, velocity_findings, velocity_fit
@@ -77,9 +77,9 @@ class Examination(Shown):
         return tuple(finding for finding in self.findings if finding.level == "warning")
 
     @property
-    def distrusts(self) -> bool:
-        """Whether velocities are not the motion's or an effort is none: no size is reliable."""
-        return any(f.code in MISTIMED | {"zero-effort", "stuck-effort"} for f in self.warnings)
+    def doubts(self) -> Set[str]:
+        """Codes of the findings by which no contact's size is reliable."""
+        return (LAGLESS | {"zero-effort"}) & {finding.code for finding in self.warnings}
 
     @property
     def load(self) -> tuple[float, float] | None:

@@ -126,9 +126,7 @@ class Run(Shown):
     @cached_property
     def moving(self) -> Mask:
         """Where a joint is not at rest, read-only: all estimates share it. (T, n)"""
-        moving: Mask = ~self.standing
-        moving.setflags(write=False)
-        return moving
+        return handed_over(~self.standing)
 
     @cached_property
     def standstill(self) -> Array:

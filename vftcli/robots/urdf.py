@@ -192,8 +192,7 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
             "write it as one file (mj_saveLastXML)"
         )
     for part in root.iter():
-        words = part.get("quat", "").split()
-        if words and all(NUMBER.fullmatch(word) and float(word) == 0.0 for word in words):
+        if re.fullmatch(r"[\s0.+-]*0[\s0.+-]*", part.get("quat", "")):
             raise RobotError(f"{path}: {part.tag} quat is of zeros only, which is no rotation")
     pin = needed(
         "pinocchio",

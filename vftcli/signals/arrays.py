@@ -65,7 +65,7 @@ def pieces(values: NDArray[Any], size: int = 1 << 16) -> Iterator[NDArray[Any]]:
         release(values)
 
 
-def handed_over(value: Array) -> Array:
+def handed_over(value: NDArray[Any]) -> NDArray[Any]:
     """Make the caller's own new array read-only in place and return it."""
     value.setflags(write=False)
     if isinstance(value.base, np.ndarray):
