@@ -107,6 +107,8 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
         assert rows["true", part]["l1_Nm"] == pytest.approx(0.0, abs=1e-9)
     assert rows["late", "all"]["lag_s"] == pytest.approx(0.05)
     assert rows["copy", "free"]["skill"] is None
+    assert 0.0 < rows["gmo", "all"]["observer_us"] < rows["gmo", "all"]["command_us"]
+    assert rows["copy", "all"]["observer_us"] is rows["zero", "all"]["command_us"] is None
     code, out, err = run(*asked(manifest, *words))  # on the screen that everybody sees
     assert code == 0, err
     assert [line for line in out.splitlines() if "no answer" in line] == [
@@ -116,7 +118,11 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
 
 
 @pytest.mark.slow
-def test_a_second_run_does_what_is_left_and_the_same_bytes(run, manifest: Path) -> None:
+def test_a_second_run_does_what_is_left_and_the_same_bytes(
+    run, manifest: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same but for times, which are held here."""
+    monkeypatch.setattr("vftcli.reproduction.scoring.thread_time", lambda: 0.0)
     code, out, err = run(*asked(manifest))
     assert code == 0, err
     assert f"gone: no {FIXTURES / 'nowhere.csv'}; source: a page that has it" in err

@@ -248,6 +248,8 @@ def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
     t = 0.01 * np.arange(500)
     made = SimpleNamespace(
         wrenches=(),
+        motion=SimpleNamespace(log=SimpleNamespace(terms=None)),
+        observers=[SimpleNamespace(estimate=lambda _: None)] * 2,
         contacts=SimpleNamespace(contacts=[contact], candidates=[unknown]),
         estimates=[
             ExternalTorque(name=name, t=t, tau=np.zeros((500, 6))) for name in ("best", "gmo")

@@ -38,6 +38,8 @@ ARM_COLUMNS = {
     "interval_score_Nm": Column("interval score", "N·m", seldom=True),
     "missing": Column("no answer", form=".2f", seldom=True),
     "lag": Column("lag", "s", words=True, seldom=True),
+    "observer_us": Column("own CPU", "µs a sample", ".2f", seldom=True),
+    "command_us": Column("whole CPU", "µs a sample", ".0f", seldom=True),
     "over_best": Column("over best, 95 %", words=True, seldom=True),
 }
 LIST_COLUMNS = {
@@ -107,6 +109,7 @@ class Results:
             best = scores.get((arm, protocol, BEST, part))
             row = dict(zip((*BY, "part"), place, strict=True))
             row["exact_model"] = joints[place]["exact_model"][0]
+            row |= {key: joints[place][key].mean() for key in ("observer_us", "command_us")}
             row |= score.numbers(np.nan if best is None or method == BEST else best.drawn)
             if part == "free":
                 row["skill"] = np.nan  # zero is perfect there: L1 and false rows speak

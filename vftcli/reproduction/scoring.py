@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ COLUMNS: tuple[tuple[Any, str], ...] = (
     (String, "log arm protocol method part"),
     (Int64, "joint"),
     (Boolean, "future exact_model marked"),
-    (Float64, "truth_error_Nm rmse_Nm l1_Nm"),
+    (Float64, "truth_error_Nm rmse_Nm l1_Nm observer_us command_us"),
     (pl.List(Float64), " ".join(Score._fields)),
     (Int64, "true_contacts found found_as_load split false"),
     (Float64, "free_h"),
@@ -135,6 +136,8 @@ class Answer(NamedTuple):
     wrench: Array | None = None
     future: bool = False  #: Whether it uses what comes later.
     lists: Mapping[str, Sequence[ListedRow]] = {}  #: Its contacts by part, one of `LISTS`.
+    #: Time on a processor a sample, of the observer alone and of the whole analysis. [µs]
+    cost: Mapping[str, float] = {}
 
 
 def score_log(task: ScoreTask) -> None:
@@ -160,7 +163,7 @@ def score_log(task: ScoreTask) -> None:
         "truth_error_Nm": log.truth_error.tau_Nm,
     }
     rows = [
-        {**shared, "method": answer.torque.name, "future": answer.future, **row}
+        {**shared, **answer.cost, "method": answer.torque.name, "future": answer.future, **row}
         for answer in answers
         for row in rows_of(answer, truth, log)
     ]
@@ -169,7 +172,10 @@ def score_log(task: ScoreTask) -> None:
 
 def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator[Answer]:
     """What zero, the vendor and our observers say, `best` with its list of contacts."""
-    t, made = recording.t, analyse(recording, robot, task.choice, Runs())
+    t, begun, choice = recording.t, thread_time(), task.choice
+    made = analyse(recording, robot, choice, Runs())
+    us = 1e6 / len(t)
+    whole = us * (thread_time() - begun)
     wrenches = {wrench.name: wrench.known for wrench in made.wrenches}
     nothing = np.zeros((recording.samples, 6))
     yield Answer(ExternalTorque(name="zero", t=t, tau=np.zeros(recording.q.shape)), nothing)
@@ -188,10 +194,12 @@ def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator
             for each in (made.contacts.contacts, made.contacts.candidates)
         )
         lists = dict(zip(LISTS, (counted, sorted((*counted, *weak))), strict=True))
-    for torque in made.estimates:
-        name = torque.name
+    for observer, torque in zip(made.observers, made.estimates, strict=True):
+        name, terms, begun = torque.name, made.motion.log.terms, thread_time()
+        choice.observers.run(observer, terms)
+        cost = {"observer_us": us * (thread_time() - begun), "command_us": whole}
         own = lists if name == BEST else {}
-        yield Answer(torque, wrenches.get(name), not OBSERVERS[name].online, own)
+        yield Answer(torque, wrenches.get(name), not OBSERVERS[name].online, own, cost)
 
 
 def outside_answer(task: ScoreTask, recording: Recording, _: Robot) -> Iterator[Answer]:
