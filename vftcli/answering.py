@@ -1,9 +1,9 @@
 """What commands and notebooks answer alike, behind what one log's `pipeline` makes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from vftcli.admittance.choice import FILE, ControlChoice, released_robot
 from vftcli.analysis import Analysis
@@ -14,6 +14,7 @@ from vftcli.readers.references import estimates_columns
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, Runs
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import Asked
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.wrench.choice import WrenchChoice
@@ -183,44 +184,41 @@ class Replayed(NamedTuple):
 
 def replayed(
     log: Opened | None,
-    words: Mapping[str, Any],
-    choice_of: Callable[..., AnalysisChoice],
-    control: ControlChoice,
+    asked: Asked,
+    choice_of: Callable[[Asked], AnalysisChoice],
     release: Sequence[str] = (),
     seed: int | None = None,
-    anyway: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Replayed:
     """A log's force, a scenario in the loop, or a release through every controller.
 
     Args:
         log: The log or scenario, None for a release.
-        words: What was typed of the options.
-        choice_of: What is asked with an observer, and with other words.
-        control: The controllers.
+        asked: The controllers, whether unstable ones run too, and what is asked of the log.
+        choice_of: The choice of what is asked.
         release: Where a release begins, as ``x=0.3``.
         seed: Seed of a scenario.
-        anyway: Whether unstable controllers run too.
         progress: Called with the steps of a simulation that are done, and all.
     """
     from vftcli.admittance.replay import release_deviation, replay, replay_release
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli admit")
-    named = words.get("observer") or [DRIVER]
+    named = asked.words.get("observer") or [DRIVER]
     if len(named) > 1:
         raise ParameterError("one observer's force drives the replay; give --observer once")
     stored = None
-    if isinstance(log, Path) and words.get("columns") is None:
+    if isinstance(log, Path) and asked.words.get("columns") is None:
         stored = estimates_columns(log, named[0]) if log.exists() else None
     # A table of estimates may hold those of an observer that is none of ours.
-    choice = choice_of(named[0]) if stored is None else choice_of(DRIVER, columns=stored)
-    if words.get("frame") not in {None, "base"}:
+    words = {"observer": named} if stored is None else {"observer": [DRIVER], "columns": stored}
+    choice, anyway = choice_of(asked.but(**words)), bool(asked.words.get("anyway"))
+    if asked.words.get("frame") not in {None, "base"}:
         raise ParameterError(
             "the replay is in base axes about the flange point; leave --frame away"
         )
     choice = replace(choice, wrench=replace(choice.wrench or WrenchChoice(), frame="base"))
-    control = replace(control, as_printed=choice.observers.as_printed)
+    control = replace(asked.of(ControlChoice), as_printed=choice.observers.as_printed)
     if log is None:
         deviation, arm = release_deviation(release), released_robot(choice.robot)
         made = replay_release(

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import polars as pl
 
@@ -35,17 +35,17 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification.choice import Task
 from vftcli.observers.choice import GoalChoice, ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches, prepared
+from vftcli.pipeline import AnalysisChoice, analyse_logs, choice_of, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, settings_as_typed
+from vftcli.signals.option import Asked, Choice, settings_as_typed
 from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remarks
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench.choice import AlsoWrench, WrenchChoice
 
 if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
@@ -54,7 +54,6 @@ if TYPE_CHECKING:
 #: A robot as a user names it; None where the log settles it.
 NamedRobot = str | Path | Robot | None
 R = TypeVar("R")
-C = TypeVar("C", bound=Choice)
 
 #: The rooms' choices of which calls take the options.
 OF_LOG: tuple[type[Choice], ...] = (ReadChoice, RobotChoice)
@@ -65,47 +64,13 @@ OF_ESTIMATE: tuple[type[Choice], ...] = (
     RefinementChoice,
     WrenchChoice,
 )
-OF_REPORT = (*OF_ESTIMATE, ReferenceChoice)
+OF_REPORT = (*OF_ESTIMATE, AlsoWrench, ReferenceChoice)
 
 
-class Asked(NamedTuple):
-    """The keywords of a call, as they would be typed."""
-
-    call: str  #: The call as `run.json` holds it.
-    robot: "str | Robot | None"  #: The arm.
-    words: Mapping[str, Any]  #: Word of an option → what it was given.
-    settings: Mapping[str, str]  #: Name → value of the settings.
-    anyway: bool = False  #: Whether to continue despite errors.
-
-    def of(self, kind: type[C]) -> C:
-        """The choice of a room that they state."""
-        own = {word: self.words[word] for word in kind.options() if word in self.words}
-        return kind.parsed(settings=self.settings, **own)
-
-    def analysis(
-        self,
-        logs: Iterable[Opened],
-        *,
-        wrench: bool = False,
-        **others: object,
-    ) -> AnalysisChoice:
-        """What they ask of some logs."""
-        made: dict[str, Any] = {"refinement": self.of(RefinementChoice), **others}
-        made.setdefault("observers", self.of(ObserverChoice))
-        by_word = {"frame", "zero"} & {word for word, value in self.words.items() if value}
-        if wrench or by_word or any(map(WrenchChoice.takes, self.settings)):
-            made["wrench"] = self.of(WrenchChoice)
-        if self.words.get("reference") is not None:
-            made["reference"] = self.of(ReferenceChoice)
-        return AnalysisChoice(
-            read=self.of(ReadChoice),
-            free=self.of(FreeChoice),
-            contacts=made["refinement"].contacts,
-            robot=replace(self.of(RobotChoice), name=self.robot),
-            library=Library(log for log in logs if not isinstance(log, Recording)),
-            examiner=Examiner(anyway=self.anyway),
-            **made,
-        )
+def choice_for(asked: Asked, logs: Iterable[Opened], **others: Any) -> AnalysisChoice:  # noqa: ANN401
+    """What is asked of some logs, with others of its choices."""
+    library = Library(log for log in logs if not isinstance(log, Recording))
+    return choice_of(asked, library, Examiner(anyway=bool(asked.words["anyway"])), **others)
 
 
 def call(
@@ -147,7 +112,8 @@ def call(
             typed = {w: options[w].keyword(values.pop(w)) for w in words if w in values}
             if typed.get("columns") is not None and isinstance(log, Recording):
                 raise ParameterError("columns are those of a file; this log is read already")
-            asked = Asked(f"vftcli.{name}({said})", arm, typed, settings, anyway)
+            typed |= {"robot": arm, "anyway": anyway}
+            asked = Asked(typed, settings, f"vftcli.{name}({said})")
             return function(log, asked, **values)
 
         vars(called)["__signature__"] = shown
@@ -184,9 +150,9 @@ def several(logs: Opened | OpenedLogs) -> list[Opened]:
 @call(*OF_LOG)
 def inspect(log: Opened, asked: Asked) -> "Examination":
     """What a log holds and what is wrong with it: its `remarks`, and the `robots` that fit."""
-    choice, robot = asked.analysis([log]), None
+    choice, robot = choice_for(asked, [log]), None
     recording = choice.library.open(log, choice.read)
-    if asked.robot is not None or choice.read.effort == "auto":
+    if choice.robot.name is not None or choice.read.effort == "auto":
         recording, robot = prepared(recording, choice)
     return examine(recording, robot)
 
@@ -194,15 +160,15 @@ def inspect(log: Opened, asked: Asked) -> "Examination":
 @call(*OF_CONTACTS)
 def contacts(log: Opened, asked: Asked) -> "ContactList":
     """What touched the arm along a log."""
-    (made,) = analyse_logs([log], asked.analysis([log]), work=list_touches)
+    (made,) = analyse_logs([log], choice_for(asked, [log]), work=list_touches)
     assert made.contacts is not None, "a log that tells no contacts raises"
     return made.contacts
 
 
-@call(*OF_ESTIMATE)
-def estimate(log: Opened, asked: Asked, *, wrench: bool = False) -> Analysis:
+@call(*OF_ESTIMATE, AlsoWrench)
+def estimate(log: Opened, asked: Asked) -> Analysis:
     """The external torques along a log, with the contacts and the wrench of ``best``."""
-    return analysed(log, for_estimates(asked.analysis([log], wrench=wrench)), asked)
+    return analysed(log, for_estimates(choice_for(asked, [log])), asked)
 
 
 @call(*OF_REPORT)
@@ -210,12 +176,11 @@ def report(
     log: Opened,
     asked: Asked,
     *,
-    wrench: bool = False,
     output: str | Path | None = None,
     force: bool = False,
 ) -> Analysis:
     """Everything about a log, as `vftcli report` has it; ``output=`` is the folder to write."""
-    made = analysed(log, asked.analysis([log], wrench=wrench), asked)
+    made = analysed(log, choice_for(asked, [log]), asked)
     if output is not None:
         made.save(output, force=force)
     return made
@@ -227,15 +192,15 @@ def analysed(log: Opened, choice: AnalysisChoice, asked: Asked) -> Analysis:
 
     (made,) = analyse_logs([log], choice)
     remarks = Remarks((*made.recording.source.remarks, *all_remarks(made)))
-    return replace(made, remarks=remarks, run={"command": asked.call})
+    return replace(made, remarks=remarks, run={"command": asked.line})
 
 
 @call(*OF_REPORT, also=("reference",))
-def compare(logs: Opened | OpenedLogs, asked: Asked, *, wrench: bool = False) -> "pl.DataFrame":
+def compare(logs: Opened | OpenedLogs, asked: Asked) -> "pl.DataFrame":
     """Each observer's error against a reference, the columns those of ``errors.csv``."""
     if asked.words.get("reference") is None:
         raise ParameterError("compare needs reference=: two-cycle, sensor, vendor, zero, …")
-    choice = for_comparison(asked.analysis(several(logs), wrench=wrench))
+    choice = for_comparison(choice_for(asked, several(logs)))
     return errors_of(list(analyse_logs(several(logs), choice)))
 
 
@@ -243,7 +208,7 @@ def compare(logs: Opened | OpenedLogs, asked: Asked, *, wrench: bool = False) ->
 def thresholds(free: Opened | OpenedLogs, asked: Asked, rate: float = 1.0) -> "Thresholds":
     """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
     logs = several(free)
-    return free_thresholds(logs, asked.analysis(logs), rate, anyway=asked.anyway)[2]
+    return free_thresholds(logs, choice_for(asked, logs), rate, anyway=asked.words["anyway"])[2]
 
 
 @call(*OF_CONTACTS, Task, GoalChoice, RefinementChoice, also=("method",))
@@ -251,10 +216,10 @@ def identify(logs: Opened | OpenedLogs, asked: Asked, *, check: OpenedLogs = ())
     """The robot that logs of free motion show; `Robot.save` writes its file."""
     paths, task, goal = several(logs), asked.of(Task), asked.of(GoalChoice)
     if task.method == "gains":
-        found = gains_of(paths[0], asked.analysis(paths, observers=TUNED), goal)
+        found = gains_of(paths[0], choice_for(asked, paths, observers=TUNED), goal)
         return found.robot.with_gains({line.section: dict(line.gains) for line in found.tuned})
-    choice = asked.analysis([*paths, *check])
-    examiner = Examiner(anyway=asked.anyway, fitting=task.keeps_links)
+    choice = choice_for(asked, [*paths, *check])
+    examiner = Examiner(anyway=asked.words["anyway"], fitting=task.keeps_links)
     return identified(paths, check, replace(choice, examiner=examiner), task).robot
 
 
@@ -290,11 +255,7 @@ def admit(
     seed: int | None = None,
 ) -> "pl.DataFrame":
     """The comparison of admittance controllers on a log's force, a row a controller and axis."""
-
-    def choice(observer: str, **words: str) -> AnalysisChoice:
-        changed = asked._replace(words={**asked.words, **words, "observer": [observer]})
-        return changed.analysis([] if log is None else [log])
-
     release = [release] if isinstance(release, str) else list(release)
-    found = replayed(log, asked.words, choice, asked.of(ControlChoice), release, seed, asked.anyway)
+    logs = [] if log is None else [log]
+    found = replayed(log, asked, lambda words: choice_for(words, logs), release, seed)
     return pl.DataFrame(found.replay.rows, infer_schema_length=None)

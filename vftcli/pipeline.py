@@ -20,6 +20,7 @@ from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
+from vftcli.signals.option import Asked, Choice
 from vftcli.signals.progress import no_stage
 from vftcli.signals.recording import Recording, refuse_repeated_logs
 
@@ -90,6 +91,34 @@ class AnalysisChoice:
     def lists_contacts(self) -> bool:
         """Whether what touched the arm is listed: that needs the complete log."""
         return self.contacts and not self.observers.causal
+
+
+#: Field of `AnalysisChoice` → what it is of what is asked.
+KINDS: dict[str, type[Choice]] = {
+    "read": ReadChoice,
+    "robot": RobotChoice,
+    "observers": ObserverChoice,
+    "free": FreeChoice,
+    "refinement": RefinementChoice,
+}
+
+
+def choice_of(asked: Asked, library: Library, examiner: Examiner, **others: Any) -> AnalysisChoice:  # noqa: ANN401
+    """What a command or a call asks of logs, with others of the choices."""
+    from vftcli.evaluation.reference_choice import ReferenceChoice
+    from vftcli.wrench.choice import WrenchChoice
+
+    own: dict[str, Any] = {
+        name: asked.of(kind) for name, kind in KINDS.items() if name not in others
+    }
+    own |= others
+    if asked.words.get("wrench") or asked.states(WrenchChoice):
+        own["wrench"] = asked.of(WrenchChoice)
+    if asked.words.get("reference") is not None:
+        judged = bool(asked.words.get("details"))
+        own["reference"] = replace(asked.of(ReferenceChoice), contacts=judged)
+    contacts = own["refinement"].contacts
+    return AnalysisChoice(library=library, examiner=examiner, contacts=contacts, **own)
 
 
 #: What is done with each log of a command.

@@ -67,10 +67,10 @@ def test_what_an_option_names_is_an_input_unless_it_is_one_of_ours() -> None:
     values = {
         "log": Path("log.csv"),
         "output": Path("out"),
-        "analysis_robot_robot": "ur5",
-        "analysis_observers_observer": ["gmo", "fdo"],
-        "analysis_free_free": ["bag", "1:2"],
-        "reference_reference": "file:truth.parquet",
+        "robot": "ur5",
+        "observer": ["gmo", "fdo"],
+        "free": ["bag", "1:2"],
+        "reference": "file:truth.parquet",
         "seed": 3,
     }
     names = {str(path) for path in options.inputs_of(values)}

@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import pytest
 import typer
@@ -11,17 +11,18 @@ from typer.testing import CliRunner
 from vftcli.admittance.choice import ControlChoice
 from vftcli.batch.choice import WorkersChoice
 from vftcli.bias.choice import RefinementChoice
-from vftcli.cli.analysis import AnalysisOptions, LogOptions
-from vftcli.cli.options import FORMS, Bundle, Needed, Typed, checked_form, command
+from vftcli.cli.options import FORMS, TableForm, checked_form, command
+from vftcli.doctor.examination import Examiner
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import OutputChoice
+from vftcli.pipeline import choice_of
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import PackageError, ParameterError
-from vftcli.signals.option import Choice, Option
+from vftcli.signals.option import Asked, Choice, Option
 from vftcli.wrench.choice import FIT, WrenchChoice
 
 EVERY = (
@@ -40,25 +41,20 @@ class SizeChoice(Choice):
     each: Annotated[tuple[int, ...], Option("--each", "N", "Repeatable.", len, several=True)] = ()
 
 
-class Outer(Bundle):
-    sizes: Typed[SizeChoice]
-    csv: Annotated[bool, Option("--csv", "", "A table.")]
+def called(*words: str) -> tuple[int, dict[str, Any]]:
+    """Run a command with choices; return its exit code and what it was handed."""
+    seen: dict[str, Any] = {}
 
-
-def called(*words: str) -> tuple[int, dict[str, object]]:
-    """Run a command with bundles; return its exit code and what it was handed."""
-    seen: dict[str, object] = {}
-
-    @command
+    @command(SizeChoice, TableForm)
     def work(
         name: Annotated[str, Option("", "NAME", "Who.")],
-        outer: Outer,
+        asked: Asked,
         *,
         times: Annotated[int, Option("--times", "N", "How often.")] = 1,
         at: Annotated[float | None, Option("--at", "S", "When.")],
     ) -> None:
         """Do something."""
-        seen.update(name=name, outer=outer, times=times, at=at)
+        seen.update(name=name, asked=asked, times=times, at=at)
 
     app = typer.Typer()
     app.command()(work)
@@ -68,22 +64,26 @@ def called(*words: str) -> tuple[int, dict[str, object]]:
 def test_a_command_is_handed_what_was_typed() -> None:
     code, seen = called("me", "--size", "7", "-l", "--csv", "--times", "2", "--each", "a")
     assert code == 0
-    assert seen["outer"].sizes.words == {"word": None, "size": 7, "loud": True, "each": ["a"]}
-    choice = seen["outer"].sizes.choice(word="w")
+    asked = seen["asked"]
+    own = {name: asked.words[name] for name in SizeChoice.options()}
+    assert own == {"word": None, "size": 7, "loud": True, "each": ["a"]}
+    choice = asked.but(word="w").of(SizeChoice)
     assert choice == SizeChoice(word="w", size=7, loud=True, each=1)
-    assert (seen["outer"].csv, seen["name"], seen["times"], seen["at"]) == (True, "me", 2, None)
+    assert asked.words["csv"]
+    assert (seen["name"], seen["times"], seen["at"]) == ("me", 2, None)
 
 
 def test_what_is_not_typed_has_its_default_and_limits_hold() -> None:
-    assert called("me")[1]["outer"].sizes.choice(word="w") == SizeChoice(word="w")
+    assert called("me")[1]["asked"].but(word="w").of(SizeChoice) == SizeChoice(word="w")
     assert called()[0] == 2  # the argument is missing
     assert called("me", "--size", "0")[0] == 2
 
 
-def test_a_field_without_default_is_asked_for_where_the_choice_is_needed() -> None:
-    @command
-    def work(sizes: Needed[SizeChoice]) -> None:
+def test_an_option_that_the_function_has_itself_is_asked_for_as_there() -> None:
+    @command(SizeChoice)
+    def work(word: Annotated[str, SizeChoice.option("word")], asked: Asked) -> None:
         """Do something."""
+        assert asked.of(SizeChoice).word == word
 
     app = typer.Typer()
     app.command()(work)
@@ -102,7 +102,7 @@ def test_a_choice_of_nothing_typed_is_the_choice_s_default(choice: type[Choice])
 @pytest.mark.parametrize(
     "typed",
     [
-        {"also_wrench": True},
+        {"wrench": True},
         {"frame": "base"},
         {"virtual-sensor.solver": "map"},
         {"virtual-sensor.tool": "0,0,0.1"},
@@ -112,21 +112,10 @@ def test_a_choice_of_nothing_typed_is_the_choice_s_default(choice: type[Choice])
         {},
     ],
 )
-def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, object]) -> None:
-    words = {"zero": [], **typed}
-    also = bool(words.pop("also_wrench", False))
-    nothing = {
-        name: Typed(choice, {})
-        for name, choice in (
-            ("observers", ObserverChoice),
-            ("free", FreeChoice),
-            ("refinement", RefinementChoice),
-        )
-    }
-    log = LogOptions(reading=Typed(ReadChoice, {}), robot=Typed(RobotChoice, {}))
-    asked = AnalysisOptions(
-        **nothing, log=log, also_wrench=also, wrench=Typed(WrenchChoice, words), anyway=False,
-    ).choice(Library())  # fmt: skip
+def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, Any]) -> None:
+    settings = {name: text for name, text in typed.items() if "." in name}
+    words = {"zero": [], **{name: word for name, word in typed.items() if "." not in name}}
+    asked = choice_of(Asked(words, settings, ""), Library(), Examiner())
     assert (asked.wrench is not None) == bool(typed)
 
 

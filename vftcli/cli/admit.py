@@ -7,9 +7,8 @@ import typer
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import AnalysisOptions
+from vftcli.cli.analysis import ANALYSIS, choice_for, give_back
 from vftcli.cli.console import (
-    command_line,
     detail,
     echo,
     echo_data,
@@ -19,31 +18,23 @@ from vftcli.cli.console import (
     say_left_out,
     steps_of,
 )
-from vftcli.signals.option import OUTPUT, WRITE, Option
+from vftcli.signals.option import WRITE, Asked, Option
 
 if TYPE_CHECKING:
     from vftcli.answering import Replayed
-    from vftcli.pipeline import AnalysisChoice
 
 
-class ShownOptions(opt.Bundle):
-    """What is shown and drawn of the comparison."""
-
-    figures: opt.Figures
-    json: opt.Json
-    latex: Annotated[bool, opt.LATEX._replace(group=OUTPUT)]
-
-
-@opt.command
+@opt.command(ControlChoice, *ANALYSIS)
 def admit(
-    controllers: opt.Typed[ControlChoice],
+    asked: Asked,
     release: Annotated[
         list[str] | None,
         Option("--release", "AXIS=VALUE", "Release from rest, without a log: x=0.3, rz=0.5."),
     ],
     seed: Annotated[int | None, opt.SEED],
-    analysis: AnalysisOptions,
-    shown: ShownOptions,
+    figures: opt.Figures,
+    json: opt.Json,
+    latex: Annotated[bool, opt.LATEX],
     log: Annotated[
         Path | None,
         Option("", "[LOG|SCENARIO]", "A log, an estimates.parquet, or a scenario to simulate."),
@@ -68,49 +59,38 @@ def admit(
 
     if (log is None) != bool(release):
         raise typer.BadParameter("give one of LOG, SCENARIO, --release AXIS=VALUE")
-    if output is None and (show_made or shown.figures):
+    if output is None and (show_made or figures):
         raise typer.BadParameter("--open and --figures are of what -o DIR writes; give -o too")
-    if shown.json and shown.latex:
+    if json and latex:
         raise typer.BadParameter("choose one of --json and --latex")
-    names = files_of_replay(shown.figures)
+    names = files_of_replay(figures)
     if output is not None:
         OutputFolder(output, force, names).check()
-    typed = {**analysis.log.reading.words, **analysis.observers.words, **analysis.wrench.words}
-
-    def asked(observer: str, **reading: str) -> "AnalysisChoice":
-        analysis.log.reading.words.update(reading)
-        return analysis.choice(Library([log] if log else []), observer=[observer])
-
+    give_back()
+    library, progress = Library([log] if log else []), steps_of("simulating")
     found = replayed(
-        log,
-        typed,
-        asked,
-        controllers.choice(),
-        release or (),
-        seed,
-        anyway=analysis.anyway,
-        progress=steps_of("simulating"),
+        log, asked, lambda words: choice_for(words, library), release or (), seed, progress
     )
-    show(found, shown)
+    show(found, json=json, latex=latex)
     if output is not None:
         write_admittance(
             output,
             found.replay,
             found.recording,
             found.run,
-            command=command_line(),
+            command=asked.line,
             force=force,
             examinations=found.examinations,
-            form=shown.figures,
+            form=figures,
         )
-        if not (shown.json or shown.latex):
+        if not (json or latex):
             say(f"wrote {output}: open {output / 'index.html'}")
         say_left_out(names)
         if show_made:
             open_made(output)
 
 
-def show(found: "Replayed", shown: ShownOptions) -> None:
+def show(found: "Replayed", *, json: bool, latex: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.outputs.admittance_tables import (
         comparison_text,
@@ -120,11 +100,11 @@ def show(found: "Replayed", shown: ShownOptions) -> None:
     )
 
     result = found.replay
-    if shown.json:
+    if json:
         logs = [found.recording] if found.recording is not None else []
         say_json(logs, result.remarks, rows=result.rows)
         return
-    if shown.latex:
+    if latex:
         echo_data(latex_text(result))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")

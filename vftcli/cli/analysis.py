@@ -1,24 +1,36 @@
-"""The options of commands that analyse a log, and what they state together."""
+"""What commands ask of logs: the choices that they share, and what is made of them."""
 
 import os
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from vftcli.bias.choice import RefinementChoice
 from vftcli.cli.console import health_of, stages
-from vftcli.cli.options import Anyway, Bundle, TalkOptions, Typed, Wrench
-from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.cli.options import Anyway, Talk
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import OutputChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.option import WRITE, Option
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.signals.option import Asked
+from vftcli.wrench.choice import AlsoWrench, WrenchChoice
 
 if TYPE_CHECKING:
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
+
+#: How a log is read, which arm made it, and all that can be asked of it but a reference.
+LOG = (ReadChoice, RobotChoice)
+ANALYSIS = (
+    *LOG,
+    ObserverChoice,
+    FreeChoice,
+    RefinementChoice,
+    AlsoWrench,
+    WrenchChoice,
+    Anyway,
+    Talk,
+)
 
 #: Arrays from this size on have memory of their own, which goes back with them. [bytes]
 #:
@@ -46,81 +58,21 @@ def give_back() -> None:
         return
 
 
-class LogOptions(Bundle):
-    """How a log is read, and which arm made it."""
+def choice_for(
+    asked: Asked,
+    library: "Library",
+    *,
+    on_screen: bool = False,
+    **others: Any,  # noqa: ANN401 - choices
+) -> "AnalysisChoice":
+    """What is asked of a command's logs: their health is said, and how far the work is shown."""
+    from vftcli.pipeline import choice_of
 
-    reading: Typed[ReadChoice]
-    robot: Typed[RobotChoice]
-
-    def asked(
-        self,
-        library: "Library",
-        *,
-        anyway: bool = False,
-        on_screen: bool = False,
-        **others: Any,  # noqa: ANN401 - choices
-    ) -> "AnalysisChoice":
-        """What is asked of such a log, its health said, with other choices."""
-        from vftcli.pipeline import AnalysisChoice
-
-        return AnalysisChoice(
-            read=self.reading.choice(),
-            robot=self.robot.choice(),
-            library=library,
-            examiner=health_of(library, anyway=anyway, on_screen=on_screen),
-            **others,
-        )
+    examiner = health_of(library, anyway=bool(asked.words.get("anyway")), on_screen=on_screen)
+    return choice_of(asked, library, examiner, **{"progress": stages(), **others})
 
 
-class ExtraOptions(Bundle):
-    """What else is written for other programs."""
-
-    mcap: Annotated[
-        bool,
-        Option("--mcap", "", "Also write estimates.mcap (ROS 2, Foxglove).", group=WRITE),
-    ]
-    written: Typed[OutputChoice]
-
-    def choice(self, **others: bool) -> OutputChoice:
-        """What is written, with what the command's own options ask for."""
-        extras = tuple(name for name, asked in {**others, "mcap": self.mcap}.items() if asked)
-        return replace(self.written.choice(), extras=extras)
-
-
-class AnalysisOptions(Bundle):
-    """All that can be asked of a log but what it is compared with."""
-
-    log: LogOptions
-    observers: Typed[ObserverChoice]
-    free: Typed[FreeChoice]
-    refinement: Typed[RefinementChoice]
-    also_wrench: Wrench
-    wrench: Typed[WrenchChoice]
-    anyway: Anyway
-    talk: TalkOptions
-
-    def choice(
-        self,
-        library: "Library",
-        reference: Typed[ReferenceChoice] | None = None,
-        *,
-        on_screen: bool = False,
-        **observers: Any,  # noqa: ANN401 - words in place of those that are typed
-    ) -> "AnalysisChoice":
-        """The choice that the options state, a reference's with it where there is one."""
-        give_back()
-        compared = reference is not None and reference.words["reference"]
-        return self.log.asked(
-            library,
-            anyway=self.anyway,
-            on_screen=on_screen,
-            observers=self.observers.choice(**observers),
-            free=self.free.choice(),
-            refinement=self.refinement.choice(),
-            contacts=self.refinement.choice().contacts,
-            wrench=self.wrench.choice() if self.also_wrench or self.wrench.is_asked else None,
-            reference=replace(reference.choice(), contacts=self.talk.details)
-            if reference is not None and compared
-            else None,
-            progress=stages(),
-        )
+def outputs_of(asked: Asked) -> OutputChoice:
+    """What is written for other programs."""
+    extras = tuple(name for name in ("csv", "rrd", "mcap") if asked.words.get(name))
+    return replace(asked.of(OutputChoice), extras=extras)

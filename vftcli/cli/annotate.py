@@ -6,10 +6,12 @@ from typing import Annotated, Any
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LogOptions
-from vftcli.cli.console import command_line, detail, echo_data, say, stages
+from vftcli.cli.analysis import LOG
+from vftcli.cli.console import detail, echo_data, say, stages
 from vftcli.observers.choice import ObserverChoice
-from vftcli.signals.option import WRITE, Option
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import WRITE, Asked, Option
 from vftcli.signals.parsing import check_known
 from vftcli.wrench.choice import WrenchChoice
 
@@ -28,15 +30,13 @@ def added_columns(words: list[str] | None) -> list[str]:
     return names
 
 
-@opt.command
+@opt.command(*LOG, ObserverChoice, WrenchChoice, WorkersChoice, opt.Anyway, opt.Talk)
 def annotate_dataset(
     dataset: Annotated[
         Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")
     ],
     output: opt.Folder,
-    logged: LogOptions,
-    observers: opt.Typed[ObserverChoice],
-    wrench: opt.Typed[WrenchChoice],
+    asked: Asked,
     add: Annotated[
         list[str] | None,
         Option(
@@ -47,9 +47,6 @@ def annotate_dataset(
             completes=lambda: ADDED,
         ),
     ],
-    workers: opt.Typed[WorkersChoice],
-    anyway: opt.Anyway,
-    _talk: opt.TalkOptions,
     json: opt.Json,
     force: opt.Force,
 ) -> None:
@@ -65,24 +62,24 @@ def annotate_dataset(
     from vftcli.batch.annotation import USUAL, ForceChoice
     from vftcli.outputs.run_record import to_json
 
-    added = added_columns(add)
-    asked = ForceChoice(
-        read=logged.reading.choice(),
-        robot=logged.robot.choice(),
-        observers=observers.choice(observer=observers.words["observer"] or [USUAL]),
-        wrench=wrench.choice() if "wrench" in added or wrench.is_asked else None,
+    added, anyway = added_columns(add), asked.words["anyway"]
+    choice = ForceChoice(
+        read=asked.of(ReadChoice),
+        robot=asked.of(RobotChoice),
+        observers=asked.but(observer=asked.words["observer"] or [USUAL]).of(ObserverChoice),
+        wrench=asked.of(WrenchChoice) if "wrench" in added or asked.states(WrenchChoice) else None,
         sd="sd" in added,
         contact="contact" in added,
         anyway=anyway,
     )
-    engine = workers.choice()
+    engine = asked.of(WorkersChoice)
     engine.check_closed(anyway=anyway)
     record = annotate(
         dataset,
         output,
-        asked,
+        choice,
         engine,
-        command=command_line(),
+        command=asked.line,
         tell=detail,
         progress=stages(),
         force=force,
@@ -90,7 +87,7 @@ def annotate_dataset(
     if json:
         echo_data(to_json(record))
         return
-    for line in copy_lines(record, asked.observer):
+    for line in copy_lines(record, choice.observer):
         say(line)
     say(f"wrote {output}")
 

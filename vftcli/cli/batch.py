@@ -10,11 +10,12 @@ import typer
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
-from vftcli.cli.console import command_line, say, stages
+from vftcli.cli.analysis import ANALYSIS, choice_for, give_back, outputs_of
+from vftcli.cli.console import say, stages
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.signals.option import Option, names_at
+from vftcli.outputs import OutputChoice
+from vftcli.signals.option import Asked, Option, names_at
 
 if TYPE_CHECKING:
     from vftcli.batch.run import BatchCount
@@ -24,7 +25,7 @@ WITHOUT_REFERENCE = ("estimate", "contacts")
 SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
 
 
-@opt.command
+@opt.command(WorkersChoice, ReferenceChoice, *ANALYSIS, opt.Mcap, OutputChoice)
 def batch(
     logs: Annotated[
         list[Path],
@@ -40,10 +41,7 @@ def batch(
             completes=names_at("batch.log_work:COMMANDS"),
         ),
     ],
-    workers: opt.Typed[WorkersChoice],
-    reference: opt.Typed[ReferenceChoice],
-    analysis: AnalysisOptions,
-    also: ExtraOptions,
+    asked: Asked,
     force: opt.Force,
 ) -> None:
     """Run a command on many logs; resume where it stopped.
@@ -61,7 +59,8 @@ def batch(
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.progress import no_stage
 
-    choice = analysis.choice(Library(), reference)
+    give_back()
+    choice, anyway = choice_for(asked, Library()), asked.words["anyway"]
     choice.robot.check()
     if do == "compare" and choice.reference is None:
         raise ParameterError("--do compare needs --reference: two-cycle, sensor, vendor, zero, …")
@@ -72,9 +71,9 @@ def batch(
         choice = narrowed(choice)
     # These are of each worker.
     choice = replace(choice, library=Library(), examiner=Examiner(), progress=no_stage)
-    job = LogJob(do=do, choice=choice, anyway=analysis.anyway, written=also.choice())
-    engine = workers.choice()
-    engine.check_closed(anyway=analysis.anyway)
+    job = LogJob(do=do, choice=choice, anyway=anyway, written=outputs_of(asked))
+    engine = asked.of(WorkersChoice)
+    engine.check_closed(anyway=anyway)
     collection = LogCollection(choice.read, output)
     found = list(collection.find(logs))
     say_passed([path.name for path in collection.passed])
@@ -82,16 +81,16 @@ def batch(
         raise LogError(
             f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"
         )
-    asked = BatchRun(
+    run = BatchRun(
         logs=found,
         job=job,
         folder=BatchFolder(absolute(output)),
         workers=engine,
-        command=command_line(),
+        command=asked.line,
         tell=say,
         progress=partial(show_count, stages()),
     )
-    failures, count = asked.run(force=force)
+    failures, count = run.run(force=force)
     STAGES.end()
     for name, reason in failures.select("log", "line").head(MOST_TOLD).iter_rows():
         say(f"error: {name}: {reason}")

@@ -9,11 +9,10 @@ import typer
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.batch import SOME_FAILED
-from vftcli.cli.compare import TableOptions
-from vftcli.cli.console import command_line, echo, echo_data, open_made, say, say_json, show, stages
+from vftcli.cli.console import echo, echo_data, open_made, say, say_json, show, stages
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import LOG, Choice, Option, setting
+from vftcli.signals.option import LOG, Asked, Choice, Option, setting
 from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:
@@ -31,19 +30,7 @@ class BenchChoice(Choice):
     rounds: Annotated[int, setting("bench.rounds", "N", "Interleaved runs.", least=1)] = 7
 
 
-class Sources(opt.Bundle):
-    """What is scored."""
-
-    data: Annotated[
-        Path | None, Option("--data", "DIR", "Look here for the manifest's logs.", group=LOG)
-    ]
-    outside: Annotated[
-        list[str] | None,
-        Option("--outside", "NAME=DIR", "Score these estimates too. Repeatable."),
-    ]
-
-
-@opt.command
+@opt.command(BenchChoice, opt.TableForm, WorkersChoice, opt.Anyway, opt.Talk)
 def benchmark(
     what: Annotated[
         str,
@@ -55,14 +42,16 @@ def benchmark(
         ),
     ] = "sim",
     *,
-    source: Sources,
+    data: Annotated[
+        Path | None, Option("--data", "DIR", "Look here for the manifest's logs.", group=LOG)
+    ],
+    outside: Annotated[
+        list[str] | None,
+        Option("--outside", "NAME=DIR", "Score these estimates too. Repeatable."),
+    ],
     robot: Annotated[str | None, RobotChoice.option("robot")],
-    length: opt.Typed[BenchChoice],
     output: Annotated[Path | None, opt.OUT._replace(help="Write here; default: benchmark.vft.")],
-    table: TableOptions,
-    workers: opt.Typed[WorkersChoice],
-    anyway: opt.Anyway,
-    talk: opt.TalkOptions,
+    asked: Asked,
     force: opt.Force,
     open_page: opt.Open,
 ) -> None:
@@ -74,29 +63,30 @@ def benchmark(
 
     Example: vftcli benchmark sim
     """
-    engine = workers.choice()
-    unfit: dict[str, object] = {"--robot": robot, "--set bench": length.is_asked}
+    engine, form, anyway = asked.of(WorkersChoice), opt.form_of(asked), asked.words["anyway"]
+    length = asked.states(BenchChoice)
+    unfit: dict[str, object] = {"--robot": robot, "--set bench": length}
     if what == SPEED:
-        unfit = {"--outside": source.outside, "-o": output, "--anyway": anyway, "--force": force}
+        unfit = {"--outside": outside, "-o": output, "--anyway": anyway, "--force": force}
         unfit |= {"--open": open_page, "--jobs": engine != WorkersChoice()}
     if what in {SPEED, "sim"}:
-        unfit["--data"] = source.data
+        unfit["--data"] = data
     if given := [name for name, value in unfit.items() if value]:
         raise typer.BadParameter(f"benchmark {what} takes no {', '.join(given)}")
     if what == SPEED:
-        time_observers(robot or "ur5", length.choice(), table.form)
+        time_observers(robot or "ur5", asked.of(BenchChoice), form)
         return
     from vftcli.reproduction.benchmark import BenchmarkRun
 
-    manifest, rivals = named(what, source)
+    manifest, rivals = named(what, data, outside)
     if all(map(manifest.missing, manifest.logs)):
-        say_none(manifest, table.form)
+        say_none(manifest, form)
         return
     marked, output = unfair(manifest, rivals, anyway=anyway), output or Path("benchmark.vft")
     engine.check_closed(anyway=anyway)
-    run = BenchmarkRun(manifest, rivals, output, engine, command_line(), marked, say, stages())
+    run = BenchmarkRun(manifest, rivals, output, engine, asked.line, marked, say, stages())
     results = run.run(force=force)
-    print_results(results, table.form, manifest.absent(), every=talk.details)
+    print_results(results, form, manifest.absent(), every=asked.words["details"])
     for name, failure in run.failures:
         echo(printable(f"error: {name}: {failure.line}"), err=True)
     say("\n".join([*manifest.absent(), f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
@@ -106,16 +96,18 @@ def benchmark(
         raise typer.Exit(SOME_FAILED if results.rows else 1)
 
 
-def named(what: str, source: Sources) -> "tuple[Manifest, list[Rival]]":
+def named(
+    what: str, data: Path | None, outside: list[str] | None
+) -> "tuple[Manifest, list[Rival]]":
     """The manifest and the outside estimates that the command line names."""
     from vftcli.observers.table import DEFAULT
     from vftcli.reproduction.manifest import load_manifest, rival_of
 
-    if source.data is not None and not source.data.is_dir():
-        raise typer.BadParameter(f"--data {source.data}: there is no such folder")
-    manifest, ours = load_manifest(what, source.data), ("zero", "vendor", *DEFAULT)
+    if data is not None and not data.is_dir():
+        raise typer.BadParameter(f"--data {data}: there is no such folder")
+    manifest, ours = load_manifest(what, data), ("zero", "vendor", *DEFAULT)
     try:
-        return manifest, [rival_of(text, ours, manifest.logs) for text in source.outside or ()]
+        return manifest, [rival_of(text, ours, manifest.logs) for text in outside or ()]
     except ParameterError as error:
         raise typer.BadParameter(str(error)) from None
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import AnalysisOptions
+from vftcli.cli.analysis import ANALYSIS, choice_for, give_back
 from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.errors import VftError
-from vftcli.signals.option import OUTPUT, WRITE, Option
+from vftcli.signals.option import COMPARE, WRITE, Asked, Option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,60 +25,24 @@ if TYPE_CHECKING:
 MORE = "Intervals, lags, pairs of observers: --details"  #: What screens leave out.
 
 
-class TableOptions(opt.Bundle):
-    """The form of the table; one at most."""
+def figure_folder(figures: str | None, output: Path | None, force: bool) -> "OutputFolder | None":
+    """Where the figure of the errors goes, None where none is asked for."""
+    if (figures is None) != (output is None):
+        raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
+    if output is None:
+        return None
+    from vftcli.outputs.figures import ERROR_FIGURES
+    from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.paper import figure_files
 
-    GROUP = OUTPUT
-
-    json: opt.Json
-    csv: Annotated[bool, Option("--csv", "", "Print one row per observer and joint.")]
-    markdown: Annotated[bool, Option("--markdown", "", "Print a Markdown table.")]
-    latex: Annotated[bool, opt.LATEX]
-
-    @property
-    def form(self) -> str:
-        """The one form that is asked for, or "terminal"."""
-        asked = [name for name, wanted in vars(self).items() if wanted]
-        if len(asked) > 1:
-            raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in asked)}")
-        return asked[0] if asked else "terminal"
+    folder = OutputFolder(output, force, figure_files(figures, ERROR_FIGURES))
+    folder.check()
+    return folder
 
 
-class DrawnErrors(opt.Bundle):
-    """The figure of the errors, and where it goes."""
-
-    figures: opt.Figures
-    output: Annotated[
-        Path | None, Option("-o/--output", "DIR", "Folder for --figures.", group=WRITE)
-    ]
-    force: opt.Force
-
-    def folder(self) -> "OutputFolder | None":
-        """Where the figure goes, None where none is asked for."""
-        if (self.figures is None) != (self.output is None):
-            raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
-        if self.output is None:
-            return None
-        from vftcli.outputs.figures import ERROR_FIGURES
-        from vftcli.outputs.files import OutputFolder
-        from vftcli.outputs.paper import figure_files
-
-        folder = OutputFolder(self.output, self.force, figure_files(self.figures, ERROR_FIGURES))
-        folder.check()
-        return folder
-
-    def write(self, errors: "pl.DataFrame") -> None:
-        """Draw the errors, if that is asked for, and say where."""
-        if (figures := self.folder()) is not None:
-            from vftcli.outputs.figures import error_figures
-            from vftcli.outputs.paper import write_figures
-
-            with figures as folder:
-                write_figures(folder, error_figures(errors), str(self.figures))
-            say(f"wrote {self.output}: figures/errors-single.{self.figures}, errors-double")
-
-
-def judged_by_jacobian(log: Path, error: VftError, choice: "AnalysisChoice") -> "JacobianJudgement":
+def judged_by_jacobian(
+    log: Path, error: VftError, choice: "AnalysisChoice", reference: str
+) -> "JacobianJudgement":
     """What a vendor's torques beside a Jacobian tell; raises any other error."""
     from vftcli.evaluation.wrenches import judge_jacobian
     from vftcli.readers.references import jacobian_log
@@ -87,7 +51,6 @@ def judged_by_jacobian(log: Path, error: VftError, choice: "AnalysisChoice") -> 
     if not isinstance(error, JacobianError):
         raise error
     read = jacobian_log(log, error, choice.read, choice.library.label(log))
-    reference = choice.reference.name if choice.reference else None
     made = judge_jacobian(read, choice.wrench, reference)
     for remark in (*read.remarks, *made.remarks):
         say(f"note: {read.name}: {remark}")
@@ -113,48 +76,21 @@ def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, detai
     return f"{text}\n{pairs_text(pl.concat(pairs))}" if pairs else text
 
 
-@opt.command
-def compare(
-    logs: opt.Logs,
-    reference: opt.Needed[ReferenceChoice],
-    analysis: AnalysisOptions,
-    table: TableOptions,
-    drawn: DrawnErrors,
+def print_errors(
+    form: str,
+    rows: "pl.DataFrame",
+    analyses: "Sequence[Analysis]",
+    judged: "Sequence[JacobianJudgement]",
+    *,
+    details: bool,
 ) -> None:
-    """Print each observer's error against a reference.
-
-    Example: vftcli compare fixtures/ur5_circle.csv --robot ur5 --reference zero --interval 0:4
-    """
-    from vftcli.answering import errors_of
-    from vftcli.batch.log_work import for_comparison
+    """Print the errors in the form that is asked for."""
     from vftcli.outputs.error_tables import FORMS
     from vftcli.outputs.run_record import all_remarks
-    from vftcli.pipeline import analyse_logs
-    from vftcli.readers.library import Library
 
-    drawn.folder()
-    library = Library(logs)
-    choice = for_comparison(analysis.choice(library, reference))
-    left_out, analyses, judged = LeftOut(library, logs), [], []
-
-    def leave_out(log: Path, error: VftError) -> None:
-        """Judge a vendor's torques by their Jacobian; leave any other log out."""
-        try:
-            judged.append(judged_by_jacobian(log, error, choice))
-        except VftError as reason:
-            left_out.add(log, reason)
-
-    for made in analyse_logs(logs, choice, leave_out):
-        if not table.json:
-            say_analysis(made)
-        analyses.append(made)
-    if not (analyses or judged):
-        left_out.end(0)
-    rows = errors_of(analyses, [made.errors for made in judged])
-    drawn.write(rows)
-    if table.form == "terminal":
-        echo(terminal_text(rows, analyses, details=analysis.talk.details))
-    elif table.json:
+    if form == "terminal":
+        echo(terminal_text(rows, analyses, details=details))
+    elif form == "json":
         every = [remark for a in analyses for remark in all_remarks(a)]
         about = [
             {"recording": x.log.name, "path": str(x.log.path), "sha256": x.log.sha256}
@@ -162,5 +98,54 @@ def compare(
         ]
         say_json([*(a.recording for a in analyses), *about], every, rows=rows.to_dicts())
     else:
-        echo_data(FORMS[table.form](rows, analyses))
+        echo_data(FORMS[form](rows, analyses))
+
+
+@opt.command(ReferenceChoice, *ANALYSIS, opt.TableForm)
+def compare(
+    logs: opt.Logs,
+    reference: Annotated[str, ReferenceChoice.option("reference", group=COMPARE)],
+    asked: Asked,
+    figures: opt.Figures,
+    output: Annotated[
+        Path | None, Option("-o/--output", "DIR", "Folder for --figures.", group=WRITE)
+    ],
+    force: opt.Force,
+) -> None:
+    """Print each observer's error against a reference.
+
+    Example: vftcli compare fixtures/ur5_circle.csv --robot ur5 --reference zero --interval 0:4
+    """
+    from vftcli.answering import errors_of
+    from vftcli.batch.log_work import for_comparison
+    from vftcli.outputs.figures import error_figures
+    from vftcli.outputs.paper import write_figures
+    from vftcli.pipeline import analyse_logs
+    from vftcli.readers.library import Library
+
+    folder, form = figure_folder(figures, output, force), opt.form_of(asked)
+    give_back()
+    library = Library(logs)
+    choice = for_comparison(choice_for(asked, library))
+    left_out, analyses, judged = LeftOut(library, logs), [], []
+
+    def leave_out(log: Path, error: VftError) -> None:
+        """Judge a vendor's torques by their Jacobian; leave any other log out."""
+        try:
+            judged.append(judged_by_jacobian(log, error, choice, reference))
+        except VftError as reason:
+            left_out.add(log, reason)
+
+    for made in analyse_logs(logs, choice, leave_out):
+        if form != "json":
+            say_analysis(made)
+        analyses.append(made)
+    if not (analyses or judged):
+        left_out.end(0)
+    rows = errors_of(analyses, [made.errors for made in judged])
+    if folder is not None:
+        with folder:
+            write_figures(folder, error_figures(rows), str(figures))
+        say(f"wrote {output}: figures/errors-single.{figures}, errors-double")
+    print_errors(form, rows, analyses, judged, details=asked.words["details"])
     left_out.end(len(analyses) + len(judged))

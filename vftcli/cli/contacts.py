@@ -6,19 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LogOptions
-from vftcli.cli.console import (
-    LeftOut,
-    canvas,
-    command_line,
-    echo,
-    echo_data,
-    say_analysis,
-    say_json,
-    stages,
-)
+from vftcli.cli.analysis import LOG, choice_for
+from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
 from vftcli.free_motion.choice import FreeChoice
-from vftcli.signals.option import OUTPUT, Option
+from vftcli.signals.option import OUTPUT, Asked, Choice, Option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,7 +17,7 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
 
 
-class ListOptions(opt.Bundle):
+class ListForm(Choice):
     """The form of the list."""
 
     GROUP = OUTPUT
@@ -36,84 +27,69 @@ class ListOptions(opt.Bundle):
     all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.")]
 
 
-@opt.command
-def list_contacts(
-    logs: opt.Logs,
-    logged: LogOptions,
-    free: opt.Typed[FreeChoice],
-    form: ListOptions,
-    anyway: opt.Anyway,
-    talk: opt.TalkOptions,
-) -> None:
+@opt.command(*LOG, FreeChoice, ListForm, opt.Anyway, opt.Talk)
+def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     """List what touched the arm. The default command.
 
     Needs no output folder and no reference; with --free LOG or --free A:B it tells more.
 
     Example: vftcli contacts fixtures/ur5_circle.csv --robot ur5 --free 0.3:4
     """
-    if form.json and form.csv:
+    json, csv = asked.words["json"], asked.words["csv"]
+    if json and csv:
         raise typer.BadParameter("choose one of --json, --csv")
 
     from vftcli.pipeline import analyse_logs, list_touches
     from vftcli.readers.library import Library
     from vftcli.readers.references import stored_observers
 
-    if len(logs) == 1 and logged.reading.words["columns"] is None and stored_observers(logs[0]):
-        print_stored(logs[0], form)
+    if len(logs) == 1 and asked.words["columns"] is None and stored_observers(logs[0]):
+        print_stored(logs[0], asked)
         return
     library = Library(logs)
-    choice = logged.asked(
-        library,
-        anyway=anyway,
-        on_screen=not (form.json or form.csv),
-        free=free.choice(),
-        progress=stages(),
-    )
+    choice = choice_for(asked, library, on_screen=not (json or csv))
     left_out = LeftOut(library, logs)
     found = []
     for made in analyse_logs(logs, choice, left_out.add, list_touches):
         say_analysis(made)
         found.append(made)
     if found:
-        print_lists(found, form, left_out.reasons, every=form.all or talk.details)
+        print_lists(found, asked, left_out.reasons)
     left_out.end(len(found))
 
 
-def print_stored(estimates: Path, form: ListOptions) -> None:
+def print_stored(estimates: Path, asked: Asked) -> None:
     """Print the list that the folder of an ``estimates.parquet`` holds."""
     from vftcli.outputs.contacts import contacts_csv, stored_list, stored_record
     from vftcli.outputs.screen import list_screen
 
     record = stored_record(estimates)
-    if form.json:
+    if asked.words["json"]:
         say_json([record])
-    elif form.csv:
+    elif asked.words["csv"]:
         echo_data(contacts_csv([stored_list(record)]))
     else:
-        echo(list_screen(stored_list(record), canvas(), every=form.all), nl=False)
+        echo(list_screen(stored_list(record), canvas(), every=asked.words["all"]), nl=False)
 
 
-def print_lists(
-    found: "list[Analysis]", form: ListOptions, failed: "Mapping[str, str]", *, every: bool
-) -> None:
+def print_lists(found: "list[Analysis]", asked: Asked, failed: "Mapping[str, str]") -> None:
     """Print the lists in the form that is asked for."""
     from vftcli.outputs.contacts import contacts_csv
     from vftcli.outputs.report import contacts_envelope
     from vftcli.outputs.run_record import to_json
     from vftcli.outputs.screen import log_screen, logs_screen
 
-    lists = [made.contacts for made in found if made.contacts is not None]
-    if form.json:
-        echo_data(to_json(contacts_envelope(found, command_line(), failed)))
-    elif form.csv:
-        echo_data(contacts_csv(lists))
+    if asked.words["json"]:
+        echo_data(to_json(contacts_envelope(found, asked.line, failed)))
+    elif asked.words["csv"]:
+        echo_data(contacts_csv([made.contacts for made in found if made.contacts is not None]))
     else:
-        screen = canvas()
+        screen, every = canvas(), asked.words["all"] or asked.words["details"]
         texts = (
             []
             if len(found) + len(failed) == 1
             else [logs_screen(found, screen, failed, every=every)]
         )
-        if not texts or form.all:
+        if not texts or asked.words["all"]:
             texts += [log_screen(made, screen, every=every) for made in found]
         echo("\n".join(texts), nl=False, colour=screen.colour)

@@ -9,17 +9,12 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.console import command_line, echo, say, say_json, say_left_out, steps_of
 from vftcli.readers.reader import ReadChoice
-from vftcli.signals.option import Option, names_at
+from vftcli.signals.option import Asked, Option, names_at
 
 
-@opt.command
+@opt.command(ReadChoice, opt.Talk)
 def convert_log(
-    log: opt.Log,
-    output: opt.Folder,
-    reading: opt.Typed[ReadChoice],
-    _talk: opt.TalkOptions,
-    json: opt.Json,
-    force: opt.Force,
+    log: opt.Log, output: opt.Folder, asked: Asked, json: opt.Json, force: opt.Force
 ) -> None:
     """Write any log as Parquet, CSV or MCAP.
 
@@ -34,7 +29,7 @@ def convert_log(
     from vftcli.signals.errors import ParameterError
 
     check_conversion(output, force)
-    choice = reading.choice()
+    choice = asked.of(ReadChoice)
     if choice.derive == "dq":
         raise ParameterError(
             "convert writes what was logged; --set log.derive=dq belongs to an estimate"
@@ -64,7 +59,7 @@ def convert_log(
     say(f"wrote {recording.samples} samples of {', '.join(recording.signals)}")
 
 
-@opt.command
+@opt.command()
 def simulate_log(
     *,
     scenario: Annotated[str, Option("", "SCENARIO", "list, a scenario's name or a FILE.toml.")],

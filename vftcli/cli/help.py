@@ -163,7 +163,7 @@ LISTS = {
 }
 
 
-@opt.command
+@opt.command()
 def show_help(
     ctx: typer.Context,
     topic: Annotated[

@@ -3,13 +3,12 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from vftcli.bias.choice import RefinementChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LogOptions
+from vftcli.cli.analysis import LOG, choice_for
 from vftcli.cli.console import (
-    command_line,
     detail,
     echo,
     echo_data,
@@ -24,6 +23,7 @@ from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import Asked
 
 
 def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str, object]) -> None:
@@ -61,22 +61,18 @@ def file_for(robot: str) -> Path:
     return Path("my_" + re.sub(r"[^\w.-]", "_", robot) + ".toml")
 
 
-@opt.command
+@opt.command(*LOG, Task, GoalChoice, FreeChoice, RefinementChoice, opt.Anyway, opt.Talk)
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[
         Path | None,
         opt.OUT._replace(help="Write here; default: my_ROBOT.toml in this folder."),
     ],
-    logged: LogOptions,
-    asked: opt.Typed[Task],
-    goal: opt.Typed[GoalChoice],
+    asked: Asked,
     check: opt.Check,
-    free: opt.Typed[FreeChoice],
-    bias: opt.Typed[RefinementChoice],
-    made: opt.MadeOptions,
-    anyway: opt.Anyway,
-    _talk: opt.TalkOptions,
+    figures: opt.Figures,
+    json: opt.Json,
+    force: opt.Force,
     show: opt.Open,
 ) -> None:
     """Make a robot file: friction, inertia, payload, gains.
@@ -97,31 +93,27 @@ def identify_robot(
     )
     from vftcli.readers.library import Library
 
-    task, without_load, refinement = asked.choice(), free.choice(), bias.choice()
-    pages = {"--check": check, "--open": show}
-    check_uses(task, without_load, logs, {**pages, "--gains": goal.words["gains"]})
+    task, free = asked.of(Task), asked.of(FreeChoice)
+    others = {"--check": check, "--open": show, "--gains": asked.words["gains"]}
+    check_uses(task, free, logs, others)
     if task.method == "gains":
-        also = {"free": without_load, "refinement": refinement, "anyway": anyway}
-        find_gains(logs[0], output, logged, goal.choice(), made, **also)
+        find_gains(logs[0], output, asked, figures)
         return
-    library = Library([*logs, *(check or ()), *without_load.logs])
+    library = Library([*logs, *(check or ()), *free.logs])
     # That the profile is not the arm's is what this command is there to change; but the
     # friction method keeps the profile's links, and the default begins with it.
-    examiner = health_of(library, anyway=anyway, fitting=task.keeps_links)
-    choice = replace(logged.asked(library, free=without_load), examiner=examiner)
+    examiner = health_of(library, anyway=asked.words["anyway"], fitting=task.keeps_links)
+    choice = replace(choice_for(asked, library), examiner=examiner)
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
     output = output or file_for(profile.name)
-    form = made.figures
-    OutputFolder(output.parent, made.force, files_beside(output, form)).check()
+    OutputFolder(output.parent, force, files_beside(output, figures)).check()
     found = identified(logs, check or (), choice, replace(task, name=output.stem), say_recording)
-    record = write_identification(
-        output, found, examiner.examinations, command_line(), made.force, form
-    )
+    record = write_identification(output, found, examiner.examinations, asked.line, force, figures)
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")
     say(f"wrote {', '.join(map(str, beside(output).values()))}")
-    if made.json:
+    if json:
         echo_data(record)
     else:
         echo(tables_text(found))
@@ -129,14 +121,7 @@ def identify_robot(
         open_made(output.with_suffix(".html"))
 
 
-def find_gains(
-    log: Path,
-    output: Path | None,
-    logged: LogOptions,
-    goal: GoalChoice,
-    made: opt.MadeOptions,
-    **others: Any,  # noqa: ANN401 - choices
-) -> None:
+def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None) -> None:
     """Write the gains that a goal asks for: the log's spectra show what error every gain makes."""
     from vftcli.answering import TUNED, gains_of
     from vftcli.outputs.examination import health_record, overridden_lines
@@ -146,17 +131,18 @@ def find_gains(
     from vftcli.outputs.grids import tuned_grid
     from vftcli.readers.library import Library
 
-    choice = logged.asked(Library([log]), observers=TUNED, **others)
+    choice, goal = choice_for(asked, Library([log]), observers=TUNED), asked.of(GoalChoice)
+    force = asked.words["force"]
     if output is None:
         recording = choice.library.open(log, choice.read)
         output = file_for(choice.examiner.robot(recording, choice.robot).name)
-    check_file(output, made.force)
+    check_file(output, force)
     found = gains_of(log, choice, goal)
     notes, health = list(map(str, found.remarks)), found.examinations
-    said = [command_line(), f"goal: {goal.gains}", f"robot: {found.robot.name}", *notes]
+    said = [asked.line, f"goal: {goal.gains}", f"robot: {found.robot.name}", *notes]
     heading = [*overridden_lines(health), *said]
-    write_tuned(output, heading, found.spectra, found.tuned, force=made.force, form=made.figures)
-    if made.json:
+    write_tuned(output, heading, found.spectra, found.tuned, force=force, form=figures)
+    if asked.words["json"]:
         rows = [line.record for line in found.tuned]
         about = {"goal": goal.gains, "examination": health_record(health), "observers": rows}
         say_json([found.recording], found.remarks, **about)

@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LogOptions
+from vftcli.cli.analysis import LOG, choice_for
 from vftcli.cli.config import NAME
 from vftcli.cli.console import echo, say, say_json, say_robots
-from vftcli.signals.option import Option
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import Asked, Option
 
 if TYPE_CHECKING:
     from vftcli.proposal import ProposedOption
 
 
-@opt.command
+@opt.command(*LOG, opt.Talk)
 def inspect_log(
     logs: opt.Logs,
-    logged: LogOptions,
-    _talk: opt.TalkOptions,
+    asked: Asked,
     output: Annotated[
         Path | None,
         opt.OUT._replace(help="Write here; the options that the log calls for."),
@@ -45,7 +46,7 @@ def inspect_log(
 
     if output is not None:
         check_file(output, force)
-    choice, chosen, examiner = logged.reading.choice(), logged.robot.choice(), Examiner()
+    choice, chosen, examiner = asked.of(ReadChoice), asked.of(RobotChoice), Examiner()
     examinations = []
     for log in logs:
         recording, arm = read_first_recording(log, choice), None
@@ -57,7 +58,7 @@ def inspect_log(
     say_robots(examiner.robots)
     if not json:
         echo("\n\n".join(map(examination_text, examinations)))
-    written = {} if output is None else write_options(output, logs, logged, force=force)
+    written = {} if output is None else write_options(output, logs, asked, force=force)
     if json:
         entries = [log_entry(one.recording, examination_record(one)) for one in examinations]
         say_json(entries, [remark for one in examinations for remark in one.remarks], **written)
@@ -68,16 +69,17 @@ def inspect_log(
 
 
 def write_options(
-    output: Path, logs: Sequence[Path], logged: LogOptions, *, force: bool
+    output: Path, logs: Sequence[Path], asked: Asked, *, force: bool
 ) -> dict[str, Any]:
     """Write the options that logs call for, and give them for machines."""
     from vftcli.outputs.files import write_text
     from vftcli.proposal import config_text, propose
     from vftcli.readers.library import Library
 
-    words = {**logged.reading.words, **logged.robot.words}
+    words = {word: asked.words.get(word) for kind in LOG for word in kind.options()}
+    words |= asked.settings
     given = {name.replace("_", "-"): value for name, value in words.items() if value is not None}
-    choice = logged.asked(Library(logs), on_screen=True)
+    choice = choice_for(asked, Library(logs), on_screen=True)
     proposed = [from_folder(output.parent, option) for option in propose(logs, choice, given)]
     write_text(output, config_text(proposed), force)
     settled = {option.key: option.value for option in proposed if option.key and option.holds}

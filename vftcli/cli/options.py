@@ -1,10 +1,10 @@
 """The options of the commands: what typer is given, made of the rooms' choices.
 
 An option is an `Option` beside a field of a room's choice, or beside an argument of the one command
-that has it. A command is handed one object for all options of a choice::
+that has it. A command is handed the words of all options of its choices at once::
 
-    @command
-    def convert_log(log: Log, reading: Typed[ReadChoice], force: Force) -> None: ...
+    @command(ReadChoice, Talk)
+    def convert_log(log: Log, asked: Asked, force: Force) -> None: ...
 """
 
 import inspect
@@ -12,20 +12,20 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, Generic, NamedTuple, TypeVar, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 import typer
 
 from vftcli.cli.config import READ
-from vftcli.cli.console import speaking
+from vftcli.cli.console import command_line, speaking
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
     ESTIMATE,
     LOG,
     NUMBERS,
     OUTPUT,
-    WRENCH,
     WRITE,
+    Asked,
     Choice,
     Option,
     assignment,
@@ -33,9 +33,6 @@ from vftcli.signals.option import (
     settings_by_name,
 )
 from vftcli.signals.packages import check_installed
-
-C = TypeVar("C", bound=Choice)
-EMPTY = inspect.Parameter.empty
 
 Log = Annotated[Path, Option("", "LOG", "A log file or bag folder, recognised by content.")]
 Logs = Annotated[
@@ -48,37 +45,13 @@ LogFolder = Annotated[
     Path | None, OUT._replace(help="Write here; default: LOG.vft in this folder.")
 ]
 Force = Annotated[bool, Option("--force", "", "Overwrite what exists.", group=WRITE)]
-Json = Annotated[
-    bool,
-    Option(
-        "--json",
-        "",
-        "Print JSON on stdout.",
-        group=OUTPUT,
-    ),
-]
+Json = Annotated[bool, Option("--json", "", "Print JSON on stdout.", group=OUTPUT)]
 Open = Annotated[
-    bool,
-    Option(
-        "--open",
-        "",
-        "Open the page or the recording when done.",
-        group=OUTPUT,
-    ),
-]
-Anyway = Annotated[
-    bool,
-    Option(
-        "--anyway",
-        "",
-        "Continue despite errors; the outputs are marked.",
-        group=LOG,
-    ),
+    bool, Option("--open", "", "Open the page or the recording when done.", group=OUTPUT)
 ]
 Check = Annotated[
     list[Path] | None, Option("--check", "LOG", "Try the result on this log. Repeatable.")
 ]
-Wrench = Annotated[bool, Option("--wrench", "", "Add the wrench of every observer.", group=WRENCH)]
 
 
 FORMS = ("pdf", "svg", "png")  #: What figures may be written as.
@@ -106,7 +79,7 @@ Figures = Annotated[
 SET = Option(
     "--set", "NAME=VALUE", "Change any setting (help settings). Repeatable.", group=ESTIMATE
 )
-LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).")
+LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).", group=OUTPUT)
 SEED = Option("--seed", "N", "Seed everything random.", least=0)
 
 
@@ -115,99 +88,120 @@ SEED = Option("--seed", "N", "Seed everything random.", least=0)
 ENDING = re.compile(r"(?<=.)(\.[A-Za-z]\w*)?(\.(gz|zst|zstd|bz2|xz))?$")
 
 
-def folder_of(output: Path | None, logs: Sequence[Path], reading: "Typed[Any]") -> Path:
+def folder_of(output: Path | None, logs: Sequence[Path], asked: Asked) -> Path:
     """Where a command writes: as typed, else into a folder here that is named after the log."""
     if output is not None:
         return output
     if len(logs) > 1:
         return Path("report.vft")
     name = logs[0].resolve().name
-    part = (reading.words["episode"], reading.words["arm"])
+    part = (asked.words["episode"], asked.words["arm"])
     stem = name if logs[0].is_dir() else ENDING.sub("", name, count=1)
     return Path("-".join([stem, *filter(None, part)]) + ".vft")
 
 
-class Typed(Generic[C]):
-    """The words that a user typed of the options of a choice."""
+class Anyway(Choice):
+    """Whether to go on where results mean nothing."""
 
-    def __init__(self, kind: type[C], words: dict[str, Any]) -> None:
-        self._kind, self.words = kind, words
+    GROUP = LOG
 
-    def choice(self, **others: Any) -> C:  # noqa: ANN401 - words are texts, numbers and lists
-        """The choice that they state, checked, with other words for some of them."""
-        return self._kind.parsed(**{**self.words, **others})
-
-    @property
-    def is_asked(self) -> bool:
-        """Whether any of them is given."""
-        return any(self.words.values())
+    anyway: Annotated[
+        bool, Option("--anyway", "", "Continue despite errors; the outputs are marked.")
+    ]
 
 
-class Needed(Typed[C]):
-    """The same where the fields without a default have to be given."""
-
-
-class Bundle:
-    """Options that belong together, each an attribute."""
-
-    GROUP = ""  #: Heading of those that have none of their own.
-
-    def __init__(self, **values: Any) -> None:  # noqa: ANN401 - options are of every kind
-        vars(self).update(values)
-
-
-class MadeOptions(Bundle):
-    """What is made: figures too, JSON in place of words, over what is there."""
-
-    figures: Figures
-    json: Json
-    force: Force
-
-
-class TalkOptions(Bundle):
+class Talk(Choice):
     """How much a command says; heard before it runs."""
 
     GROUP = OUTPUT
 
     details: Annotated[bool, Option("-v/--details", "", "Show everything that is known.")]
-    quiet: Annotated[
-        bool,
-        Option("-q/--quiet", "", "Print errors and results only."),
-    ]
+    quiet: Annotated[bool, Option("-q/--quiet", "", "Print errors and results only.")]
 
 
-def command(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a command as typer wants it: every option of its choices a parameter of its own.
+class Mcap(Choice):
+    """Whether estimates are written for ROS 2 too."""
 
-    Its `options` are the option of every parameter by name, its `choices` what has its settings.
+    GROUP = WRITE
+
+    mcap: Annotated[bool, Option("--mcap", "", "Also write estimates.mcap (ROS 2, Foxglove).")]
+
+
+class TableForm(Choice):
+    """The form of a table; one at most."""
+
+    GROUP = OUTPUT
+
+    json: Json
+    csv: Annotated[bool, Option("--csv", "", "Print one row per observer and joint.")]
+    markdown: Annotated[bool, Option("--markdown", "", "Print a Markdown table.")]
+    latex: Annotated[bool, LATEX]
+
+
+def form_of(asked: Asked) -> str:
+    """The one form of a table that is asked for, or "terminal"."""
+    forms = [name for name in TableForm.options() if asked.words[name]]
+    if len(forms) > 1:
+        raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in forms)}")
+    return forms[0] if forms else "terminal"
+
+
+def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a command for typer of a function: every option of these choices a parameter.
+
+    They stand where its argument `Asked` does, but for those that it has itself. The command's
+    `options` are the option of every parameter by name, its `choices` what has its settings.
     """
-    arguments = inspect.signature(function).parameters.values()
-    part = members("", {a.name: (a.annotation, a.default) for a in arguments})
-    if any(option.is_setting for kind in part.choices for _, _, option in kind.options().values()):
-        own = SET._replace(completes=lambda: set_words(part.choices))
-        part.parameters.extend(
-            taken_apart("set", Annotated[list[str] | None, own], None).parameters
-        )
 
-    def called(**values: Any) -> None:  # noqa: ANN401
-        from vftcli.outputs.files import protected
+    def of(function: Callable[..., None]) -> Callable[..., None]:
+        own, parts = inspect.signature(function).parameters, [*parameters_of(function, choices)]
+        options = {each.name: option for each, option in parts}
 
-        if part.choices:
-            values["settings"] = settings_of(values.get("set") or (), part.choices)
-        inputs = [*inputs_of(values), *filter(None, [READ.get()])]
-        # How much it says: what its -v and -q ask, as usual where it has none.
-        asked = {name.rpartition("_")[2]: value for name, value in values.items()}
-        loud = speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
-        with protected(inputs), loud:
-            function(**part.made(values))
+        def called(**values: Any) -> None:  # noqa: ANN401
+            from vftcli.outputs.files import protected
 
-    called.__name__, called.__doc__ = function.__name__, function.__doc__
-    # typer asks for the signature; without annotations of its own it finds nothing else.
-    vars(called)["__signature__"] = inspect.Signature([each for each, _ in part.parameters])
-    vars(called)["options"] = {each.name: option for each, option in part.parameters}
-    vars(called)["choices"] = part.choices
-    called.__annotations__ = {}
-    return called
+            settings = settings_of(values.get("set") or (), choices)
+            inputs = [*inputs_of(values), *filter(None, [READ.get()])]
+            # How much it says: what its -v and -q ask, as usual where it has none.
+            loud = speaking(details=bool(values.get("details")), quiet=bool(values.get("quiet")))
+            with protected(inputs), loud:
+                asked = Asked(values, settings, command_line())
+                own_values = {n: options[n].read(values[n]) for n in own if n in values}
+                function(**dict.fromkeys(own, asked) | own_values)
+
+        called.__name__, called.__doc__ = function.__name__, function.__doc__
+        # typer asks for the signature; without annotations of its own it finds nothing else.
+        vars(called)["__signature__"] = inspect.Signature([each for each, _ in parts])
+        vars(called).update(options=options, choices=choices)
+        called.__annotations__ = {}
+        return called
+
+    return of
+
+
+def parameters_of(
+    function: Callable[..., None], choices: Sequence[type[Choice]]
+) -> Iterator[tuple[inspect.Parameter, Option]]:
+    """What typer sees of a function, each with its option."""
+    own = inspect.signature(function).parameters
+    every = [(kind.GROUP, *each) for kind in choices for each in kind.options().items()]
+    for name, argument in own.items():
+        if argument.annotation is Asked:
+            for group, word, (_, what, option) in every:
+                if not option.is_setting and word not in own:
+                    grouped = option._replace(group=option.group or group)
+                    yield parameter(word, typed_as(what, option), option), grouped
+        elif get_origin(argument.annotation) is Annotated:
+            what, option = get_args(argument.annotation)
+            yield parameter(name, what, option, argument.default), option
+        else:  # typer's own context
+            yield argument.replace(kind=inspect.Parameter.KEYWORD_ONLY), Option("", "", "")
+    if any(option.is_setting for *_, (_, _, option) in every):
+        option = SET._replace(completes=lambda: set_words(choices))
+        yield parameter("set", list[str] | None, option), option
+
+
+EMPTY = inspect.Parameter.empty
 
 
 def settings_of(words: Iterable[str], choices: Sequence[type[Choice]]) -> dict[str, str]:
@@ -227,54 +221,8 @@ def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:
             yield from (f"{each}=" for each in (option.values() if name == NUMBERS else [name]))
 
 
-class Part(NamedTuple):
-    """One argument of a command in its parts."""
-
-    parameters: list[tuple[inspect.Parameter, Option]]  #: What typer sees.
-    made: Callable[[Mapping[str, Any]], Any]  #: The argument of the values that typer parsed.
-    choices: tuple[type[Choice], ...] = ()  #: The rooms' choices in it.
-
-
-def members(prefix: str, kinds: Mapping[str, tuple[Any, object]], group: str = "") -> Part:
-    """Arguments by name, each of a kind and with a default, as one that makes them all."""
-    parts = {name: taken_apart(prefix + name, *what) for name, what in kinds.items()}
-    flat = [
-        (parameter, option._replace(group=option.group or group))
-        for part in parts.values()
-        for parameter, option in part.parameters
-    ]
-    choices = tuple(kind for part in parts.values() for kind in part.choices)
-    return Part(
-        flat, lambda values: {name: part.made(values) for name, part in parts.items()}, choices
-    )
-
-
-def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 - an annotation
-    """One argument of a command as parameters: itself, or every option of what it is."""
-    if isinstance(kind, type) and issubclass(kind, Bundle):
-        each = inspect.get_annotations(kind).items()
-        found = {own: (what, getattr(kind, own, EMPTY)) for own, what in each}
-        part = members(f"{name}_", found, kind.GROUP)
-        return Part(part.parameters, lambda values: kind(**part.made(values)), part.choices)
-    if (typed := get_origin(kind)) in {Typed, Needed}:
-        (choice,) = get_args(kind)
-        found = {
-            word: (typed_as(choice, *field, needed=typed is Needed), EMPTY)
-            for word, field in choice.options().items()
-            if not field[2].is_setting
-        }
-        part = members(f"{name}_", found, choice.GROUP)
-        nothing = dict.fromkeys(word for word in choice.options() if word not in found)
-
-        def made(values: Mapping[str, Any]) -> Any:  # noqa: ANN401 - `Typed` of this choice
-            return typed(choice, part.made(values) | nothing | choice.words_of(values["settings"]))
-
-        return Part(part.parameters, made, (choice,))
-    if typed is not Annotated:  # typer's own context
-        plain = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind)
-        return Part([(plain, Option("", "", ""))], lambda values: values[name])
-    what, option = get_args(kind)
-    what = str | None if option.reads else what
+def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> inspect.Parameter:  # noqa: ANN401
+    """An option or argument as typer takes it; one that may be missing has a default."""
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
@@ -282,27 +230,17 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
     if option.completes or option.values():
         how["autocompletion"] = option.values
     info = typer.Option(*option.name.split("/"), **how) if option.name else typer.Argument(**how)
-    single = inspect.Parameter(
-        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[what, info]
-    )
-    return Part([(single, option)], lambda values: option.read(values[name]))
+    kind = inspect.Parameter.KEYWORD_ONLY
+    return inspect.Parameter(name, kind, default=default, annotation=Annotated[what, info])
 
 
-def typed_as(
-    choice: type[Choice],
-    field: str,
-    kind: Any,  # noqa: ANN401 - an annotation
-    option: Option,
-    *,
-    needed: bool,
-) -> object:
+def typed_as(what: Any, option: Option) -> Any:  # noqa: ANN401 - annotations
     """What typer makes of a field's typed text; where that is missing the room knows."""
-    among, default = (kind, *get_args(kind)), getattr(choice, field, EMPTY)
-    one = next((one for one in (int, float, Path) if one in among and not option.reads), str)
-    what: Any = list[one] if option.several else one if option.metavar else bool  # type: ignore[valid-type]
-    if not (needed and default is EMPTY) and option.metavar:
-        what = what | None
-    return Annotated[what, option._replace(reads=None)]
+    if not option.metavar:
+        return bool
+    among = (what, *get_args(what))
+    one: Any = next((one for one in (int, float, Path) if one in among and not option.reads), str)
+    return (list[one] if option.several else one) | None
 
 
 def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
@@ -312,8 +250,6 @@ def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
             path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
             # A word without an ending is a name of ours, as of a robot, where no log is
             # asked for.
-            named = (
-                path is word or (isinstance(path, Path) and path.suffix) or name.endswith("free")
-            )
+            named = path is word or (isinstance(path, Path) and path.suffix) or name == "free"
             if name != "output" and isinstance(path, Path) and named:
                 yield path

@@ -5,18 +5,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
-from vftcli.cli.console import (
-    LeftOut,
-    canvas,
-    command_line,
-    open_made,
-    say_analysis,
-    say_written,
-    show,
-)
+from vftcli.cli.analysis import ANALYSIS, choice_for, give_back, outputs_of
+from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_written, show
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.signals.option import WRITE, Choice, Option, setting
+from vftcli.outputs import OutputChoice
+from vftcli.signals.option import WRITE, Asked, Choice, Option, setting
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -32,15 +25,21 @@ class PrintChoice(Choice):
     ] = None
 
 
-@opt.command
+class Tables(Choice):
+    """What else is written of estimates."""
+
+    GROUP = WRITE
+
+    csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.")]
+    rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.")]
+
+
+@opt.command(ReferenceChoice, *ANALYSIS, opt.Mcap, OutputChoice, PrintChoice)
 def report(
     logs: opt.Logs,
     output: opt.LogFolder,
-    reference: opt.Typed[ReferenceChoice],
-    analysis: AnalysisOptions,
-    also: ExtraOptions,
+    asked: Asked,
     figures: opt.Figures,
-    beside: opt.Typed[PrintChoice],
     json: opt.Json,
     force: opt.Force,
     show: opt.Open,
@@ -59,16 +58,17 @@ def report(
     from vftcli.pipeline import WRITING, analyse_logs, sense
     from vftcli.readers.library import Library
 
-    library, published, written = Library(logs), beside.choice().table, also.choice()
-    output = opt.folder_of(output, logs, analysis.log.reading)
+    give_back()
+    library, published, written = Library(logs), asked.of(PrintChoice).table, outputs_of(asked)
+    output, details = opt.folder_of(output, logs, asked), asked.words["details"]
     names = report_files([library.label(log) for log in logs], written.extras, figures)
     OutputFolder(output, force, names).check()
-    choice = analysis.choice(library, reference, on_screen=not json)
+    choice = choice_for(asked, library, on_screen=not json)
     if published is not None:
-        check_published(published, reference.words["reference"])
+        check_published(published, asked.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
     # Of several logs one without a wrench is left out, and details show what is said of it.
-    choice = replace(choice, answers_first=len(logs) == 1 and not (json or analysis.talk.details))
+    choice = replace(choice, answers_first=len(logs) == 1 and not (json or details))
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
         analyses.append(made)
@@ -81,12 +81,12 @@ def report(
         left_out.end(0)
     failed = left_out.reasons
     if not json:  # the answer first: a file that cannot be written does not cost it
-        show_answers(analyses, failed, details=analysis.talk.details)
+        show_answers(analyses, failed, details=details)
     choice.progress("writing", WRITING, 1.0)
     record = write_report(
         output,
         [sense(made, choice) for made in analyses],
-        command=command_line(),
+        command=asked.line,
         force=force,
         choice=written,
         form=figures,
@@ -119,14 +119,11 @@ def show_answers(
             show(print_text(made.published))
 
 
-@opt.command
+@opt.command(*ANALYSIS, opt.Mcap, OutputChoice, Tables)
 def estimate(
     log: opt.Log,
     output: opt.LogFolder,
-    analysis: AnalysisOptions,
-    also: ExtraOptions,
-    csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.", group=WRITE)],
-    rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.", group=WRITE)],
+    asked: Asked,
     json: opt.Json,
     force: opt.Force,
     show: opt.Open,
@@ -148,15 +145,16 @@ def estimate(
     from vftcli.signals.recording import EXAMINED
     from vftcli.streaming import analysed_in_blocks, comes_in_blocks
 
-    output = opt.folder_of(output, [log], analysis.log.reading)
-    library, written = Library([log]), also.choice(csv=csv, rrd=rrd or show)
+    give_back()
+    output, library = opt.folder_of(output, [log], asked), Library([log])
+    written = outputs_of(asked.but(rrd=asked.words["rrd"] or show))
     names = estimate_files(written.extras)
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
-    if analysis.log.reading.words["columns"] is None:
+    if asked.words["columns"] is None:
         refuse_estimates(log)
     OutputFolder(output, force, names).check()
-    choice = analysis.choice(library)
+    choice = choice_for(asked, library)
     # Of a large log only the columns that are looked at are read; outputs show all.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = for_estimates(choice)
@@ -165,12 +163,12 @@ def estimate(
     if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
         found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
     else:
-        choice = replace(choice, answers_first=not (json or analysis.talk.details))
+        choice = replace(choice, answers_first=not (json or asked.words["details"]))
         found = analyse(*prepared(recording, choice), choice)
         if not json:  # the answer first; of blocks it comes with the last of them
             show_short(found)
         found = sense(found, choice)
-    made, record = write_estimate_folder(output, found, command_line(), written, force)
+    made, record = write_estimate_folder(output, found, asked.line, written, force)
     if not json and made is not found:
         show_short(made)
     say_written(record, output, names, json=json)

@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import command_line, say, show, stages
-from vftcli.signals.option import Option
+from vftcli.cli.console import say, show, stages
+from vftcli.signals.option import Asked, Option
 
 
-@opt.command
+@opt.command(opt.Talk)
 def reproduce(
     paper: Annotated[str, Option("", "PAPER", "Which: huang2025.")],
     output: Annotated[Path | None, opt.OUT._replace(help="Write here; default: huang2025.vft.")],
@@ -21,7 +21,7 @@ def reproduce(
     ],
     fast: Annotated[bool, Option("--fast", "", "Use one seed a scenario instead of five.")],
     force: opt.Force,
-    _talk: opt.TalkOptions,
+    asked: Asked,
 ) -> None:
     """Run the paper's experiments beside its numbers.
 
@@ -58,7 +58,7 @@ def reproduce(
 
     found = gather(wanted, names, run_jobs(jobs, watch))
     with folder:
-        write_reproduction(folder, wanted, found, jobs, command_line(), figures)
+        write_reproduction(folder, wanted, found, jobs, asked.line, figures)
     show(terminal(short_overview(found)))
     say(f"wrote {output}: open {output / 'index.html'}")
     if any(shown.failures for shown in found.values()):

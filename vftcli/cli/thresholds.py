@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LogOptions
+from vftcli.cli.analysis import LOG, choice_for
 from vftcli.cli.console import echo, say, say_json, say_recording, say_robots
 from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
-from vftcli.signals.option import COMPARE, Option
+from vftcli.signals.option import Asked, Option
 
 if TYPE_CHECKING:
     from vftcli.robots.run import Run
@@ -16,14 +16,10 @@ if TYPE_CHECKING:
     from vftcli.signals.wrench import Wrench
 
 
-@opt.command
+@opt.command(*LOG, ReferenceChoice, opt.Anyway, opt.Talk)
 def contact_thresholds(
     logs: opt.Logs,
-    logged: LogOptions,
-    reference: Annotated[str | None, ReferenceChoice.option("reference", group=COMPARE)],
-    columns: Annotated[str | None, ReferenceChoice.option("reference_columns", group=COMPARE)],
-    anyway: opt.Anyway,
-    _talk: opt.TalkOptions,
+    asked: Asked,
     check: opt.Check,
     json: opt.Json,
     rate: Annotated[
@@ -49,18 +45,17 @@ def contact_thresholds(
     from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
 
-    asked = None if reference is None else ReferenceChoice(name=reference, columns=columns)
-    if asked is not None and not check:
+    choice = choice_for(asked, Library([*logs, *(check or ())]))
+    library, reference = choice.library, choice.reference
+    if reference is not None and not check:
         raise ParameterError("--reference says where a log was touched: name that with --check LOG")
-    library = Library([*logs, *(check or ())])
-    choice = logged.asked(library, anyway=anyway)
-    free, signals, thresholds = free_thresholds(logs, choice, rate, anyway=anyway)
+    free, signals, thresholds = free_thresholds(logs, choice, rate, anyway=asked.words["anyway"])
     counted = left_out(signals, rate)
     checks = []
     for log in check or ():
         pushed = modelled(*prepared(library.open(log, choice.read.whole), choice), choice, Runs())
         check_alike((signals[0], compared := compared_signals(pushed)))
-        truth = truth_of(pushed, asked or settled_reference(pushed.recording))
+        truth = truth_of(pushed, reference or settled_reference(pushed.recording))
         checks.append(check_contacts(compared, thresholds, *truth))
     if json:
         record = thresholds_record(thresholds, counted, checks)

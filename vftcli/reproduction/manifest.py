@@ -15,12 +15,12 @@ from typing import Any, NamedTuple, cast
 
 from vftcli.batch.keys import content_digest, digest_of, with_files
 from vftcli.doctor.examination import Examiner
-from vftcli.notebook import OF_ESTIMATE, Asked
-from vftcli.pipeline import AnalysisChoice
+from vftcli.notebook import OF_ESTIMATE
+from vftcli.pipeline import AnalysisChoice, choice_of
 from vftcli.readers.library import Library, absolute
 from vftcli.readers.table import listed
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import interval
+from vftcli.signals.option import Asked, interval
 from vftcli.signals.parsing import check_known, toml_file
 from vftcli.simulation.scenario import Vector, section_from
 
@@ -193,8 +193,8 @@ class Manifest:
         if protocol == "free":
             words["free"] = [str(logs.get(word, word)) for word in log.free]
         arm = str(robot) if robot is not None else self.robot(log)
-        made = Asked("", arm, {"frame": "base", **words}, {}).analysis([file], wrench=True)
-        made = replace(made, library=Library(), examiner=Examiner())
+        asked = Asked({"frame": "base", "wrench": True, **words, "robot": arm}, {}, "")
+        made = choice_of(asked, Library(), Examiner())
         return cast("AnalysisChoice", with_files(made, absolute))
 
     def trains_on(self, log: BenchmarkLog, protocol: str) -> Iterator[tuple[BenchmarkLog, Spans]]:

@@ -13,7 +13,7 @@ from importlib import import_module
 from inspect import get_annotations
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, Self, get_args
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import did_you_mean
@@ -194,6 +194,30 @@ class Choice:
                 else:
                     values[field] = option.read(tuple(typed) if option.several else typed)
         return cls(**values)
+
+
+C = TypeVar("C", bound=Choice)
+
+
+class Asked(NamedTuple):
+    """What a command or a call was given, as it would be typed."""
+
+    words: Mapping[str, Any]  #: Word of an option → what was given for it, None for nothing.
+    settings: Mapping[str, str]  #: Name → text of the settings.
+    line: str  #: The command or call, as `run.json` holds it.
+
+    def of(self, kind: type[C]) -> C:
+        """The choice of a room that they state, checked."""
+        own = {word: self.words[word] for word in kind.options() if word in self.words}
+        return kind.parsed(settings=self.settings, **own)
+
+    def states(self, kind: type[Choice]) -> bool:
+        """Whether they say anything of a room's choice."""
+        return any(map(self.words.get, kind.options())) or any(map(kind.takes, self.settings))
+
+    def but(self, **words: Any) -> "Asked":  # noqa: ANN401 - texts, numbers, lists of them
+        """The same with other words for some of the options."""
+        return self._replace(words={**self.words, **words})
 
 
 def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option, object]]:

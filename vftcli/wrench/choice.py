@@ -49,6 +49,14 @@ class ZeroChoice:
         return cls(spans=tuple(spans), start=START in words)
 
 
+class AlsoWrench(Choice):
+    """Whether a wrench is asked for, with nothing else said of it."""
+
+    GROUP = WRENCH
+
+    wrench: Annotated[bool, Option("--wrench", "", "Add the wrench of every observer.")]
+
+
 @dataclass(frozen=True, kw_only=True)
 class WrenchChoice(Choice):
     """What a user asks of the virtual sensor."""
