@@ -163,6 +163,12 @@ def test_what_cannot_be_done_is_one_line(run, tmp_path: Path, words, reported: s
     assert not (tmp_path / "out").exists()
 
 
+def test_free_motion_among_the_logs_is_none_of_them(run, folder: Path, tmp_path: Path) -> None:
+    words = (*HERE, "--free", folder / "b" / "log.csv", "-o", tmp_path / "out")
+    code, _, err = run("batch", folder, *words)
+    assert (code, err.splitlines()[-1].split(":")[0]) == (0, "2 logs")
+
+
 def test_what_describes_logs_is_passed_over_and_said_once(
     run, folder: Path, tmp_path: Path
 ) -> None:
