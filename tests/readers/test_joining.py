@@ -1,8 +1,8 @@
 """Long logs: part by part they are what they are in one piece, whatever comes at a time."""
 
-import errno
 import importlib
 import re
+import resource
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -168,18 +168,17 @@ def test_what_the_last_tenth_says_counts(
         read_chosen(path, ReadChoice())
 
 
-def test_where_temporary_files_have_no_room_a_table_stays_in_memory_and_a_bag_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("room", [0, 2000])
+@pytest.mark.parametrize("made", [bare_mcap, lambda path: table().write_csv(path) or path])
+def test_what_temporary_files_have_no_room_for_stays_in_memory(
+    tmp_path: Path, made: Callable[[Path], Path], room: int
 ) -> None:
-    def full() -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    path = tmp_path / "log.csv"
-    table().write_csv(path)
-    monkeypatch.setattr(importlib.import_module("vftcli.readers.table"), "TemporaryFile", full)
-    check_same(*both_ways(path))
-    with pytest.raises(LogError, match=r"No space left on device.*TMPDIR=FOLDER"):
-        read_chosen(bare_mcap(tmp_path / "log.mcap"), ReadChoice())
+    path, (_, most) = made(tmp_path / "log"), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, most))
+    try:
+        check_same(*both_ways(path))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
 
 
 def test_quoted_text_is_read_whole(tmp_path: Path) -> None:

@@ -1,13 +1,13 @@
 """Aliases: the names under which users' tables hold the signals."""
 
+import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 
 from vftcli.readers.columns import SIGNALS, Item
-from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import (
+    OWN_STAMPS,
     Cell,
     Cells,
     Names,
@@ -20,7 +20,6 @@ from vftcli.readers.table import (
     missing_column,
     named_cells,
     pick_of,
-    require_positions,
 )
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import tables_beside
@@ -33,9 +32,6 @@ CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time",
 NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)")
 #: A message's own stamp, or a part of it.
 HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
-#: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes
-#: them.
-OWN_STAMPS = "t_src_ns"
 #: Field of Recording → names its columns go by, in lower case and without their index.
 ALIASES: dict[str, list[str]] = tables_beside(__file__, "aliases.toml")
 #: Names of libfranka's residual, measured torque minus model: its sign has to be turned.
@@ -73,19 +69,22 @@ AXES = re.compile(r"(?i)r?[xyz]|q[wxyz]|roll|pitch|yaw")
 FEWEST_JOINTS = 3
 
 RESIDUAL_TURNED = fact("residual-turned")  #: Said wherever libfranka's residual is used.
+EFFORT_IS_CURRENT = fact("effort-is-current")
 
 
 class NamedColumns:
-    """The columns of a headed table by what their names say.
+    """The columns of a headed table by what their names say, or by `usual` ones alone.
 
     Attributes:
+        usual: Signal → the item that says its columns where it has any.
         groups: Name without index, in lower case → index → column.
         twice: Name of a group → a column that has the index of another.
         joints: Name of a group → the joints' names, if it has any.
     """
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: Table, usual: Sequence[Item] = ()) -> None:
         self.table = table
+        self.usual = {SIGNALS.get(item.signal, item.signal): item for item in usual}
         self.twice: dict[str, str] = {}
         self.joints: dict[str, Names] = {}
         found: dict[str, dict[int, Cell]] = {}
@@ -128,6 +127,8 @@ class NamedColumns:
 
     def find(self, signal: str) -> Pick | None:
         """The columns of the clock or a signal, None where none bears a name of it."""
+        if self.usual:
+            return self._usual(signal)
         if signal in {"t", "wrench"}:
             return clock_pick(self.table) if signal == "t" else wrench_pick(self.table)
         found = [name for name in ALIASES[signal] if name in self.groups]
@@ -148,12 +149,22 @@ class NamedColumns:
             return Pick(signal, cells)
         return None
 
+    def _usual(self, signal: str) -> Pick | None:
+        if (item := self.usual.get(signal)) is None:
+            return None
+        columns = {column.partition("[")[0] for column in (item.pattern or "").split("|")}
+        # The clock and the positions are always looked for.
+        if signal not in {"t", "q"} and columns.isdisjoint(self.table.names):
+            return None
+        return pick_of(item, named_cells(self.table, item))
+
     def stated(self, item: Item) -> Pick:
         """The columns that an item of --columns means, by their names or by its own."""
-        pattern = item.pattern
-        if pattern is not None:
-            is_group = pattern.lower() in self.groups and pattern not in self.table.names
-            return pick_of(item, self.cells(pattern) if is_group else named_cells(self.table, item))
+        pattern = item.pattern or ""
+        if pattern not in self.table.names and pattern.lower() in self.groups:
+            return pick_of(item, self.cells(pattern))
+        if pattern or item.rate is not None:
+            return pick_of(item, named_cells(self.table, item))
         signal = SIGNALS.get(item.signal, item.signal)
         found = self.find(signal)
         if found is None and signal == "wrench" and (own := self.groups.get("actual_tcp_force")):
@@ -161,23 +172,27 @@ class NamedColumns:
         if found is None:
             raise missing_column(self.table, item.signal, item.signal)
         pick = pick_of(item, found.cells)
-        return pick._replace(factor=pick.factor * found.factor)
+        # A stated unit is in place of the usual one; a sign is turned again.
+        scale = found.factor if item.unit is None else math.copysign(1.0, found.factor)
+        return pick._replace(factor=pick.factor * scale, unit=pick.unit or found.unit)
 
-    def others(self, stated: Sequence[Pick]) -> Iterator[Pick]:
+    def others(self, stated: Mapping[str, Pick]) -> Iterator[Pick]:
         """The signals beside those that a text names.
 
         Where it names the positions, only what it leaves out and no estimate can do
         without: velocities, and an effort where it names none; what two groups could be
         is left out.
         """
-        known, used = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
-        joints = next((len(pick.cells) for pick in stated if pick.signal == "q"), None)
-        if joints is None:
+        if "t" not in stated and (clock := self.find("t")):
+            yield clock
+        known, used = stated.keys(), {cell for pick in stated.values() for cell in pick.cells}
+        if "q" not in stated:
             for signal in (*ALIASES, "wrench"):
                 pick = self.find(signal) if signal not in known else None
                 if pick is not None and (signal == "wrench" or used.isdisjoint(pick.cells)):
                     yield pick
             return
+        joints = len(stated["q"].cells)
         for wanted in (("dq",), EFFORTS):
             fitting = []
             for signal in wanted if known.isdisjoint(wanted) else ():
@@ -191,30 +206,30 @@ class NamedColumns:
                 yield fitting[0]._replace(remark=remark)
 
 
-def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, Names]:
+def picks_by_alias(
+    table: Table, stated: Sequence[Item], usual: Sequence[Item], names: Names
+) -> tuple[Picks, Names]:
     """Find the signals of a headed table by the names of its columns, and the joints' names."""
-    columns = NamedColumns(table)
-    rate = next((item.rate for item in stated if item.rate is not None), None)
-    named = [item for item in stated if item.rate is None and item.signal != "_"]
-    own = {item.signal: columns.stated(item) for item in named}
-    clock = own.pop("t", None) or (None if rate is not None else columns.find("t"))
-    known = {pick.signal for pick in own.values()}
-    signals = [*own.values(), *columns.others(tuple(own.values()))]
-    q = next((pick.cells for pick in signals if pick.signal == "q"), ())
+    columns = NamedColumns(table, usual)
+    own = {pick.signal: pick for pick in map(columns.stated, stated)}
+    picks = own | {pick.signal: pick for pick in columns.others(own)}
+    q = picks["q"].cells if "q" in picks else ()
     # A group of another width is about something else: a gripper, a base.
-    also = {"q", "wrench", *known}
-    signals = [p for p in signals if not q or len(p.cells) == len(q) or p.signal in also]
+    kept = {"t", "q", "wrench", *own, *columns.usual}
+    picks = {s: p for s, p in picks.items() if not q or len(p.cells) == len(q) or s in kept}
     each = columns.joints.items()
-    names = next((names for stem, names in each if columns.cells(stem) == q), ())
-    if effort_of(names) == "current" and not known & set(EFFORTS):
+    if len(names) != len(q):
+        names = next((joints for stem, joints in each if columns.cells(stem) == q), ())
+    if effort_of(names) == "current" and own.keys().isdisjoint(EFFORTS) and "torque" in picks:
         efforts = [tuple(columns.groups.get(name, {}).values()) for name in ("effort", "eff")]
-        for k, pick in enumerate(signals):
-            if pick.signal == "torque" and pick.cells in efforts:
-                signals[k] = pick._replace(signal="current", remark=fact("effort-is-current"))
-    origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
-    origin = None if origin in table.lists else origin
-    picks = Picks(tuple(signals), clock, rate, origin=origin)
-    return require_positions(table, picks), names
+        if picks["torque"].cells in efforts:
+            current = picks.pop("torque")._replace(signal="current", remark=EFFORT_IS_CURRENT)
+            picks = {"current": current} | picks
+    if table.names.count(OWN_STAMPS) == 1:
+        column = table.names.index(OWN_STAMPS)
+        if column not in table.lists:
+            picks[OWN_STAMPS] = Pick(OWN_STAMPS, (Cell(column),))
+    return picks, names
 
 
 def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
@@ -346,25 +361,8 @@ def along_arm(names: Names, signals: Signals) -> tuple[Names, Signals]:
 
 def effort_of(names: Sequence[str]) -> str:
     """The signal of a JointState's effort by its joints' names: UR's drivers publish currents."""
-    is_ur = len(names) == len(UR_NAMES) and all(name.endswith(UR_NAMES) for name in names)
-    return "current" if is_ur else "torque"
-
-
-def laid_along(raw: RawLog, names: Names, request: ReadChoice) -> RawLog:
-    """A log of JointState messages with its joints base to tip, its effort by their names."""
-    items = request.spec.items
-    if any("|" in (item.pattern or "") for item in items):
-        return raw
-    width = raw.signals["q"].shape[1]
-    if len(names) != width:
-        raise LogError(f"{len(names)} names of joints for {width} positions: {', '.join(names)}")
-    names, signals = along_arm(names, dict(raw.signals))
-    remarks, stated = raw.remarks, {SIGNALS.get(item.signal) for item in items}
-    if effort_of(names) == "current" and "torque" in signals and not stated & set(EFFORTS):
-        signals["current"] = signals.pop("torque")
-        remarks = (*remarks, fact("effort-is-current"))
-    hint = robot_of(names)
-    return replace(raw, signals=signals, joint_names=names, robot_hint=hint, remarks=remarks)
+    of_ur = [name.endswith(UR_NAMES) for name in names].count(True)
+    return "current" if of_ur == len(UR_NAMES) else "torque"
 
 
 def robot_of(names: Sequence[str]) -> str | None:

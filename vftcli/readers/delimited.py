@@ -324,12 +324,15 @@ def joint_names(table: TextTable) -> Names:
                 f"{words[1][:60]}), as where two controllers publish on one topic. Keep the rows "
                 "of the arm."
             )
-    names = tuple(words[0] for words in found)
-    if len(names) != 1 or not names[0].startswith(("[", "(")):
-        return names
-    listed: object = None
-    with suppress(ValueError, SyntaxError, RecursionError, MemoryError):
-        listed = ast.literal_eval(names[0])  # a list as Python prints it
-    if not isinstance(listed, list | tuple) or not all(isinstance(name, str) for name in listed):
-        raise LogError(f"{table.path}: the column name holds no list of joints: {names[0][:60]!r}")
-    return tuple(listed)
+    names: Any = tuple(words[0] for words in found)
+    if len(names) == 1 and names[0].startswith(("[", "(")):
+        with suppress(ValueError, SyntaxError, RecursionError, MemoryError):
+            names = ast.literal_eval(names[0])  # a list as Python prints it
+    positions = sum("position" in name for name in table.names)
+    listed = isinstance(names, list | tuple) and all(isinstance(name, str) for name in names)
+    if not listed or len(names) != positions:
+        raise LogError(
+            f"{table.path}: the column name holds no list of joints, one for each of {positions} "
+            f"positions: {str(names)[:60]!r}"
+        )
+    return tuple(names)

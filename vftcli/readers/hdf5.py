@@ -30,7 +30,7 @@ from vftcli.readers.opening import (
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import Blocks, Names, Places, listed
-from vftcli.readers.tables import ArrayTable, from_table, read_known_columns
+from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.packages import needed
 from vftcli.signals.remarks import fact
@@ -196,12 +196,13 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, places)
     first = ALOHA_ARM * ARMS.index(arm)
     span = f"[{first}:{first + ALOHA_ARM - 1}]"
-    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span}"
-    usual += f",current[mA]={DYNAMIXEL}{span}"
+    usual = f"t@{ALOHA_RATE:g}Hz"
+    if not stated:
+        usual += f",q[rad]={ALOHA}{span},dq=observations/qvel{span},current[mA]={DYNAMIXEL}{span}"
     if DYNAMIXEL in names and not stated:
         remarks = (*remarks, fact("effort-of-dynamixel"))
     clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention" if not request.spec.item("t") else ""
-    raw = read_known_columns(table, usual, request, remarks=remarks, clock_name=clock)
+    raw = from_table(table, request, usual=usual, remarks=remarks, clock_name=clock)
     return replace(raw, part="" if stated else f"{arm} arm")
 
 
@@ -212,7 +213,7 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     computed = DROID_STATE + DROID_COMPUTED in table.names
     remarks = (fact("computed-torque-left-out"),) if computed else ()
     clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
-    raw = read_known_columns(table, DROID_USUAL, request, remarks=remarks, clock_name=clock)
+    raw = from_table(table, request, usual=DROID_USUAL, remarks=remarks, clock_name=clock)
     # The serial number in the episode's metadata begins with the robot's name.
     serial = ""
     for path in sorted(Path(table.path).parent.glob("metadata_*.json"))[:1]:

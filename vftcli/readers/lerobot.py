@@ -18,7 +18,7 @@ from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import LogFormat
 from vftcli.readers.table import Names, Notes, listed
-from vftcli.readers.tables import read_known_columns
+from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -90,7 +90,7 @@ def read_episode(
         each_of = each_of.items() if isinstance(each_of, dict) else ()
         features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
         usual, names, side, remarks = _columns_of(file.path, table, features, request)
-    raw = read_known_columns(table, usual, request, joint_names=names, remarks=remarks)
+    raw = from_table(table, request, usual=usual, joint_names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
     return replace(
         _by_frames(raw, table, info.get("fps")),

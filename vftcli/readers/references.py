@@ -26,7 +26,7 @@ from vftcli.readers.table import (
     Picks,
     Table,
     listed,
-    unchecked_picks,
+    picks_of,
 )
 from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
@@ -80,13 +80,12 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
 
 
 def _stated(table: Table, columns: str) -> Picks:
-    picks = unchecked_picks(table, parse_columns(columns, log=False))
-    signals = {pick.signal: pick for pick in picks.signals}
-    if not {TORQUE, "wrench"} & set(signals):
+    picks = picks_of(table, parse_columns(columns, log=False))
+    if picks.keys().isdisjoint({TORQUE, "wrench"}):
         raise LogError(
             f"{table.path}: --reference-columns names no tau_ext or wrench, as in t,tau_ext:6."
         )
-    if (wrench := signals.get("wrench")) and len(wrench.cells) != 6:
+    if (wrench := picks.get("wrench")) and len(wrench.cells) != 6:
         raise LogError(f"{table.path}: a wrench has 6 columns, not {len(wrench.cells)}.")
     return picks
 
@@ -106,9 +105,8 @@ def _found(table: Table) -> Picks:
             f"{table.path}: which columns are the reference torques is unclear: {there}. "
             "Name them with --reference-columns, as in t=time,tau_ext=true_tau_{i}."
         )
-    picks = [Pick(TORQUE, columns.cells(name)) for name in groups]
-    picks += [] if wrench is None else [wrench]
-    return Picks(tuple(picks), columns.find("t"))
+    found = [*(Pick(TORQUE, columns.cells(name)) for name in groups), wrench, columns.find("t")]
+    return {pick.signal: pick for pick in found if pick is not None}
 
 
 def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
@@ -133,9 +131,9 @@ def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
             f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
             f"{listed(table.names)}"
         )
-    picks = [Pick(kind, each) for kind, each in found.items() if each]
-    clock = Pick("t", (columns["t"],), unit="s")
-    raw = load_signals(table, Picks(tuple(picks), clock), ReadChoice())
+    picks = {kind: Pick(kind, each) for kind, each in found.items() if each}
+    picks["t"] = Pick("t", (columns["t"],), unit="s")
+    raw = load_signals(table, picks, ReadChoice())
     wrench = raw.signals.get("wrench") if len(found["wrench"]) == len(AXES) else None
     t, tau, sd = program_clock(raw, path), raw.signals[TORQUE], raw.signals.get("band")
     return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), wrench
@@ -209,7 +207,7 @@ class JacobianLog(NamedTuple):
 def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str) -> JacobianLog:
     """Read the log in which positions were looked for in vain."""
     table = found.table
-    signals = {p.signal: p for p in found.picks.signals if p.signal in {"tau_ext", "wrench"}}
+    picks = {s: p for s, p in found.picks.items() if s in {"t", TORQUE, "wrench"}}
     places = {
         (int(match[2]), int(match[3])): Cell(column)
         for column, name in enumerate(table.names)
@@ -222,13 +220,12 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
             f"{table.path}: the Jacobian has {len(rows)} rows, {n} columns and "
             f"{len(places)} cells; a wrench needs 6 rows and a column for each of 6 joints or more."
         )
-    if "tau_ext" not in signals or len(signals["tau_ext"].cells) != n:
+    if TORQUE not in picks or len(picks[TORQUE].cells) != n:
         raise LogError(
             f"{path}: a Jacobian of {n} joints and no external torques of {n} joints beside it. "
             "Name their columns with --columns, as in tau_ext=tau_ext_{i}."
         )
-    signals["jacobian"] = Pick("jacobian", tuple(places[r, c] for r in rows for c in columns))
-    picks = Picks(tuple(signals.values()), found.picks.clock, found.picks.rate)
+    picks["jacobian"] = Pick("jacobian", tuple(places[r, c] for r in rows for c in columns))
     raw = without_repeats(measured(load_signals(table, picks, ReadChoice()), path), path)
     t = seconds(raw)
     start, stop = choice.interval or (-np.inf, np.inf)

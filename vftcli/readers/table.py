@@ -1,5 +1,6 @@
 """Tables: columns of numbers under names or in file order, whatever file they come from."""
 
+import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,7 +19,6 @@ from vftcli.signals.arrays import Array, release
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.wrench import WrenchFrame
 
 #: A cell of a Jacobian among the columns: row, then column.
 JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
@@ -52,11 +52,9 @@ class Table(ABC):
     def load(self, columns: Places, clock: int | None = None) -> Block:
         """All rows of some columns."""
         first, *more = self.blocks(columns, clock)
-        return (
-            {c: np.concatenate([first[c], *(b[c] for b in more)]) for c in columns}
-            if more
-            else first
-        )
+        if not more:
+            return first
+        return {c: np.concatenate([first[c], *(block[c] for block in more)]) for c in columns}
 
 
 class Cell(NamedTuple):
@@ -73,26 +71,20 @@ Cells = tuple[Cell, ...]  #: The cells of a signal.
 class Pick(NamedTuple):
     """The cells that make up one signal."""
 
-    signal: str  #: Field of Recording, or "t".
-    cells: Cells  #: One cell a joint, base to tip.
+    signal: str  #: Field of Recording, "t" for the clock, or one of `BESIDE`.
+    cells: Cells = ()  #: One cell a joint, base to tip; one or two of the clock.
     factor: float = 1.0  #: Factor to SI units and to our sign.
-    unit: str | None = None  #: The unit if it was stated.
-    frame: WrenchFrame | None = None  #: Frame of a wrench if it was stated.
+    unit: str | None = None  #: The unit if it was stated; of a wrench its frame.
     remark: Remark | None = None  #: What was turned, if anything was.
+    rate: float | None = None  #: Of a clock without a column. [Hz]
 
 
-class Picks(NamedTuple):
-    """All signals of a table and its clock, or its rate [Hz] where it has no clock.
-
-    `constants` are columns of which the last value counts; `origin` is the column of the
-    log's own stamps [ns] in a table with a clock that starts at zero.
-    """
-
-    signals: tuple[Pick, ...]
-    clock: Pick | None
-    rate: float | None = None
-    constants: tuple[int, ...] = ()
-    origin: int | None = None
+Picks = dict[str, Pick]  #: All signals of a table, and what is beside them.
+#: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes
+#: them.
+OWN_STAMPS = "t_src_ns"
+PAYLOAD = "payload"  #: Columns of which the last values are a mass and its centre.
+BESIDE = {"t", OWN_STAMPS, PAYLOAD}  #: Columns that are kept as they are stored.
 
 
 class JacobianError(LogError):
@@ -104,11 +96,6 @@ class JacobianError(LogError):
 
 
 def picks_of(table: Table, spec: ColumnSpec) -> Picks:
-    """The columns that a --columns text of a log means."""
-    return require_positions(table, unchecked_picks(table, spec))
-
-
-def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
     """The columns that a --columns text means, whatever signals they are."""
     if spec.named:
         if not table.names:
@@ -116,7 +103,7 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
                 f"{table.path}: the table has no header, so --columns must count its "
                 f"{table.width} columns in file order, as in t,q:6,dq:6,current:6."
             )
-        found = [pick_of(item, named_cells(table, item)) for item in spec.items if item.pattern]
+        found = [pick_of(item, named_cells(table, item)) for item in spec.items]
     else:
         cells = [cell for column in range(table.width) for cell in cells_of(table, column)]
         missing = len(cells) - spec.width
@@ -127,12 +114,10 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
                 f"{len(cells)}; {remedy}."
             )
         left = iter(cells)
-        items = [item for item in spec.items if item.rate is None]
-        found = [pick_of(item, tuple(islice(left, item.width or missing))) for item in items]
-    signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
-    clock = next((pick for pick in found if pick.signal == "t"), None)
-    rate = next((item.rate for item in spec.items if item.rate is not None), None)
-    return Picks(signals, clock, rate)
+        widths = [(item.width or missing) * (item.rate is None) for item in spec.items]
+        each = zip(spec.items, widths, strict=True)
+        found = [pick_of(item, tuple(islice(left, width))) for item, width in each]
+    return {pick.signal: pick for pick in found if pick.signal != "_"}
 
 
 def cells_of(table: Table, column: int, elements: slice = slice(None)) -> Cells:
@@ -144,33 +129,25 @@ def cells_of(table: Table, column: int, elements: slice = slice(None)) -> Cells:
 
 def pick_of(item: Item, cells: Cells) -> Pick:
     """The cells of an item, with its factor to SI units."""
-    wrench, turned = item.signal == "wrench", any(cell.turned for cell in cells)
-    return Pick(
-        signal=SIGNALS.get(item.signal, item.signal),
-        cells=cells,
-        factor=item.factor,
-        unit=item.unit,
-        frame=WrenchFrame.parsed(item.unit) if wrench and item.unit else None,
-        remark=fact("sign-turned", signal=item.signal) if item.factor < 0 or turned else None,
-    )
+    turned = item.factor < 0 or any(cell.turned for cell in cells)
+    remark = fact("sign-turned", signal=item.signal) if turned else None
+    signal = SIGNALS.get(item.signal, item.signal)
+    return Pick(signal, cells, item.factor, item.unit, remark, item.rate)
 
 
 def named_cells(table: Table, item: Item) -> Cells:
-    """The cells that a pattern names, in the order of its indices."""
-    pattern = item.pattern or ""
-    names = table.names
-    if "|" in pattern:
-        return tuple(c for part in pattern.split("|") for c in _exact(table, item, part.strip()))
+    """The cells that a pattern names, in the order of its indices; none of a stated rate."""
+    if (pattern := item.pattern) is None:
+        return ()
     if "{i}" not in pattern:
-        return _exact(table, item, pattern)
+        return tuple(c for part in pattern.split("|") for c in _exact(table, item, part.strip()))
     template = re.compile(
         re.escape(pattern).replace(r"\{i\}", r"(\d{1,9})", 1).replace(r"\{i\}", r"\1")
     )
-    found = {
-        int(match[1]): column
-        for column, name in reversed(list(enumerate(names)))  # of two of one name the first
-        if (match := template.fullmatch(name))
-    }
+    found: dict[int, Cell] = {}
+    for column, name in enumerate(table.names):
+        if match := template.fullmatch(name):
+            found.setdefault(int(match[1]), Cell(column))  # of two of one name the first
     if not found:
         raise missing_column(table, item.signal, pattern)
     indices = range(min(found), min(found) + len(found))  # from 0 or from 1, but without holes
@@ -179,7 +156,7 @@ def named_cells(table: Table, item: Item) -> Cells:
             f"{table.path}: {item.signal}={pattern} finds {len(found)} columns but none for "
             f"index {missing[0]}. Name them one by one with |."
         )
-    return tuple(Cell(found[index]) for index in indices)
+    return tuple(found[index] for index in indices)
 
 
 def _exact(table: Table, item: Item, name: str) -> Cells:
@@ -193,13 +170,13 @@ def _exact(table: Table, item: Item, name: str) -> Cells:
         bare, (first, colon, last) = match[1], match[2].partition(":")
         stop = last if colon else int(first) + 1
         elements = slice(int(first or 0), int(stop) if stop else None)
-    if names.count(bare) != 1:
-        if bare in names:
-            raise LogError(
-                f"{table.path}: {names.count(bare)} columns are called {bare!r}. Count the "
-                "columns in file order instead, as in t,q:6,_:12."
-            )
+    if bare not in names:
         raise missing_column(table, item.signal, bare)
+    if names.count(bare) > 1:
+        raise LogError(
+            f"{table.path}: {names.count(bare)} columns are called {bare!r}. Count the "
+            "columns in file order instead, as in t,q:6,_:12."
+        )
     column = names.index(bare)
     length, cells = table.lists.get(column), cells_of(table, column, elements)
     if length is None and bare != name:
@@ -223,10 +200,9 @@ def listed(names: Sequence[str], most: int = 24) -> str:
     return f"{shown} and {len(names) - most} more" if len(names) > most else shown
 
 
-def require_positions(table: Table, picks: Picks) -> Picks:
-    """Return the picks, or raise unless there are positions and all signals have their width."""
-    joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
-    if joints == 0:
+def require_positions(table: Table, picks: Picks) -> None:
+    """Raise unless there are positions and all signals have their width."""
+    if not (joints := len(picks.get("q", Pick("q")).cells)):
         there = listed(table.names) if table.names else f"{table.width} columns without names"
         if any(JACOBIAN.match(name) for name in table.names):
             raise JacobianError(
@@ -241,25 +217,26 @@ def require_positions(table: Table, picks: Picks) -> Picks:
             "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm "
             "(a reference goes to --reference file:PATH)."
         )
-    for pick in picks.signals:
-        if len({cell[:2] for cell in pick.cells}) < len(pick.cells):
+    for signal, pick in picks.items():
+        if signal in BESIDE:
+            continue
+        count, wrench = len(pick.cells), signal == "wrench"
+        if len({cell[:2] for cell in pick.cells}) < count:
             raise LogError(
-                f"{table.path}: --columns names a column of {pick.signal} twice; every joint has "
+                f"{table.path}: --columns names a column of {signal} twice; every joint has "
                 "one of its own."
             )
-        expected = 6 if pick.signal == "wrench" else joints
-        if len(pick.cells) != expected:
+        if count != (6 if wrench else joints):
+            expected = "a wrench has 6" if wrench else f"q has {joints}"
             raise LogError(
-                f"{table.path}: {pick.signal} has {len(pick.cells)} columns, "
-                + ("a wrench has 6" if pick.signal == "wrench" else f"q has {joints}")
-                + ". Check --columns."
+                f"{table.path}: {signal} has {count} columns, {expected}. Check --columns."
             )
-    if picks.clock is not None and not 1 <= len(picks.clock.cells) <= 2:
+    clock = picks.get("t")
+    if clock is not None and clock.rate is None and not 1 <= len(clock.cells) <= 2:
         raise LogError(
             f"{table.path}: t must be one column, or one of seconds and one of nanoseconds, not "
-            f"{len(picks.clock.cells)}."
+            f"{len(clock.cells)}."
         )
-    return picks
 
 
 #: Bytes of a signal that wait in memory. A longer one lies in a nameless file in the
@@ -267,23 +244,18 @@ def require_positions(table: Table, picks: Picks) -> Picks:
 HELD = 1 << 23
 
 
-class NoRoomError(LogError):
-    """The folder of temporary files has no room for a log."""
-
-
 class JoinedRows:
-    """The rows of a signal, part by part; beyond `held` bytes they wait in a file.
+    """The rows of a signal, part by part; beyond `HELD` bytes they wait in a file if it has room.
 
     Attributes:
         count: How many there are so far.
         shapes: The shapes of single rows.
     """
 
-    def __init__(self, held: float | None = None) -> None:
+    def __init__(self) -> None:
         self.count, self.shapes = 0, set[tuple[int, ...]]()
-        self._most = HELD if held is None else held
         self._held: list[Column] = []
-        self._size = 0
+        self._size, self._written, self._most = 0, 0, float(HELD)
         self._file: Any = None
 
     def add(self, rows: Column) -> None:
@@ -299,37 +271,36 @@ class JoinedRows:
     def _write(self) -> None:
         try:
             if self._file is None:
-                self._file = TemporaryFile()  # noqa: SIM115 - open until all rows are there
+                self._file = TemporaryFile(buffering=0)  # noqa: SIM115 - open until all is there
                 finalize(self, self._file.close)
-            for rows in self._held:
-                self._file.write(np.ascontiguousarray(rows))
-                release(rows)
-            self._file.flush()
-        except OSError as error:
-            raise NoRoomError(
-                f"a long log has no room in the folder of temporary files ({error.strerror}). "
-                "Name another: TMPDIR=FOLDER"
-            ) from None
-        self._held, self._size = [], 0
+            while self._held:
+                rows = np.ascontiguousarray(self._held[0]).reshape(-1).view(np.uint8)
+                while rows.size:
+                    rows = rows[self._file.write(rows.data) :]
+                self._written += self._held[0].nbytes
+                release(self._held.pop(0))
+            self._size = 0
+        except OSError:  # it has no room
+            self._most = math.inf
 
     def whole(self) -> Column:
         """All rows, where they have one shape; nothing can be added any more."""
-        if self._file is None:
-            return np.concatenate(self._held) if len(self._held) > 1 else self._held[0]
-        self._write()
-        mapped = mmap(self._file.fileno(), 0, access=ACCESS_READ)  # stays when the file is closed
-        return np.frombuffer(mapped, self._kind).reshape(-1, *min(self.shapes))
+        if self._file is not None and self._most < math.inf:
+            self._write()
+        if self._written:
+            # The memory of the file stays when it is closed.
+            mapped = mmap(self._file.fileno(), self._written, access=ACCESS_READ)
+            first = np.frombuffer(mapped, self._kind).reshape(-1, *min(self.shapes))
+            self._held.insert(0, first)
+        return np.concatenate(self._held) if len(self._held) > 1 else self._held[0]
 
 
-def joined(parts: Iterable[Signals], held: float | None = None) -> Signals:
-    """Signals that come part by part, each as one array; all parts have the same signals.
-
-    Beyond `held` bytes, by default `HELD`, a signal waits in a file.
-    """
+def joined(parts: Iterable[Signals]) -> Signals:
+    """Signals that come part by part, each as one array; all parts have the same signals."""
     found: dict[str, JoinedRows] = {}
     for part in parts:
         for name, rows in part.items():
-            found.setdefault(name, JoinedRows(held)).add(rows)
+            found.setdefault(name, JoinedRows()).add(rows)
     if not found:
         raise LogError("the log has no rows; nothing was recorded into it")
     return {name: rows.whole() for name, rows in found.items()}

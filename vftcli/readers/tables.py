@@ -1,6 +1,5 @@
 """Generic tables: headed by aliases, described by --columns, or by the layout of a format."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -12,22 +11,26 @@ import numpy as np
 
 from vftcli.readers.aliases import (
     RESIDUAL_TURNED,
-    laid_along,
+    kinematic_order,
     picks_by_alias,
     robot_of,
     table_clock,
 )
-from vftcli.readers.columns import ColumnSpec, guess_columns, parse_columns, tick_of
+from vftcli.readers.columns import guess_columns, parse_columns, tick_of
 from vftcli.readers.delimited import EchoTable, TextTable, joint_names
 from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import (
+    BESIDE,
+    OWN_STAMPS,
+    PAYLOAD,
     Block,
     Blocks,
+    Cell,
     Cells,
     Column,
-    NoRoomError,
+    Names,
     Notes,
     Pick,
     Picks,
@@ -35,9 +38,10 @@ from vftcli.readers.table import (
     Signals,
     Table,
     joined,
-    missing_column,
     named_cells,
+    pick_of,
     picks_of,
+    require_positions,
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -53,32 +57,41 @@ BLOCK_ROWS = 1 << 16  #: Rows of arrays that are read at a time.
 WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
 
 
-def from_table(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
-    """Read a table by its --columns text, else by the aliases of its column names.
+def from_table(
+    table: Table, request: ReadChoice, *, usual: str = "", names: Names = (), **more: RawField
+) -> RawLog:
+    """Read a table by its --columns text, else by the usual columns or by aliases of their names.
 
     A text that names signals says something of these; what it leaves out is found by name.
+    `names` are the joints' where they are known.
     """
     spec = request.spec
-    item = spec.item("q")
-    more |= {"segment": spec.segment, "degrees_possible": item is None or item.unit is None}
-    if spec.items and (not table.names or not spec.named):
-        return load_signals(table, picks_of(table, spec), request, **more)
-    if not table.names and table.width == 1:
-        raise LogError(
-            f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
-            "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
-        )
-    if not table.names:
-        return _read_by_values(table, request, **more)
-    picks, joints = picks_by_alias(table, spec.items)
-    more |= {"joint_names": joints, "robot_hint": robot_of(joints)}
+    if any("|" in (item.pattern or "") for item in spec.items):
+        names = ()
+    if not table.names and not spec.items:
+        table, found = _by_values(table)
+        spec = parse_columns(found)._replace(segment=spec.segment)
+    if table.names and (spec.named or not spec.items):
+        known = parse_columns(usual).items if usual else ()
+        picks, names = picks_by_alias(table, spec.items, known, names)
+    else:
+        picks = picks_of(table, spec)
+    require_positions(table, picks)
+    if names and len(names) == len(picks["q"].cells):
+        order = kinematic_order(names)
+        for signal, pick in picks.items():
+            if len(pick.cells) == len(names) and signal not in {"wrench", *BESIDE}:
+                picks[signal] = pick._replace(cells=tuple(pick.cells[k] for k in order))
+        names = tuple(names[k] for k in order)
+        more = {"joint_names": names, "robot_hint": robot_of(names), **more}
+    more = {"segment": spec.segment, "degrees_possible": picks["q"].unit is None, **more}
     return load_signals(table, picks, request, **more)
 
 
 def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
     """Read a table by the columns of its format; what it has not of them is left out."""
     spec, names = parse_columns(layout.columns), table.names
-    items = []
+    picks = {} if spec.named else picks_of(table, spec)
     for item in spec.items if spec.named else ():
         cells: Cells = ()
         with suppress(LogError):
@@ -87,53 +100,31 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
             table_clock(table, cells[0].column)
         wanted = {"t": 1, "wrench": layout.joints and 6}.get(item.signal, layout.joints)
         if len(cells) == wanted if wanted else len(cells) > 1:
-            items.append(item)
+            pick = pick_of(item, cells)
+            picks[pick.signal] = pick
         elif item.signal in {"t", "q"}:
             raise LogError(
                 f"{table.path}: no {item.pattern} among its {table.width} columns. {layout.remedy}"
             )
-    picks = picks_of(table, spec._replace(items=tuple(items)) if spec.named else spec)
     # Of the vendors' signals libfranka's residual alone is turned.
-    signals = [p._replace(remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
+    picks = {s: p._replace(remark=RESIDUAL_TURNED if p.remark else None) for s, p in picks.items()}
     payload = layout.payload.split()
-    constants = tuple(map(names.index, payload)) if set(payload) <= set(names) else ()
-    picks = picks._replace(signals=tuple(signals), constants=constants)
+    if payload and set(payload) <= set(names):
+        picks[PAYLOAD] = Pick(PAYLOAD, tuple(Cell(names.index(name)) for name in payload))
+    require_positions(table, picks)
     raw = load_signals(table, picks, request, clock_name=layout.clock)
     if layout is not UR:
         return raw
     return replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
 
 
-def read_known_columns(table: Table, usual: str, request: ReadChoice, **more: RawField) -> RawLog:
-    """Read a table with known columns, but for what a --columns text says of them."""
-    stated = request.spec
-    if stated.items and not stated.named:
-        return from_table(table, request, **more)
-    items = {}
-    for item in parse_columns(usual).items:
-        columns = (column.partition("[")[0] for column in (item.pattern or "").split("|"))
-        # The clock and the positions are always looked for.
-        if item.signal in {"t", "q"} or not set(table.names).isdisjoint(columns):
-            items[item.signal] = item
-    if stated.item("q") is not None:
-        items = {signal: item for signal, item in items.items() if signal == "t"}
-    for item in stated.items:
-        before, items[item.signal] = items.get(item.signal), item
-        if item.pattern is not None or item.rate is not None:
-            continue
-        if before is None:  # one without columns is of the usual ones
-            raise missing_column(table, item.signal, item.signal)
-        scale = before.factor if item.unit is None else math.copysign(1.0, before.factor)
-        unit = item.unit or before.unit
-        items[item.signal] = before._replace(factor=item.factor * scale, unit=unit)
-    spec = ColumnSpec(items=tuple(items.values()), named=True, segment=stated.segment)
-    unit = items["q"].unit if "q" in items else None
-    more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
-    return load_signals(table, picks_of(table, spec), request, **more)
-
-
-def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
-    """Read a table without a header by its values, and say what its columns are."""
+def _by_values(table: Table) -> tuple[Table, str]:
+    """A table without a header, loaded, and what its columns are by their values, which is said."""
+    if table.width == 1:
+        raise LogError(
+            f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
+            "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
+        )
     columns: Block = {}
     if 1 < table.width <= WIDEST and not table.lists:
         with suppress(LogError):  # what is no number somewhere is no clue
@@ -149,9 +140,8 @@ def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawL
         )
     remark = fact("columns-by-value", count=table.width, columns=found.columns, why=found.why)
     named = {str(k): column for k, column in columns.items()}
-    loaded = ArrayTable(path=table.path, columns=named, headed=False, remarks=table.remarks)
-    picks = picks_of(loaded, parse_columns(found.columns))
-    return load_signals(loaded, picks, request, remarks=(remark,), **more)
+    loaded = ArrayTable(table.path, named, headed=False, remarks=(*table.remarks, remark))
+    return loaded, found.columns
 
 
 @dataclass
@@ -227,7 +217,7 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     """Read a table of text by its layout, --columns or aliases."""
     if layout.name in {"bagpy", "rostopic", "ros2-echo"}:
         printed = (EchoTable if layout.name == "ros2-echo" else TextTable)(file)
-        return laid_along(from_table(printed, request), joint_names(printed), request)
+        return from_table(printed, request, names=joint_names(printed))
     if layout.columns or layout.name == "ur-rtde":
         return read_layout(TextTable(file), layout if layout.columns else UR, request)
     return from_table(TextTable(file), request)
@@ -242,45 +232,32 @@ def load_signals(
     **more: RawField,
 ) -> RawLog:
     """Load the picked columns of a table and scale them."""
-    signals = tuple(p for p in picks.signals if request.wants(p.signal))
-    clock = picks.clock.cells if picks.clock else ()
-    origin = () if picks.origin is None else (picks.origin,)
-    whole: dict[int, list[Column]] = {
-        column: [] for column in (*(cell.column for cell in clock), *origin, *picks.constants)
-    }
+    signals = [p for s, p in picks.items() if s not in BESIDE and request.wants(s)]
+    beside = {s: [cell.column for cell in picks[s].cells] for s in BESIDE & picks.keys()}
+    whole: dict[int, list[Column]] = {column: [] for each in beside.values() for column in each}
+    asked = sorted({*whole, *(cell.column for pick in signals for cell in pick.cells)})
 
     def stacked() -> Iterator[Signals]:
-        asked = sorted({*whole, *(cell.column for pick in signals for cell in pick.cells)})
-        for parts in whole.values():
-            parts.clear()
-        for loaded in table.blocks(asked, clock[0].column if clock else None):
+        for loaded in table.blocks(asked, next(iter(beside.get("t", ())), None)):
             for column, parts in whole.items():
                 parts.append(loaded[column])
             yield {pick.signal: _stacked(pick, loaded) for pick in signals}
 
-    try:
-        arrays = joined(stacked())
-    except NoRoomError:  # then it waits in memory
-        arrays = joined(stacked(), math.inf)
+    arrays = joined(stacked())
     loaded = {c: np.concatenate(parts) for c, parts in whole.items()}
     rows = len(next(iter(arrays.values())))
-    stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)
-    if picks.origin is not None and len(stamps):
-        more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
-    constants = tuple(float(loaded[c][-1]) for c in picks.constants if rows)
+    stamps, tick, words = _stamps(table, picks.get("t"), loaded, rows, clock_name)
+    if OWN_STAMPS in beside and rows:
+        start = float(loaded[beside[OWN_STAMPS][0]][0]) * 1e-9
+        more["origin"] = start - float(stamps[0]) * tick
+    constants = tuple(float(loaded[c][-1]) for c in beside.get(PAYLOAD, ()) if rows)
     if constants and np.isfinite(constants).all():
         more |= {"payload_mass": constants[0], "payload_com": constants[1:] or None}
-    remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
-    wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
-    more.setdefault("wrench_frame", wrench.frame if wrench else None)
-    return RawLog(
-        stamps=stamps,
-        tick=tick,
-        clock=words,
-        signals=arrays,
-        remarks=(*remarks, *more.pop("remarks", ())),
-        **more,
-    )
+    if (wrench := next((p for p in signals if p.signal == "wrench"), None)) and wrench.unit:
+        more.setdefault("wrench_frame", WrenchFrame.parsed(wrench.unit))
+    remarks = (pick.remark for pick in signals if pick.remark)
+    more["remarks"] = (*table.remarks, *remarks, *more.get("remarks", ()))
+    return RawLog(stamps=stamps, tick=tick, clock=words, signals=arrays, **more)
 
 
 def _stacked(pick: Pick, loaded: Block) -> Array:
@@ -299,18 +276,17 @@ def _stacked(pick: Pick, loaded: Block) -> Array:
 
 
 def _stamps(
-    table: Table, picks: Picks, loaded: Block, rows: int, clock_name: str
+    table: Table, clock: Pick | None, loaded: Block, rows: int, clock_name: str
 ) -> tuple[Column, float, str]:
     """The stamps of the rows (T,), the length of their tick and which clock they are."""
-    clock = picks.clock
     if clock is None:
-        if picks.rate is None:
-            raise LogError(
-                f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
-                "order), or say the rate of a log without one: t@125Hz."
-            )
-        words = clock_name or f"none: {picks.rate:g} Hz as stated"
-        return np.arange(rows), 1 / picks.rate, words
+        raise LogError(
+            f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
+            "order), or say the rate of a log without one: t@125Hz."
+        )
+    if clock.rate is not None:
+        words = clock_name or f"none: {clock.rate:g} Hz as stated"
+        return np.arange(rows), 1 / clock.rate, words
     if clock.factor < 0 or any(cell.turned for cell in clock.cells):
         raise LogError(
             f"{table.path}: --columns turns the sign of the clock; time cannot run back."

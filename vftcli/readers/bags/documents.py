@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import along_arm, laid_along
+from vftcli.readers.aliases import along_arm
 from vftcli.readers.bags.container import Batch, Channel
 from vftcli.readers.bags.decode import KINDS, Stream
 from vftcli.readers.bags.ros_messages import VECTORS
@@ -117,11 +117,9 @@ class Documents:
             clock = "log time of the recorder"
             columns["timestamp_ns"] = np.array(times, dtype=np.int64)
         table = ArrayTable(path=f"{self.path}: topic {channel.topic}", columns=columns)
-        raw, names = from_table(table, request, clock_name=clock), rows[0].get("name", [])
+        names = rows[0].get("name", [])
         named = isinstance(names, list) and all(isinstance(name, str) for name in names)
-        if not named or len(names) != raw.signals["q"].shape[1]:
-            return raw
-        return laid_along(raw, tuple(names), request)
+        return from_table(table, request, names=tuple(names) if named else (), clock_name=clock)
 
 
 def is_joint_state(row: Document) -> bool:
