@@ -5,13 +5,10 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 
-from vftcli.readers.columns import SIGNALS, Item
+from vftcli.readers.columns import Cell, Cells, Item
 from vftcli.readers.table import (
     OWN_STAMPS,
-    Cell,
-    Cells,
     Names,
-    Pick,
     Picks,
     Signals,
     Table,
@@ -84,7 +81,7 @@ class NamedColumns:
 
     def __init__(self, table: Table, usual: Sequence[Item] = ()) -> None:
         self.table = table
-        self.usual = {SIGNALS.get(item.signal, item.signal): item for item in usual}
+        self.usual = {item.field: item for item in usual}
         self.twice: dict[str, str] = {}
         self.joints: dict[str, Names] = {}
         found: dict[str, dict[int, Cell]] = {}
@@ -125,7 +122,7 @@ class NamedColumns:
             )
         return tuple(group.values())
 
-    def find(self, signal: str) -> Pick | None:
+    def find(self, signal: str) -> Item | None:
         """The columns of the clock or a signal, None where none bears a name of it."""
         if self.usual:
             return self._usual(signal)
@@ -145,11 +142,11 @@ class NamedColumns:
                     f"{', '.join(map(str, indices[:12]))}, with holes. Name them with --columns."
                 )
             if name in TURNED:
-                return Pick(signal, cells, -1.0, remark=RESIDUAL_TURNED)
-            return Pick(signal, cells)
+                return Item(signal, -1.0, cells=cells, remark=RESIDUAL_TURNED)
+            return Item(signal, cells=cells)
         return None
 
-    def _usual(self, signal: str) -> Pick | None:
+    def _usual(self, signal: str) -> Item | None:
         if (item := self.usual.get(signal)) is None:
             return None
         columns = {column.partition("[")[0] for column in (item.pattern or "").split("|")}
@@ -158,17 +155,16 @@ class NamedColumns:
             return None
         return pick_of(item, named_cells(self.table, item))
 
-    def stated(self, item: Item) -> Pick:
+    def stated(self, item: Item) -> Item:
         """The columns that an item of --columns means, by their names or by its own."""
         pattern = item.pattern or ""
         if pattern not in self.table.names and pattern.lower() in self.groups:
             return pick_of(item, self.cells(pattern))
         if pattern or item.rate is not None:
             return pick_of(item, named_cells(self.table, item))
-        signal = SIGNALS.get(item.signal, item.signal)
-        found = self.find(signal)
-        if found is None and signal == "wrench" and (own := self.groups.get("actual_tcp_force")):
-            found = Pick(signal, tuple(own.values()))  # UR's
+        found = self.find(item.field)
+        if found is None and item.signal == "wrench" and "actual_tcp_force" in self.groups:
+            found = Item("wrench", cells=self.cells("actual_tcp_force"))  # UR's
         if found is None:
             raise missing_column(self.table, item.signal, item.signal)
         pick = pick_of(item, found.cells)
@@ -176,7 +172,7 @@ class NamedColumns:
         scale = found.factor if item.unit is None else math.copysign(1.0, found.factor)
         return pick._replace(factor=pick.factor * scale, unit=pick.unit or found.unit)
 
-    def others(self, stated: Mapping[str, Pick]) -> Iterator[Pick]:
+    def others(self, stated: Mapping[str, Item]) -> Iterator[Item]:
         """The signals beside those that a text names.
 
         Where it names the positions, only what it leaves out and no estimate can do
@@ -202,7 +198,7 @@ class NamedColumns:
                         fitting.append(pick)
             if len(fitting) == 1:
                 column = self.table.names[fitting[0].cells[0].column]
-                remark = fact("signal-by-name", signal=fitting[0].signal, column=column)
+                remark = fact("signal-by-name", signal=fitting[0].field, column=column)
                 yield fitting[0]._replace(remark=remark)
 
 
@@ -211,8 +207,8 @@ def picks_by_alias(
 ) -> tuple[Picks, Names]:
     """Find the signals of a headed table by the names of its columns, and the joints' names."""
     columns = NamedColumns(table, usual)
-    own = {pick.signal: pick for pick in map(columns.stated, stated)}
-    picks = own | {pick.signal: pick for pick in columns.others(own)}
+    own = {pick.field: pick for pick in map(columns.stated, stated)}
+    picks = own | {pick.field: pick for pick in columns.others(own)}
     q = picks["q"].cells if "q" in picks else ()
     # A group of another width is about something else: a gripper, a base.
     kept = {"t", "q", "wrench", *own, *columns.usual}
@@ -228,7 +224,7 @@ def picks_by_alias(
     if table.names.count(OWN_STAMPS) == 1:
         column = table.names.index(OWN_STAMPS)
         if column not in table.lists:
-            picks[OWN_STAMPS] = Pick(OWN_STAMPS, (Cell(column),))
+            picks[OWN_STAMPS] = Item(OWN_STAMPS, cells=(Cell(column),))
     return picks, names
 
 
@@ -254,21 +250,21 @@ def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
     }
 
 
-def wrench_pick(table: Table) -> Pick | None:
+def wrench_pick(table: Table) -> Item | None:
     """The six columns of a wrench, or its column of lists; None where one of them is missing."""
     there = enumerate(table.names)
     names = ["" if column in table.lists else name.lower() for column, name in there]
     for text in WRENCHES:
         wanted = text.split()
         if all(names.count(name) == 1 for name in wanted):
-            return Pick("wrench", tuple(Cell(names.index(n)) for n in wanted))
+            return Item("wrench", cells=tuple(Cell(names.index(n)) for n in wanted))
     rows = [c for c, n in enumerate(table.names) if n.lower() == "wrench"]
     if len(rows) == 1 and table.lists.get(rows[0]) == 6:
-        return Pick("wrench", cells_of(table, rows[0]))
+        return Item("wrench", cells=cells_of(table, rows[0]))
     return None
 
 
-def clock_pick(table: Table) -> Pick | None:
+def clock_pick(table: Table) -> Item | None:
     """The columns of time, None where none bears a name of it: one, or seconds and nanoseconds.
 
     A message's own stamp goes before the time at which a recorder took it.
@@ -292,7 +288,7 @@ def clock_pick(table: Table) -> Pick | None:
             f"{table.path}: {clocks} could each be the clock. Say which with --columns, as in "
             f"t={'|'.join(table.names[c] for c in found[0])},q=…"
         )
-    return Pick("t", tuple(table_clock(table, c) for c in found[0])) if found else None
+    return Item("t", cells=tuple(table_clock(table, c) for c in found[0])) if found else None
 
 
 def table_clock(table: Table, column: int) -> Cell:

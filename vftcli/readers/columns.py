@@ -4,7 +4,7 @@ And what the values of a table without a header settle of it, as a text of that 
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from itertools import permutations
 from typing import NamedTuple
@@ -13,23 +13,16 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, root_mean_squares
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark
 from vftcli.signals.series import median_step
 
 #: Name in --columns → field of Recording. `t` is the clock and `_` skips.
-SIGNALS: dict[str, str] = {
-    "q": "q",
-    "dq": "dq",
-    "current": "current",
-    "tau": "torque",
-    "tau+g": "torque_without_gravity",
-    "target_q": "target_q",
-    "target_dq": "target_dq",
-    "target_current": "target_current",
-    "target_torque": "target_torque",
-    "tau_ext": "tau_ext",
-    "wrench": "wrench",
+SIGNALS = {
+    "q": "q", "dq": "dq", "current": "current", "tau": "torque", "tau+g": "torque_without_gravity",
+    "target_q": "target_q", "target_dq": "target_dq", "target_current": "target_current",
+    "target_torque": "target_torque", "tau_ext": "tau_ext", "wrench": "wrench",
     "temperature": "temperature",
-}
+}  # fmt: skip
 
 DEGREE = 0.017453292519943295
 
@@ -44,15 +37,8 @@ UNITS: dict[str, dict[str, float]] = {
     "tau": {"Nm": 1.0, "N·m": 1.0, "mNm": 1e-3, "Ncm": 1e-2},
     "temperature": {"C": 1.0, "°C": 1.0, "degC": 1.0},
 }  # fmt: skip
-#: Signals that share another signal's units.
-KINDS = {
-    "target_q": "q",
-    "target_dq": "dq",
-    "target_current": "current",
-    "tau+g": "tau",
-    "target_torque": "tau",
-    "tau_ext": "tau",
-}
+#: Torques of every kind have the same units.
+UNITS |= dict.fromkeys(("tau+g", "torque", "tau_ext"), UNITS["tau"])
 
 ITEM = re.compile(
     r"(?P<minus>-)?(?P<name>tau\+g|[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
@@ -60,16 +46,34 @@ ITEM = re.compile(
 )
 
 
-class Item(NamedTuple):
-    """One item of a --columns text."""
+class Cell(NamedTuple):
+    """A column, or one element of a column of lists; `turned` where its sign is."""
 
-    signal: str  #: A key of SIGNALS, `t`, or `_`.
+    column: int
+    element: int | None = None
+    turned: bool = False
+
+
+Cells = tuple[Cell, ...]  #: The cells of a signal.
+
+
+class Item(NamedTuple):
+    """One item of a --columns text, and in a table the cells that it means."""
+
+    signal: str  #: A key of SIGNALS, `t`, or `_`; of cells found without a text also their field.
     factor: float = 1.0  #: What a value is multiplied with to be in SI units and in our sign.
-    unit: str | None = None  #: The unit as written, or None.
+    unit: str | None = None  #: The unit as written, or None; of a wrench its frame.
     width: int = 1  #: Columns in a row that it covers, in a headerless table; 0 for all others.
     #: The column names it means, in a headed table; None for those found without it.
     pattern: str | None = None
     rate: float | None = None  #: Sampling rate of a table that has no clock. [Hz]
+    cells: Cells = ()  #: One cell a joint, base to tip; one or two of the clock.
+    remark: Remark | None = None  #: What is to be said of it, if anything is.
+
+    @property
+    def field(self) -> str:
+        """The field of Recording, of the clock and of what is skipped the name itself."""
+        return SIGNALS.get(self.signal, self.signal)
 
 
 class ColumnSpec(NamedTuple):
@@ -102,10 +106,10 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
         raise LogError(f"--columns: segment={numbers[0]} must be one whole number, from 1.")
     segment = int(numbers[0][:9]) if numbers else None
     items = tuple(_parse_item(part) for part in parts if not part.startswith("segment="))
-    signals = {item.signal for item in items}
+    names = [item.signal for item in items if item.signal != "_"]
     # Nothing can be counted without positions: what is left says a unit or a sign.
     single = all(item.width == 1 or item.signal == "wrench" for item in items)
-    alone = log and single and not signals & {"q", "_"}
+    alone = log and single and "q" not in names and len(names) == len(items)
     named = alone or any(item.pattern is not None for item in items)
     for item in items:
         if named and not alone and item.pattern is None and item.rate is None:
@@ -113,10 +117,10 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
                 f"--columns: {item.signal} has no column name while others have one. Name every "
                 "signal (q=joint_{i}), or count columns in file order (t,q:6), not both."
             )
-    names = [item.signal for item in items if item.signal != "_"]
-    for name in names:
-        if names.count(name) > 1:
-            raise LogError(f"--columns: {name} is given twice. Skip the other columns with _.")
+        if names.count(item.signal) > 1:
+            raise LogError(
+                f"--columns: {item.signal} is given twice. Skip the other columns with _."
+            )
     if sum(item.width == 0 for item in items) > 1:
         raise LogError("--columns: _:* covers all columns that are left; give it once.")
     if log and items and "q" not in names and not named:
@@ -125,48 +129,39 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
 
 
 def _parse_item(part: str) -> Item:
-    match = ITEM.fullmatch(part)
-    if match is None:
+    if (match := ITEM.fullmatch(part)) is None:
         raise LogError(
             f"--columns: cannot understand {part!r}. Items are t, q:6, q[deg]:7, -tau_ext:7, _:13 "
             "(in file order), or q=joint_pos_{i} (by name)."
         )
-    name = match["name"]
+    minus, name, unit, rate, width, pattern = match.groups()
     if name not in SIGNALS and name not in {"t", "_"}:
         raise LogError(
             f"--columns: no signal {name!r}. Signals: t {' '.join(SIGNALS)}, and _ to skip."
         )
-    if name == "_" and (match["pattern"] or match["minus"]):
+    if name == "_" and (pattern or minus):
         raise LogError(f"--columns: {part!r}: _ only skips, as in _:13.")
-    factor = _unit_factor(name, match["unit"]) * (-1.0 if match["minus"] else 1.0)
-    rate = None
-    if match["rate"] is not None:
+    factor, hertz = _unit_factor(name, unit) * (-1.0 if minus else 1.0), None
+    if rate is not None:
         with suppress(ValueError):
-            rate = float(match["rate"])
-        if name != "t" or rate is None or not 0 < rate < 1e7:
+            hertz = float(rate)
+        if name != "t" or hertz is None or not 0 < hertz < 1e7:
             raise LogError(f"--columns: {part!r}: a table without a clock is given as t@125Hz.")
-    if match["count"] == "*":
+    if width == "*":
         if name != "_":
             raise LogError(f"--columns: {part!r}: only _:* covers all columns that are left.")
         return Item(name, width=0)
-    count = int(match["count"] or (6 if name == "wrench" and match["pattern"] is None else 1))
-    if count == 0 or count > 10_000 or (name == "t" and count != 1):
+    count = int(width or (6 if name == "wrench" and pattern is None else 1))
+    if not 0 < count <= 10_000 or (name == "t" and count != 1):
         raise LogError(f"--columns: {part!r} covers {count} columns; it must cover at least one.")
-    return Item(
-        signal=name,
-        factor=factor,
-        unit=match["unit"],
-        width=count,
-        pattern=match["pattern"],
-        rate=rate,
-    )
+    return Item(name, factor, unit, count, pattern, hertz)
 
 
 def _unit_factor(signal: str, unit: str | None) -> float:
     """Factor from a unit in brackets to SI; the bracket of a wrench names its frame instead."""
     if unit is None or signal in {"wrench", "_"}:
         return 1.0
-    units = UNITS[KINDS.get(signal, signal)]
+    units = UNITS[signal.removeprefix("target_")]
     if unit not in units:
         raise LogError(f"--columns: {signal} has no unit {unit!r}; units: {', '.join(units)}.")
     return units[unit]
@@ -237,12 +232,11 @@ def guess_columns(columns: Sequence[Array]) -> Guess | None:
     fitting = [n for n in JOINTS if 2 * n < table.shape[1] and _is_layout(matches, table, n)]
     if len(fitting) != 1:
         return None
-    joints, start = fitting[0], 1 + 2 * fitting[0]
-    blocks, left = divmod(len(columns) - start, joints)
-    parts = [table[:, start + k * joints : start + (k + 1) * joints] for k in range(blocks)]
-    few = slice(None, None, len(table) // FITTED + 1)
-    found, why = _efforts([part[few] for part in parts], table[few, 1 + joints : start])
-    rest = left if found else (blocks - 1) * joints + left
+    joints, few = fitting[0], slice(None, None, len(table) // FITTED + 1)
+    blocks, left = divmod(len(columns) - 1, joints)
+    _, dq, *efforts = (table[few, 1 + k * joints :][:, :joints] for k in range(blocks))
+    found, why = _efforts(efforts, dq)
+    rest = left if found else (blocks - 3) * joints + left
     skipped = f",_:{rest}" if rest else ""
     texts = [
         ",".join(["t", *(f"{name}:{joints}" for name in ("q", "dq", *names))]) + skipped
@@ -291,9 +285,10 @@ def _derivatives(t: Array, table: Array) -> Mask:
         change, area = (np.diff(values[::step], axis=0) for values in (table, integral))
         own, other = np.sum(change**2, axis=0), np.sum(area**2, axis=0)
         left = own[:, None] + other[None, :] - 2 * change.T @ area
-        share = np.full((width, width), np.inf)
-        live = own > 0
-        share[live] = left[live] / own[live, None]
+        # A column that never changes is the derivative of none.
+        share = np.divide(
+            left, own[:, None], out=np.full_like(left, np.inf), where=own[:, None] > 0
+        )
         best = np.minimum(best, share)
     best[0] = best[:, 0] = np.inf
     np.fill_diagonal(best, np.inf)
@@ -307,34 +302,27 @@ def _efforts(parts: Sequence[Array], dq: Array) -> tuple[list[tuple[str, ...]], 
     """All readings of the blocks of columns behind the velocities that fit, by name, and why."""
     if len(parts) != 3:
         return ([] if parts else [()]), ""
-    pairs = sorted((fit for fit in _driven(parts, dq) if fit[0] < DRIVEN), key=lambda fit: fit[0])
-    readings = []
-    for misfit, torque, current, constants in pairs:
-        measured = 3 - torque - current
-        if misfit > CLEAR * pairs[0][0] or not _alike(parts[measured], parts[current]):
+    fits = []
+    for order in permutations(range(3)):
+        _, current, torque = (parts[k] for k in order)
+        if np.abs(torque).max() < CONSTANTS[0] * np.abs(current).max():
             continue
-        names = {measured: "current", current: "target_current", torque: "target_torque"}
-        shown = " ".join(f"{constant:.3g}" for constant in constants)
-        readings.append((tuple(names[k] for k in range(3)), shown))
-    if len(readings) != 1:
-        return [names for names, _ in readings], ""
-    why = f", target_torque is target_current times {readings[0][1]} N·m/A but for friction"
-    return [readings[0][0]], why
-
-
-def _driven(
-    parts: Sequence[Array], dq: Array
-) -> Iterator[tuple[float, int, int, tuple[float, ...]]]:
-    """Misfit of blocks as torque and current, friction beside it; both; constants [N·m/A]."""
-    for torque, current in permutations(range(len(parts)), 2):
-        size = root_mean_squares(parts[current])
-        if np.abs(parts[torque]).max() < CONSTANTS[0] * np.abs(parts[current]).max():
-            continue
+        size = root_mean_squares(current)
         live = np.flatnonzero(size > 2e-3 * size.max())
-        fits = [_fitted(parts[torque][:, j], parts[current][:, j], dq[:, j]) for j in live]
-        constants = tuple(constant for constant, _ in fits)
-        if fits and all(CONSTANTS[0] < k < CONSTANTS[1] for k in constants):
-            yield float(np.median([misfit for _, misfit in fits])), torque, current, constants
+        each = [_fitted(torque[:, j], current[:, j], dq[:, j]) for j in live]
+        if each and all(CONSTANTS[0] < constant < CONSTANTS[1] for constant, _ in each):
+            fits.append((float(np.median([misfit for _, misfit in each])), order, each))
+    readings = {}
+    for misfit, order, each in sorted(fits):
+        clear = misfit < DRIVEN and misfit <= CLEAR * min(fits)[0]
+        if clear and _alike(parts[order[0]], parts[order[1]]):
+            names = dict(zip(order, ("current", "target_current", "target_torque"), strict=True))
+            shown = " ".join(f"{constant:.3g}" for constant, _ in each)
+            readings[tuple(names[k] for k in range(3))] = shown
+    if len(readings) != 1:
+        return list(readings), ""
+    (shown,) = readings.values()
+    return list(readings), f", target_torque is target_current times {shown} N·m/A but for friction"
 
 
 def _fitted(torque: Array, current: Array, dq: Array) -> tuple[float, float]:

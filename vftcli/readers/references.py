@@ -12,17 +12,15 @@ import numpy as np
 
 from vftcli.readers.aliases import NamedColumns
 from vftcli.readers.cleaning import measured, seconds, without_repeats
-from vftcli.readers.columns import parse_columns
+from vftcli.readers.columns import Cell, Item, parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.opening import open_log, sha256_of
 from vftcli.readers.parquet import ParquetTable
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import (
     JACOBIAN,
-    Cell,
     JacobianError,
     Notes,
-    Pick,
     Picks,
     Table,
     listed,
@@ -105,8 +103,12 @@ def _found(table: Table) -> Picks:
             f"{table.path}: which columns are the reference torques is unclear: {there}. "
             "Name them with --reference-columns, as in t=time,tau_ext=true_tau_{i}."
         )
-    found = [*(Pick(TORQUE, columns.cells(name)) for name in groups), wrench, columns.find("t")]
-    return {pick.signal: pick for pick in found if pick is not None}
+    found = [
+        *(Item(TORQUE, cells=columns.cells(name)) for name in groups),
+        wrench,
+        columns.find("t"),
+    ]
+    return {pick.field: pick for pick in found if pick is not None}
 
 
 def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
@@ -131,8 +133,8 @@ def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
             f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
             f"{listed(table.names)}"
         )
-    picks = {kind: Pick(kind, each) for kind, each in found.items() if each}
-    picks["t"] = Pick("t", (columns["t"],), unit="s")
+    picks = {kind: Item(kind, cells=each) for kind, each in found.items() if each}
+    picks["t"] = Item("t", unit="s", cells=(columns["t"],))
     raw = load_signals(table, picks, ReadChoice())
     wrench = raw.signals.get("wrench") if len(found["wrench"]) == len(AXES) else None
     t, tau, sd = program_clock(raw, path), raw.signals[TORQUE], raw.signals.get("band")
@@ -225,7 +227,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
             f"{path}: a Jacobian of {n} joints and no external torques of {n} joints beside it. "
             "Name their columns with --columns, as in tau_ext=tau_ext_{i}."
         )
-    picks["jacobian"] = Pick("jacobian", tuple(places[r, c] for r in rows for c in columns))
+    picks["jacobian"] = Item("jacobian", cells=tuple(places[r, c] for r in rows for c in columns))
     raw = without_repeats(measured(load_signals(table, picks, ReadChoice()), path), path)
     t = seconds(raw)
     start, stop = choice.interval or (-np.inf, np.inf)

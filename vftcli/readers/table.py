@@ -8,13 +8,13 @@ from itertools import islice
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any, NamedTuple
+from typing import Any
 from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
+from vftcli.readers.columns import Cell, Cells, ColumnSpec, Item
 from vftcli.signals.arrays import Array, release
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.parsing import printable
@@ -57,29 +57,7 @@ class Table(ABC):
         return {c: np.concatenate([first[c], *(block[c] for block in more)]) for c in columns}
 
 
-class Cell(NamedTuple):
-    """A column, or one element of a column of lists; `turned` where its sign is."""
-
-    column: int
-    element: int | None = None
-    turned: bool = False
-
-
-Cells = tuple[Cell, ...]  #: The cells of a signal.
-
-
-class Pick(NamedTuple):
-    """The cells that make up one signal."""
-
-    signal: str  #: Field of Recording, "t" for the clock, or one of `BESIDE`.
-    cells: Cells = ()  #: One cell a joint, base to tip; one or two of the clock.
-    factor: float = 1.0  #: Factor to SI units and to our sign.
-    unit: str | None = None  #: The unit if it was stated; of a wrench its frame.
-    remark: Remark | None = None  #: What was turned, if anything was.
-    rate: float | None = None  #: Of a clock without a column. [Hz]
-
-
-Picks = dict[str, Pick]  #: All signals of a table, and what is beside them.
+Picks = dict[str, Item]  #: Field of Recording → its cells; and what is beside the signals.
 #: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes
 #: them.
 OWN_STAMPS = "t_src_ns"
@@ -117,7 +95,7 @@ def picks_of(table: Table, spec: ColumnSpec) -> Picks:
         widths = [(item.width or missing) * (item.rate is None) for item in spec.items]
         each = zip(spec.items, widths, strict=True)
         found = [pick_of(item, tuple(islice(left, width))) for item, width in each]
-    return {pick.signal: pick for pick in found if pick.signal != "_"}
+    return {item.field: item for item in found if item.signal != "_"}
 
 
 def cells_of(table: Table, column: int, elements: slice = slice(None)) -> Cells:
@@ -127,12 +105,11 @@ def cells_of(table: Table, column: int, elements: slice = slice(None)) -> Cells:
     return tuple(Cell(column, k) for k in range(table.lists[column])[elements])
 
 
-def pick_of(item: Item, cells: Cells) -> Pick:
-    """The cells of an item, with its factor to SI units."""
+def pick_of(item: Item, cells: Cells) -> Item:
+    """An item with its cells."""
     turned = item.factor < 0 or any(cell.turned for cell in cells)
     remark = fact("sign-turned", signal=item.signal) if turned else None
-    signal = SIGNALS.get(item.signal, item.signal)
-    return Pick(signal, cells, item.factor, item.unit, remark, item.rate)
+    return item._replace(cells=cells, remark=remark)
 
 
 def named_cells(table: Table, item: Item) -> Cells:
@@ -202,7 +179,7 @@ def listed(names: Sequence[str], most: int = 24) -> str:
 
 def require_positions(table: Table, picks: Picks) -> None:
     """Raise unless there are positions and all signals have their width."""
-    if not (joints := len(picks.get("q", Pick("q")).cells)):
+    if not (joints := len(picks.get("q", Item("q")).cells)):
         there = listed(table.names) if table.names else f"{table.width} columns without names"
         if any(JACOBIAN.match(name) for name in table.names):
             raise JacobianError(

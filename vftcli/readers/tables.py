@@ -16,7 +16,7 @@ from vftcli.readers.aliases import (
     robot_of,
     table_clock,
 )
-from vftcli.readers.columns import guess_columns, parse_columns, tick_of
+from vftcli.readers.columns import Cell, Cells, Item, guess_columns, parse_columns, tick_of
 from vftcli.readers.delimited import EchoTable, TextTable, joint_names
 from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
@@ -27,12 +27,9 @@ from vftcli.readers.table import (
     PAYLOAD,
     Block,
     Blocks,
-    Cell,
-    Cells,
     Column,
     Names,
     Notes,
-    Pick,
     Picks,
     Places,
     Signals,
@@ -100,8 +97,7 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
             table_clock(table, cells[0].column)
         wanted = {"t": 1, "wrench": layout.joints and 6}.get(item.signal, layout.joints)
         if len(cells) == wanted if wanted else len(cells) > 1:
-            pick = pick_of(item, cells)
-            picks[pick.signal] = pick
+            picks[item.field] = pick_of(item, cells)
         elif item.signal in {"t", "q"}:
             raise LogError(
                 f"{table.path}: no {item.pattern} among its {table.width} columns. {layout.remedy}"
@@ -110,7 +106,7 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
     picks = {s: p._replace(remark=RESIDUAL_TURNED if p.remark else None) for s, p in picks.items()}
     payload = layout.payload.split()
     if payload and set(payload) <= set(names):
-        picks[PAYLOAD] = Pick(PAYLOAD, tuple(Cell(names.index(name)) for name in payload))
+        picks[PAYLOAD] = Item(PAYLOAD, cells=tuple(Cell(names.index(n)) for n in payload))
     require_positions(table, picks)
     raw = load_signals(table, picks, request, clock_name=layout.clock)
     if layout is not UR:
@@ -241,7 +237,7 @@ def load_signals(
         for loaded in table.blocks(asked, next(iter(beside.get("t", ())), None)):
             for column, parts in whole.items():
                 parts.append(loaded[column])
-            yield {pick.signal: _stacked(pick, loaded) for pick in signals}
+            yield {pick.field: _stacked(pick, loaded) for pick in signals}
 
     arrays = joined(stacked())
     loaded = {c: np.concatenate(parts) for c, parts in whole.items()}
@@ -260,7 +256,7 @@ def load_signals(
     return RawLog(stamps=stamps, tick=tick, clock=words, signals=arrays, **more)
 
 
-def _stacked(pick: Pick, loaded: Block) -> Array:
+def _stacked(pick: Item, loaded: Block) -> Array:
     """One signal's cells side by side, scaled. (T, n)"""
     rows = len(loaded[pick.cells[0].column])
     out = np.empty((rows, len(pick.cells)))
@@ -276,7 +272,7 @@ def _stacked(pick: Pick, loaded: Block) -> Array:
 
 
 def _stamps(
-    table: Table, clock: Pick | None, loaded: Block, rows: int, clock_name: str
+    table: Table, clock: Item | None, loaded: Block, rows: int, clock_name: str
 ) -> tuple[Column, float, str]:
     """The stamps of the rows (T,), the length of their tick and which clock they are."""
     if clock is None:
