@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cached_property
-from itertools import takewhile
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.opening import LogFile
+from vftcli.readers.opening import HEAD_BYTES, LogFile
 from vftcli.readers.table import Blocks, Column, Names, Places, Table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
@@ -51,29 +51,25 @@ class TextTable(Table):
 
     def __init__(self, file: LogFile) -> None:
         self.file, self.path = file, file.path
+        lines = [decoded(line).removeprefix("\ufeff") for line in file.lines[:200]]
+        if not lines:
+            raise LogError(f"{self.path}: not a table of text; `vftcli inspect` says what it is.")
+        if 1 < len(file.lines) <= 200 and len(file.content) > len(file.head):
+            lines.pop()  # the head may end inside a line
+        rows = list(dropwhile(is_comment, lines))
+        #: The first lines that hold something, without comments but for one of names.
+        self.sample = rows or lines
+        comment = lines[-len(rows) - 1].lstrip("# ") if len(lines) > len(rows) > 0 else ""
+        names, cells = (re.split(r"[,;\t ]+", line.strip()) for line in (comment, self.sample[0]))
+        named = len(names) == len(cells) and not any(map(is_number, names))
+        if comment and named and all(map(is_number, cells)):
+            self.sample = [comment, *rows]
         cells = self.cells(self.sample[0])
         self.width = len(cells)
         numbers = all(not cell or self.is_number(cell) for cell in cells)
         self.names = () if numbers else tuple(cells)
-
-    @cached_property
-    def sample(self) -> list[str]:
-        """The first lines that hold something, without comments."""
-        lines = [decoded(line) for line in self.file.lines[:200]]
-        if not lines:
-            raise LogError(f"{self.path}: not a table of text; `vftcli inspect` says what it is.")
-        if len(self.file.lines) <= 200 and len(self.file.content) > len(self.file.head):
-            lines = lines[:-1] if len(lines) > 1 else lines  # the head may end inside a line
-        lines[0] = lines[0].removeprefix("\ufeff")
-        comments = list(takewhile(is_comment, lines))
-        rows = lines[len(comments) :]
-        if comments and rows:
-            head = comments[-1].lstrip("# ")
-            names, cells = (re.split(r"[,;\t ]+", line.strip()) for line in (head, rows[0]))
-            numbers = all(map(is_number, cells)) and not any(map(is_number, names))
-            if numbers and len(names) == len(cells):
-                return [head, *rows]
-        return rows or lines
+        #: Whether the names are a line of their own.
+        self.is_headed = not numbers and len(self.sample) == len(rows)
 
     @cached_property
     def separator(self) -> str:
@@ -129,8 +125,10 @@ class TextTable(Table):
         """The columns of each piece of the text; `kinds` has the polars type of each."""
         for text in self._pieces():
             # Most texts parse as they are; mending copies them, so it waits for a
-            # failure.
-            found = self._parse(text, kinds) or self._parse(self._mended(text), kinds)
+            # failure, but for doubled blanks, between which polars sees cells.
+            doubled = self.separator == " " and re.search(rb"  |\n | \r?\n", text[:HEAD_BYTES])
+            found = None if doubled else self._parse(text, kinds)
+            found = found or self._parse(self._mended(text), kinds)
             if found is None:
                 raise self._diagnosed(kinds)
             yield found
@@ -161,38 +159,19 @@ class TextTable(Table):
         return found
 
     @cached_property
-    def is_headed(self) -> bool:
-        """Whether the names are a line of their own, and not a comment's."""
-        lines = [decoded(line).removeprefix("\ufeff").strip() for line in self.file.lines[:200]]
-        first = next((line for line in lines if not line.startswith("#")), "")
-        return bool(self.names) and self.cells(first) == list(self.names)
-
-    @cached_property
     def _is_quoted(self) -> bool:
         return any('"' in line for line in self.sample)
 
     def _pieces(self) -> Iterator[bytes]:
         """The text of the rows; in one piece where a line's end may not be a row's."""
-        if self._needs_mending(self.file.head):
-            yield self._mended_rows()
-            return
         content: Any = self.file.content.obj
-        end = self._end()
-        place = (content.find(b"\n") + 1 or end) if self.is_headed else 0
+        place, end = self._start(), self._end()
         while True:
             stop = -1 if self._is_quoted else content.find(b"\n", place + BLOCK_BYTES, end)
             stop = stop + 1 or end
             yield content[place:stop]
             if (place := stop) >= end:
                 return
-
-    def _needs_mending(self, head: bytes) -> bool:
-        """Whether the head holds what polars refuses: blank lines, odd ends, comments."""
-        blank = re.search(rb"(\n|^)[ \t\r]*\n", head) is not None
-        lone = b"\r" in head and (b"\r\r" in head or head.count(b"\r") != head.count(b"\r\n"))
-        blanks = self.separator == " " and re.search(rb"  |\n | \r?\n", head) is not None
-        begins = is_comment(decoded(head[:64])) or head.startswith(b"\xef\xbb\xbf")
-        return blank or lone or blanks or begins
 
     def _mended(self, text: bytes) -> bytes:
         """A text with plain line ends, without blank lines and doubled blanks."""
@@ -201,45 +180,44 @@ class TextTable(Table):
             text = re.sub(rb"[ \t]+", b" ", text).replace(b"\n ", b"\n").replace(b" \n", b"\n")
         return re.sub(rb"\n\s*\n", b"\n", text.lstrip(b"\n "))
 
-    def _mended_rows(self) -> bytes:
-        """The text of all rows, mended, behind the comments and the header."""
-        text = self._mended(bytes(self.file.content[: self._end()]).removeprefix(b"\xef\xbb\xbf"))
-        while is_comment(decoded(text[:64])):
-            text = text.partition(b"\n")[2].lstrip(b"\n ")
-        return text.partition(b"\n")[2] if self.is_headed else text
+    def _start(self) -> int:
+        """Where the first row begins, behind comments, blank lines and the names."""
+        pattern = rb"(\xef\xbb\xbf)?([ \t]*(#[^\r\n]*)?[\r\n]+)*"
+        pattern += rb"[^\r\n]*[\r\n]*" if self.is_headed else b""
+        match = re.match(pattern, self.file.content)
+        return match.end() if match else 0
 
     def _end(self) -> int:
         """Where the last row ends, or begins if it is cut, so that it has to go."""
-        content = self.file.content
-        tail = bytes(content[-TAIL_BYTES:])
-        if len(re.split(rb"[\r\n]+", tail, maxsplit=3)) <= 3:
-            tail = bytes(content)  # very long rows
-        stripped = tail.rstrip(b"\r\n")
-        rows = [line for line in re.split(rb"[\r\n]+", stripped) if line.strip()]
-        if len(rows) < 2 or not self._ends_inside(rows, ended=len(stripped) < len(tail)):
+        content, rows = self.file.content, list[bytes]()
+        for size in (TAIL_BYTES, len(content)):  # all of it where rows are very long
+            if len(rows) < 3:
+                tail = bytes(content[-size:])
+                rows = re.split(rb"[\r\n]+", tail.rstrip(b"\r\n"))
+        ended = tail.endswith((b"\r", b"\n"))
+        if len(rows) < 2 or not rows[-1].strip() or not self._ends_inside(rows, ended=ended):
             return len(content)
         self.remarks = (fact("row-cut"),)
-        start = len(stripped) - len(re.split(rb"[\r\n]+", stripped)[-1])
-        return len(content) - len(tail) + start
+        return len(content) - len(tail) + len(tail.rstrip(b"\r\n")) - len(rows[-1])
 
     def _ends_inside(self, rows: list[bytes], *, ended: bool) -> bool:
         """Whether the last row lacks cells, or may lack digits of its last number."""
-        last = self.cells(decoded(rows[-1]))
+        *above, last = (self.cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 :])
         if len(last) < self.width:
-            return len(self.cells(decoded(rows[-2]))) == self.width or len(rows) == 2
+            return len(above[-1]) == self.width or len(rows) == 2
         if ended:
             return False
-        above = [self.cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 : -1]]
         ends = {cells[-1] for cells in above if cells and cells[-1] not in self.names[-1:]}
-        decimals = {len(end.partition(".")[2]) for end in ends}
         # Loggers print one number of decimals: fewer than above means digits are lost.
         if "." in last[-1] or "," in last[-1]:
+            decimals = {len(end.partition(".")[2]) for end in ends}
             return decimals != {len(last[-1].partition(".")[2])}
         return ends != {last[-1]}
 
     def _diagnosed(self, kinds: Mapping[int, str]) -> LogError:
         """Look at the table row by row for what the parser could not take."""
-        for number, row in enumerate(self._mended_rows().split(b"\n"), start=1):
+        rows = self._mended(bytes(self.file.content[self._start() : self._end()]))
+        for number, row in enumerate(rows.split(b"\n"), start=1):
             cells = self.cells(decoded(row))
             if len(cells) > self.width:
                 return LogError(
@@ -280,7 +258,7 @@ def _numbers(series: Series, path: Path) -> Column:
     return values if series.dtype != pl.Float64 or not series.null_count() else np.array(values)
 
 
-STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id.
+STAMP = ("sec", "nanosec", "frame_id")  #: Columns before the names of ros2 topic echo --csv.
 
 
 class EchoTable(TextTable):
@@ -290,26 +268,18 @@ class EchoTable(TextTable):
     stamp and frame.
     """
 
-    is_headed = False
-
     def __init__(self, file: LogFile) -> None:
         super().__init__(file)
+        cells = split_cells(self.sample[0], ",")
+        kinds = "".join("0" if is_number(cell) else "x" for cell in cells)
+        match = re.fullmatch("00x(x+)(0+)", kinds)
+        count = len(match[1]) if match and all(cell.isdigit() for cell in cells[:2]) else 0
+        #: Number of names in the first row; 0 where it is no such row.
+        self.joints = count if match and count and not len(match[2]) % count else 0
         fields = ("name", "position", "velocity", "effort")
         each = [f"{field}{k}" for field in fields for k in range(self.joints)]
         each += [f"_{k}" for k in range(self.width)]
-        self.names = ("sec", "nanosec", "frame_id", *each[: self.width - STAMP])
-
-    @cached_property
-    def joints(self) -> int:
-        """Number of names in the first row; 0 where it is no such row."""
-        cells = split_cells(self.sample[0], ",")
-        words = [k for k, cell in enumerate(cells) if k >= STAMP and not is_number(cell)]
-        count = len(words)
-        values = len(cells) - STAMP - count
-        stamped = len(cells) > STAMP and all(cell.isdigit() for cell in cells[:2])
-        if not stamped or is_number(cells[2]) or words != list(range(STAMP, STAMP + count)):
-            return 0
-        return count if count and values >= count and values % count == 0 else 0
+        self.names, self.is_headed = (*STAMP, *each)[: self.width], False
 
 
 def joint_names(table: TextTable) -> Names:
