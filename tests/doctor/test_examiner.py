@@ -76,6 +76,11 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it() ->
         RobotError, match=r"^Which arm\? Best fits: ur5e \(.* %\), .*\. Add --robot ur5e$"
     ):
         examiner.robot(log, RobotChoice())
+    turned = replace(log, torque=-log.require("torque"))
+    with pytest.raises(
+        RobotError, match=r"^Which arm\? Best fits: .* \(\d{2,3} %\), .* \(\d{2,3} %\); none explains"
+    ):
+        examiner.robot(turned, RobotChoice())
 
 
 def test_the_payload_of_one_log_is_not_that_of_another() -> None:

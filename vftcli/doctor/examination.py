@@ -248,10 +248,12 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
     """The profile that the maker's own model in a log tells, and on what grounds."""
     found, fits = guess_robot(recording)
     if found is None:
-        near = ", ".join(fit.in_short for fit in fits[:NEAREST])
-        words = (
-            f"Best fits: {near}. Add --robot {fits[0].robot}" if fits else choices_for(recording)
-        )
+        near, words = fits[:NEAREST], choices_for(recording)
+        if near:
+            good = [f"--robot {fit.robot}" for fit in near if fit.fits]
+            best = f"Best fits: {', '.join(fit.in_short for fit in near)}"
+            none = "none explains the torques (vftcli inspect). Add --robot NAME or a URDF"
+            words = f"{best}. Add {' or '.join(good)}" if good else f"{best}; {none}"
         raise UnsettledRobotError(f"Which arm? {words}", recording)
     others = [str(fit) for fit in fits if fit is not found]
     remark = fact("robot-guessed", robot=found.robot, fit=str(found), others=others or ["none"])

@@ -79,7 +79,7 @@ class RobotMatch:
     def in_short(self) -> str:
         """Its name and model error, as ``ur10 with 0.19 kg (0.50 %)``."""
         load = f" with {self.load:.2g} kg" if self.load else ""
-        percent = f"{100 * self.misfit:#.2g}".removesuffix(".")
+        percent = f"{100 * self.misfit:{'.0f' if self.misfit > 0.1 else '#.2g'}}".removesuffix(".")
         return f"{self.robot}{load} ({percent} %)"
 
 
