@@ -78,7 +78,8 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it() ->
         examiner.robot(log, RobotChoice())
     turned = replace(log, torque=-log.require("torque"))
     with pytest.raises(
-        RobotError, match=r"^Which arm\? Best fits: .* \(\d{2,3} %\), .* \(\d{2,3} %\); none explains"
+        RobotError,
+        match=r"^Which arm\? Best fits: .* \(\d{2,3} %\), .* \(\d{2,3} %\); none explains",
     ):
         examiner.robot(turned, RobotChoice())
 
