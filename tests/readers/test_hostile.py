@@ -150,7 +150,7 @@ def test_bombs_are_refused_in_one_line_and_little_memory(tmp_path: Path) -> None
         (lambda path: parquet(path, dq=lists([])), "dq holds no number in its first row"),
         (lambda path: parquet(path, q=lists(None)), "q holds no number in its first row"),
         (lambda path: parquet(path, q=lists([1.0])), "lists of q are not all 1 long"),
-        (lambda path: parquet(path, q=[[None] * 7] * ROWS), "lists of q hold null"),
+        (lambda path: parquet(path, q=[[None] * 7] * ROWS), "column q holds null"),
         (lambda path: parquet(path, t=[[0.0, 1.0]] * ROWS), "clock 't' holds 2 numbers a row"),
         (lambda path: parquet(path, t=[], q=[], dq=[]), "has no rows"),
         (lambda path: npz(path, time=np.zeros((ROWS, 3))), "clock 'time' holds 3 numbers a row"),

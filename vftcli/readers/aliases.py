@@ -24,7 +24,10 @@ from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
 #: Names of the clock; a unit may follow, as in time_ms.
-CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds")
+CLOCKS = (
+    "t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds",
+    "time_since_skill_started",
+)  # fmt: skip
 #: The nanoseconds beside a column of seconds: its name has the same stem.
 NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)")
 #: A message's own stamp, or a part of it.

@@ -9,10 +9,8 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from functools import partial
 from io import BytesIO
-from pathlib import Path
 from tokenize import TokenError
 from typing import Any, Literal
 
@@ -36,6 +34,7 @@ from vftcli.readers.tables import UR, ArrayTable, from_table, read_layout
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import fact
 
+RESAVE = ". Save it with np.save or np.savez."  #: What to do where NumPy cannot read an array.
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
 
 
@@ -48,7 +47,7 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if layout.name == "npz":
         return _read_arrays(file, request, _npz_arrays(file))
     if layout.name == "npy":
-        array = _npy_array(file.path, file.head, file.content)
+        array = _npy_array(file)
         if not array.dtype.names:
             return _read_rows(file, array, request)
         columns = {name: array[name] for name in array.dtype.names}
@@ -88,23 +87,14 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
             rows = _arrays_of_lists(file, {"rows": log})["rows"]
             yield {0: partial(_read_rows, file, rows)}
         return
-    held = [value.get(SKILL) for value in log.values() if isinstance(value, dict)]
-    if skills := [states for states in held if isinstance(states, dict)]:
-        yield {k: partial(_read_skill, file, states) for k, states in enumerate(skills)}
-        return
-    inner = next(iter(log.values())) if len(log) == 1 else None
-    log = inner if isinstance(inner, dict) else log
-    yield {0: lambda request: _read_arrays(file, request, _arrays_of_lists(file, log))}
+    inner = [value for value in log.values() if isinstance(value, dict)]
+    skills = [value[SKILL] for value in inner if isinstance(value.get(SKILL), dict)]
+    logs = skills or (inner if len(inner) == len(log) == 1 else [log])
+    yield {k: partial(_read_states, file, states) for k, states in enumerate(logs)}
 
 
-def _read_skill(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
-    if "time_since_skill_started" in log:
-        arrays = _arrays_of_lists(file, {**log, "time": log["time_since_skill_started"]})
-        usual = {"time": "t[s]", "q": "q[rad]", "dq": "dq", "tau_J": "tau"}
-        items = [f"{signal}={name}" for name, signal in usual.items() if name in arrays]
-        request = replace(request, columns=request.columns or ",".join(items))
-        log = {name: arrays[name] for name in usual if name in arrays}
-    return _read_arrays(file, request, _arrays_of_lists(file, log))
+def _read_states(file: LogFile, states: Mapping[Any, Any], request: ReadChoice) -> RawLog:
+    return _read_arrays(file, request, _arrays_of_lists(file, states))
 
 
 def _read_rows(file: LogFile, rows: Column, request: ReadChoice) -> RawLog:
@@ -156,41 +146,23 @@ def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> Columns:
 
 
 def _npz_arrays(file: LogFile) -> Columns:
-    arrays = {}
-    with naming_damage(file.path, "a damaged .npz file", zipfile.BadZipFile):
-        bundle = zipfile.ZipFile(BytesIO(file.content))
-        total = sum(member.file_size for member in bundle.infolist())
+    with (
+        naming_damage(file.path, "a damaged .npz file", zipfile.BadZipFile, remedy=RESAVE),
+        np.load(BytesIO(file.content), allow_pickle=False) as bundle,
+    ):
+        total = sum(member.file_size for member in bundle.zip.infolist())
         check_unpacked(file.path, total, len(file.content))
-        for member in bundle.infolist():
-            if member.filename.endswith(".npy"):
-                with bundle.open(member) as stream:
-                    content = stream.read(total + 1)
-                name = member.filename.removesuffix(".npy")
-                arrays[name] = _npy_array(file.path, content, content)
-    return arrays
+        each = ((name, bundle[name]) for name in bundle.files)
+        return {name: array for name, array in each if isinstance(array, np.ndarray)}
 
 
-def _npy_array(path: Path, head: bytes, content: bytes | memoryview) -> Column:
-    """One array of an .npy file, never executing what it may carry.
-
-    What the header claims is compared with the file's size before it is believed.
-    """
-    stream = BytesIO(head)
-    with naming_damage(path, "not a readable .npy file", TokenError):
-        version = np.lib.format.read_magic(stream)
-        header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }[version]
-        shape, _, dtype = header(stream)
-        claimed = int(np.prod([int(s) for s in shape], dtype=object)) * dtype.itemsize
-    if claimed != len(content) - stream.tell() or any(s < 0 for s in shape):
-        raise LogError(
-            f"{path}: the header claims {claimed} bytes of numbers, the file holds "
-            f"{len(content) - stream.tell()}; it is cut, damaged, or holds more than one array."
-        )
-    with naming_damage(path, "not a readable array", remedy=". Save it with np.save."):
-        return np.asarray(np.lib.format.read_array(BytesIO(content), allow_pickle=False))
+def _npy_array(file: LogFile) -> Column:
+    stream = BytesIO(file.content)
+    with naming_damage(file.path, "it is cut, damaged or no array", TokenError, remedy=RESAVE):
+        array = np.lib.format.read_array(stream, allow_pickle=False)
+    if left := len(file.content) - stream.tell():
+        raise LogError(f"{file.path}: {left} bytes follow the array, so it holds more than one.")
+    return np.asarray(array)
 
 
 #: Type words of the second line of a binary file by UR's official client.
@@ -202,10 +174,9 @@ BINARY_TYPES = {
 
 def binary_table(file: LogFile) -> ArrayTable:
     """A binary file by UR's official client: two lines of text, then big-endian records."""
-    first, end, rest = bytes(file.content[: 1 << 20]).partition(b"\n")
-    second, end_too, _ = rest.partition(b"\n")
+    first, second, *_ = [*bytes(file.content[: 1 << 20]).split(b"\n", 2), b"", b""]
     names, types = first.decode("ascii", errors="replace").split(), second.split()
-    if not end or not end_too or len(names) != len(types) or not names:
+    if len(names) != len(types) or not names:
         raise LogError(
             f"{file.path}: the header names {len(names)} columns and {len(types)} types; a binary "
             "RTDE file has one type a column. It is damaged or cut."
@@ -220,7 +191,7 @@ def binary_table(file: LogFile) -> ArrayTable:
         remarks.append(fact("recipe-byte-skipped"))
     if left := len(body) % record.itemsize:
         remarks.append(fact("record-cut", rest_bytes=left))
-    records = np.frombuffer(body, dtype=record, count=len(body) // record.itemsize)
+    records = np.frombuffer(body[: len(body) - left], dtype=record)
     columns = {name: records[str(names.index(name))] for name in names}
     return ArrayTable(path=file.path, columns=columns, remarks=tuple(remarks))
 

@@ -4,6 +4,7 @@ DROID's raw release is a folder of episodes, each a trajectory.h5 with its metad
 it.
 """
 
+import itertools
 import json
 import math
 import os
@@ -124,43 +125,28 @@ class Hdf5Table(ArrayTable):
 
 
 def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
-    """The datasets of numbers of an open file that have some rows."""
-    found = {name: d for name, d in datasets_of(path, content) if is_signal(d, fewest_rows)}
+    """The datasets of numbers of an open file that have some rows, each under one of its paths."""
+    import h5py
+
+    found, looked_at = {}, itertools.count(1)
+
+    def look(name: str, item: Hdf5) -> None:
+        if next(looked_at) > MOST_OBJECTS or name.count("/") > DEEPEST:
+            raise LogError(
+                f"{path}: more than {MOST_OBJECTS} groups and datasets, or {DEEPEST} groups "
+                "inside one another; no log is."
+            )
+        if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub":
+            return
+        shape = item.shape or (0,)
+        own = not item.is_virtual and not item.external
+        if own and len(shape) <= 2 and all(shape) and shape[0] >= fewest_rows:
+            found[name] = item
+
+    content.visititems(look)  # follows no link to elsewhere, and comes to each once
     if not found:
         raise LogError(f"{path}: an HDF5 file without datasets of numbers, so no log.")
     return Hdf5Table(path, dict(sorted(found.items(), key=lambda item: natural(item[0]))))
-
-
-def datasets_of(path: Path, content: Hdf5) -> Iterator[tuple[str, Hdf5]]:
-    """Every dataset of an open file by its path, links to elsewhere and second ways left out."""
-    import h5py
-
-    seen: set[int] = set()
-    waiting = [("", content["/"], 0)]
-    while waiting:
-        prefix, group, depth = waiting.pop()
-        for name in group:
-            # Soft and external links may lead anywhere, also out of the file.
-            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                continue
-            item = group.get(name)
-            address = h5py.h5o.get_info(item.id).addr
-            if address in seen:
-                continue
-            seen.add(address)
-            if len(seen) > MOST_OBJECTS:
-                raise LogError(f"{path}: more than {MOST_OBJECTS} groups and datasets; no log is.")
-            if isinstance(item, h5py.Dataset):
-                yield f"{prefix}{name}", item
-            elif isinstance(item, h5py.Group) and depth < DEEPEST:
-                waiting.append((f"{prefix}{name}/", item, depth + 1))
-
-
-def is_signal(dataset: Hdf5, fewest_rows: int) -> bool:
-    """Whether a dataset may be a signal: numbers of the file's own, one or many a row."""
-    shape = dataset.shape or (0,)
-    numbers = dataset.dtype.kind in "fiub" and len(shape) <= 2 and shape[0] >= fewest_rows
-    return bool(numbers and all(shape) and not dataset.is_virtual and not dataset.external)
 
 
 ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
@@ -182,7 +168,6 @@ FRANKA = ("panda", "fr3")
 DESCRIPTION_BYTES = 1 << 20  #: Letters of a description beside the numbers that are parsed.
 
 TRAJECTORY = "trajectory.h5"
-DEEPEST_FOLDER = 8  #: Folders inside folders; DROID has five: version, lab, success, date, episode.
 MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
 
 
@@ -291,8 +276,6 @@ def trajectories(folder: Path) -> Iterator[Path | None]:
     """Every episode below a folder in the order of their names; None for a folder without one."""
     for place, below, names in os.walk(folder):
         below.sort()
-        if len(Path(place).relative_to(folder).parts) >= DEEPEST_FOLDER:
-            below.clear()
         yield Path(place) / TRAJECTORY if TRAJECTORY in names else None
 
 
@@ -307,33 +290,38 @@ def recognises(file: LogFile, _: LogFormat) -> bool:
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The logs of an HDF5 file, or of DROID's folder by name, with their places if several."""
-    if not file.is_folder:
-        with opened(file) as content:
-            table = table_of(file.path, content)
-            anchor, groups = layout_of(table)
-            read, several = LAYOUTS.get(anchor, read_any), len(groups) > 1
-            yield {
-                k: partial(_placed, g.rstrip("/") * several, partial(read, table.within(g)))
-                for k, g in groups.items()
-            }
+    if file.is_folder:
+        paths = [path for path in trajectories(file.path) if path is not None]
+        if not paths:
+            raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
+        places = [str(path.parent.relative_to(file.path)) for path in paths]
+        reads = [partial(read_file, path) for path in paths]
+        yield _placed(dict(enumerate(zip(places, reads, strict=True))))
         return
-    paths = [path for path in trajectories(file.path) if path is not None]
-    if not paths:
-        raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
-
-    def read_file(path: Path, request: ReadChoice) -> RawLog:
-        raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
-        return replace(raw, part="", files=(path,))
-
-    places = [str(path.parent.relative_to(file.path)) * (len(paths) > 1) for path in paths]
-    each = enumerate(zip(places, paths, strict=True))
-    yield {k: partial(_placed, place, partial(read_file, path)) for k, (place, path) in each}
+    with opened(file) as content:
+        table = table_of(file.path, content)
+        anchor, groups = layout_of(table)
+        read = LAYOUTS.get(anchor, read_any)
+        yield _placed(
+            {k: (g.rstrip("/"), partial(read, table.within(g))) for k, g in groups.items()}
+        )
 
 
-def _placed(place: str, read: Callable[[ReadChoice], RawLog], request: ReadChoice) -> RawLog:
-    raw = read(request)
-    said = (fact("episode-place", place=place),) if place else ()
-    return replace(raw, remarks=(*said, *raw.remarks))
+def read_file(path: Path, request: ReadChoice) -> RawLog:
+    """Read an episode of DROID's folder."""
+    raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
+    return replace(raw, part="", files=(path,))
+
+
+def _placed(each: Mapping[int, tuple[str, Callable[[ReadChoice], RawLog]]]) -> Episodes:
+    """Episodes, of several each with a remark where it lies."""
+
+    def read(place: str, own: Callable[[ReadChoice], RawLog], request: ReadChoice) -> RawLog:
+        raw = own(request)
+        return replace(raw, remarks=(fact("episode-place", place=place), *raw.remarks))
+
+    several = len(each) > 1
+    return {k: partial(read, place, own) if several else own for k, (place, own) in each.items()}
 
 
 def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:

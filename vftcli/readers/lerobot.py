@@ -52,11 +52,11 @@ class Episode(NamedTuple):
     """Where an episode is."""
 
     number: int  #: Its index.
+    #: Its data file by the dataset's usual name, None where it is unknown.
+    file: Path | None
     length: int | None = None  #: Its frames, None where it is unknown.
     #: Index of its first frame in the dataset, None where it is unknown.
     start: int | None = None
-    #: Its data file by the dataset's usual name, None where it is unknown.
-    file: Path | None = None
 
 
 class Element(NamedTuple):
@@ -206,34 +206,7 @@ def text_of(path: Path) -> str:
         raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
 
 
-def dataset_episodes(folder: Path) -> list[Episode]:
-    """The episodes of a dataset, rising."""
-    tables = sorted((folder / "meta" / "episodes").rglob("*.parquet"))
-    lines = folder / "meta" / "episodes.jsonl"
-    if there := tables or ([lines] if lines.is_file() else []):
-        # Who reads all episodes asks for each again.
-        states = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in there)
-        found = _remembered_episodes(folder, states)
-    else:
-        files = sorted((folder / "data").rglob("*.parquet"))
-        each = (episodes_of(ParquetTable(open_log(path)).episodes()) for path in files)
-        found = [Episode(number) for numbers in each for number in numbers]
-    if not found:
-        raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
-    by_number = {episode.number: episode for episode in found}
-    return [by_number[number] for number in sorted(by_number)]
-
-
-@lru_cache(maxsize=2)
-def _remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...]) -> list[Episode]:
-    found: list[Episode] = []
-    for path, _, _ in states:
-        read = _episodes_of_table if path.suffix == ".parquet" else _episodes_of_lines
-        found += read(folder, path)
-    return found
-
-
-def _episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
+def _by_table(folder: Path, path: Path) -> Iterator[Episode]:
     table = ParquetTable(open_log(path))
     if missing := [name for name in EPISODES_TABLE if name not in table.names]:
         raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
@@ -242,35 +215,59 @@ def _episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     columns = [loaded[place] for place in places]
     if not all(column.ndim == 1 and np.isfinite(column).all() for column in columns):
         raise LogError(f"{path}: a row of the table of episodes lacks a number.")
-    for row in zip(*columns, strict=True):
-        number, length, start, end, chunk, file = (int(value) for value in row)
+    for number, length, start, end, chunk, file in np.stack(columns, 1).astype(int).tolist():
         if end - start != length:
             raise LogError(f"{path}: episode {number} has {length} frames and spans {end - start}.")
         place = folder / "data" / f"chunk-{chunk:03d}" / f"file-{file:03d}.parquet"
-        yield Episode(number, length, start, place)
+        yield Episode(number, place, length, start)
 
 
-def _episodes_of_lines(folder: Path, path: Path) -> Iterable[Episode]:
-    chunk = info_of(folder).get("chunks_size")
-    chunk = chunk if isinstance(chunk, int) and chunk > 0 else 1000
+def _by_lines(folder: Path, path: Path) -> Iterator[Episode]:
+    files = {file.name: file for file in (folder / "data").rglob("*.parquet")}
     for line in filter(str.strip, text_of(path).splitlines()):
         try:
             row = json.loads(line)
             number, length = int(row[EPISODE]), int(row["length"])
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
             raise LogError(f"{path}: a line that names no episode: {line[:60]!r}.") from None
-        name = f"episode_{number:06d}.parquet"
-        yield Episode(number, length, file=folder / "data" / f"chunk-{number // chunk:03d}" / name)
+        yield Episode(number, files.get(f"episode_{number:06d}.parquet"), length)
+
+
+def _by_data(_: Path, path: Path) -> Iterator[Episode]:
+    for number in episodes_of(ParquetTable(open_log(path)).episodes()):
+        yield Episode(number, path)
+
+
+#: Files of a dataset that name its episodes, the best first → what reads one.
+WAYS = {
+    "meta/episodes/**/*.parquet": _by_table, "meta/episodes.jsonl": _by_lines,
+    "data/**/*.parquet": _by_data,
+}  # fmt: skip
+
+
+@lru_cache(maxsize=64)  # who reads all episodes asks for each again
+def _episodes_by(way: str, folder: Path, path: Path, _changed: int) -> tuple[Episode, ...]:
+    return tuple(WAYS[way](folder, path))
+
+
+def dataset_episodes(folder: Path) -> list[Episode]:
+    """The episodes of a dataset, rising."""
+    found: dict[int, Episode] = {}
+    for way in WAYS:
+        for path in sorted(folder.glob(way)):
+            each = _episodes_by(way, folder, path, path.stat().st_mtime_ns)
+            found |= {episode.number: episode for episode in each}
+        if found:
+            return [found[number] for number in sorted(found)]
+    raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
 
 
 def data_file(folder: Path, episode: Episode) -> Path:
-    """The data file of an episode: where the table says, by its name, or the one that holds it."""
+    """The data file of an episode: where the table says, or the one that holds it."""
     if episode.file is not None and episode.file.is_file():
         return episode.file
-    files = sorted((folder / "data").rglob("*.parquet"))
-    own = [path for path in files if path.name == f"episode_{episode.number:06d}.parquet"]
-    for path in own or files:
-        if own or episode.number in episodes_of(ParquetTable(open_log(path)).episodes()):
+    for path in sorted((folder / "data").rglob("*.parquet")):
+        if episode.number in episodes_of(ParquetTable(open_log(path)).episodes()):
             return path
     raise LogError(f"{folder}: no file of data/**/*.parquet holds episode {episode.number}.")
 

@@ -9,8 +9,10 @@ import pickle
 import pickletools
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from mmap import mmap
+from typing import Any, Literal
 
 import numpy as np
 
@@ -35,37 +37,26 @@ Object = dict[str, Data]  #: An object of a document.
 
 def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
     """The lines that are not empty, with their numbers from 1."""
-    start, number = 0, 0
     data: Any = content.obj
-    if data.find(b"\n") < 0:
-        data = bytes(data).replace(b"\r", b"\n")
-    while start < len(content):
-        number += 1
-        end = data.find(b"\n", start)
-        end = len(content) if end < 0 else end
-        if line := data[start : min(end, start + LONGEST_LINE + 1)].strip():
-            yield number, line
-        start = end + 1
+    stream = data if isinstance(data, mmap) else io.BytesIO(data)
+    stream.seek(0)
+    for number, line in enumerate(iter(stream.readline, b""), start=1):
+        if bare := line.strip():
+            yield number, bare
 
 
 def columns_of_lines(file: LogFile, lines: Iterable[tuple[int, bytes]]) -> tuple[Columns, Notes]:
     """The numbers of objects, one a line; a last one that is cut is left out and said."""
     blocks: list[Columns] = []
-    objects: list[Object] = []
-    waiting: int | None = None
-    first = number = 1
-    for number, line in lines:
-        if waiting is not None:
-            raise LogError(f"{file.path}: line {waiting} is not one JSON object.")
-        if (found := _object_in(line)) is None:
-            waiting = number
-            continue
-        objects.append(found)
-        if len(objects) == CHUNK_LINES:
-            blocks.append(columns_of(file, objects, first))
-            objects, first = [], number + 1
-    if objects:
-        blocks.append(columns_of(file, objects, first))
+    odd: list[int] = []  # numbers of lines without an object
+    left = iter(lines)
+    while part := list(islice(left, CHUNK_LINES)):
+        each = {number: _object_in(line) for number, line in part}
+        odd += [number for number, found in each.items() if found is None]
+        if odd and odd[0] != part[-1][0]:
+            raise LogError(f"{file.path}: line {odd[0]} is not one JSON object.")
+        if objects := [found for found in each.values() if found is not None]:
+            blocks.append(columns_of(file, objects, part[0][0]))
     if not blocks:
         raise LogError(f"{file.path}: no line holds a JSON object.")
     if any(block.keys() != blocks[0].keys() for block in blocks):
@@ -74,7 +65,7 @@ def columns_of_lines(file: LogFile, lines: Iterable[tuple[int, bytes]]) -> tuple
         columns = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
     except ValueError:
         raise LogError(f"{file.path}: a field differs in length from line to line.") from None
-    return columns, (fact("line-cut"),) if waiting is not None else ()
+    return columns, (fact("line-cut"),) if odd else ()
 
 
 def _object_in(line: bytes) -> Object | None:
@@ -144,86 +135,36 @@ class Refused(pickle.UnpicklingError):
     """The pickle asks for something that is no array of numbers."""
 
 
-class Marker:
-    """Stands for the class ndarray, which a pickle names but may not call."""
+class Stub:
+    """What a pickle makes of a name by NumPy's, kept as it was asked for and never executed."""
 
-    def __new__(cls, *_: object, **__: object) -> "Marker":
-        """Refuse to be called."""
-        raise Refused("an array of its own making")
-
-
-class PickledType:
-    """The type of an array's numbers as a pickle tells it; NumPy's own never meets a pickle.
-
-    Attributes:
-        dtype: The type of plain numbers, letters or booleans; None for any other.
-    """
-
-    def __init__(self, code: Data = None, *_: Data) -> None:
-        if isinstance(code, str) and re.search(r"O|object", code):
-            raise Refused("an array of objects")
-        plain = isinstance(code, str) and re.fullmatch(
-            r"[<>=|]?([biufc?]\d{0,2}|[SU]\d{1,3})", code
-        )
-        self.dtype: np.dtype[Any] | None = np.dtype(code) if plain else None
+    def __init__(self, name: str, *arguments: Data) -> None:
+        self.name, self.arguments = name, arguments
+        self.state: tuple[Data, ...] = ()
 
     def __setstate__(self, state: Data) -> None:
-        """Take up the byte order, the second of what NumPy pickles of a type."""
-        _version, order, subarray, names = state[:4]
-        if subarray is not None or names is not None or order not in {"<", ">", "=", "|"}:
-            self.dtype = None
-        elif self.dtype is not None and order in {"<", ">"}:
-            self.dtype = self.dtype.newbyteorder(order)
-
-
-class PickledArray:
-    """An array of a pickle: a view of the pickle's own bytes.
-
-    Attributes:
-        array: The array; empty where it holds no plain numbers.
-    """
-
-    __slots__ = ("array",)
-
-    def __init__(self, kind: Data = Marker, *_: Data) -> None:
-        if kind is not Marker:
-            raise Refused("an array of a kind of its own")
-        self.array = NOTHING
-
-    def __setstate__(self, state: Data) -> None:
-        """Lay the array over bytes, of a shape, type and order, as NumPy pickles them."""
-        shape, kind, fortran, content = state[-4:]
-        if not isinstance(kind, PickledType) or not isinstance(content, bytes | bytearray):
-            raise Refused("an array of objects")
-        if kind.dtype is not None:
-            numbers = np.frombuffer(content, dtype=kind.dtype)
-            self.array = numbers.reshape(shape, order="F" if fortran else "C")
+        self.state = state
 
 
 Built = tuple[Any, int]  #: What was built of a part of a pickle, and how many numbers it holds.
-NOTHING = np.empty(0, dtype="V1")  #: An array that holds no numbers.
+#: All that a pickle may call, by the names of NumPy before 2.
+ALLOWED = {
+    "numpy.ndarray", "numpy.dtype", "numpy.core.multiarray._reconstruct",
+    "numpy.core.multiarray.scalar", "numpy.core.numeric._frombuffer", "_codecs.encode",
+}  # fmt: skip
 
 
-def _from_buffer(buffer: Data, kind: Data, shape: Data, order: Data = "C") -> PickledArray:
-    array = PickledArray()
-    array.__setstate__((shape, kind, order == "F", buffer))
-    return array
-
-
-def _scalar(kind: Data, content: Data = None) -> Data:
-    if not isinstance(kind, PickledType) or kind.dtype is None or not isinstance(content, bytes):
-        raise Refused("a scalar that is no number")
-    return np.frombuffer(content, dtype=kind.dtype, count=1)[0].item()
-
-
-#: All that a pickle may call, by the names of NumPy before 2, each replaced by ours.
-ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
-    ("numpy", "ndarray"): Marker,
-    ("numpy", "dtype"): PickledType,
-    ("numpy.core.multiarray", "_reconstruct"): PickledArray,
-    ("numpy.core.multiarray", "scalar"): _scalar,
-    ("numpy.core.numeric", "_frombuffer"): _from_buffer,
-}
+def dtype_of(kind: Data) -> np.dtype[Any] | None:
+    """The type of an array's plain numbers, letters or booleans; None for any other."""
+    code = kind.arguments[0] if isinstance(kind, Stub) and kind.name == "dtype" else "O"
+    if not isinstance(code, str) or re.search(r"O|object", code):
+        raise Refused("an array of objects")
+    # The second to fourth of what NumPy pickles of a type.
+    order, subarray, names = kind.state[1:4] or ("=", None, None)
+    plain = re.fullmatch(r"[<>=|]?([biufc?]\d{0,2}|[SU]\d{1,3})", code)
+    if not plain or subarray is not None or names is not None or order not in set("<>=|"):
+        return None
+    return np.dtype(f"{order}{plain[1]}" if order in {"<", ">"} else code)
 
 
 class ArrayUnpickler(pickle.Unpickler):
@@ -236,23 +177,15 @@ class ArrayUnpickler(pickle.Unpickler):
     def __init__(self, content: bytes) -> None:
         super().__init__(io.BytesIO(content))
         self._left = max(BUILT_LIMIT, len(content))
+        self._known: dict[int, Built | None] = {}
 
     def find_class(self, module: str, name: str) -> Data:
         """Return what a name may stand for."""
-        if (module, name) == ("_codecs", "encode"):
-            return self._encoded
         if (module, name) == ("collections", "OrderedDict"):
             return self._ordered
-        try:
-            return ALLOWED[module.replace("._core.", ".core."), name]
-        except KeyError:
-            raise Refused(f"{module}.{name}"[:80]) from None
-
-    def _encoded(self, text: Data, encoding: Data = "latin1") -> bytes:
-        if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
-            raise Refused("an odd encoding")
-        self._claim(len(text))
-        return text.encode("latin1")
+        if f"{module.replace('._core.', '.core.')}.{name}" not in ALLOWED:
+            raise Refused(f"{module}.{name}"[:80])
+        return lambda *arguments: Stub(name, *arguments)
 
     def _ordered(self, items: Data = ()) -> dict[Data, Data]:
         self._claim(len(items))
@@ -265,36 +198,62 @@ class ArrayUnpickler(pickle.Unpickler):
 
     def built(self, value: Data) -> Data:
         """What was loaded, with arrays for pickled arrays, once its size is known to be bounded."""
-        built, size = self._settled(value, {}, 0)
+        built, size = self._settled(value, 0)
         self._claim(size)
         return built
 
-    def _settled(self, value: Data, known: dict[int, Built | None], depth: int) -> Built:
+    def _settled(self, value: Data, depth: int) -> Built:
         """A value with arrays for pickled arrays, and how many numbers it has in full.
 
         A part that is named again is not walked again: a few lists that hold one another
         a few times over are more than any memory takes.
         """
-        if isinstance(value, PickledArray):
-            return value.array, value.array.size
-        if not isinstance(value, list | tuple | dict):
+        if not isinstance(value, Stub | list | tuple | dict):
             return value, 1
-        if id(value) in known:
-            if (before := known[id(value)]) is None:
+        if id(value) in self._known:
+            if (before := self._known[id(value)]) is None:
                 raise Refused("a list that holds itself")
             return before
         if depth > DEPTH:
             raise Refused(f"lists nested more than {DEPTH} deep")
-        known[id(value)] = None
-        parts = [
-            self._settled(part, known, depth + 1)
-            for part in (value.values() if isinstance(value, dict) else value)
-        ]
-        inner = [part for part, _ in parts]
-        whole = dict(zip(value, inner, strict=True)) if isinstance(value, dict) else inner
-        built = whole, 1 + sum(size for _, size in parts)
-        known[id(value)] = built
+        self._known[id(value)] = None
+        if isinstance(value, Stub):
+            built = self._array(value)
+        else:
+            inner = value.values() if isinstance(value, dict) else value
+            parts = [self._settled(part, depth + 1) for part in inner]
+            whole = [part for part, _ in parts]
+            keyed = dict(zip(value, whole, strict=True)) if isinstance(value, dict) else whole
+            built = keyed, 1 + sum(size for _, size in parts)
+        self._known[id(value)] = built
         return built
+
+    def _array(self, stub: Stub) -> Built:
+        """An array, a view of the pickle's own bytes where it can be; a number; or bytes."""
+        shape: Data = ()
+        order: Literal["C", "F"] = "C"
+        if stub.name == "encode":  # how protocol 2 holds bytes
+            text, encoding = (*stub.arguments, "latin1")[:2]
+            if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
+                raise Refused("an odd encoding")
+            self._claim(len(text))
+            return text.encode("latin1"), 1
+        if stub.name == "_reconstruct":
+            shape, kind, fortran, content = stub.state[-4:]
+            order = "F" if fortran else "C"
+        elif stub.name == "_frombuffer":
+            content, kind, shape, order = stub.arguments[:4]
+        elif stub.name == "scalar":
+            kind, content = stub.arguments
+        else:
+            raise Refused("an array of its own making")
+        dtype, content = dtype_of(kind), self._settled(content, DEPTH)[0]
+        if not isinstance(content, bytes | bytearray):
+            raise Refused("an array of objects")
+        if dtype is None:  # of no plain numbers
+            return np.empty(0, dtype="V1"), 0
+        array = np.frombuffer(content, dtype=dtype).reshape(shape, order=order)
+        return (array, array.size) if shape != () else (array.item(), 1)
 
 
 #: Larger pickles are refused: they have to be held in memory twice.

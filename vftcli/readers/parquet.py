@@ -114,26 +114,24 @@ class ColumnarTable(Table):
 
         name, length = self.names[column], self.lists.get(column)
         if length is not None:
-            even = np.all(np.asarray(values.value_lengths()) == length)
-            flat = values.flatten()
+            even, flat = np.all(np.asarray(values.value_lengths()) == length), values.flatten()
             if values.null_count or not even or len(flat) != length * len(values):
                 raise LogError(f"{self.path}: the lists of {name} are not all {length} long.")
-            if not is_number(flat.type):
-                raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
-            return plain(flat).astype(np.float64).reshape(len(values), length)
+            values = flat
         kind = values.type
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
             unit = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
             values = values.cast(unit).cast(pa.int64())
         elif pa.types.is_boolean(kind):
             values = values.cast(pa.uint8())
-        elif not is_number(kind):
+        elif not pa.types.is_integer(kind) and not pa.types.is_floating(kind):
             raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
         whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
         target = np.int64 if whole else np.float64
         # Not copied where nothing is to be changed: what is picked of it is copied once
         # more.
-        return plain(values).astype(target, copy=False)
+        numbers = plain(values).astype(target, copy=False)
+        return numbers if length is None else numbers.reshape(-1, length)
 
     def _check(self, columns: Places) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
@@ -167,13 +165,6 @@ def plain(values: Arrow) -> Column:
     if values.null_count or values.type.bit_width < 8:
         return np.asarray(values.to_numpy(zero_copy_only=False))
     return np.from_dlpack(values)
-
-
-def is_number(kind: Arrow) -> bool:
-    """Whether a column holds numbers."""
-    import pyarrow as pa
-
-    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
 
 
 class ParquetTable(ColumnarTable):

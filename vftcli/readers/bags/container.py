@@ -1,8 +1,7 @@
 """Containers of messages: their files on disk, and the channels and batches that each yields."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from importlib import import_module
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from vftcli.readers.opening import LogFile, check_unpacked, natural
 from vftcli.signals import parsing
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+from vftcli.signals.remarks import Remark, caution, fact, warning
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
@@ -29,52 +28,42 @@ class Channel(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Messages of one channel, one behind the other."""
+    """Messages of one channel."""
 
     channel: Channel  #: The topic of all of them.
-    buffer: Bytes  #: Their bytes.
-    offsets: Integers  #: Where each begins. (k,)
-    lengths: Integers  #: How long each is. (k,)
-    times: Integers  #: When each was recorded. (k,) [ns]
+    times: list[int]  #: When each was recorded. [ns]
+    contents: list[bytes]  #: Their bytes.
 
 
 #: The channel of a message, None where the file does not say; its time [ns]; its bytes.
-Message = tuple[Channel | None, int, bytes]
-Messages = Iterator[Message]
+Messages = Iterator[tuple[Channel | None, int, bytes]]
 
 BATCH_BYTES = 16 * 1024 * 1024
 MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
-def batched(messages: Iterable[Message], budget: "ReadBudget") -> Iterator[Batch]:
+def batched(messages: Messages, budget: "ReadBudget") -> Iterator[Batch]:
     """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
-    found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
+    found: dict[int, Batch] = {}
     held = 0
     for channel, time, content in messages:
         if channel is None:
             raise budget.error("messages of an unknown topic; the file is damaged.")
-        _, times, contents = found.setdefault(id(channel), (channel, [], []))
+        _, times, contents = found.setdefault(id(channel), Batch(channel, [], []))
         times.append(time)
         contents.append(content)
         held += len(content) + MESSAGE_COST
         if held > BATCH_BYTES:
-            yield from map(_batch, found.values())
+            yield from found.values()
             found, held = {}, 0
-    yield from map(_batch, found.values())
-
-
-def _batch(found: tuple[Channel, list[int], list[bytes]]) -> Batch:
-    channel, times, contents = found
-    lengths = np.array([len(content) for content in contents])
-    buffer, wrapped = np.frombuffer(b"".join(contents), dtype=np.uint8), np.array(times)
-    # Recorders that count past 2⁶³ wrap.
-    return Batch(channel, buffer, np.cumsum(lengths) - lengths, lengths, wrapped.astype(np.int64))
+    yield from found.values()
 
 
 @dataclass
 class MessageCount:
     """What a container says of its messages, and what was found."""
 
+    end: int  #: Where its last whole record ends. [B]
     kept: int = 0  #: Messages found.
     chunks: int = 0  #: Chunks found.
     counted: int | None = None  #: Messages that it counts, None where it does not say.
@@ -83,8 +72,8 @@ class MessageCount:
     missing: int = 0  #: Bytes of messages that should stand before that place. [B]
     closed: bool = False  #: Whether its recorder closed it.
 
-    def report(self, budget: "ReadBudget", left: int, counter: str) -> None:
-        """Say so if the container is cut, and how much of it was kept."""
+    def report(self, budget: "ReadBudget", size: int, counter: str) -> None:
+        """Say so if the container of this size [B] is cut, and how much of it was kept."""
         kept, chunks, missing = self.kept, self.chunks, self.missing
         if self.counted is not None and kept > self.counted:
             raise budget.error(
@@ -97,12 +86,12 @@ class MessageCount:
             counted = self.counted_chunks
             budget.note(warning("chunks-missing", kept=kept, chunks=chunks, counted=counted))
         elif self.counted is None and missing > 0:
-            size = self.data_end + missing
-            budget.note(warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size))
-        elif left and self.closed:
+            whole = self.data_end + missing
+            budget.note(warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=whole))
+        elif size > self.end and self.closed:
             budget.note(fact("index-cut", kept=kept, chunks=chunks))
-        elif left:
-            budget.note(warning("chunks-cut", kept=kept, rest_bytes=left))
+        elif size > self.end:
+            budget.note(warning("chunks-cut", kept=kept, rest_bytes=size - self.end))
         elif not self.closed:
             budget.note(caution("recorder-stopped", kept=kept))
 
@@ -164,39 +153,6 @@ def storage_files(file: LogFile) -> list[str]:
     return sorted(plain, key=natural)
 
 
-#: How a file of a container begins → what of `records` reads it.
-CONTAINERS = {
-    b"#ROSBAG V2.0\n": "BagMessages",
-    b"\x89MCAP0\r\n": "McapMessages",
-    b"SQLite format 3\0": "db3_messages",
-}
-
-
-def batches(files: Sequence[LogFile], budget: ReadBudget) -> Iterator[Batch]:
-    """The messages of files, one behind the other; what a library raises is said in one line."""
-    for file in files:
-        found = next((x for magic, x in CONTAINERS.items() if file.head.startswith(magic)), None)
-        if found is None:
-            raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
-        try:
-            messages_of = getattr(import_module("vftcli.readers.bags.records"), found)
-            for batch in batched(messages_of(file, budget), budget):
-                yield batch
-                file.release()
-        except LogError:
-            raise
-        except MemoryError:
-            raise budget.error(
-                "a part of it claims more memory than the file holds; it is damaged."
-            ) from None
-        except Exception as error:  # noqa: BLE001 - libraries document none of what damage raises
-            reason = printable(f"{type(error).__name__}: {error}")[:100]
-            raise budget.error(f"not a readable bag; it is damaged ({reason}).") from None
-        if file.path != budget.path:
-            for remark in file.remarks:
-                budget.note(replace(remark, where=Where(about=file.path.name)))
-
-
 def printable(name: str) -> str:
     """A name of a bag for messages: one line, no control characters, not too long."""
     return parsing.printable(name[:120])
@@ -208,11 +164,11 @@ def type_name(name: str) -> str:
     return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
 
 
+Content = Any  #: Bytes, or a mapped file.
+
+
 class CutError(ValueError):
     """The content ends inside a record."""
-
-
-Content = Any  #: Bytes, or a mapped file.
 
 
 def sized(content: Content, place: int, width: int = 4) -> tuple[bytes, int]:
@@ -248,13 +204,9 @@ def unpacked(budget: ReadBudget, name: str, packed: bytes, size: int) -> bytes:
     return content
 
 
-def strided(buffer: Bytes, offsets: Integers, a: int, b: int) -> Bytes:
-    """Bytes a to b of each message. (k, b − a)"""
-    if len(offsets) > 1:
-        stride = int(offsets[1] - offsets[0])
-        if stride > 0 and (offsets[1:] - offsets[:-1] == stride).all():
-            return np.ndarray(
-                (len(offsets), b - a), np.uint8, buffer, int(offsets[0]) + a, (stride, 1)
-            )
-    picked: Bytes = buffer[offsets[:, None] + np.arange(a, b)]
-    return picked
+def of_chunk(records: Iterator[Any], budget: ReadBudget) -> Iterator[Any]:
+    """The records of a chunk, all of which must be whole."""
+    try:
+        yield from records
+    except CutError:
+        raise budget.error("a record ends outside its chunk; damaged.") from None

@@ -1,16 +1,18 @@
 """Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.readers.aliases import along_arm
-from vftcli.readers.bags.container import Batch, Channel, Integers, ReadBudget
-from vftcli.readers.bags.ros_messages import LayoutError, MessageLayout, Types, types_for
-from vftcli.readers.table import Column, Columns, JoinedRows, Names, Signals
+from vftcli.readers.bags.container import Batch, Bytes, Channel, Integers, ReadBudget
+from vftcli.readers.bags.ros_messages import LayoutError, MessageLayout, types_for
+from vftcli.readers.table import Columns, JoinedRows, Names, Signals
 from vftcli.signals.arrays import Array
 
 
@@ -99,7 +101,21 @@ class Stream:
         """Number of positions."""
         return len(self.signals["q"].T)
 
+    @property
+    def host(self) -> Integers:
+        """Header stamps if they are set and never run back, else receive stamps. (T,) [ns]"""
+        header = self.header
+        good = header is not None and header[0] > 0 and runs(header)
+        return header if header is not None and good else self.receive
 
+
+def runs(stamps: Array | Integers) -> bool:
+    """Whether stamps are set and never run back."""
+    good = bool(np.all(np.isfinite(stamps))) and bool(np.all(np.diff(stamps) >= 0))
+    return good and (len(stamps) < 2 or bool(stamps[-1] > stamps[0]))
+
+
+Numbers = Callable[[Sequence[str]], Array]
 #: What tells streams of a topic apart: the joints' names, the frame, the signals.
 _Key = tuple[Names, str, Names]
 
@@ -108,11 +124,8 @@ _Key = tuple[Names, str, Names]
 class _Topic:
     """What is known of a channel while its batches come in."""
 
-    types: Types
     layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
-    #: Times and signals by name, and `place` in the batch at hand, of each layout in it.
-    parts: dict[_Key, list[Columns]] = field(default_factory=dict)
-    #: The times and signals of all batches.
+    #: The times, signals, and numbers among all messages, of all batches.
     series: dict[_Key, dict[str, JoinedRows]] = field(default_factory=dict)
     mixed: set[_Key] = field(default_factory=set)
     constants: dict[str, tuple[float, ...]] = field(default_factory=dict)
@@ -123,69 +136,77 @@ class Decoder:
 
     def __init__(self, budget: ReadBudget) -> None:
         self.budget = budget
-        self.topics: dict[Channel, _Topic] = {}
+        self.topics: dict[Channel, _Topic] = defaultdict(_Topic)
         self.others: dict[str, str] = {}
 
-    def take(self, batch: Batch) -> None:
-        """Decode one batch, or remember that its type carries nothing we hold."""
+    def take(self, batch: Batch, places: Integers) -> None:
+        """Decode messages with these places (k, 2), or remember that we hold none of their type."""
         channel = batch.channel
         if channel.type not in KINDS or channel.encoding not in {"ros1", "cdr"}:
             self.others[channel.topic] = channel.type or channel.encoding
             return
+        lengths = np.array([len(content) for content in batch.contents])
         try:
-            if channel not in self.topics:
-                self.topics[channel] = _Topic(types=types_for(channel))
-            topic = self.topics[channel]
-            for length in np.unique(batch.lengths):
-                self._of_length(batch, topic, int(length))
-            for key, parts in topic.parts.items():
-                series = topic.series.setdefault(key, defaultdict(JoinedRows))
-                for name, value in _in_recorded_order(parts):
-                    series[name].add(value)
-            topic.parts.clear()
+            for length in np.unique(lengths):
+                own = lengths == length
+                content = b"".join(compress(batch.contents, own))
+                messages = np.frombuffer(content, np.uint8).reshape(-1, max(length, 1))
+                self._take_matrix(channel, messages, places[own])
         except LayoutError as error:
             raise self.budget.error(
                 f"a message of {channel.topic} does not fit the definition of "
                 f"{channel.type} ({error}). The bag is damaged, or its definition is another's."
             ) from None
 
-    def _of_length(self, batch: Batch, topic: _Topic, length: int) -> None:
-        rows = np.flatnonzero(batch.lengths == length)
-        known, place = topic.layouts.setdefault(length, []), 0
-        while rows.size:
-            if place == len(known):
-                start, channel = int(batch.offsets[rows[0]]), batch.channel
-                message, cdr = batch.buffer[start : start + length], channel.encoding == "cdr"
-                known.append(MessageLayout(topic.types, message, channel.type, cdr=cdr))
-                if sum(map(len, topic.layouts.values())) > LAYOUTS:
+    def _take_matrix(self, channel: Channel, messages: Bytes, places: Integers) -> None:
+        layouts = self.topics[channel].layouts
+        known, tried = layouts.setdefault(messages.shape[1], []), 0
+        while len(messages):
+            if tried == len(known):
+                message, cdr = messages[0].tobytes(), channel.encoding == "cdr"
+                known.append(MessageLayout(types_for(channel), message, channel.type, cdr=cdr))
+                if sum(map(len, layouts.values())) > LAYOUTS:
                     raise LayoutError(f"its messages have more than {LAYOUTS} layouts")
-            fits = known[place].fits(batch.buffer, batch.offsets[rows])
+            fits = known[tried].fits(messages)
             if fits.any():
-                self._decode(batch, topic, known[place], rows[fits])
-            rows, place = rows[~fits], place + 1
+                own = slice(None) if fits.all() else fits  # which copies none
+                numbers = partial(known[tried].numbers, messages[own])
+                self.add(channel, numbers, known[tried].texts, places[own])
+            messages, places, tried = messages[~fits], places[~fits], tried + 1
 
-    def _decode(self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers) -> None:
-        kind = KINDS[batch.channel.type]
-        at = batch.buffer, batch.offsets[rows]
-        each = {signal: layout.numbers(paths, *at) for signal, paths in kind.signals.items()}
+    def add(
+        self, channel: Channel, numbers: Numbers, texts: Mapping[str, Names], places: Integers
+    ) -> None:
+        """Take up messages of one shape.
+
+        Args:
+            channel: Their topic, of a type in `KINDS`.
+            numbers: Gives the numbers of each at the first of some paths. (k, count)
+            texts: Dotted path → strings, the same in each.
+            places: Number among all messages, and time of recording [ns], of each. (k, 2)
+        """
+        kind, topic = KINDS[channel.type], self.topics[channel]
+        each = {signal: numbers(paths) for signal, paths in kind.signals.items()}
         for name, paths in kind.constants.items():
-            if (last := layout.numbers(paths, *at)[-1]).size:
+            if (last := numbers(paths)[-1]).size:
                 topic.constants[name] = tuple(last.tolist())
         # Some drivers publish joints alphabetically; every message of a layout has one
         # order.
-        own = layout.texts.get(kind.names, ())
+        own = texts.get(kind.names, ())
         names, signals = along_arm(own, {s: value for s, value in each.items() if value.shape[1]})
         if kind.franka and "tau_ext" in signals:
             signals["tau_ext"] = 0.0 - signals["tau_ext"]
-        key = names, "".join(layout.texts.get(kind.frame, ())), tuple(signals)
-        part = signals | {"place": rows, "receive": batch.times[rows]}
-        if (clock := layout.numbers(["time"], *at)).size:  # a robot's own [s]
+        key = names, "".join(texts.get(kind.frame, ())), tuple(signals)
+        part: Columns = {**signals, "place": places[:, 0], "receive": places[:, 1]}
+        if (clock := numbers(["time"])).size:  # a robot's own [s]
             part["robot"] = clock[:, 0]
         # float64 holds both whole.
-        stamp = [layout.numbers([f"header.stamp.{part}"], *at) for part in ("sec", "nanosec")]
+        stamp = [numbers([f"header.stamp.{p}"]) for p in ("sec", "nanosec")]
         if all(number.size for number in stamp):
             part["header"] = np.hstack(stamp).astype(np.int64) @ (10**9, 1)
-        topic.parts.setdefault(key, []).append(part)
+        series = topic.series.setdefault(key, defaultdict(JoinedRows))
+        for name, value in part.items():
+            series[name].add(value)
         if names != own:
             topic.mixed.add(key)
 
@@ -200,6 +221,10 @@ class Decoder:
                     for name, rows in series.items()
                     if len(rows.shapes) == 1 and rows.count == series["receive"].count
                 }
+                place = found["place"]
+                if np.any(place[1:] < place[:-1]):  # of several layouts in turn
+                    order = np.argsort(place)
+                    found = {name: value[order] for name, value in found.items()}
                 yield Stream(
                     channel=channel,
                     kind=KINDS[channel.type],
@@ -212,13 +237,3 @@ class Decoder:
                     signals={name: found[name] for name in signals if name in found},
                     constants=topic.constants,
                 )
-
-
-def _in_recorded_order(parts: list[Columns]) -> Iterator[tuple[str, Column]]:
-    order = np.argsort(np.concatenate([part.pop("place") for part in parts]), kind="stable")
-    for name, value in parts[0].items():
-        values = [part[name] for part in parts if name in part]
-        if len(parts) == 1:
-            yield name, value  # one layout's rows rise already
-        elif len(values) == len(parts) and len({each.shape[1:] for each in values}) == 1:
-            yield name, np.concatenate(values)[order]

@@ -5,24 +5,25 @@ import re
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import along_arm
-from vftcli.readers.bags.container import Batch, Channel
-from vftcli.readers.bags.decode import KINDS, Stream
-from vftcli.readers.bags.ros_messages import VECTORS
+from vftcli.readers.bags.container import Batch, Channel, Integers
+from vftcli.readers.bags.decode import Decoder
+from vftcli.readers.bags.ros_messages import VECTORS, parts_at
 from vftcli.readers.objects import flat
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import Column, Names
 from vftcli.readers.tables import ArrayTable, from_table
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
-JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
+FRAME = "header.frame_id"
 FOXGLOVE = "foxglove.JointStates"
 #: Names of a document's stamp, and of the seconds and nanoseconds in it.
 STAMPS = ("header.stamp", "timestamp", "stamp")
@@ -32,74 +33,65 @@ Document = dict[str, Any]  #: A message, flattened: dotted path → value.
 
 
 class Documents:
-    """Documents of all channels, flattened as they come in."""
+    """Documents of all channels, flattened as they come in.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        #: The documents of each channel, and when each was recorded. [ns]
+    Those that are JointState or WrenchStamped messages go to the decoder, unless --columns
+    speaks of other fields.
+    """
+
+    def __init__(self, path: Path, request: ReadChoice, decoder: Decoder) -> None:
+        self.path, self.request, self.decoder = path, request, decoder
+        asked = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
+        self.decodes = asked <= {"", "position", "velocity", "effort"}
+        #: The other documents of each channel, and when each was recorded. [ns]
         self.found: dict[Channel, tuple[list[Document], list[int]]] = {}
 
-    def take(self, batch: Batch) -> bool:
+    def take(self, batch: Batch, places: Integers) -> bool:
         """Take up a batch of JSON or JointStates; False if it is neither."""
         channel = batch.channel
-        if channel.encoding != "json" and (channel.encoding, channel.type) != (
-            "protobuf", FOXGLOVE,
-        ):  # fmt: skip
+        if channel.encoding != "json" and channel[1:3] != (FOXGLOVE, "protobuf"):
             return False
-        rows, times = self.found.setdefault(channel, ([], []))
-        for offset, length in zip(batch.offsets, batch.lengths, strict=True):
-            message = batch.buffer[offset : offset + length].tobytes()
+        shapes: dict[Shape | None, list[int]] = {}
+        rows: list[Document] = []
+        for content in batch.contents:
             try:
-                rows.append(flattened(message, channel.encoding))
+                rows.append(flattened(content, channel.encoding))
             except (ValueError, RecursionError) as error:
                 raise LogError(
                     f"{self.path}: message {len(rows) + 1} of {channel.topic} is damaged "
                     f"({str(error)[:60]})"
                 ) from None
-        times.extend(batch.times.tolist())
+            shape = shape_of(rows[-1]) if self.decodes else None
+            shapes.setdefault(shape, []).append(len(rows) - 1)
+        for shape, at in shapes.items():
+            own = [rows[k] for k in at]
+            if shape is None:
+                left = self.found.setdefault(channel, ([], []))
+                left[0].extend(own)
+                left[1].extend(places[at, 1].tolist())
+            else:
+                kind, names, frame, _ = shape
+                as_ros, texts = channel._replace(type=kind), {"name": names, FRAME: (frame,)}
+                self.decoder.add(as_ros, partial(numbers_of, own), texts, places[at])
         return True
 
-    def streams(self, request: ReadChoice) -> list[Stream]:
-        """The channels with documents that are JointState or WrenchStamped messages.
-
-        None where --columns speaks of other fields; no channel where its stamps are no
-        whole seconds and nanoseconds.
-        """
-        asked = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
-        if not asked <= {"", "position", "velocity", "effort"}:
-            return []
-        streams: list[Stream | None] = []
-        for channel, (rows, times) in self.found.items():
-            are_wrenches = all(f"wrench.{path}" in row for row in rows for path in VECTORS)
-            by_names: dict[Names, list[int]] = {}
-            if are_wrenches or all(map(is_joint_state, rows)):
-                for k, row in enumerate(rows):
-                    names = () if are_wrenches else tuple(row["name"])
-                    by_names.setdefault(names, []).append(k)
-            for names, at in by_names.items():
-                own, stamps = [rows[k] for k in at], [times[k] for k in at]
-                streams.append(stream_of(channel, own, stamps, names))
-        return list(filter(None, streams))
-
-    def read(self, request: ReadChoice) -> RawLog:
-        """Read the channel with documents that hold joint positions."""
+    def read(self, topics: set[str]) -> RawLog:
+        """Read the channel with documents that hold joint positions; topics are all there are."""
         failures: dict[int, LogError] = {}
         for channel, (rows, times) in self.found.items():
             try:
-                raw = self._read(channel, rows, times, request)
+                raw = self._read(channel, rows, times)
             except LogError as error:
                 failures.setdefault(len(rows), error)
                 continue
-            left = sorted({other.topic for other in self.found} - {channel.topic})
+            left = sorted(topics - {channel.topic})
             said = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
             return replace(raw, remarks=(*raw.remarks, *said))
         # The fullest channel is the one that was meant; what it lacks is what the user
         # can mend.
         raise failures[max(failures)]
 
-    def _read(
-        self, channel: Channel, rows: Sequence[Document], times: list[int], request: ReadChoice
-    ) -> RawLog:
+    def _read(self, channel: Channel, rows: Sequence[Document], times: list[int]) -> RawLog:
         each = {key: column_of(rows, key) for key in rows[0]}
         columns = {
             key: column
@@ -107,57 +99,55 @@ class Documents:
             if column is not None and not key.lower().startswith(("timestamp", "stamp", "header"))
         }
         stamps = [stamp_of(row) for row in rows]
-        base = next((b for b in STAMPS if isinstance(rows[0].get(b), int | float)), "")
+        number = next((each[base] for base in STAMPS if each.get(base) is not None), None)
         clock = f"stamps in the messages of {channel.topic}"
         if None not in stamps:
             columns["timestamp_ns"] = np.array(stamps, dtype=np.int64)
-        elif base and (number := column_of(rows, base)) is not None:
+        elif number is not None:
             columns["timestamp"] = number
         else:
             clock = "log time of the recorder"
             columns["timestamp_ns"] = np.array(times, dtype=np.int64)
         table = ArrayTable(path=f"{self.path}: topic {channel.topic}", columns=columns)
-        names = rows[0].get("name", [])
-        named = isinstance(names, list) and all(isinstance(name, str) for name in names)
-        return from_table(table, request, names=tuple(names) if named else (), clock_name=clock)
+        names = names_of(rows[0])
+        return from_table(table, self.request, names=names, clock_name=clock)
 
 
-def is_joint_state(row: Document) -> bool:
-    """Whether a document has names, and as many positions."""
-    names, positions = row.get("name"), row.get("position")
-    if not isinstance(names, list) or not isinstance(positions, list):
-        return False
-    return len(names) == len(positions) > 0 and all(isinstance(name, str) for name in names)
+def numbers_of(rows: Sequence[Document], paths: Sequence[str]) -> Array:
+    """The numbers of each document at the first path that is there. (k, count)"""
+    each = (column_of(rows, name) for name in parts_at(paths, rows[0]))
+    columns = (column.reshape(len(rows), -1) for column in each if column is not None)
+    return np.hstack([np.empty((len(rows), 0)), *columns])
 
 
-def stream_of(
-    channel: Channel, rows: Sequence[Document], times: list[int], names: Names = ()
-) -> Stream | None:
-    """One stream, None where its numbers or stamps are not what they should be."""
-    stamps = [stamp_of(row) for row in rows]
-    without = all(stamp is None for stamp in stamps)
-    if any(key.startswith(STAMPS) for key in rows[0]) if without else None in stamps:
+#: The type of ROS that a document is of, its joints' names, its frame, whether it has no stamp.
+Shape = tuple[str, Names, str, bool]
+
+
+def shape_of(row: Document) -> Shape | None:
+    """What a document holds of a JointState or WrenchStamped message; None of any other.
+
+    None, too, where its stamp is no whole seconds and nanoseconds.
+    """
+    stamp, names, positions = stamp_of(row), names_of(row), row.get("position")
+    if stamp is not None:
+        row["header.stamp.sec"], row["header.stamp.nanosec"] = divmod(stamp, 10**9)
+    elif any(key.startswith(STAMPS) for key in row):
         return None
-    kind, shape = JOINT_STATE if names else WRENCH, (len(rows), len(names) or len(VECTORS))
-    signals = {}
-    for signal, paths in KINDS[kind].signals.items():
-        keys = [f"wrench.{path}" for path in VECTORS] if signal == "wrench" else paths
-        each = [column for key in keys if (column := column_of(rows, key)) is not None]
-        if len(each) == len(keys) and (values := np.column_stack(each)).shape == shape:
-            signals[signal] = values
-    if "q" not in signals and "wrench" not in signals:
-        return None
-    ordered, signals = along_arm(names, signals)
-    return Stream(
-        channel=channel._replace(type=kind),
-        kind=KINDS[kind],
-        names=ordered,
-        mixed=ordered != names,
-        frame=str(rows[0].get("header.frame_id", "")),
-        receive=np.array(times, dtype=np.int64),
-        header=None if without else np.array(stamps, dtype=np.int64),
-        signals=signals,
-    )
+    frame = str(row.get(FRAME, ""))
+    if all(f"wrench.{path}" in row for path in VECTORS):
+        return "geometry_msgs/WrenchStamped", (), frame, stamp is None
+    if names and isinstance(positions, list) and len(names) == len(positions):
+        return "sensor_msgs/JointState", names, frame, stamp is None
+    return None
+
+
+def names_of(row: Document) -> Names:
+    """The names of a document's joints, none where it has no list of texts."""
+    names = row.get("name")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return ()
+    return tuple(names)
 
 
 def column_of(rows: Sequence[Document], path: str) -> Column | None:

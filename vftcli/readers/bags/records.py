@@ -13,31 +13,42 @@ read is bounded by the size of the file.
 import sqlite3
 import struct
 import zlib
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
+from dataclasses import replace
+from io import BytesIO
 from typing import Any
 
+import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
+from mcap.records import Channel as McapChannel
+from mcap.records import Chunk, Schema
 from mcap.stream_reader import MAGIC_SIZE
-from rosbags.rosbag1.reader import RecordType
 
 from vftcli.readers.bags.container import (
+    Batch,
     Channel,
     Content,
     CutError,
     MessageCount,
     Messages,
     ReadBudget,
+    batched,
+    of_chunk,
     printable,
     sized,
     type_name,
     unpacked,
 )
 from vftcli.readers.opening import LogFile
-from vftcli.signals.remarks import warning
+from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Where, warning
 
 BAG_MAGIC = 13  #: Bytes before the first record of a ROS 1 bag.
-MESSAGE, CONNECTION = bytes([RecordType.MSGDATA]), bytes([RecordType.CONNECTION])
+#: Numbers of the kinds of records in a ROS 1 bag.
+MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = range(2, 8)
 #: What a field of a header takes at least, but for those that no recorder writes.
 BYTES_PER_FIELD = 8
 
@@ -55,201 +66,158 @@ def _fields(head: bytes) -> Header:
     return fields
 
 
-class BagMessages:
-    """Messages of a bag, chunk by chunk, and what is known of it while its records come in.
+def _bag_records(
+    content: Content, budget: ReadBudget, counts: MessageCount | None = None
+) -> Iterator[tuple[int, Header, bytes, int]]:
+    """Kind, header, data and place of each record of a bag, those of a chunk behind it.
 
-    Attributes:
-        counts: What its header and index count, and what was found.
-        channels: Connection → topic.
-        starts, indexed: Where messages begin in the last chunk, by it and by the records behind it.
-        listed, counted: Chunks that the index at the end lists; messages that it counts.
+    Without counts of a chunk.
     """
-
-    def __init__(self, file: LogFile, budget: ReadBudget) -> None:
-        self.content: Content = file.content.obj
-        self.budget = budget
-        self.counts = MessageCount()
-        self.channels: dict[bytes, Channel] = {}
-        self.starts: list[int] = []
-        self.indexed: list[int] = []
-        self.listed = self.counted = 0
-
-    def __iter__(self) -> Messages:
-        end = BAG_MAGIC
-        while True:
-            try:
-                header, data, place = self._record(self.content, end)
-            except CutError:
-                break
-            yield from self._take(header, data)
-            end = place
-        self._check_index()
-        self.counts.report(self.budget, len(self.content) - end, "its index")
-
-    def _record(self, content: Content, place: int) -> tuple[Header, bytes, int]:
+    place = counts.end if counts else 0
+    while place < len(content):
+        start = place
         head, place = sized(content, place)
-        self.budget.spend(1 + len(head) // BYTES_PER_FIELD)
+        budget.spend(1 + len(head) // BYTES_PER_FIELD)
         data, place = sized(content, place)
-        return _fields(head), data, place
+        header = _fields(head)
+        kind = header[b"op"][0]
+        if counts:
+            counts.end = place
+        yield kind, header, data, start
+        if kind == CHUNK and counts:
+            size = int.from_bytes(header[b"size"], "little")
+            chunk = unpacked(budget, header[b"compression"].decode(), data, size)
+            yield from of_chunk(_bag_records(chunk, budget), budget)
 
-    def _take(self, header: Header, data: bytes) -> Messages:
-        op, counts = header[b"op"][0], self.counts
-        if op == RecordType.IDXDATA:
-            self.indexed += [place for *_, place in struct.iter_unpack("<III", data)]
-            return
-        self._check_index()
-        if op == RecordType.CHUNK:
-            counts.chunks += 1
-            yield from self._chunk(header, data)
-        elif op == RecordType.CONNECTION:
-            self._connect(header, data)
-        elif op == RecordType.CHUNK_INFO:
-            self.listed += 1
-            self.counted += sum(count for _, count in struct.iter_unpack("<II", data))
-            counts.counted = self.counted if self.listed == counts.counted_chunks else None
-        elif op == RecordType.BAGHEADER:
-            if header.get(b"encryptor"):
-                raise self.budget.error("the bag is encrypted. Decrypt it first.")
-            # The place of the index is written when the bag is closed.
-            counts.closed = any(header[b"index_pos"])
-            chunks = int.from_bytes(header[b"chunk_count"], "little")
-            counts.counted_chunks = chunks if counts.closed else None
-        else:
-            raise self.budget.error("an unknown record; the bag is damaged.")
 
-    def _connect(self, header: Header, data: bytes) -> None:
-        about = {name: value.decode("utf-8", "replace") for name, value in _fields(data).items()}
-        self.channels[header[b"conn"]] = Channel(
-            topic=printable(header[b"topic"].decode("utf-8", "replace")),
-            type=type_name(about[b"type"]),
-            encoding="ros1",
-            definition=about[b"message_definition"],
-        )
+def _connection(header: Header, data: bytes) -> Channel:
+    fields = _fields(data) | {b"topic": header[b"topic"]}
+    about = {name: value.decode("utf-8", "replace") for name, value in fields.items()}
+    topic, kind = printable(about[b"topic"]), type_name(about[b"type"])
+    return Channel(topic, kind, "ros1", about[b"message_definition"])
 
-    def _chunk(self, header: Header, data: bytes) -> Messages:
-        name, size = header[b"compression"].decode(), int.from_bytes(header[b"size"], "little")
-        chunk, place = unpacked(self.budget, name, data, size), 0
-        while place < len(chunk):
-            start = place
-            inner, content, place = self._record(chunk, start)
-            if inner[b"op"] == MESSAGE:
-                self.starts.append(start)
-                seconds, rest = struct.unpack("<II", inner[b"time"])
-                yield self.channels.get(inner[b"conn"]), seconds * 10**9 + rest, content
-            elif inner[b"op"] == CONNECTION:
-                self._connect(inner, content)
+
+def _check_index(starts: list[int], indexed: list[int], budget: ReadBudget) -> None:
+    if indexed and sorted(indexed) != starts:
+        raise budget.error("a chunk and its index count differently; it is damaged.")
+
+
+def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
+    """Messages of a ROS 1 bag, chunk by chunk."""
+    counts = MessageCount(end=BAG_MAGIC)
+    channels: dict[bytes, Channel] = {}
+    starts, indexed = list[int](), list[int]()  # of messages, by a chunk and by its index
+    chunks = counted = 0  # chunks and messages that the index at the end lists
+    with suppress(CutError):
+        for kind, header, data, start in _bag_records(file.content.obj, budget, counts):
+            if kind == MESSAGE:
+                starts.append(start)
+                counts.kept += 1
+                seconds, rest = struct.unpack("<II", header[b"time"])
+                yield channels.get(header[b"conn"]), seconds * 10**9 + rest, data
+            elif kind == CONNECTION:
+                channels[header[b"conn"]] = _connection(header, data)
+            elif kind == INDEX:
+                indexed += [place for *_, place in struct.iter_unpack("<III", data)]
+            elif kind == CHUNK:
+                _check_index(starts, indexed, budget)
+                starts, indexed = [], []
+                counts.chunks += 1
+            elif kind == CHUNK_INFO:
+                chunks += 1
+                counted += sum(count for _, count in struct.iter_unpack("<II", data))
+                counts.counted = counted if chunks == counts.counted_chunks else None
+            elif kind == BAG_HEADER:
+                if header.get(b"encryptor"):
+                    raise budget.error("the bag is encrypted. Decrypt it first.")
+                # The place of the index is written when the bag is closed.
+                counts.closed = any(header[b"index_pos"])
+                found = int.from_bytes(header[b"chunk_count"], "little")
+                counts.counted_chunks = found if counts.closed else None
             else:
-                raise self.budget.error("an unknown record; the bag is damaged.")
-        self.counts.kept += len(self.starts)
-
-    def _check_index(self) -> None:
-        if self.indexed and sorted(self.indexed) != self.starts:
-            raise self.budget.error("a chunk and its index count differently; it is damaged.")
-        self.starts, self.indexed = [], []
+                raise budget.error("an unknown record; the bag is damaged.")
+        _check_index(starts, indexed, budget)
+    counts.report(budget, len(file.content), "its index")
 
 
+#: Kinds of records before the summary of an MCAP file.
 DATA = {
     Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX,
     Opcode.ATTACHMENT, Opcode.METADATA,
 }  # fmt: skip
 DATA_END_BYTES = 13  #: Length of the record that ends the data, its head included.
-
 ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
 
 
-def _text(value: object) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""
+def _mcap_records(
+    content: Content, budget: ReadBudget, counts: MessageCount | None = None
+) -> Iterator[tuple[int, bytes]]:
+    """Kind and content of each record of a file, those of a chunk behind it.
+
+    Without counts of a chunk.
+    """
+    place = counts.end if counts else 0
+    while place < len(content):
+        kind = content[place]
+        body, place = sized(content, place + 1, 8)
+        budget.spend(1)
+        if counts:
+            counts.end = place
+            if kind in DATA and not counts.closed:
+                counts.data_end = place
+        yield kind, body
+        if kind == Opcode.CHUNK and counts:
+            chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+            own = unpacked(budget, chunk.compression, chunk.data, chunk.uncompressed_size)
+            # A checksum of zero means that the writer made none.
+            if chunk.uncompressed_crc not in {0, zlib.crc32(own)}:
+                raise budget.error("a chunk does not match its checksum; damaged.")
+            yield from of_chunk(_mcap_records(own, budget), budget)
 
 
-class McapMessages:
+def mcap_messages(file: LogFile, budget: ReadBudget) -> Messages:
     """Messages of an MCAP file, chunk by chunk, those outside chunks one by one."""
+    counts, size, message = MessageCount(end=MAGIC_SIZE), len(file.content), int(Opcode.MESSAGE)
+    schemas = defaultdict(lambda: Schema(0, b"", "", ""))
+    channels: dict[int, Channel] = {}
+    with suppress(CutError):
+        for kind, body in _mcap_records(file.content.obj, budget, counts):
+            if kind == message:
+                counts.kept += 1
+                number, _, time, _ = struct.unpack_from("<HIqq", body)
+                yield channels.get(number), time, body[22:]
+            elif kind == Opcode.SCHEMA:
+                schema = Schema.read(ReadDataStream(BytesIO(body)))
+                schemas[schema.id] = schema
+            elif kind == Opcode.CHANNEL:
+                given = McapChannel.read(ReadDataStream(BytesIO(body)))
+                channels[given.id] = _channel(given, schemas[given.schema_id])
+            elif kind == Opcode.CHUNK:
+                counts.chunks += 1
+            elif kind == Opcode.STATISTICS:
+                counts.closed, counts.counted = True, struct.unpack_from("<Q", body)[0]
+            elif kind == Opcode.DATA_END:
+                counts.closed = True
+            elif kind == Opcode.FOOTER:
+                left, counts.end = size - counts.end, size
+                if left != MAGIC_SIZE:
+                    raise budget.error(f"{left} bytes follow its end, not {MAGIC_SIZE}; damaged.")
+                (summary,) = struct.unpack_from("<Q", body)
+                # Before it should lie the messages, and a record that says so.
+                counts.missing = summary - DATA_END_BYTES - counts.data_end if summary else 0
+                break
+    counts.report(budget, size, "its statistics")
 
-    def __init__(self, file: LogFile, budget: ReadBudget) -> None:
-        self.content: Content = file.content.obj
-        self.budget = budget
-        self.counts = MessageCount()
-        #: Number of a schema → its name, encoding and data.
-        self.schemas: dict[int, tuple[bytes, bytes, bytes]] = {}
-        self.channels: dict[int, Channel] = {}
-        self.indexed = 0
 
-    def __iter__(self) -> Messages:
-        content, counts, end = self.content, self.counts, MAGIC_SIZE
-        with suppress(CutError, struct.error):
-            for op, body, place in self._records(content, MAGIC_SIZE):
-                end = place
-                if op in DATA and not counts.closed:
-                    counts.data_end = end
-                if op == Opcode.CHUNK:
-                    counts.chunks += 1
-                    yield from self._chunk(body)
-                elif op == Opcode.FOOTER:
-                    if (left := len(content) - end) != MAGIC_SIZE:
-                        raise self.budget.error(
-                            f"{left} bytes follow its end where {MAGIC_SIZE} should; it is damaged."
-                        )
-                    (summary,) = struct.unpack_from("<Q", body)
-                    if summary:  # the messages should end before it
-                        counts.missing = summary - DATA_END_BYTES - counts.data_end
-                    end = len(content)
-                    break
-                else:
-                    yield from self._take(op, body, end)
-        if self.indexed > counts.chunks:
-            counts.counted_chunks = self.indexed
-        counts.report(self.budget, len(content) - end, "its statistics")
-
-    def _records(self, content: Content, place: int) -> Iterator[tuple[int, bytes, int]]:
-        while place < len(content):
-            op = content[place]
-            body, place = sized(content, place + 1, 8)
-            self.budget.spend(1)
-            yield op, body, place
-
-    def _take(self, op: int, body: bytes, end: int) -> Messages:
-        if op == Opcode.MESSAGE:
-            self.counts.kept += 1
-            number, _, time, _ = struct.unpack_from("<HIQQ", body)
-            yield self.channels.get(number), time, body[22:]
-        elif op == Opcode.SCHEMA:
-            name, place = sized(body, 2)
-            encoding, place = sized(body, place)
-            number = int.from_bytes(body[:2], "little")
-            self.schemas[number] = name, encoding, sized(body, place)[0]
-        elif op == Opcode.CHANNEL:
-            number, schema = struct.unpack_from("<HH", body)
-            topic, place = sized(body, 4)
-            serialised = _text(sized(body, place)[0])
-            name, language, data = self.schemas.get(schema, (b"", b"", b""))
-            text = _text(data) if language in {b"ros1msg", b"ros2msg", b"ros2idl"} else ""
-            self.channels[number] = Channel(
-                topic=printable(_text(topic)),
-                type=type_name(_text(name)) if text else printable(_text(name)),
-                encoding=serialised if serialised in ENCODINGS else "other",
-                definition=text,
-                idl=language == b"ros2idl",
-            )
-        elif op == Opcode.STATISTICS:
-            self.counts.closed, self.counts.counted = True, struct.unpack_from("<Q", body)[0]
-        elif op == Opcode.CHUNK_INDEX:
-            self.indexed += 1
-        elif op == Opcode.DATA_END:
-            self.counts.closed, self.counts.data_end = True, end - DATA_END_BYTES
-
-    def _chunk(self, body: bytes) -> Messages:
-        *_, size, checksum = struct.unpack_from("<QQQI", body)
-        compression, place = sized(body, 28)
-        packed, _ = sized(body, place, 8)
-        content, end = unpacked(self.budget, _text(compression), packed, size), 0
-        # A checksum of zero means that the writer made none.
-        if checksum and zlib.crc32(content) != checksum:
-            raise self.budget.error("a chunk does not match its checksum; damaged.")
-        with suppress(CutError, struct.error):
-            for op, inner, place in self._records(content, 0):
-                yield from self._take(op, inner, 0)  # a chunk inside a chunk is none
-                end = place
-        if end < len(content):
-            raise self.budget.error("a record ends outside its chunk; damaged.")
+def _channel(given: McapChannel, schema: Schema) -> Channel:
+    known = schema.encoding in {"ros1msg", "ros2msg", "ros2idl"}
+    return Channel(
+        topic=printable(given.topic),
+        type=type_name(schema.name) if known else printable(schema.name),
+        encoding=given.message_encoding if given.message_encoding in ENCODINGS else "other",
+        definition=schema.data.decode("utf-8", "replace") if known else "",
+        idl=schema.encoding == "ros2idl",
+    )
 
 
 ZSTD = b"\x28\xb5\x2f\xfd"
@@ -277,6 +245,10 @@ def db3_messages(file: LogFile, budget: ReadBudget) -> Messages:
     journal = file.path.with_name(f"{file.path.name}-wal")
     if file.wrapping is None and journal.is_file() and (size := journal.stat().st_size):
         budget.note(warning("journal-left", journal=printable(journal.name), bytes=size))
+
+
+def _text(value: object) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""
 
 
 def _opened(file: LogFile) -> sqlite3.Connection:
@@ -332,18 +304,12 @@ def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Messages
             definition=_text(text),
             idl=language == b"ros2idl",
         )
-    for number, time, content in rows("messages ORDER BY id", "topic_id, timestamp, data"):
-        if not isinstance(content, bytes) or not isinstance(time, int):
+    for number, time, data in rows("messages ORDER BY id", "topic_id, timestamp, data"):
+        if not isinstance(data, bytes) or not isinstance(time, int):
             raise budget.error(f"a message of topic {number!s:.20} is no bytes; damaged.")
-        data = content
-        if content.startswith(ZSTD):  # on its own
-            import zstandard
-
-            length = zstandard.frame_content_size(content)
-            budget.claim(length if length >= 0 else MESSAGE_LIMIT)
-            unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
-            data = unpacker.decompress(content, max_output_size=MESSAGE_LIMIT)
-        yield channels.get(number), time, data
+        packing = "zstd" if data.startswith(ZSTD) else ""  # on its own
+        size = zstandard.frame_content_size(data) if packing else 0
+        yield channels.get(number), time, unpacked(budget, packing, data, size)
 
 
 def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
@@ -364,3 +330,37 @@ def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
                 "computed or not there. No recorder writes such a bag; it was edited."
             )
     return found
+
+
+#: How a file of a container begins → what reads it.
+CONTAINERS = {
+    b"#ROSBAG V2.0\n": bag_messages,
+    b"\x89MCAP0\r\n": mcap_messages,
+    b"SQLite format 3\0": db3_messages,
+}
+
+
+def batches(files: Sequence[LogFile], budget: ReadBudget) -> Iterator[Batch]:
+    """The messages of files, one behind the other; what a library raises is said in one line."""
+    for file in files:
+        messages_of = next(
+            (x for magic, x in CONTAINERS.items() if file.head.startswith(magic)), None
+        )
+        if messages_of is None:
+            raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
+        try:
+            for batch in batched(messages_of(file, budget), budget):
+                yield batch
+                file.release()
+        except LogError:
+            raise
+        except MemoryError:
+            raise budget.error(
+                "a part of it claims more memory than the file holds; it is damaged."
+            ) from None
+        except Exception as error:  # noqa: BLE001 - libraries document none of what damage raises
+            reason = printable(f"{type(error).__name__}: {error}")[:100]
+            raise budget.error(f"not a readable bag; it is damaged ({reason}).") from None
+        if file.path != budget.path:
+            for remark in file.remarks:
+                budget.note(replace(remark, where=Where(about=file.path.name)))

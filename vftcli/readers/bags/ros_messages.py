@@ -6,18 +6,18 @@ same layout if and only if it is as long and all its length prefixes are equal; 
 are required to be equal too, so that joint names hold for every message of a group.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.bags.container import Bytes, Channel, Integers, strided, type_name
+from vftcli.readers.bags.container import Bytes, Channel, type_name
 from vftcli.readers.opening import reason_of
 from vftcli.readers.table import Names
-from vftcli.signals.arrays import Mask
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError, OutputError
 from vftcli.signals.parsing import tables_beside
 
@@ -56,64 +56,55 @@ SPARE_VISITS = 1000
 VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 
-class Leaf(NamedTuple):
-    """Numbers in a message: where, of which type, how many."""
-
-    offset: int
-    code: str
-    numbers: int
+def parts_at(paths: Sequence[str], there: Container[str]) -> list[str]:
+    """The first of some paths that is there, or the six numbers of a wrench below it; or none."""
+    each = ([p] if p in there else [f"{p}.{part}" for part in VECTORS] for p in paths)
+    return next((names for names in each if all(name in there for name in names)), [])
 
 
 class MessageLayout:
-    """Where everything lies in messages of one shape.
+    """Where everything lies in serialised messages of one shape, a row of bytes each.
 
     Attributes:
-        leaves: Dotted path → numbers.
+        paths: Dotted path → code and count of numbers, and where they begin.
         texts: Dotted path → strings, one or several.
-        fixed: Ranges of bytes that have to be equal for a message to have this layout.
+        kind: The messages' structure, each number under its dotted path.
     """
 
-    def __init__(self, types: Types, message: Bytes, kind: str, *, cdr: bool) -> None:
-        self.leaves: dict[str, Leaf] = {}
+    def __init__(self, types: Types, message: bytes, kind: str, *, cdr: bool) -> None:
+        self.paths: dict[str, tuple[tuple[str, tuple[int]], int]] = {}
         self.texts: dict[str, Names] = {}
-        self.fixed: list[tuple[int, int]] = []
         self._types, self._message, self._cdr = types, message, cdr
         self._order, self._position, self._visits = "<", 0, 0
+        #: Ranges of bytes that have to be equal for a message to have this layout.
+        self._fixed: list[tuple[int, int]] = []
         if cdr:  # four bytes: representation and byte order
             if len(message) < 4 or message[0] != 0 or message[1] > 1:
                 raise LayoutError("unknown encapsulation")
             self._order = "<" if message[1] == 1 else ">"
-            self.fixed.append((0, 2))
+            self._fixed.append((0, 2))
             self._position = 4
         self._walk("", kind, 0)
         # Some writers pad a message at its end.
         if len(message) - self._position > (8 if cdr else 0):
             raise LayoutError(f"{len(message) - self._position} bytes too many")
-        self._expected = [message[a:b].copy() for a, b in self.fixed]
-        del self._message  # a part of a batch, all of which would stay in memory
+        self._first = np.frombuffer(message, np.uint8)
+        formats, offsets = zip(*self.paths.values(), strict=True) if self.paths else ((), ())
+        fields: Any = {"names": [*self.paths], "formats": formats, "offsets": offsets}
+        self.kind = np.dtype(fields | {"itemsize": len(message)})
 
-    def fits(self, buffer: Bytes, offsets: Integers) -> Mask:
-        """Which messages, all of this layout's length, have this layout. (k,)"""
-        same = np.ones(len(offsets), dtype=bool)
-        for (a, b), expected in zip(self.fixed, self._expected, strict=True):
-            same &= (strided(buffer, offsets, a, b) == expected).all(axis=1)
+    def fits(self, messages: Bytes) -> Mask:
+        """Which messages, all as long as this layout, have it. (k,)"""
+        same = np.ones(len(messages), dtype=bool)
+        for a, b in self._fixed:
+            same &= (messages[:, a:b] == self._first[a:b]).all(axis=1)
         return same
 
-    def numbers(
-        self, paths: Sequence[str], buffer: Bytes, offsets: Integers
-    ) -> NDArray[np.float64]:
-        """The numbers of each message at the first path that is there. (k, count)
-
-        At a path without numbers of its own are the six of a wrench, or none.
-        """
-        each = [[p] if p in self.leaves else [f"{p}.{part}" for part in VECTORS] for p in paths]
-        found = next((names for names in each if self.leaves.keys() >= set(names)), [])
-        columns = [np.empty((len(offsets), 0))]
-        for leaf in map(self.leaves.__getitem__, found):
-            dtype = np.dtype(leaf.code)
-            raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.numbers * dtype.itemsize)
-            columns.append(np.ascontiguousarray(raw).view(dtype).astype(np.float64))
-        return np.hstack(columns) if len(columns) != 2 else columns[1]
+    def numbers(self, messages: Bytes, paths: Sequence[str]) -> Array:
+        """The numbers of each message at the first path that is there. (k, count)"""
+        table = messages.view(self.kind)[:, 0]
+        each = (table[name] for name in parts_at(paths, self.paths))
+        return np.hstack([np.empty((len(messages), 0)), *each])
 
     def _walk(self, path: str, kind: str, depth: int) -> None:
         if depth > MAX_DEPTH:
@@ -128,16 +119,20 @@ class MessageLayout:
         for part in self._types[kind]:
             inner = f"{path}.{part.name}" if path else part.name
             many = self._count() if part.many == -1 else part.many
+            count = 1 if many is None else many
             if part.type in SIZES:
-                self._numbers(inner, part, 1 if many is None else many)
+                code, size = self._order + SIZES[part.type], int(SIZES[part.type][1])
+                if count:
+                    self._align(size)
+                start = self._take(count * size, inner)
+                if len(self.paths) > MAX_LEAVES:
+                    raise LayoutError(f"{inner} is outside the message")
+                self.paths[inner] = (code, (count,)), start
             elif part.type == "string":
-                texts = [self._text(inner) for _ in range(1 if many is None else many)]
-                self.texts[inner] = tuple(texts)
-            elif many is None:
-                self._walk(inner, part.type, depth + 1)
+                self.texts[inner] = tuple(self._text(inner) for _ in range(count))
             else:
-                for k in range(many):
-                    self._walk(f"{inner}[{k}]", part.type, depth + 1)
+                for k in range(count):
+                    self._walk(inner if many is None else f"{inner}[{k}]", part.type, depth + 1)
 
     def _take(self, size: int, what: str) -> int:
         start, self._position = self._position, self._position + size
@@ -145,39 +140,28 @@ class MessageLayout:
             raise LayoutError(f"{what} is outside the message")
         return start
 
-    def _take_fixed(self, size: int, what: str) -> Bytes:
+    def _take_fixed(self, size: int, what: str) -> bytes:
         """The next bytes, which every message of this layout must repeat."""
         start = self._take(size, what)
-        if self.fixed and self.fixed[-1][1] == start:
-            start, _ = self.fixed.pop()
-        self.fixed.append((start, self._position))
-        return self._message[self._position - size : self._position]
+        before = self._fixed.pop()[0] if self._fixed and self._fixed[-1][1] == start else start
+        self._fixed.append((before, self._position))
+        return self._message[start : self._position]
 
     def _align(self, size: int) -> None:
         if self._cdr:
             self._position += -(self._position - 4) % size
 
-    def _numbers(self, path: str, part: Field, count: int) -> None:
-        code = SIZES[part.type]
-        size = np.dtype(code).itemsize
-        if count:
-            self._align(size)
-        start = self._take(count * size, path)
-        if len(self.leaves) > MAX_LEAVES:
-            raise LayoutError(f"{path} is outside the message")
-        self.leaves[path] = Leaf(start, self._order + code, count)
-
     def _count(self) -> int:
         self._align(4)
-        count = int(self._take_fixed(4, "a length").view(f"{self._order}u4")[0])
+        order: Literal["little", "big"] = "little" if self._order == "<" else "big"
+        count = int.from_bytes(self._take_fixed(4, "a length"), order)
         # An element takes a byte or more: a larger count is damage, not data.
         if count > len(self._message) - self._position:
             raise LayoutError("a count larger than what is left of the message")
         return count
 
     def _text(self, path: str) -> str:
-        raw = self._take_fixed(self._count(), path).tobytes()
-        return raw.removesuffix(b"\0").decode("utf-8", "replace")
+        return self._take_fixed(self._count(), path).removesuffix(b"\0").decode("utf-8", "replace")
 
 
 @lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
@@ -278,16 +262,15 @@ def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
     One is made and laid out; every message has the same bytes but for the numbers, which
     are put in column by column.
     """
-    template = type_store().serialize_cdr(template_of(kind, values), long_name(kind))
-    layout = MessageLayout(known_types(), np.frombuffer(template, np.uint8), kind, cdr=True)
-    if unknown := sorted({*values} - {*layout.leaves, *layout.texts}):
+    template = bytes(type_store().serialize_cdr(template_of(kind, values), long_name(kind)))
+    layout = MessageLayout(known_types(), template, kind, cdr=True)
+    if unknown := sorted({*values} - {*layout.paths, *layout.texts}):
         raise OutputError(f"{kind} has no field {unknown[0]}")
     out = np.tile(np.frombuffer(template, np.uint8), (rows, 1))
-    for path, leaf in layout.leaves.items():
-        if path in values and leaf.numbers:
-            table = np.asarray(values[path], dtype=leaf.code).reshape(-1, leaf.numbers)
-            packed = np.ascontiguousarray(table).view(np.uint8)
-            out[:, leaf.offset : leaf.offset + packed.shape[1]] = packed
+    messages = out.view(layout.kind)[:, 0]
+    for path in values.keys() & layout.paths.keys():
+        if messages[path].size:
+            messages[path] = np.reshape(np.asarray(values[path]), (-1, messages[path].shape[1]))
     return out
 
 
@@ -297,17 +280,14 @@ def template_of(kind: str, values: Mapping[str, Value], path: str = "") -> Any: 
     for field in known_types()[kind]:
         inner = f"{path}.{field.name}" if path else field.name
         given: Any = values.get(inner)
-        if field.type in SIZES and field.many is None:
-            made[field.name] = 0
-        elif field.type in SIZES:
-            # A sequence is as long as the rows that it is given.
-            width = field.many if field.many != -1 else 0 if given is None else given.shape[-1]
-            made[field.name] = np.zeros(width, SIZES[field.type])
+        # A sequence is as long as the rows that it is given.
+        many = field.many if field.many != -1 else 0 if given is None else np.shape(given)[-1]
+        if field.type in SIZES:
+            made[field.name] = 0 if many is None else np.zeros(many, SIZES[field.type])
         elif field.type == "string":
-            made[field.name] = str(given or "") if field.many is None else [*map(str, given or ())]
+            made[field.name] = str(given or "") if many is None else [*map(str, given or ())]
         else:  # sequences of messages stay empty
-            deeper = field.many is None
-            made[field.name] = template_of(field.type, values, inner) if deeper else []
+            made[field.name] = template_of(field.type, values, inner) if many is None else []
     return type_store().types[long_name(kind)](**made)
 
 

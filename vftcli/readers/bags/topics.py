@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.aliases import RESIDUAL_TURNED, effort_of, robot_of
-from vftcli.readers.bags.container import Integers, ReadBudget, batches, storage_files
-from vftcli.readers.bags.decode import Decoder, Stream
+from vftcli.readers.bags.container import ReadBudget, storage_files
+from vftcli.readers.bags.decode import Decoder, Stream, runs
 from vftcli.readers.bags.documents import Documents
-from vftcli.readers.columns import SIGNALS, Item
+from vftcli.readers.bags.records import batches
+from vftcli.readers.columns import SIGNALS
 from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import LogFormat
@@ -44,14 +45,11 @@ def aligned(
             release(values)
     frame = gathering.take_wrench(streams)
     gathering.report_left_out(streams, others)
-    width = lead.width
     # Another topic about the arm may have the names.
-    named = [s.names for s in streams if len(s.names) == width and robot_of(s.names)]
-    names = lead.names or next(iter(named), ())
+    named = (s.names for s in streams if len(s.names) == lead.width and robot_of(s.names))
+    names = lead.names or next(named, ())
     return RawLog(
-        stamps=gathering.stamps,
-        tick=gathering.tick,
-        clock=gathering.words,
+        **clock_of(lead),
         signals={name: v for name, v in gathering.signals.items() if request.wants(name)},
         wrench_frame=frame,
         joint_names=names,
@@ -67,8 +65,6 @@ class Gathering:
 
     Attributes:
         lead: The topic with the joints' positions.
-        stamps, tick, words: Its best clock.
-        host: Its header or receive stamps, on which other topics are aligned. (T,) [ns]
         signals: Field of Recording → values at the leading topic's times. (T, k)
         used: Topics beside the leading one that gave a signal.
         remarks: What was chosen, and what looks suspicious.
@@ -76,13 +72,12 @@ class Gathering:
 
     def __init__(self, lead: Stream, request: ReadChoice, path: Path) -> None:
         self.lead, self.path = lead, path
-        self.stamps, self.tick, self.words, self.host = clock_of(lead)
-        self.said_of_wrench = request.spec.item("wrench")
+        self.items = request.spec.items
         self.signals: dict[str, Array] = {}
         self.used: set[str] = set()
         self.remarks: list[Remark] = []
         self._take_lead()
-        self._settle_effort(request.spec.items)
+        self._settle_effort()
 
     def _take_lead(self) -> None:
         lead, width = self.lead, self.lead.width
@@ -103,13 +98,13 @@ class Gathering:
         if lead.kind.franka and "tau_ext" in self.signals:
             self.remarks.append(RESIDUAL_TURNED)
 
-    def _settle_effort(self, items: Sequence[Item]) -> None:
+    def _settle_effort(self) -> None:
         """Decide what effort is: what --columns says, else current for UR joints, else torque.
 
         --columns names a field or none, as in -tau=effort, current[mA]=effort, -tau.
         """
         there, lead = dict(self.signals), self.lead
-        for item in items:
+        for item in self.items:
             # A wrench without a field is the one that is read anyway, of whichever topic.
             signal = SIGNALS.get(item.signal)
             if signal is None or (signal == "wrench" and not item.pattern):
@@ -143,20 +138,21 @@ class Gathering:
     def _take_own(self, stream: Stream) -> None:
         """Take a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
         name, lead = stream.topic.removeprefix(OWN), self.lead
-        value = stream.signals.get("wrench" if name == "wrench" else "effort")
-        same = stream.messages == lead.messages and np.array_equal(host_times(stream), self.host)
-        if value is None or not same or name not in {*SIGNALS, *SIGNALS.values()}:
+        signal = SIGNALS.get(name, name)
+        value = stream.signals.get("wrench" if signal == "wrench" else "effort")
+        if value is None or signal not in SIGNALS.values():
             return
-        field_name = SIGNALS.get(name, name)
-        if field_name in EFFORTS and lead.kind.names:
+        if not np.array_equal(stream.host, lead.host):
+            return
+        if signal in EFFORTS and lead.kind.names:
             for other in set(EFFORTS) & set(self.signals):
                 if all(map(np.array_equal, pieces(self.signals[other]), pieces(value))):
                     del self.signals[other]  # /joint_states' effort said the same without its kind
-        self.signals[field_name] = value
+        self.signals[signal] = value
 
     def take_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
         """Take the wrench of a sensor or of the vendor; return what --columns or the bag states."""
-        said = self.said_of_wrench
+        said = next((item for item in self.items if item.signal == "wrench"), None)
         named = said is not None and said.pattern is not None
         frame = FRANKA_FRAME if self.lead.kind.franka else None
         # A sensor's topic goes before the vendor's, the fullest before the others.
@@ -186,41 +182,39 @@ class Gathering:
 
         It is held at the ends. A caution where the other topic does not cover that time.
         """
-        lead, times, topic = self.lead, self.host, stream.topic
-        own = host_times(stream)
+        lead, topic = self.lead, stream.topic
+        times, own, values = lead.host, stream.host, stream.signals[signal]
         # One of the two may have receive stamps only: like is compared with like.
-        if times is not lead.header:
-            own = stream.receive
-        elif own is stream.receive:
-            times = lead.receive
-        fresh = np.concatenate([[True], np.diff(own) > 0])
-        own, values = own[fresh], stream.signals[signal][fresh]
+        if (times is lead.header) != (own is stream.header):
+            times, own = lead.receive, stream.receive
         if signal != "wrench":
             # Another topic may hold further joints, or the same in another order.
             if stream.names and lead.names and values.shape[1] == len(stream.names):
                 values = values[:, [stream.names.index(name) for name in lead.names]]
             if values.shape[1] != lead.width:
                 return False
+        fresh = np.diff(own, prepend=own[0] - 1) > 0
+        own, values = own[fresh], values[fresh]
         usual = median_step(own.astype(np.float64)) if len(own) > 1 else 0.0
         outside = (times < own[0] - NEAR * usual) | (times > own[-1] + NEAR * usual)
         if len(own) < 2 or np.mean(outside) > 0.05 or np.any(np.diff(own) < 0):
             self.remarks.append(caution("topic-too-short", signal=signal, topic=topic))
             return False
-        start = int(own[0])  # whole nanoseconds are subtracted before they are scaled
-        x, xp = np.asarray((times - start) * 1e-9, float), np.asarray((own - start) * 1e-9, float)
+        # Whole nanoseconds are subtracted before they are scaled.
+        x, xp = (np.asarray((stamps - own[0]) * 1e-9, float) for stamps in (times, own))
+        self.signals[signal] = resample_columns(x, xp, values)
         self.used.add(topic)
         rate, leads = 1e9 / usual, lead.topic
         self.remarks.append(
             fact("signal-interpolated", signal=signal, topic=topic, rate_Hz=rate, lead=leads)
         )
-        self.signals[signal] = resample_columns(x, xp, values)
         return True
 
     def report_left_out(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
         """Remark which messages and topics were left out, those with forces first."""
         lead, topic = self.lead, self.lead.topic
         for stream in streams:
-            if stream.channel == lead.channel and stream.names == lead.names and stream is not lead:
+            if (stream.channel, stream.names) == (lead.channel, lead.names) and stream is not lead:
                 there, count = tuple(stream.signals) or ("names",), stream.messages
                 self.remarks.append(
                     caution("messages-left-out", messages=count, topic=topic, signals=there)
@@ -287,37 +281,19 @@ def leading(
     return best
 
 
-def clock_of(stream: Stream) -> tuple[Any, float, str, Integers]:
-    """A stream's best clock: the robot's own, else its header's, else the recorder's.
-
-    Returns:
-        Its stamps (T,), the length of their tick [s], which clock they are, and header or receive
-        stamps (T,) [ns].
-    """
-    host, robot, topic = host_times(stream), stream.robot, stream.topic
+def clock_of(stream: Stream) -> dict[str, Any]:
+    """A stream's best clock, as fields of RawLog: the robot's, its header's or the recorder's."""
+    host, robot, topic = stream.host, stream.robot, stream.topic
     if robot is None or not runs(robot):
         unset = f"receive stamps of {topic} (its header stamps are unset or run back)"
         words = unset if host is stream.receive else f"header stamps of {topic}"
-        return host, 1e-9, words, host
-    words = f"robot clock (time of {topic})"
+        return {"stamps": host, "tick": 1e-9, "clock": words}
+    found = {"stamps": robot, "clock": f"robot clock (time of {topic})"}
     # Franka counts whole milliseconds, which seconds in float64 would blur.
     milliseconds = np.rint(robot * 1e3)
     if np.all(np.abs(robot * 1e3 - milliseconds) < 1e-3) and abs(robot[-1]) < 1e12:
-        return milliseconds.astype(np.int64), 1e-3, words, host
-    return robot, 1.0, words, host
-
-
-def runs(stamps: Array | Integers) -> bool:
-    """Whether stamps are set and never run back."""
-    good = bool(np.all(np.isfinite(stamps))) and bool(np.all(np.diff(stamps) >= 0))
-    return good and (len(stamps) < 2 or bool(stamps[-1] > stamps[0]))
-
-
-def host_times(stream: Stream) -> Integers:
-    """Header stamps if they are set and never run back, else receive stamps. (T,) [ns]"""
-    header = stream.header
-    is_set = header is not None and header[0] > 0 and runs(header)
-    return header if header is not None and is_set else stream.receive
+        found |= {"stamps": milliseconds.astype(np.int64), "tick": 1e-3}
+    return found
 
 
 METADATA_BYTES = 1024 * 1024
@@ -333,12 +309,15 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     paths = [file.path / name for name in storage_files(file)]
     size = sum(path.stat().st_size for path in paths) if file.is_folder else len(file.content)
     budget = ReadBudget(path=file.path, size=size)
-    decoder, documents = Decoder(budget), Documents(file.path)
+    decoder = Decoder(budget)
+    documents = Documents(file.path, request, decoder)
     messages = 0
     for batch in batches([open_log(path) for path in paths] if paths else [file], budget):
-        messages += len(batch.offsets)
-        if not documents.take(batch):
-            decoder.take(batch)
+        numbers = np.arange(messages, messages + len(batch.times))
+        places = np.column_stack([numbers, batch.times])
+        messages += len(numbers)
+        if not documents.take(batch, places):
+            decoder.take(batch, places)
     if "metadata.yaml" in file.entries:
         with (file.path / "metadata.yaml").open("rb") as metadata:
             text = metadata.read(METADATA_BYTES)
@@ -352,14 +331,11 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     if messages == 0:
         why = "; ".join(["no messages in any whole chunk", *map(str, budget.remarks)])
         raise LogError(f"{file.path}: {why}.")
-    of_documents = documents.streams(request)
-    streams = [*decoder.streams(), *of_documents]
+    streams = [*decoder.streams()]
+    topics = {channel.topic: channel.type or channel.encoding for channel in documents.found}
     # ROS messages go before documents: their types say what they hold.
     if documents.found and not any("q" in stream.signals for stream in streams):
-        raw = documents.read(request)
+        raw = documents.read({*topics, *(stream.topic for stream in streams)})
     else:
-        known = {stream.topic for stream in of_documents}
-        rows = (channel for channel in documents.found if channel.topic not in known)
-        others = decoder.others | {c.topic: c.type or c.encoding for c in rows}
-        raw = aligned(streams, file.path, request, others)
+        raw = aligned(streams, file.path, request, decoder.others | topics)
     return replace(raw, remarks=(*budget.remarks, *raw.remarks))
