@@ -229,7 +229,7 @@ READINGS = {
 """What an effort is called → what is found where it is K⁻¹τ, τ, τ − g, −τ and −K⁻¹τ."""
 
 
-@pytest.mark.statistical
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_an_effort_is_distinct_from_four_others_on_real_logs(logs: Path, name: str) -> None:
     """Each is explained best as what it is; what explains it less than 1.5 × better is said."""
@@ -249,7 +249,7 @@ def test_an_effort_is_distinct_from_four_others_on_real_logs(logs: Path, name: s
             tried = replace(plain, **{called: effort})
             reported = [
                 reading
-                for reading in readings(replace(windows, recording=tried), robot)
+                for reading in readings(replace(windows, recording=tried))
                 # Currents without gravity are none of the five.
                 if reading.code != "current-without-gravity"
             ]
