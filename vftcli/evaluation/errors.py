@@ -20,6 +20,7 @@ from vftcli.signals.parsing import check_kind
 from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
 
+Schema = dict[str, type[pl.DataType]]  #: Column of a table → its type.
 #: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the
 #: samples.
 #:
@@ -27,7 +28,7 @@ from vftcli.signals.series import median_step
 #: one; `missing` the share without an answer, which counts as the answer 0, so that
 #: nothing hides by failing. `l1_Nm` is the mean |error|; `skill` is 1 less the RMSE over
 #: the reference's rms, 1 for the reference itself, 0 for an estimate that is always zero.
-SCHEMA: dict[str, type[pl.DataType]] = {
+SCHEMA: Schema = {
     "recording": pl.String,
     "observer": pl.String,
     "joint": pl.Int64,
@@ -201,8 +202,13 @@ def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFr
     """The tidy table of scored joints, observer by observer."""
     # One joint after the other: of a long log not all of them have room at once.
     of_joints = [rows(recording, reference, joint) for joint in joints]
-    lines = [line for observer in zip(*of_joints, strict=True) for line in observer]
-    return pl.DataFrame(lines, schema=SCHEMA)
+    return tidy([line for observer in zip(*of_joints, strict=True) for line in observer], SCHEMA)
+
+
+def tidy(rows: Sequence[Mapping[str, object]], schema: Schema) -> pl.DataFrame:
+    """A table of rows; what is no finite number is null, which JSON can hold."""
+    number = pl.col(pl.Float64)
+    return pl.DataFrame(rows, schema).with_columns(pl.when(number.is_finite()).then(number))
 
 
 def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object]]:
@@ -216,40 +222,36 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
             "observer": name,
             "joint": joint.joint,
             "reference": reference,
-            "reference_floor_Nm": number(joint.floor),
+            "reference_floor_Nm": joint.floor,
             "samples": len(joint.reference),
         }
         if len(error):
             x, draws, paired = np.ascontiguousarray(error[:, k]), joint.own[k], joint.paired.draws
             square, moving = float(np.mean(x**2)), x[joint.moving]
-            level = root_mean_square(joint.reference)
+            rmse, level = np.sqrt(square), root_mean_square(joint.reference)
             low, high = interval(square, draws.draws[:, 0], draws.blocks)
-            covered = joint.within[k] / joint.banded[k] if joint.banded[k] >= LEAST else np.nan
             here |= {
-                "rmse_Nm": number(np.sqrt(square)),
-                "rmse_low_Nm": number(low),
-                "rmse_high_Nm": number(high),
-                "bias_Nm": number(x.mean()),
-                "max_Nm": number(abs(x).max()),
-                "l1_Nm": number(abs(x).mean()),
-                "skill": number(skill(np.sqrt(square), level)),
-                "reference_rms_Nm": number(level),
-                "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
-                "lag_s": number(joint.lag[k]),
+                "rmse_Nm": rmse,
+                "rmse_low_Nm": low,
+                "rmse_high_Nm": high,
+                "bias_Nm": x.mean(),
+                "max_Nm": abs(x).max(),
+                "l1_Nm": abs(x).mean(),
+                "skill": skill(rmse, level),
+                "reference_rms_Nm": level,
+                "correlation": correlation(joint.estimates[:, k], joint.reference),
+                "lag_s": joint.lag[k],
                 "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
                 "reference_trusted": share >= TRUSTED_SHARE,
                 "at_rest": 1.0 - share,
-                "rmse_moving_Nm": number(root_mean_square(moving)) if len(moving) else None,
-                "coverage_95": number(covered),
                 "missing": joint.missing[k] / len(x),
             }
+            if len(moving):
+                here["rmse_moving_Nm"] = root_mean_square(moving)
+            if joint.banded[k] >= LEAST:
+                here["coverage_95"] = joint.within[k] / joint.banded[k]
         lines.append(here)
     return lines
-
-
-def number(value: float) -> float | None:
-    """A finite number, or None, which tables and JSON can hold."""
-    return float(value) if np.isfinite(value) else None
 
 
 class PoolMember(NamedTuple):
@@ -333,23 +335,17 @@ class JointMeans(NamedTuple):
 def joint_means(errors: pl.DataFrame) -> JointMeans:
     """The mean RMSE of every observer over trusted joints, over all if none is."""
     rows = errors.filter(pl.col("joint").is_not_null())
-    joints = set(rows["joint"])
-    doubted = set[int]()
-    if "reference_trusted" in rows.columns:
-        doubted = set(rows.filter(~pl.col("reference_trusted").fill_null(value=True))["joint"])
-    without = doubted if joints - doubted else set[int]()
-    used = rows.filter(~pl.col("joint").is_in(list(without)))
-    known = used.filter(pl.col("rmse_Nm").is_finite())
-    means = known.group_by("observer", maintain_order=True).agg(pl.col("rmse_Nm").mean())
-    floor = float("nan")
-    if "reference_floor_Nm" in used.columns:
-        floors = used.unique("joint")["reference_floor_Nm"].drop_nulls().to_numpy()
-        floors = floors[np.isfinite(floors)]
-        floor = float(floors.mean()) if len(floors) else floor
-    l1, skills, beside = {}, {}, ("l1_Nm", "reference_rms_Nm")
-    if {*beside} <= {*known.columns}:
-        mean = pl.col("rmse_Nm", *beside).mean()
-        each = known.drop_nulls(beside).group_by("observer").agg(mean)
-        for name, rmse, size, level in each.iter_rows():
+    trusted = pl.col("reference_trusted").fill_null(value=True)
+    doubted = set(rows.filter(~trusted)["joint"])
+    without = tuple(sorted(doubted)) if set(rows["joint"]) - doubted else ()
+    used = rows.filter(~pl.col("joint").is_in(without))
+    floor = used.unique("joint").select(pl.col("reference_floor_Nm").cast(pl.Float64).mean()).item()
+    known = used.filter(pl.col("rmse_Nm").is_finite()).group_by("observer", maintain_order=True)
+    found, l1, skills = {}, {}, {}
+    for name, rmse, size, level in known.agg(
+        pl.col("rmse_Nm", "l1_Nm", "reference_rms_Nm").mean()
+    ).iter_rows():
+        found[name] = rmse
+        if size is not None:
             l1[name], skills[name] = size, skill(rmse, level)
-    return JointMeans(dict(means.iter_rows()), floor, tuple(sorted(without)), l1, skills)
+    return JointMeans(found, float("nan") if floor is None else floor, without, l1, skills)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.errors import SCHEMA, correlation, evaluate, number, rmse
+from vftcli.evaluation.errors import SCHEMA, Schema, correlation, evaluate, rmse, tidy
 from vftcli.free_motion.free_motion import within
 from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
@@ -25,7 +25,7 @@ from vftcli.wrench.solvers import LEAST_SIGMA, decompose, wrench_of
 #: `band_share` is the share of the samples with a 95 % band that holds the reference,
 #: `missing` that without an answer where the pose can tell one, which counts as the
 #: answer 0.
-WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
+WRENCH_SCHEMA: Schema = {
     **SCHEMA,
     "axis": pl.String,
     "rmse_N": pl.Float64,
@@ -52,23 +52,23 @@ def evaluate_wrenches(
                 "recording": recording,
                 "observer": wrench.name,
                 "axis": axis,
-                f"rmse_{unit}": number(overall[k]),
+                f"rmse_{unit}": overall[k],
                 "reference": reference.name,
                 "samples": len(error),
             }
             if len(error):
                 row |= {
-                    f"bias_{unit}": number(error.mean()),
-                    f"max_{unit}": number(abs(error).max()),
-                    "correlation": number(correlation(x, y)),
-                    "missing": float(np.mean(~answered[known, k])),
+                    f"bias_{unit}": error.mean(),
+                    f"max_{unit}": abs(error).max(),
+                    "correlation": correlation(x, y),
+                    "missing": np.mean(~answered[known, k]),
                 }
                 if wrench.sd is not None:
                     # An error of NaN lies in no band.
                     inside = abs(wrench.known[known, k] - y) <= COVERS * wrench.sd[known, k]
-                    row["band_share"] = float(inside.mean())
+                    row["band_share"] = inside.mean()
             rows.append(row)
-    return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
+    return tidy(rows, WRENCH_SCHEMA)
 
 
 #: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench"
@@ -76,7 +76,7 @@ def evaluate_wrenches(
 #:
 #: One to one: of the true contacts some are found; of those missed some are merged, which
 #: run into others. Rows that are neither credited nor false alarms are splits.
-CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
+CONTACT_SCHEMA: Schema = {
     "recording": pl.String,
     "observer": pl.String,
     "reference": pl.String,
@@ -98,17 +98,13 @@ def with_contacts(
     errors: pl.DataFrame, recording: str, reference: str, contacts: Iterable[ContactScore]
 ) -> pl.DataFrame:
     """The errors, and below them one row an observer: how it tells contacts."""
-    rows = [
-        (
-            *(recording, score.name, reference, score.signal),
-            *(of.contacts, of.listed, of.found, of.missed, of.merged, of.split, of.false_alarms),
-            *map(number, (of.false_alarms_per_h, of.mean_delay, of.longest_delay)),
-        )
-        for score in contacts
-        for of in (score.detection,)
-    ]
-    table = pl.DataFrame(rows, schema=CONTACT_SCHEMA, orient="row")
-    return pl.concat([errors, table], how="diagonal")
+    rows = []
+    for score in contacts:
+        of, own = score.detection, (recording, score.name, reference, score.signal)
+        counts = of.contacts, of.listed, of.found, of.missed, of.merged, of.split, of.false_alarms
+        row = (*own, *counts, of.false_alarms_per_h, of.mean_delay, of.longest_delay)
+        rows.append(dict(zip(CONTACT_SCHEMA, row, strict=True)))
+    return pl.concat([errors, tidy(rows, CONTACT_SCHEMA)], how="diagonal")
 
 
 class JacobianJudgement(NamedTuple):
