@@ -203,7 +203,7 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "rows of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=Q[:5])),
     "no joints of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=T)),
     "keyword": ("refrence. Did you mean reference", lambda: vft.report(CIRCLE, refrence="zero")),
-    "setting": ("no such setting.*low-pass", lambda: vft.contacts(CIRCLE, settings=LOW)),
+    "setting": ("is no setting here.*low-pass", lambda: vft.contacts(CIRCLE, settings=LOW)),
     "setting's value": ("expected a text", lambda: vft.contacts(CIRCLE, settings=NONE)),
     "flag": ("True or False", lambda: vft.estimate(CIRCLE, causal="yes")),
     "nothing": ("required argument: 'log'", vft.inspect),

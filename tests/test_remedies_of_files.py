@@ -318,7 +318,7 @@ CLUSTER = "needs a cluster, its certificates or an installation without Dask"
 NAMED = "only names the option that is wrong, and what it may be"
 WITHOUT_ROW = {
     NAMED: (
-        ": too large for a file of options", ": not a text in UTF-8", "--config …: …",
+        ": too large: TOML may have", "--config …: …",
         "--columns is empty", "has no column name while others have one",
         "is given twice. Skip the other", "--columns: no q; a log needs",
         "must be one whole number, from 1", "--columns: cannot understand", "--columns: no signal",
@@ -327,8 +327,8 @@ WITHOUT_ROW = {
         "--columns: … has no unit", "has no field", "is neither a number, as in 0, nor all",
         "--columns turns the sign of the clock", "names a column of … twice",
         "--tip …: ", "--figures … is not … or …", "--reference-columns names no tau_ext",
-        "is not a number or a list", "is no setting; vftcli help settings lists them",
-        "this command has no such setting", "--set …=… is not ……",
+        "is not a number or a list", "is no setting here; vftcli help settings lists all",
+        "--set …=… is not ……",
     ),
     NOTHING: (
         "is now --robot", "is what an MJCF gives its joints", "makes no use of …; leave it away",

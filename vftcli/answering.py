@@ -12,7 +12,7 @@ from vftcli.observers.choice import LOG_GAINS, GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, check_logged, examine, model, prepared, read
 from vftcli.readers.references import estimates_columns
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run, Runs
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Asked
 from vftcli.signals.recording import EFFORTS, Recording
@@ -62,21 +62,20 @@ def free_thresholds(
     from vftcli.contacts.threshold_check import compared_signals
     from vftcli.contacts.thresholds import find_thresholds
 
-    models, opened = Runs(), choice.library.open_logs(logs, choice.read)
-    runs = [modelled(*prepared(log, choice), choice, models) for log in opened]
+    runs = [modelled(log, choice) for log in choice.library.open_logs(logs, choice.read)]
     shown = [remark for run in runs for remark in touched(run, anyway=anyway)]
     signals = [compared_signals(run) for run in runs]
     found = find_thresholds(signals, rate)
     return runs, signals, replace(found, remarks=(*found.remarks, *shown))
 
 
-def modelled(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> Run:
+def modelled(recording: Recording, choice: AnalysisChoice) -> Run:
     """A log with its robot, examined.
 
     Raises:
         ExaminationError: If a finding makes every result meaningless.
     """
-    run = models.of(recording, robot)
+    run = prepared(recording, choice)
     choice.examiner.examine(run.recording, run.robot)
     return run
 
@@ -157,8 +156,8 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
     from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
 
     goal = parse_goal(asked.gains, asked.threshold)
-    recording, robot = prepared(choice.library.open(log, choice.read), choice)
-    motion = read(recording, robot, choice, Runs())
+    run = prepared(choice.library.open(log, choice.read), choice)
+    motion = read(run, choice)
     examinations = examine(motion, choice)
     found = model(motion, choice)
     if found is None or (spectra := found.plain.spectra) is None:
@@ -166,7 +165,7 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
         raise ParameterError(f"nothing to find gains from: {why}")
     tuned = tune_all(spectra, goal)
     remarks = (*found.remarks, *bounds_reached(tuned, spectra, goal))
-    return FoundGains(robot, recording, goal, tuned, spectra, remarks, examinations)
+    return FoundGains(run.robot, run.recording, goal, tuned, spectra, remarks, examinations)
 
 
 #: Observer of the force unless another is named: the paper's controller has it.
@@ -232,12 +231,13 @@ def replayed(
         return Replayed(made)
     if isinstance(log, Path) and is_scenario(log):
         return looped(str(log), seed, choice, control, anyway=anyway, progress=progress)
-    recording, arm = prepared(choice.library.open(log, choice.read), choice)
+    run = prepared(choice.library.open(log, choice.read), choice)
+    recording, arm = run.recording, run.robot
     check_logged(recording, "admit runs a controller that must not see the future")
     if stored is None:  # estimates of an earlier run were examined in it
         choice.examiner.examine(recording, arm)
     controllers = control.controllers(arm)
-    force = force_of(recording, arm, choice, control.force, named[0] if stored else None)
+    force = force_of(run, choice, control.force, named[0] if stored else None)
     made = replay(force.wrench, recording.q, arm, controllers, source=force.source, anyway=anyway)
     return Replayed(made, recording, None, choice.examiner.examinations)
 
@@ -248,24 +248,20 @@ def is_scenario(log: Path) -> bool:
 
 
 def force_of(
-    recording: Recording,
-    robot: Robot,
-    choice: AnalysisChoice,
-    source: str | None,
-    stored: str | None,
+    log: Run, choice: AnalysisChoice, source: str | None, stored: str | None
 ) -> "DrivingForce":
     """The wrench that drives a replay: the log's own, a file's, an estimate's or a new one."""
     from vftcli.admittance import replay
 
     assert choice.wrench is not None, "`replayed` asks for one"
+    of = log.recording, log.robot, choice.wrench
     if source == "sensor":
-        return replay.sensor_force(recording, robot, choice.wrench)
+        return replay.sensor_force(*of)
     if source is not None:
-        truth = Path(source.removeprefix(FILE))
-        return replay.truth_force(recording, robot, choice.wrench, truth)
+        return replay.truth_force(*of, Path(source.removeprefix(FILE)))
     if stored is not None:
-        return replay.stored_force(recording, robot, choice.wrench, stored)
-    reading = analyse(recording, robot, choice).virtual_sensor
+        return replay.stored_force(*of, stored)
+    reading = analyse(log, choice).virtual_sensor
     assert reading is not None, "a wrench was asked for"
     return replay.observed_force(reading)
 

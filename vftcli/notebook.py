@@ -150,11 +150,12 @@ def several(logs: Opened | OpenedLogs) -> list[Opened]:
 @call(*OF_LOG)
 def inspect(log: Opened, asked: Asked) -> "Examination":
     """What a log holds and what is wrong with it: its `remarks`, and the `robots` that fit."""
-    choice, robot = choice_for(asked, [log]), None
+    choice = choice_for(asked, [log])
     recording = choice.library.open(log, choice.read)
     if choice.robot.name is not None or choice.read.effort == "auto":
-        recording, robot = prepared(recording, choice)
-    return examine(recording, robot)
+        run = prepared(recording, choice)
+        return examine(run.recording, run.robot)
+    return examine(recording, None)
 
 
 @call(*OF_CONTACTS)

@@ -18,7 +18,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.readers.references import refuse_estimates
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.run import Runs
+from vftcli.robots.run import Run
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.option import Asked, Choice
 from vftcli.signals.progress import no_stage
@@ -122,7 +122,7 @@ def choice_of(asked: Asked, library: Library, examiner: Examiner, **others: Any)
 
 
 #: What is done with each log of a command.
-Analyser = Callable[[Recording, Robot, AnalysisChoice, Runs], "Analysis"]
+Analyser = Callable[[Run, AnalysisChoice], "Analysis"]
 Failed = Callable[[Any, VftError], None]  #: Who hears which log could not be analysed, and why.
 
 
@@ -142,7 +142,7 @@ def analyse_logs(
     The work on each is `analyse` if not given. A log that cannot be analysed is left out
     where somebody hears of it, else it raises a VftError, as two logs of the same run do.
     """
-    models, work, tell = Runs(), work or analyse, failed or raise_error
+    work, tell = work or analyse, failed or raise_error
     recordings: list[tuple[Path | Recording, Recording]] = []
     for path in logs:
         choice.progress(f"reading {path.name}", 0.0, 0.05)
@@ -155,34 +155,37 @@ def analyse_logs(
     refuse_repeated_logs([recording for _, recording in recordings])
     for path, recording in recordings:
         try:
-            made = work(*prepared(recording, choice), choice, models)
+            made = work(prepared(recording, choice), choice)
         except VftError as error:
             tell(path, error)
         else:
             yield made
 
 
-def list_touches(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
-) -> "Analysis":
+def list_touches(log: Run, choice: AnalysisChoice) -> "Analysis":
     """What touched the arm along a log, without any observer's estimate."""
     from vftcli.analysis import Analysis
     from vftcli.contacts.listing import list_contacts
 
-    motion = read(recording, robot, choice, models)
+    motion = read(log, choice)
     examinations = examine(motion, choice)
-    choice.progress(f"{recording.name}: listing contacts", 0.3, 1.0)
+    choice.progress(f"{log.name}: listing contacts", 0.3, 1.0)
     made = Analysis(motion=motion, observers=(), estimates=(), tunings={})
     found = list_contacts(motion).weighed(examinations[0].load, examinations[0].doubts)
     return replace(made, contacts=found, examinations=examinations)
 
 
-def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
+def prepared(recording: Recording, choice: AnalysisChoice) -> Run:
     """A log with its robot, its effort named by the robot's model where that is asked for."""
     robot = choice.examiner.robot(recording, choice.robot)
     if choice.observers.causal:
         check_logged(recording, "--causal leaves out what looks ahead")
-    return choice.examiner.read_as(recording, robot, choice.read), robot
+    return run_of(choice.examiner.read_as(recording, robot, choice.read), robot, choice)
+
+
+def run_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Run:
+    """A log with a robot, as the observers asked for have it."""
+    return choice.examiner.runs.of(recording, robot, literal=choice.observers.as_printed)
 
 
 def check_logged(recording: Recording, why: str) -> None:
@@ -199,13 +202,11 @@ def analyse_log(path: str | Path, choice: AnalysisChoice) -> "Analysis":
     return next(analyse_logs([Path(path)], choice))
 
 
-def analyse(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs | None = None
-) -> "Analysis":
-    """Estimates of a recording and, if a reference is asked for, their errors."""
-    tell, name = choice.progress, recording.name
+def analyse(log: Run, choice: AnalysisChoice) -> "Analysis":
+    """Estimates of a log and, if a reference is asked for, their errors."""
+    tell, name = choice.progress, log.name
     tell(f"{name}: examining", 0.05, 0.15)
-    motion = read(recording, robot, choice, models or Runs())
+    motion = read(log, choice)
     examinations = examine(motion, choice)
     tell(f"{name}: looking for free motion", 0.15, 0.25)
     baselines = model(motion, choice)
@@ -221,15 +222,13 @@ def analyse(
     return judge(analysis, choice)
 
 
-def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> FreeMotion:
+def read(log: Run, choice: AnalysisChoice) -> FreeMotion:
     """Read the log's free runs, each once."""
-    literal = choice.observers.as_printed
-    log = models.of(recording, robot, literal=literal)
     runs = []
     for path in choice.free.logs:
         free = choice.library.open(path, choice.read.whole)
-        free = choice.examiner.read_as(free, robot, choice.read)
-        runs.append(FreeRun(run=models.of(free, robot, literal=literal), log=log))
+        free = choice.examiner.read_as(free, log.robot, choice.read)
+        runs.append(FreeRun(run=run_of(free, log.robot, choice), log=log))
     return FreeMotion(log=log, choice=choice.free, runs=tuple(runs))
 
 

@@ -15,7 +15,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
 from vftcli.robots.robot import Robot
 from vftcli.robots.robot_file import lines_of
-from vftcli.robots.run import Runs
+from vftcli.robots.run import Run
 from vftcli.robots.terms import effort_name
 from vftcli.signals.errors import MissingSignalError, RobotError, VftError
 from vftcli.signals.parsing import printable
@@ -68,27 +68,26 @@ def propose(
 
 def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[ProposedOption]:
     """The free motion and the references that logs of a known arm call for."""
-    recording, robot = prepared(choice.library.open(logs[0], choice.read), choice)
-    refused = examine(recording, robot).refusals()
+    run = prepared(choice.library.open(logs[0], choice.read), choice)
+    refused = examine(run.recording, run.robot).refusals()
     if refused:
         yield from (ProposedOption(f"MEANINGLESS unless mended: {in_words(f)}") for f in refused)
         return
-    models = Runs()
     free = []
     for log in logs[1:]:
-        option = free_log(log, choice, models)
+        option = free_log(log, choice)
         yield option
         free += [log] if option.holds else []
     if free:
         yield ProposedOption("nothing touches the arm in them", "free", [str(log) for log in free])
     choice = replace(choice, free=FreeChoice(logs=tuple(free)))
     try:
-        found = read(recording, robot, choice, models).part.remarks
+        found = read(run, choice).part.remarks
     except VftError:
         found = ()  # why there is none says the reference that would need it
     own = "" if free else "; each log's own is found unasked"
     yield from (ProposedOption(f"{remark}{own}") for remark in found)
-    yield from references(recording, robot, choice, models)
+    yield from references(run, choice)
 
 
 def read_so(recording: Recording) -> Iterator[ProposedOption]:
@@ -137,12 +136,12 @@ def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Pro
     return ProposedOption(words, "log.effort", called, holds=False)
 
 
-def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
+def free_log(log: Path, choice: AnalysisChoice) -> ProposedOption:
     """Whether nothing touches the arm along a further log, as a remark that holds or not."""
     label = choice.library.label(log)
     try:
-        recording, robot = prepared(choice.library.open(log, choice.read.whole), choice)
-        contacts = list_touches(recording, robot, choice, models).contacts
+        run = prepared(choice.library.open(log, choice.read.whole), choice)
+        contacts = list_touches(run, choice).contacts
     except VftError as error:
         return ProposedOption(f"{label} is left out: {error}", holds=False)
     count = len(contacts.contacts) if contacts is not None else 0
@@ -151,7 +150,7 @@ def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
             f"{label}: {count} contacts by this robot's model; take it if nobody touched the arm"
         )
         return ProposedOption(words, "free", [str(log)], holds=False)
-    return ProposedOption(f"{label}: no contact in {recording.duration:.3g} s")
+    return ProposedOption(f"{label}: no contact in {run.recording.duration:.3g} s")
 
 
 #: Why a difference of cycles may tell nothing.
@@ -161,16 +160,14 @@ ONE_CYCLE = (
 )
 
 
-def references(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
-) -> Iterator[ProposedOption]:
+def references(run: Run, choice: AnalysisChoice) -> Iterator[ProposedOption]:
     """What estimates can be compared with: each is tried, and the first that works holds."""
     plain = replace(choice, observers=ObserverChoice(names=("gmo",)), contacts=False)
     found = False
-    for name, why in reasons(recording).items():
+    for name, why in reasons(run.recording).items():
         asked = replace(plain, reference=ReferenceChoice(name=name))
         try:
-            motion = analyse(recording, robot, asked, models).motion
+            motion = analyse(run, asked).motion
             given = name != "two-cycle" or motion.choice.is_given
             doubt = "" if given or motion.cycles.whole > 1 else ONE_CYCLE
         except MissingSignalError:

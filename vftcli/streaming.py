@@ -10,8 +10,8 @@ from vftcli.analysis import Analysis
 from vftcli.doctor.examination import stretches
 from vftcli.observers.observer import BlockObserver
 from vftcli.observers.table import OBSERVERS
-from vftcli.pipeline import AnalysisChoice, observe, read, sense
-from vftcli.robots.run import Run, Runs
+from vftcli.pipeline import AnalysisChoice, observe, read, run_of, sense
+from vftcli.robots.run import Run
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -50,7 +50,7 @@ def analysed_in_blocks(
     robot = choice.examiner.robot(stretches(recording), choice.robot)
     log = choice.examiner.read_as(recording, robot, choice.read, in_stretches=True)
     examined = choice.examiner.examine(log, robot, in_stretches=True)
-    whole, part = (read(each, robot, choice, Runs()) for each in (log, stretches(log)))
+    whole, part = (read(run_of(x, robot, choice), choice) for x in (log, stretches(log)))
     made = observe(whole, None, choice, running=False)
     sensed = sense(replace(made, motion=part), choice).virtual_sensor
     made = replace(made, examinations=(examined,))

@@ -140,10 +140,10 @@ def oracle(terms, truth) -> np.ndarray:
 
 def best_line(case) -> dict[str, object]:
     """The pipeline's own best estimate, and how its band holds."""
-    from vftcli.pipeline import AnalysisChoice, analyse
+    from vftcli.pipeline import AnalysisChoice, analyse, run_of
 
     choice = AnalysisChoice(observers=ObserverChoice(names=("best",)), free=case.free)
-    estimate = analyse(case.recording, case.robot, choice).estimates[0]
+    estimate = analyse(run_of(case.recording, case.robot, choice), choice).estimates[0]
     error = estimate.tau - case.truth
     line = {"best": float(rmse(estimate.tau, case.truth).mean())}
     if estimate.error_sd is None:

@@ -28,7 +28,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.observers.tuning import tune_to_spectra
-from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.readers import read
 from vftcli.reproduction.timing import (
     FREE_SECONDS,
@@ -212,7 +212,8 @@ def examination_ratio(robot: Robot, log: Path, rounds: int) -> float:
 
     def whole() -> None:
         recording = read(log, signals=EXAMINED)
-        analyse(recording, robot, AnalysisChoice(observers=causal, examiner=Examiner()))
+        choice = AnalysisChoice(observers=causal, examiner=Examiner())
+        analyse(run_of(recording, robot, choice), choice)
 
     recording = read(log, signals=EXAMINED)
     whole()

@@ -16,6 +16,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
+from vftcli.robots.run import Run
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 NEAR = 0.5
@@ -33,14 +34,14 @@ def sound(path: Path, robot: str, columns: str | None = None):
         examiner=Examiner(anyway=True),
     )
     (log,) = choice.library.open_each([path], choice.read)
-    log, arm = prepared(log.between(0.0, 30.0), choice)  # what a test has time for
-    return log, arm, choice, analyse(log, arm, choice).estimates[0]
+    run = prepared(log.between(0.0, 30.0), choice)  # what a test has time for
+    return run.recording, run.robot, choice, analyse(run, choice).estimates[0]
 
 
 def changed(path: Path, robot: str, columns: str | None = None, **values):
     """How far `best` of a log with other values is from its own, in bands. (T, n)"""
     log, arm, choice, own = sound(path, robot, columns)
-    (best,) = analyse(replace(log, **values), arm, choice).estimates
+    (best,) = analyse(Run(recording=replace(log, **values), robot=arm), choice).estimates
     assert np.isfinite(best.error_sd).all()
     return np.abs(best.tau - own.tau) / (1.96 * own.error_sd)
 
@@ -80,7 +81,8 @@ def test_a_bad_sample_stays_within_the_band(fault, row) -> None:
 def test_a_bad_sample_is_said() -> None:
     log, arm, choice, _ = sound(FIXTURE, "ur5")
     bad = replace(log, **with_sample(log, "dq", 925, 1, lambda _: 5.0))
-    said = [r for r in analyse(bad, arm, choice).remarks if r.code == "isolated-samples-evened"]
+    remarks = analyse(Run(recording=bad, robot=arm), choice).remarks
+    said = [r for r in remarks if r.code == "isolated-samples-evened"]
     assert [r.where.joints for r in said] == [(2,)]
 
 

@@ -11,7 +11,7 @@ from vftcli.analysis import Analysis
 from vftcli.bias.choice import RefinementChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
@@ -169,7 +169,7 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
     request = AnalysisChoice(
         robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("kfo-auto",))
     )
-    analysis = analyse(twice, request.robot.load(twice), request)
+    analysis = analyse(run_of(twice, request.robot.load(twice), request), request)
     assert "free-part-not-quiet" in codes(analysis)
     assert analysis.estimates[0].error_sd is None
 
@@ -209,7 +209,7 @@ def test_a_gap_in_the_log_is_survived() -> None:
             ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
         ),
     )
-    analysis = analyse(cut, request.robot.load(cut), request)
+    analysis = analyse(run_of(cut, request.robot.load(cut), request), request)
     for estimate in analysis.estimates:
         assert np.all(np.isfinite(estimate.tau))
         assert estimate.error_sd is not None

@@ -18,7 +18,7 @@ from vftcli.observers import MomentumObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.tuning import noise_level
-from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.external_torque import ExternalTorque
@@ -88,7 +88,7 @@ def constant(log, joints):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_every_joint_of_the_best_is_a_number(slow, panda, seed, stale, jitter, gaps, change):
     log = hardened(slow, seed, stale=stale, jitter=jitter, gaps=gaps)
-    analysis = analyse(log if change is None else change(log), panda, BEST)
+    analysis = analyse(run_of(log if change is None else change(log), panda, BEST), BEST)
     (best,) = analysis.estimates
     assert np.isfinite(best.tau).all()
     assert best.error_sd is None or np.all(best.error_sd > 0.0)
@@ -98,7 +98,7 @@ def test_every_joint_of_the_best_is_a_number(slow, panda, seed, stale, jitter, g
 def test_an_hour_without_samples_costs_no_band(slow, panda):
     t = np.where(np.arange(len(slow.t)) < 200, slow.t, slow.t + 3600.0)
     choice = replace(BEST, examiner=Examiner(anyway=True))
-    (best,) = analyse(replace(slow, t=t), panda, choice).estimates
+    (best,) = analyse(run_of(replace(slow, t=t), panda, choice), choice).estimates
     assert np.isfinite(best.tau).all()
     assert np.isfinite(best.error_sd).all()
 

@@ -14,10 +14,9 @@ from vftcli.bias.refine import refine
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log, model, read
+from vftcli.pipeline import AnalysisChoice, analyse_log, model, read, run_of
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.run import Runs
 from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
 
@@ -40,7 +39,7 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
             settings={"kfo": {"noise_convention": "density"}},
         ),
     )
-    motion = read(log, robot, asked, Runs())
+    motion = read(run_of(log, robot, asked), asked)
     terms, found = motion.log.terms, model(motion, asked)
     assert found is not None
     observers, _ = asked.observers.build(robot, log.median_step, found.spectra(gains=False))

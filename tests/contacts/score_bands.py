@@ -27,7 +27,7 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import load_wrench
@@ -90,7 +90,8 @@ def simulated(
     if load is not None and not load.known:
         carried = np.array([load.mass, *(load.mass * np.array(load.com))])
         truth += load_wrench(made.robot.chain, made.recording.q) @ carried
-    return analyse(made.recording, made.robot, asked(free)), truth
+    choice = asked(free)
+    return analyse(run_of(made.recording, made.robot, choice), choice), truth
 
 
 def libfranka(free: str | None) -> tuple[Analysis, Array]:

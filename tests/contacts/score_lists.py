@@ -23,7 +23,7 @@ from vftcli import pipeline
 from vftcli.contacts.contact_list import Contact
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.signals.arrays import Array, Mask
 from vftcli.simulation import load_scenario, simulate
 
@@ -104,7 +104,7 @@ def scored(name: str, seed: int, more: Sequence[str] = STICKS) -> LogScore:
 
     pipeline.find_contacts = timed  # type: ignore[assignment]
     try:
-        analysis = analyse(recording, made.robot, choice)
+        analysis = analyse(run_of(recording, made.robot, choice), choice)
     finally:
         pipeline.find_contacts = plain
     assert analysis.contacts is not None

@@ -10,7 +10,7 @@ from contact_logs import FIXTURES, true_wrench
 from vftcli.analysis import Analysis
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, sense
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of, sense
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import load_regressor, load_wrench
@@ -121,7 +121,7 @@ def test_a_load_nobody_reported_is_in_the_wrench_of_best() -> None:
         observers=ObserverChoice(names=("best",)),
         wrench=WrenchChoice(frame="base"),
     )
-    sensed = analyse(log, robot, choice).virtual_sensor
+    sensed = analyse(run_of(log, robot, choice), choice).virtual_sensor
     assert sensed is not None
     (best,) = sensed.wrenches
     assert best.sd is not None

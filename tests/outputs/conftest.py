@@ -15,7 +15,7 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation import evaluate
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs.run_record import run_record
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms
@@ -63,7 +63,8 @@ def recording() -> Recording:
 @pytest.fixture(scope="session")
 def without_reference(recording: Recording) -> Analysis:
     """All default observers on the log, with nothing to be judged by."""
-    return analyse(recording, load_robot("ur5"), AnalysisChoice(robot=RobotChoice(name="ur5")))
+    choice = AnalysisChoice(robot=RobotChoice(name="ur5"))
+    return analyse(run_of(recording, load_robot("ur5"), choice), choice)
 
 
 @pytest.fixture(scope="session")
@@ -90,7 +91,7 @@ def touched(analysis: Analysis) -> Analysis:
 def with_wrench(recording: Recording) -> Analysis:
     """The log's estimates with their wrenches in base axes."""
     request = AnalysisChoice(wrench=WrenchChoice(frame="base"), robot=RobotChoice(name="ur5"))
-    return analyse(recording, load_robot("ur5"), request)
+    return analyse(run_of(recording, load_robot("ur5"), request), request)
 
 
 Reworked = Callable[..., Analysis]

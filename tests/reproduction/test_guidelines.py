@@ -6,6 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from vftcli.evaluation import SCHEMA
 from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.observer import Observer
 from vftcli.reproduction.estimates import guideline_numbers, step_response
@@ -42,13 +43,9 @@ def test_a_response_is_read_within_three_seconds() -> None:
 
 def test_an_observers_rmse_is_its_own_mean_over_joints() -> None:
     """Two observers, three joints, rows of a wrench and an unknown joint among them."""
-    errors = pl.DataFrame(
-        {
-            "observer": ["gmo", "gmo", "gmo", "fdo", "fdo", "gmo"],
-            "joint": [1, 2, 3, 1, 2, None],
-            "rmse_Nm": [1.0, 3.0, None, 50.0, 70.0, 900.0],
-        }
-    )
+    each = [("gmo", 1, 1.0), ("gmo", 2, 3.0), ("gmo", 3, None), ("fdo", 1, 50.0), ("fdo", 2, 70.0)]
+    rows = [dict(zip(("observer", "joint", "rmse_Nm"), row, strict=True)) for row in each]
+    errors = pl.DataFrame([*rows, {"observer": "gmo", "rmse_Nm": 900.0}], SCHEMA)
     observers = MomentumObserver(gain=5.0), FilteredDynamicsObserver(omega=5.0), KalmanObserver()
     gmo, fdo, kalman = numbers(*observers, errors=errors)
     assert gmo["rmse"] == pytest.approx(2.0)

@@ -26,6 +26,7 @@ from vftcli.reproduction.scoring import (
     worst_of,
 )
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 
@@ -205,7 +206,7 @@ def test_a_planted_push_is_half_a_sine_at_the_flange_and_missing_in_the_drives(
     q = np.linspace(-0.6, 0.5, robot.joints) + 0.1 * t[:, None]
     free = Recording(t=t, q=q, dq=0.1 + 0.0 * q, **{signal: np.ones(q.shape)})
     pushes = ((1.0, 2.0, (3.0, -4.0, 12.0)), (2.0, 0.5, (0.0, 8.0, 0.0)))
-    pushed, wrench, tau = planted(free, robot, replace(LOG, pushes=pushes))
+    pushed, wrench, tau = planted(Run(recording=free, robot=robot), replace(LOG, pushes=pushes))
     sine = np.sin(np.pi * np.clip((t - 1.0) / 2.0, 0.0, 1.0))[:, None] * [3.0, -4.0, 12.0]
     sine[:, 1] += 8.0 * np.sin(np.pi * np.clip((t - 2.0) / 0.5, 0.0, 1.0))
     np.testing.assert_allclose(wrench[:, :3], sine, atol=1e-12)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.external_torque import COVERS
 from vftcli.simulation import load_scenario, simulate
@@ -43,7 +43,7 @@ def sensed(recording, **zero):
         robot=RobotChoice(name="panda"),
         observers=ObserverChoice.parsed(settings={"kfo.noise_convention": "density"}),
     )
-    return analyse(recording, request.robot.load(recording), request)
+    return analyse(run_of(recording, request.robot.load(recording), request), request)
 
 
 @pytest.mark.parametrize(("log", "share"), [("exact", 0.02), ("erring", 0.025)])

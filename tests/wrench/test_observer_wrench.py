@@ -12,7 +12,7 @@ from vftcli.pipeline import AnalysisChoice, analyse_log, prepared, read
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.run import Runs, RunSamples
+from vftcli.robots.run import RunSamples
 from vftcli.signals.series import resample_columns
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 from vftcli.wrench.sensing import (
@@ -44,7 +44,7 @@ def motion() -> FreeMotion:
     """8 s of the circle, free until 4 s."""
     asked = choice("gmo")
     recording = asked.library.open(CIRCLE, asked.read)
-    return read(*prepared(recording, asked), asked, Runs())
+    return read(prepared(recording, asked), asked)
 
 
 def reading(*names: str, **wrench: object) -> SensorReading:

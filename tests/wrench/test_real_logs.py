@@ -10,7 +10,7 @@ import pytest
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.wrench.choice import WrenchChoice
@@ -23,7 +23,7 @@ MUJOCO = "t=time,q=q{i},dq=qd{i},tau=tau{i},tau_ext=tau_ext{i},wrench[base]=Fx|F
 
 def analysed(path: Path, request: AnalysisChoice):
     recording = request.library.open(path, request.read)
-    return analyse(recording, request.robot.load(recording), request)
+    return analyse(run_of(recording, request.robot.load(recording), request), request)
 
 
 def by_axis(analysis, observer: str) -> np.ndarray:

@@ -117,7 +117,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
             )
             recording = library.open(task.file.log, asked.read)
             check_signals(recording, anyway=choice.anyway)
-            analysis = analyse(*prepared(recording, asked), asked)
+            analysis = analyse(prepared(recording, asked), asked)
             if choice.contact and analysis.contacts is None:
                 reason = next(str(r) for r in analysis.remarks if r.code == "contacts-not-told")
                 raise LogError(f"{recording.name}: {reason}")

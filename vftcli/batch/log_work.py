@@ -24,7 +24,6 @@ from vftcli.outputs.examination import rate_of
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.references import refuse_estimates
-from vftcli.robots.run import Runs
 from vftcli.signals.arrays import Array, root_mean_square
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import check_known
@@ -78,7 +77,7 @@ def work_on_log(task: LogTask) -> None:
     recording = replace(recording, source=source)
     begin("analysing")
     work: Analyser = list_touches if task.job.do == "contacts" else analyse
-    analysis = work(*prepared(recording, choice), choice, Runs())
+    analysis = work(prepared(recording, choice), choice)
     begin("writing")
     write_result(folder.path / folder.place(task.key), analysis, task)
     folder.put_rows(task.key, rows_of(analysis, task.key))

@@ -6,7 +6,7 @@ and checked as if they were typed. What is used is said, and is in the command l
 """
 
 import shlex
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from contextvars import ContextVar
 from importlib import import_module
@@ -19,8 +19,8 @@ from typer.core import TyperOption
 from vftcli.cli.commands import COMMANDS, now_of
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, interval, settings_by_name, text_of
-from vftcli.signals.parsing import did_you_mean, printable, shown, toml_tables
+from vftcli.signals.option import Choice, interval, settings_as_typed, settings_by_name
+from vftcli.signals.parsing import did_you_mean, printable, shown, toml_file
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
 NONE = "none"  #: Value of ``--config`` with which no file is read.
@@ -32,7 +32,6 @@ OTHERWISE = {
     "thresholds": {"reference", "reference-columns"},  # of --check alone
     "convert": {"log.derive"},  # it writes what was logged
 }
-LARGEST = 1 << 20  #: Bytes that such a file has at most.
 Table = dict[str, Any]  #: A table of TOML.
 FILE = "file:"  #: What a reference's file begins with.
 
@@ -125,101 +124,69 @@ def keys_for(command: Any, path: Path) -> Table:  # noqa: ANN401
     Settings have their dotted names, and their values are texts.
     """
     known, choices = known_options()
-    content = tables_of(path)
-    tables = {key: content.pop(key) for key in list(content) if key in known}
-    for name, table in tables.items():
-        if not isinstance(table, dict):
-            raise ParameterError(f"{path}: {name} = {shown(table)} is no table of options")
-        # [contacts] is the command's table, and the group of contacts.list.
-        group = [key for key in table if any(kind.takes(f"{name}.{key}") for kind in choices)]
-        if group:
-            content[name] = {key: table.pop(key) for key in group}
-        tables[name] = flattened(path, table, choices, known[name])
-        check_keys(path, f"of {name}", tables[name], known[name])
-    every = dict.fromkeys(key for options in known.values() for key in options)
-    top = flattened(path, content, choices, every)
-    check_keys(path, "of a command that reads a log", top, every)
-    others = OTHERWISE.get(command.name, set())
-    kept = {key: value for key, value in top.items() if key not in others}
-    return {**kept, **tables.get(command.name, {})}
-
-
-def flattened(
-    path: Path,
-    table: Table,
-    choices: Iterable[type[Choice]],
-    known: Container[str],
-) -> Table:
-    """A table with the settings of each group in it by their dotted names, as texts.
-
-    A former key is read as what it is now.
-    """
-    found: Table = {}
-    now = [
-        {key: value} if key in known or isinstance(value, dict) else key_now(path, key, value)
-        for key, value in table.items()
-    ]
-    for key, value in (pair for each in now for pair in each.items()):
-        if not isinstance(value, dict):
-            found[key] = value
+    every = {key for options in known.values() for key in options}
+    top, own = Table(), Table()
+    if not (path.is_file() or path.is_fifo()):
+        raise ParameterError(
+            f"--config {path}: no such file; vftcli inspect LOG -o FILE writes one"
+        )
+    for name, value in toml_file(path, "a file of options").items():
+        if name not in known:
+            top |= entry(path, name, value, every, "a command that reads a log", choices)
             continue
-        for name, given in value.items():
-            dotted = f"{key}.{name}"
-            if not any(kind.takes(dotted) for kind in choices):
-                near = did_you_mean(dotted, settings_by_name(choices))
-                raise ParameterError(
-                    f"{path}: {dotted} is no setting; vftcli help settings lists them.{near}"
-                )
-            text = text_of(given, f"{path}: {dotted}")
-            setting = settings_by_name(choices).get(dotted)
-            found[dotted] = beside(path.parent, text, setting[0]) if setting else text
-    return found
+        if not isinstance(value, dict):
+            raise ParameterError(f"{path}: {name} = {shown(value)} is no table of options")
+        for key, given in value.items():
+            # [contacts] is the command's table, and the group of contacts.list.
+            if any(kind.takes(f"{name}.{key}") for kind in choices):
+                top |= entry(path, name, {key: given}, every, "", choices)
+            else:
+                made = entry(path, key, given, known[name], name, choices)
+                own |= made if name == command.name else {}
+    others = OTHERWISE.get(command.name, set())
+    return {key: value for key, value in top.items() if key not in others} | own
 
 
-def key_now(path: Path, key: str, value: Any) -> Table:  # noqa: ANN401 - of TOML
+def entry(
+    path: Path,
+    key: str,
+    value: Any,  # noqa: ANN401 - of TOML
+    known: Collection[str],
+    owner: str,
+    choices: Sequence[type[Choice]],
+) -> Table:
+    """One key of a file as an option, or its settings by their dotted names, as texts."""
+    if key not in known and not isinstance(value, dict):
+        key, value = key_now(path, key, value)
+    if isinstance(value, dict):
+        given = {f"{key}.{name}": one for name, one in value.items()}
+        texts, own = settings_as_typed(given, choices, f"{path}: "), settings_by_name(choices)
+        return {
+            name: beside(path.parent, text, own[name][0]) if name in own else text
+            for name, text in texts.items()
+        }
+    if key in TYPED:
+        raise ParameterError(f"{path}: {key} is not kept in a file; type --{key}")
+    if key not in known:
+        near = did_you_mean(key, known) or " A key is an option without its dashes, as robot."
+        raise ParameterError(f"{path}: {shown(key)} is no option of {owner}.{near}")
+    return {key: value}
+
+
+def key_now(path: Path, key: str, value: Any) -> tuple[str, Any]:  # noqa: ANN401 - of TOML
     """A former key as the option or setting that it is now, with a note; any other as it is."""
     text = next(words_in(value), "")
     now = None if key in TYPED or isinstance(value, list) else now_of(f"--{key}", text)
     # An argument, of a command or of a xacro, has no key of its own.
     if now is None or not now.startswith("--") or "'" in now or (not text and "VALUE" in now):
-        return {key: value}
+        return key, value
     echo(printable(f"note: {path}: {key} is now {now.replace('VALUE', '…')}"), err=True)
     option, _, form = now.removeprefix("--").partition(" ")
     if option == "set":
         name, _, form = form.partition("=")
         group, _, own = name.partition(".")
-        return {} if value is False else {group: {own: form.replace("VALUE", text)}}
-    return {option: form.replace("VALUE", text) if form else value}
-
-
-def check_keys(path: Path, owner: str, table: Table, there: Mapping[str, object]) -> None:
-    """Check that every key of a table is an option."""
-    for key in table:
-        if "." in key:
-            continue
-        if key in TYPED:
-            raise ParameterError(f"{path}: {key} is not kept in a file; type --{key}")
-        if key not in there:
-            near = did_you_mean(key, there) or " A key is an option without its dashes, as robot."
-            raise ParameterError(f"{path}: {shown(key)} is no option {owner}.{near}")
-
-
-def tables_of(path: Path) -> Table:
-    """What a file holds."""
-    if not (path.is_file() or path.is_fifo()):
-        raise ParameterError(
-            f"--config {path}: no such file; vftcli inspect LOG -o FILE writes one"
-        )
-    with path.open("rb") as file:
-        content = file.read(LARGEST + 1)
-    if len(content) > LARGEST:
-        raise ParameterError(f"--config {path}: too large for a file of options")
-    try:
-        return toml_tables(content.decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise ParameterError(f"--config {path}: not a text in UTF-8") from None
-    except ParameterError as error:
-        raise ParameterError(f"--config {path}: {error}") from None
+        return group, {} if value is False else {own: form.replace("VALUE", text)}
+    return option, form.replace("VALUE", text) if form else value
 
 
 def known_options() -> tuple[dict[str, dict[str, Any]], tuple[type[Choice], ...]]:

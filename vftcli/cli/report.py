@@ -164,7 +164,7 @@ def estimate(
         found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
     else:
         choice = replace(choice, answers_first=not (json or asked.words["details"]))
-        found = analyse(*prepared(recording, choice), choice)
+        found = analyse(prepared(recording, choice), choice)
         if not json:  # the answer first; of blocks it comes with the last of them
             show_short(found)
         found = sense(found, choice)

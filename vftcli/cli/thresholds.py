@@ -40,9 +40,7 @@ def contact_thresholds(
     from vftcli.contacts.thresholds import check_alike
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
-    from vftcli.pipeline import prepared
     from vftcli.readers.library import Library
-    from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
 
     choice = choice_for(asked, Library([*logs, *(check or ())]))
@@ -53,7 +51,7 @@ def contact_thresholds(
     counted = left_out(signals, rate)
     checks = []
     for log in check or ():
-        pushed = modelled(*prepared(library.open(log, choice.read.whole), choice), choice, Runs())
+        pushed = modelled(library.open(log, choice.read.whole), choice)
         check_alike((signals[0], compared := compared_signals(pushed)))
         truth = truth_of(pushed, reference or settled_reference(pushed.recording))
         checks.append(check_contacts(compared, thresholds, *truth))

@@ -15,7 +15,7 @@ from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import paired, unwound
+from vftcli.robots.run import Runs, paired, unwound
 from vftcli.robots.terms import effort_name
 from vftcli.signals.errors import ExaminationError, UnsettledRobotError
 from vftcli.signals.recording import EFFORTS, Recording
@@ -164,6 +164,7 @@ class Examiner:
         tell: Callable[[Examination], None] | None = None,
     ) -> None:
         self._anyway, self._fitting, self._tell = anyway, fitting, tell
+        self.runs = Runs()  # of the command
         self._made: list[tuple[Recording, Robot, Examination]] = []
         self._robots: dict[tuple[str, RobotChoice, float | None, bool], Robot] = {}
 

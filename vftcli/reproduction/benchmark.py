@@ -118,7 +118,7 @@ class BenchmarkRun:
             choice = manifest.choice(log, "alone", sources[0])
             choice = replace(choice, library=Library(), examiner=Examiner(anyway=True))
             read = choice.library.open(sources[0], replace(choice.read, derive="none"))
-            recording, wrench, tau = planted(*prepared(read, choice), log)
+            recording, wrench, tau = planted(prepared(read, choice), log)
             table = (("t", recording.t), *per_joint("tau_ext", tau), *per_axis("wrench", wrench))
             put_table(companions(path)[0], frame_of(table))
             convert(recording, path, force=True)

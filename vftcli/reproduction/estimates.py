@@ -11,6 +11,7 @@ from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.motion import SHARES, Drag, return_time
 from vftcli.admittance.replay import Replay, replay, stored_force
 from vftcli.analysis import Analysis
+from vftcli.doctor.examination import Examiner
 from vftcli.evaluation.errors import correlation, joint_means
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
@@ -19,12 +20,11 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.table import PAPER
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
-from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.reproduction.control import deviation_chart
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
-from vftcli.robots.run import Runs
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import fact
@@ -65,16 +65,17 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         "zero removed": (hard, OBSERVERS[CORRECTED], ((start, stop),)),
         "soft servo": (soft, OBSERVERS[CORRECTED], ()),
     }
-    models, result = Runs(), RunResult()
+    examiner, result = Examiner(), RunResult()
     for variant, (run, observers, spans) in asked.items():
         wrench = WrenchChoice(sensor_pose=sensor_pose, zero=ZeroChoice(spans=spans))
         choice = AnalysisChoice(
+            examiner=examiner,
             observers=observers,
             contacts=False,
             wrench=wrench,
             reference=ReferenceChoice(name="sensor"),
         )
-        made = analyse(run.recording, load_robot("ur5"), choice, models)
+        made = analyse(run_of(run.recording, load_robot("ur5"), choice), choice)
         for row in error_rows(made, "axis"):
             force, moment = row["rmse_N"], row["rmse_Nm"]
             result.put(variant, {row["axis"]: moment if force is None else force})
@@ -128,14 +129,15 @@ def assembled_bearing(
 ) -> RunResult:
     """Zero drift, the bearing's weight, errors by phase, controllers' results."""
     run = simulate(load_scenario("panda-bearing", ()), seed)
-    recording, robot, models = run.recording, load_robot("panda"), Runs()
+    recording, robot, examiner = run.recording, load_robot("panda"), Examiner()
     vendor = stored_force(recording, robot, WrenchChoice(frame="base"), "libfranka").wrench
     result = RunResult()
     for variant, observers in OBSERVERS.items():
+        asked = WrenchChoice(frame="base")
         choice = AnalysisChoice(
-            observers=observers, contacts=False, wrench=WrenchChoice(frame="base")
+            examiner=examiner, observers=observers, contacts=False, wrench=asked
         )
-        made = analyse(recording, robot, choice, models)
+        made = analyse(run_of(recording, robot, choice), choice)
         (wrench,) = made.wrenches
         drift = mean_of(wrench, unloaded)
         put_weights(result, variant, drift, mean_of(wrench, hung))
@@ -251,17 +253,18 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
 def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
     """Errors joint by joint, lags, free rms, and what the guidelines go by."""
     recording = simulate(load_scenario(scenario, ()), seed).recording
-    robot, models, result = load_robot("ur5"), Runs(), RunResult()
+    robot, examiner, result = load_robot("ur5"), Examiner(), RunResult()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.
     choice_of_free = FreeChoice(period=period, alignment="period", low_pass=None)
     for variant, chosen in VARIANTS.items():
         choice = AnalysisChoice(
+            examiner=examiner,
             observers=ObserverChoice.parsed(observer=PAPER, **chosen),
             free=choice_of_free,
             contacts=False,
             reference=ReferenceChoice(name="two-cycle"),
         )
-        made = analyse(recording, robot, choice, models)
+        made = analyse(run_of(recording, robot, choice), choice)
         rows = error_rows(made, "joint")
         for row in rows:
             key = f"{row['observer']}/{row['joint']}"

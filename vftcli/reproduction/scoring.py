@@ -18,13 +18,13 @@ from vftcli.evaluation.scores import Score, episodes, lag_sums, parts_of, weight
 from vftcli.free_motion.free_motion import within
 from vftcli.observers.table import BEST, OBSERVERS
 from vftcli.outputs.batch_folder import BatchFolder
-from vftcli.pipeline import AnalysisChoice, analyse, prepared
+from vftcli.pipeline import AnalysisChoice, analyse, prepared, run_of
 from vftcli.readers.library import Library
 from vftcli.readers.references import ListedRow, read_list, read_outside, read_reference
 from vftcli.reproduction.manifest import BenchmarkLog, Rival
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Runs
+from vftcli.robots.run import Run
 from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError
@@ -81,14 +81,13 @@ class ScoreTask(NamedTuple):
         return f"{self.log.name}, {self.protocol}{rival}"
 
 
-def planted(
-    recording: Recording, robot: Robot, log: BenchmarkLog
-) -> tuple[Recording, Array, Array]:
+def planted(run: Run, log: BenchmarkLog) -> tuple[Recording, Array, Array]:
     """A free log with pushes in its drive torque: τ − Jᵀ w; their wrench and joint torque.
 
     Half sines at the flange in base axes, without moments. The motion does not yield.
     """
-    t, wrench = recording.t, np.zeros((recording.samples, 6))
+    t, recording, robot = run.t, run.recording, run.robot
+    wrench = np.zeros((recording.samples, 6))
     for start, length, force in log.pushes:
         share = (t - start) / length
         course = np.where(abs(share - 0.5) < 0.5, np.sin(np.pi * share), 0.0)
@@ -148,7 +147,8 @@ def score_log(task: ScoreTask) -> None:
     begin("reading")
     choice = replace(task.choice, library=Library([task.file]), examiner=Examiner(anyway=True))
     task = task._replace(choice=choice)
-    recording, robot = prepared(choice.library.open(task.file, choice.read), choice)
+    run = prepared(choice.library.open(task.file, choice.read), choice)
+    recording, robot = run.recording, run.robot
     begin("estimating")
     answers = [*(own_answers if task.rival is None else outside_answer)(task, recording, robot)]
     begin("scoring")
@@ -173,7 +173,7 @@ def score_log(task: ScoreTask) -> None:
 def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator[Answer]:
     """What zero, the vendor and our observers say, `best` with its list of contacts."""
     t, begun, choice = recording.t, thread_time(), task.choice
-    made = analyse(recording, robot, choice, Runs())
+    made = analyse(run_of(recording, robot, choice), choice)
     us = 1e6 / len(t)
     whole = us * (thread_time() - begun)
     wrenches = {wrench.name: wrench.known for wrench in made.wrenches}

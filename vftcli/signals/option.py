@@ -243,10 +243,9 @@ def settings_as_typed(
         if not any(kind.takes(name) for kind in there):
             near = did_you_mean(name, settings_by_name(there))
             raise ParameterError(
-                f"{by}{name}: this command has no such setting; vftcli help settings lists all."
-                f"{near}"
+                f"{by}{name} is no setting here; vftcli help settings lists all.{near}"
             )
-    return {name: text_of(value, name) for name, value in given.items()}
+    return {name: text_of(value, f"{by}{name}") for name, value in given.items()}
 
 
 def interval(text: str) -> tuple[float, float]:

@@ -88,6 +88,7 @@ def tables_beside(module: str, name: str) -> dict[str, Any]:
     return tomllib.loads(Path(module).with_name(name).read_text(encoding="utf-8"))
 
 
+LARGEST = 1 << 20  #: Letters of a text of TOML that a user gives.
 LONGEST = 10_000  #: Letters of a line of TOML; 50 000 dots in one take Python's parser 15 s.
 
 
@@ -95,6 +96,8 @@ def toml_tables(text: str) -> dict[str, Any]:
     """The tables of a TOML text."""
     import tomllib
 
+    if len(text) > LARGEST:
+        raise ParameterError(f"too large: TOML may have {LARGEST} letters")
     for number, line in enumerate(text.split("\n"), start=1):
         if len(line) > LONGEST:
             raise ParameterError(
@@ -116,9 +119,10 @@ def toml_file(path: Path, what: str) -> dict[str, Any]:
         ParameterError: If it cannot be read, or is no TOML; it names the file.
     """
     try:
-        return toml_tables(path.read_text(encoding="utf-8"))
+        with path.open(encoding="utf-8-sig") as file:
+            return toml_tables(file.read(LARGEST + 1))
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not text"
+        reason = getattr(error, "strerror", None) or "not a text in UTF-8"
         raise ParameterError(f"{path}: cannot be read as {what} ({reason})") from None
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
