@@ -3,7 +3,7 @@
 import types
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -20,7 +20,7 @@ from vftcli.robots.robot_file import (
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment
 from vftcli.signals.parsing import check_known, toml_file, toml_tables
-from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
+from vftcli.simulation.trajectories import HoldSpec, Spec, TrajectorySpec
 
 FOLDER = Path(__file__).parent / "scenarios"
 Section = TypeVar("Section")
@@ -39,8 +39,7 @@ Vector = tuple[float, float, float]
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ServoSpec:
+class ServoSpec(Spec):
     """The joint position controller."""
 
     stiffness: str | float = "stiff"  #: "stiff", "soft", or the loop's natural frequency. [rad/s]
@@ -50,8 +49,7 @@ class ServoSpec:
     torque_limits: bool = True  #: Whether the drives saturate at the robot's limits.
 
 
-@dataclass(frozen=True, kw_only=True)
-class FrictionSpec:
+class FrictionSpec(Spec):
     """Differences in kind of the true friction from the profile's smoothed curve."""
 
     enabled: bool = True  #: False for a frictionless arm.
@@ -73,8 +71,7 @@ class FrictionSpec:
     temperature_end: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class MismatchSpec:
+class MismatchSpec(Spec):
     """Deviations of the arm from its profile: one standard deviation, relative.
 
     Each parameter is drawn from the seed, a normal deviate cut at two standard
@@ -90,8 +87,7 @@ class MismatchSpec:
     payload: float = 0.0  #: Mass of the payload.
 
 
-@dataclass(frozen=True, kw_only=True)
-class PayloadSpec:
+class PayloadSpec(Spec):
     """A rigid load on the flange."""
 
     mass: float  #: Mass. [kg]
@@ -101,8 +97,7 @@ class PayloadSpec:
     known: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
-class ForceSensorSpec:
+class ForceSensorSpec(Spec):
     """A force/torque sensor between flange and handle; what is fixed beyond it, it weighs."""
 
     position: Vector = (0.0, 0.0, 0.03)  #: Origin of the sensor frame in flange axes. (3,) [m]
@@ -123,8 +118,7 @@ class ForceSensorSpec:
     known: bool = False  #: Whether the controller knows its weight.
 
 
-@dataclass(frozen=True, kw_only=True)
-class SensingSpec:
+class SensingSpec(Spec):
     """Imperfections of the log. Zeros and ones switch each of them off."""
 
     rate: float = 0.0  #: Samples per second; 0 takes the vendor's own. [Hz]
@@ -141,21 +135,17 @@ class SensingSpec:
     start: float = 100.0  #: The first time stamp on the controller's clock. [s]
 
 
-@dataclass(frozen=True, kw_only=True)
-class OnLink:
+class OnLink(Spec):
     """Where a contact acts with a wrench."""
 
-    kind: str = field(default="", init=False)
     name: str  #: Name of the contact.
     link: int = 0  #: The link it acts on; 0 for the flange.
     point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProfileSpec(OnLink):
+class ProfileSpec(OnLink, kind="profile"):
     """A stated wrench, switched on and off smoothly at stated times."""
 
-    kind: str = field(default="profile", init=False)
     spans: tuple[tuple[float, float], ...]  #: Start and end of each application. (K, 2) [s]
     force: Vector = ORIGIN  #: Force ON the robot. (3,) [N]
     torque: Vector = ORIGIN  #: Moment ON the robot about the point. (3,) [N·m]
@@ -164,22 +154,18 @@ class ProfileSpec(OnLink):
     axes: str = "base"  #: "base" or "link": what the components refer to.
 
 
-@dataclass(frozen=True, kw_only=True)
-class LoadSpec(OnLink):
+class LoadSpec(OnLink, kind="load"):
     """A load hung on a string: its weight, pulling straight down at the point."""
 
-    kind: str = field(default="load", init=False)
     weight: float  #: Weight. [N]
     spans: tuple[tuple[float, float], ...]  #: When it hangs. (K, 2) [s]
     rise: float = 0.5  #: Time in which the string takes the load. [s]
     fall: float = 0.3  #: Time in which it comes off. [s]
 
 
-@dataclass(frozen=True, kw_only=True)
-class PushesSpec(OnLink):
+class PushesSpec(OnLink, kind="pushes"):
     """Pushes of random strength and direction, as a hand gives them, drawn from the seed."""
 
-    kind: str = field(default="pushes", init=False)
     style: str = "slow"  #: "slow", "taps" or "mixed"; the ranges below override its own.
     begin: float = 0.0  #: No push before this. [s]
     end: float = 0.0  #: No push after this; 0 for the end of the log. [s]
@@ -190,11 +176,9 @@ class PushesSpec(OnLink):
     vertical: float = 0.5  #: Share of the force that may point along base z.
 
 
-@dataclass(frozen=True, kw_only=True)
-class HandSpec(OnLink):
+class HandSpec(OnLink, kind="hand"):
     """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor."""
 
-    kind: str = field(default="hand", init=False)
     #: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
     spans: tuple[tuple[float, float], ...]
     #: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
@@ -209,22 +193,18 @@ class HandSpec(OnLink):
     twist_damping: float = 0.0  #: Damper. [N·m·s/rad]
 
 
-@dataclass(frozen=True, kw_only=True)
-class StopSpec(OnLink):
+class StopSpec(OnLink, kind="stop"):
     """A hard stop: a plane that pushes back when the point goes beyond it."""
 
-    kind: str = field(default="stop", init=False)
     through: Vector  #: A point of the plane in the base frame. (3,) [m]
     normal: Vector = (0.0, 0.0, 1.0)  #: Its normal, pointing to the free side. (3,)
     stiffness: float = 2e4  #: Stiffness of the plane. [N/m]
     damping: float = 200.0  #: Damping while pressed. [N·s/m]
 
 
-@dataclass(frozen=True, kw_only=True)
-class RandomWalkSpec:
+class RandomWalkSpec(Spec, kind="random-walk"):
     """Joint torques that walk at random, the disturbance model of the Kalman observers."""
 
-    kind: str = field(default="random-walk", init=False)
     name: str  #: Name of the contact.
     #: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
     intensity: tuple[float, ...]
@@ -237,8 +217,7 @@ WrenchSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
 ContactSpec = WrenchSpec | RandomWalkSpec  #: Every kind of ``[[contacts]]`` a scenario can have.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Scenario:
+class Scenario(Spec):
     """One simulated experiment."""
 
     name: str  #: Short name.
@@ -250,15 +229,15 @@ class Scenario:
     format: str = ""  #: Log format, "" for the vendor's usual one.
     columns: str = "full"  #: "full" or "short" recipe of the RTDE log.
     pair: bool = False  #: Whether a second log of the same motion without the payload is written.
-    trajectory: TrajectorySpec = field(default_factory=HoldSpec)  #: The commanded motion.
-    servo: ServoSpec = field(default_factory=ServoSpec)  #: The position controller.
-    friction: FrictionSpec = field(default_factory=FrictionSpec)  #: The true friction's kind.
+    trajectory: TrajectorySpec = HoldSpec()  #: The commanded motion.
+    servo: ServoSpec = ServoSpec()  #: The position controller.
+    friction: FrictionSpec = FrictionSpec()  #: The true friction's kind.
     #: How far the arm lies from its profile.
-    mismatch: MismatchSpec = field(default_factory=MismatchSpec)
+    mismatch: MismatchSpec = MismatchSpec()
     payload: PayloadSpec | None = None  #: A load on the flange.
     force_sensor: ForceSensorSpec | None = None  #: A force/torque sensor on the flange.
     contacts: tuple[ContactSpec, ...] = ()  #: Everything that touches the arm.
-    sensing: SensingSpec = field(default_factory=SensingSpec)  #: What the log sees.
+    sensing: SensingSpec = SensingSpec()  #: What the log sees.
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -315,7 +294,7 @@ def apply_override(table: dict[str, Any], override: str) -> None:
 
 def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
     """A section's dataclass of its TOML table; complaints name the key that is wrong."""
-    keys = [f for f in fields(cls) if f.init]  # type: ignore[arg-type]
+    keys = fields(cls)  # type: ignore[arg-type]
     paths = {key.name: f"{where}.{key.name}".lstrip(".") for key in keys}
     for name in table:
         check_known(name, paths, f"no key {f'{where}.{name}'.lstrip('.')!r}")
@@ -332,7 +311,7 @@ def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML va
     """A TOML value as its field declares; its `kind` names a table's section."""
     items = get_args(hint)
     if get_origin(hint) in {Union, types.UnionType}:
-        if tagged := {o.kind: o for o in items if hasattr(o, "kind")}:
+        if tagged := {o.kind: o for o in items if getattr(o, "kind", "")}:
             TABLE.check(where, value)
             name = str(value.get("kind", ""))
             check_known(name, tagged, f"no {where}.kind {name!r}")
@@ -358,5 +337,12 @@ def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML va
 
 def to_toml(scenario: Scenario, seed: int) -> str:
     """A scenario as a TOML file that makes the same log again."""
-    table = asdict(scenario, dict_factory=lambda pairs: {k: v for k, v in pairs if v is not None})
-    return "".join(lines_of(table | {"seed": seed}))
+    return "".join(lines_of(as_table(scenario) | {"seed": seed}))
+
+
+def as_table(value: Any) -> Any:  # noqa: ANN401 - of a section, what it holds
+    """A section as a table of TOML, without what is not given."""
+    if isinstance(value, Spec):
+        kind = {"kind": value.kind} if value.kind else {}
+        return kind | {k: as_table(v) for k, v in vars(value).items() if v is not None}
+    return list(map(as_table, value)) if isinstance(value, tuple) else value

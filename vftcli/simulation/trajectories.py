@@ -1,9 +1,9 @@
 """The kinds of ``[trajectory]``: commanded joint motions with exact derivatives."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise, product
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -109,11 +109,20 @@ def minimum_jerk(u: Number) -> Number:
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
-@dataclass(frozen=True, kw_only=True)
-class CircleSpec:
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+class Spec:
+    """A section of a scenario, a frozen dataclass; of one of several kinds that names it."""
+
+    kind: ClassVar[str]
+
+    def __init_subclass__(cls, kind: str = "") -> None:
+        cls.kind = kind
+        dataclass(frozen=True, kw_only=True)(cls)
+
+
+class CircleSpec(Spec, kind="circle"):
     """A horizontal circle of the flange at constant speed and orientation."""
 
-    kind: str = field(default="circle", init=False)
     #: Joint positions at a point of the circle; empty takes the usual pose. (n,) [rad]
     start: tuple[float, ...] = ()
     radius: float = 0.2  #: Radius. [m]
@@ -141,11 +150,9 @@ class CircleSpec:
         return Periodic(self.period, self.cycles, mean.real, cosine, sine)
 
 
-@dataclass(frozen=True, kw_only=True)
-class HoldSpec:
+class HoldSpec(Spec, kind="hold"):
     """A held pose."""
 
-    kind: str = field(default="hold", init=False)
     start: tuple[float, ...] = ()  #: Joint positions. (n,) [rad]
     length: float = 10.0  #: How long. [s]
 
@@ -155,11 +162,9 @@ class HoldSpec:
         return Stretches(np.array([[0.0, 1.0]]), straight_paths(points), self.length)
 
 
-@dataclass(frozen=True, kw_only=True)
-class OffsetsSpec:
+class OffsetsSpec(Spec, kind="offsets"):
     """Straight lines of the flange at constant orientation between stated points, at rest there."""
 
-    kind: str = field(default="offsets", init=False)
     #: Rows (start time, end time, x, y, z): by the end time the flange is displaced from
     #: the start by (x, y, z) in base axes. [s, m]
     moves: tuple[tuple[float, float, float, float, float], ...]
@@ -186,11 +191,9 @@ class OffsetsSpec:
         return Stretches(times, tuple(paths), self.length)
 
 
-@dataclass(frozen=True, kw_only=True)
-class JointMovesSpec:
+class JointMovesSpec(Spec, kind="joint-moves"):
     """Straight moves in joint space between stated displacements from the start, at rest there."""
 
-    kind: str = field(default="joint-moves", init=False)
     #: Rows (start time, end time, one displacement a joint): by the end time the joints
     #: are displaced from the start by these. [s, rad]
     moves: tuple[tuple[float, ...], ...]
@@ -210,11 +213,9 @@ class JointMovesSpec:
         return Stretches(times, straight_paths(points), self.length)
 
 
-@dataclass(frozen=True, kw_only=True)
-class PosesSpec:
+class PosesSpec(Spec, kind="poses"):
     """Drawn joint poses, approached one after the other and held."""
 
-    kind: str = field(default="poses", init=False)
     move: float = 2.5  #: Time of each move. [s]
     dwell: float = 2.0  #: Rest at each pose. [s]
     count: int = 12  #: How many poses are drawn.
@@ -246,11 +247,9 @@ class PosesSpec:
         return Stretches(times, straight_paths(points), times[-1, 1] + self.dwell)
 
 
-@dataclass(frozen=True, kw_only=True)
-class JointwiseSpec:
+class JointwiseSpec(Spec, kind="jointwise"):
     """One joint at a time swept back and forth at several speeds, the others at rest."""
 
-    kind: str = field(default="jointwise", init=False)
     amplitude: float = 0.4  #: Sweep to each side. [rad]
     speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)  #: Mean speeds of the sweeps. [rad/s]
     rest: float = 0.3  #: Rest between sweeps. [s]
@@ -271,11 +270,9 @@ class JointwiseSpec:
         return Stretches(np.array(times), tuple(paths), t)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ExcitationSpec:
+class ExcitationSpec(Spec, kind="excitation"):
     """A Fourier series of the joints."""
 
-    kind: str = field(default="excitation", init=False)
     period: float = 10.0  #: Time of one round. [s]
     cycles: float = 2.0  #: Rounds.
     mean: tuple[float, ...]  #: Mean positions. (n,) [rad]
