@@ -32,6 +32,7 @@ from vftcli.robots import run as modelled
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
+from vftcli.signals.progress import heard_by
 from vftcli.signals.remarks import Remark
 from vftcli.wrench.choice import WrenchChoice
 
@@ -194,21 +195,22 @@ def test_a_free_run_as_long_as_the_log_is_distinct_from_it(runs: list[Path]) -> 
 
 def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
     """Seven tenths of it, after which its files are written."""
-    told: list[tuple[str, float, float]] = []
+    told: list[tuple[str, float]] = []
     asked = AnalysisChoice(
         robot=RobotChoice(name="ur5"),
         read=ReadChoice(interval=(0.0, 6.0)),
         observers=ObserverChoice(names=("gmo",)),
-        progress=lambda *step: told.append(step),
     )
-    assert analyse_log(FIXTURE, asked).contacts is not None
-    words, begins, ends = zip(*told, strict=True)
+    with heard_by(lambda *step: told.append(step)):
+        assert analyse_log(FIXTURE, asked).contacts is not None
+    words, begins = zip(*[step for step in told if step[0]], strict=True)
     assert [each.rpartition(": ")[2].split()[0] for each in words] == [
         *("reading", "examining", "looking", "listing", "running", "comparing")
     ]
-    assert begins == (0.0, *ends[:-1])
-    assert sorted(ends) == list(ends)
-    assert ends[-1] == pipeline.WRITING == 0.7
+    assert begins == (0.0, 0.05, 0.15, 0.25, 0.4, 0.5)
+    shares = [share for _, share in told]
+    assert sorted(shares) == shares
+    assert shares[-1] < pipeline.WRITING == 0.7
 
 
 @pytest.mark.parametrize(

@@ -187,7 +187,6 @@ def replayed(
     choice_of: Callable[[Asked], AnalysisChoice],
     release: Sequence[str] = (),
     seed: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Replayed:
     """A log's force, a scenario in the loop, or a release through every controller.
 
@@ -197,7 +196,6 @@ def replayed(
         choice_of: The choice of what is asked.
         release: Where a release begins, as ``x=0.3``.
         seed: Seed of a scenario.
-        progress: Called with the steps of a simulation that are done, and all.
     """
     from vftcli.admittance.replay import release_deviation, replay, replay_release
     from vftcli.signals.packages import check_installed
@@ -230,7 +228,7 @@ def replayed(
         )
         return Replayed(made)
     if isinstance(log, Path) and is_scenario(log):
-        return looped(str(log), seed, choice, control, anyway=anyway, progress=progress)
+        return looped(str(log), seed, choice, control, anyway=anyway)
     run = prepared(choice.library.open(log, choice.read), choice)
     recording, arm = run.recording, run.robot
     check_logged(recording, "admit runs a controller that must not see the future")
@@ -273,7 +271,6 @@ def looped(
     control: ControlChoice,
     *,
     anyway: bool,
-    progress: Callable[[int, int], None] | None,
 ) -> Replayed:
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
     from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
@@ -301,7 +298,6 @@ def looped(
         torque=control.loop_torque,
         zero=zero.spans[0] if zero.spans else UNLOADED,
         anyway=anyway,
-        progress=progress,
     )
     made = replay(run.wrench, run.q, arm, controllers, source=fact("force-of-loop"), anyway=anyway)
     return Replayed(made, run=run)

@@ -21,7 +21,7 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Run
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.option import Asked, Choice
-from vftcli.signals.progress import no_stage
+from vftcli.signals.progress import stage
 from vftcli.signals.recording import Recording, refuse_repeated_logs
 
 if TYPE_CHECKING:
@@ -64,10 +64,6 @@ class AnalysisChoice:
     library: Library = field(default_factory=Library, repr=False, compare=False)
     #: Who examines them, each once, and says whether results mean anything.
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
-    #: Told what is being done, and from which share of a log's work to which.
-    progress: Callable[[str, float, float], None] = field(
-        default=no_stage, repr=False, compare=False
-    )
 
     def __post_init__(self) -> None:
         if self.observers.causal and self.refinement.corrects_all:
@@ -145,7 +141,7 @@ def analyse_logs(
     work, tell = work or analyse, failed or raise_error
     recordings: list[tuple[Path | Recording, Recording]] = []
     for path in logs:
-        choice.progress(f"reading {path.name}", 0.0, 0.05)
+        stage(f"reading {path.name}", 0.0, 0.05)
         try:
             if choice.read.columns is None and isinstance(path, Path):
                 refuse_estimates(path)
@@ -169,7 +165,7 @@ def list_touches(log: Run, choice: AnalysisChoice) -> "Analysis":
 
     motion = read(log, choice)
     examinations = examine(motion, choice)
-    choice.progress(f"{log.name}: listing contacts", 0.3, 1.0)
+    stage(f"{log.name}: listing contacts", 0.3, 1.0)
     made = Analysis(motion=motion, observers=(), estimates=(), tunings={})
     found = list_contacts(motion).weighed(examinations[0].load, examinations[0].doubts)
     return replace(made, contacts=found, examinations=examinations)
@@ -204,20 +200,20 @@ def analyse_log(path: str | Path, choice: AnalysisChoice) -> "Analysis":
 
 def analyse(log: Run, choice: AnalysisChoice) -> "Analysis":
     """Estimates of a log and, if a reference is asked for, their errors."""
-    tell, name = choice.progress, log.name
-    tell(f"{name}: examining", 0.05, 0.15)
+    name = log.name
+    stage(f"{name}: examining", 0.05, 0.15)
     motion = read(log, choice)
     examinations = examine(motion, choice)
-    tell(f"{name}: looking for free motion", 0.15, 0.25)
+    stage(f"{name}: looking for free motion", 0.15, 0.25)
     baselines = model(motion, choice)
     # Before there are estimates: of a long log both have no room at once.
     contacts, unlisted = find_contacts(motion, baselines, examinations[0], choice)
-    tell(f"{name}: running observers", 0.4, 0.5)
+    stage(f"{name}: running observers", 0.4, 0.5)
     analysis = refine(observe(motion, baselines, choice), baselines, choice)
     remarks = (*analysis.remarks, *unlisted)
     analysis = replace(analysis, contacts=contacts, examinations=examinations, remarks=remarks)
     analysis = sense(analysis, choice, unasked=not choice.answers_first)
-    tell(f"{name}: comparing", 0.5, WRITING)
+    stage(f"{name}: comparing", 0.5, WRITING)
     analysis.spare()
     return judge(analysis, choice)
 
@@ -307,7 +303,7 @@ def find_contacts(
     from vftcli.contacts.listing import list_contacts
     from vftcli.signals.remarks import caution
 
-    choice.progress(f"{motion.log.name}: listing contacts", 0.25, 0.4)
+    stage(f"{motion.log.name}: listing contacts", 0.25, 0.4)
     try:
         bias = None if baselines is None else baselines.best.correction
         referenced = choice.reference is not None

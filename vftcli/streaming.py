@@ -14,6 +14,7 @@ from vftcli.pipeline import AnalysisChoice, observe, read, run_of, sense
 from vftcli.robots.run import Run
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.progress import stage
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
 from vftcli.signals.series import clock_of
@@ -71,7 +72,7 @@ def analysed_in_blocks(
             if wrenches[0].sigma_min is not None:
                 least = min(least, float(np.min(wrenches[0].sigma_min)))
         done += block.samples
-        choice.progress("estimating", done / log.samples, 1.0)
+        stage("estimating", done / log.samples)
         motion = replace(whole, log=Run(recording=block, robot=robot))
         every = slice(None)
         yield replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed), every

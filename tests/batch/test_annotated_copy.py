@@ -23,7 +23,7 @@ from vftcli.readers import recognise
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError, VftError
-from vftcli.signals.progress import no_stage
+from vftcli.signals.progress import heard_by
 from vftcli.wrench.choice import WrenchChoice
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
@@ -42,7 +42,6 @@ def made(
         here,
         "x",
         lambda _words: None,
-        how.pop("progress", no_stage),
         **how,
     )
 
@@ -91,8 +90,8 @@ DONE = {"status": "done", "file": "b/t.h5", "episode": 0, "joints": None, "joint
 def test_an_episode_that_lacks_frames_is_refused_by_its_file(record: Any, said: str) -> None:
     outcome = Outcome(None, {"episodes": [record], "robot": None, "observer": None})
     with pytest.raises(LogError, match=said):
-        gathered([outcome], ForceChoice(), print)
-    assert gathered([outcome], ForceChoice(anyway=True), lambda *_: None)["episodes"] == [record]
+        gathered([outcome], ForceChoice())
+    assert gathered([outcome], ForceChoice(anyway=True))["episodes"] == [record]
 
 
 def test_episodes_are_gathered_in_the_order_of_their_files() -> None:
@@ -103,11 +102,12 @@ def test_episodes_are_gathered_in_the_order_of_their_files() -> None:
         {"episodes": [], "robot": arms[1], "observer": None},
     ]
     ended = [Outcome(None, result) for result in results]
-    made = gathered(ended, ForceChoice(), lambda *step: told.append(step))
+    with heard_by(lambda *step: told.append(step)):
+        made = gathered(ended, ForceChoice())
     found = [(one["file"], one["episode"]) for one in made["episodes"]]
     assert found == [("a/t.h5", 0), ("b/t.h5", 0), ("b/t.h5", 2)]
     assert (made["robot"], made["observer"]) == (arms[0], "gmo")
-    assert told == [(f"{count} episodes estimated", 0.0, 0.8) for count in (2, 3, 3)]
+    assert told == [(f"{count} episodes estimated", 0.0) for count in (2, 3, 3)]
 
 
 def test_joints_are_named_by_the_first_episode_that_is_done() -> None:
@@ -125,11 +125,12 @@ def test_joints_are_named_by_the_first_episode_that_is_done() -> None:
 
 def test_the_whole_copy(tmp_path: Path) -> None:
     asked = ForceChoice(wrench=WrenchChoice(frame="base"), sd=True)
-    told: list[tuple[str, float, float]] = []
-    record = made(FIXTURE, tmp_path / "copy", asked, progress=lambda *step: told.append(step))
-    _, begins, ends = zip(*told, strict=True)
-    assert [sorted(set(edges)) for edges in (begins, ends)] == [[0.0, 0.8, 0.9], [0.8, 1.0]]
-    assert sorted(begins) == list(begins)
+    told: list[tuple[str, float]] = []
+    with heard_by(lambda *step: told.append(step)):
+        record = made(FIXTURE, tmp_path / "copy", asked)
+    begins = [begin for _, begin in told]
+    assert list(dict.fromkeys(begins)) == [0.0, 0.8, 0.9]
+    assert all(words for words, _ in told)  # an episode's own steps are not heard
     assert sorted(p.relative_to(tmp_path / "copy") for p in (tmp_path / "copy").rglob("*.*")) == (
         sorted([
             *(p.relative_to(FIXTURE) for p in FIXTURE.rglob("*.*")),

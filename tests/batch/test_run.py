@@ -11,6 +11,7 @@ from vftcli.batch.run import BatchCount, BatchRun
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.library import LogEntry
+from vftcli.signals.progress import heard_by
 
 
 def batch(folder: Path, sizes: list[int], jobs: int | None, **more: int) -> BatchRun:
@@ -28,7 +29,6 @@ def batch(folder: Path, sizes: list[int], jobs: int | None, **more: int) -> Batc
         workers=WorkersChoice(jobs=jobs),
         command="",
         tell=print,
-        progress=print,
     )
 
 
@@ -61,3 +61,11 @@ def test_equal_bytes_are_done_once_and_what_cannot_be_read_fails(tmp_path: Path)
     assert asked.count()[:4] == BatchCount(logs=4, failed=1)[:4]
     assert asked.count().left == 3
     assert asked.failures[2].stage == "finding"
+
+
+def test_a_batch_says_how_many_logs_ended_and_which_share_that_is(tmp_path: Path) -> None:
+    """None of them is a log; each counts as it ends."""
+    heard: list[tuple[str, float]] = []
+    with heard_by(lambda *step: heard.append(step)):
+        batch(tmp_path, [8] * 4, 0).work()
+    assert heard == [(f"{k}/4 logs, {k} failed", k / 4) for k in range(1, 5)]

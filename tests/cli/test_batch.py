@@ -8,8 +8,7 @@ import polars as pl
 import pytest
 
 from vftcli.batch.keys import digest_of
-from vftcli.batch.run import BatchCount
-from vftcli.cli.batch import say_passed, show_count
+from vftcli.cli.batch import say_passed
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 CIRCLE = FIXTURES / "ur5_circle.csv"
@@ -209,14 +208,6 @@ def test_ten_failures_are_told_the_others_counted(run, tmp_path: Path) -> None:
     code, _, err = run("batch", *every, *words, tmp_path / "every")
     assert (code, err.count("error: ")) == (1, 10)
     assert "… 2 more in failures.parquet\n12 logs: 0 done now, 0 before, 12 failed; " in err
-
-
-def test_a_batch_shows_how_many_logs_ended_and_which_share_that_is() -> None:
-    shown: list[tuple[object, ...]] = []
-    count = BatchCount(logs=10, before=2, done=3, failed=1)
-    show_count(lambda *words: shown.append(words), count)
-    show_count(lambda *words: shown.append(words), BatchCount(logs=0))
-    assert shown == [("6/10 logs, 1 failed", 0.6, 1.0), ("0/0 logs, 0 failed", 0.0, 1.0)]
 
 
 @pytest.mark.statistical

@@ -7,13 +7,13 @@ import re
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from vftcli.cli.console import steps_of
 from vftcli.cli.progress import Stages, clock, fitted
-from vftcli.signals.progress import steps
+from vftcli.signals.progress import heard_by, stage, steps
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 LOG, CIRCLE = FIXTURES / "ur5_taps_ur_rtde.csv", FIXTURES / "ur5_circle.csv"
@@ -30,21 +30,28 @@ def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return time
 
 
+@pytest.fixture
+def stages(now: list[float]) -> Iterator[Stages]:  # noqa: ARG001 - made on that clock
+    """The line, which hears how far the work is."""
+    line = Stages()
+    with heard_by(line.hear):
+        yield line
+
+
 def bar(done: int) -> str:
     return f"[{'#' * done}{'.' * (20 - done)}]"
 
 
 def test_work_over_a_second_shows_share_stage_and_time_left(
-    now: list[float], capsys: pytest.CaptureFixture[str]
+    now: list[float], stages: Stages, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def shown() -> str:
         return capsys.readouterr().err.replace("·", ".")
 
-    stages = Stages()
-    stages.begin("reading")
+    stage("reading")
     assert shown() == ""
     now[0] = 2.0
-    stages.begin("running observers", 0.2, 0.6)
+    stage("running observers", 0.2, 0.6)
     # A fifth in 2 s: the other four fifths take 8 s.
     assert shown() == f"\r{bar(4)} 20 %  running observers  0:08 left"
     now[0] = 120.0
@@ -53,7 +60,7 @@ def test_work_over_a_second_shows_share_stage_and_time_left(
     # Half of the stage, which goes from .2 to .6, is .4; it is shown though no stage has begun.
     assert shown().endswith(f"\r{bar(8)} 40 %  running observers  3:00 left")
     # The next log begins anew: its own speed counts, of which nothing is known yet.
-    stages.begin("b.csv: reading", 0.0, 0.1)
+    stage("b.csv: reading", 0.0, 0.1)
     assert shown().strip("\r").rstrip() == f"{bar(0)}  0 %  b.csv: reading"
     stages.end()
     assert shown().strip() == ""
@@ -61,29 +68,12 @@ def test_work_over_a_second_shows_share_stage_and_time_left(
     assert shown() == ""
 
 
-def test_steps_of_a_run_are_its_share_and_no_loop_within_one_moves_it(
-    now: list[float], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stages = Stages()
-    monkeypatch.setattr("vftcli.cli.console.STAGES", stages)
-    monkeypatch.setattr("vftcli.cli.console.is_watched", lambda: True)
-    progress = steps_of("simulating")
-    progress(0, 5)
-    now[0] = 2.0
-    progress(2, 5)  # two of five steps in 2 s: the other three take 3 s
-    for _ in steps("ab"):
-        stages._tick()
-        shown = capsys.readouterr().err.replace("·", ".")
-        assert shown.endswith(f"\r{bar(8)} 40 %  simulating  0:03 left")
-
-
 def test_what_is_printed_takes_the_line_away_first(
-    now: list[float], capsys: pytest.CaptureFixture[str]
+    now: list[float], stages: Stages, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    stages = Stages()
-    stages.begin("one")
+    stage("one")
     now[0] = 2.0
-    stages.begin("two")
+    stage("two")
     line = capsys.readouterr().err.lstrip("\r")
     stages.echo("result")
     out, err = capsys.readouterr()
@@ -93,27 +83,30 @@ def test_what_is_printed_takes_the_line_away_first(
 
 
 def test_the_line_comes_after_a_second_and_anew_each_second(
-    now: list[float], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    now: list[float],
+    stages: Stages,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     waited: list[float] = []
     monkeypatch.setattr(Stages, "_wait", lambda _, seconds: waited.append(seconds))
-    stages = Stages()
-    stages.begin("one")
+    stage("one")
     now[0] = 1.0
-    stages.begin("two", 0.02)
+    stage("two", 0.02)
     assert capsys.readouterr().err == ""
     now[0] = 2.0
-    stages.begin("three", 0.02)  # a fiftieth is too little to guess the rest from
+    stage("three", 0.02)  # a fiftieth is too little to guess the rest from
     assert capsys.readouterr().err.endswith("]  2 %  three")
-    stages.begin("four", 0.03)  # 2 s · .97/.03
+    stage("four", 0.03)  # 2 s · .97/.03
     assert capsys.readouterr().err.endswith("]  3 %  four  1:05 left")
-    stages.begin("four", 0.04)  # what is the same stage waits for its second
+    stage("four", 0.04)  # what is the same stage waits for its second
     assert capsys.readouterr().err == ""
     stages._tick()
     assert capsys.readouterr().err.rstrip().endswith("]  4 %  four  0:48 left")
     assert waited == [1.0, 1.0]
 
 
+@pytest.mark.usefixtures("stages")
 @pytest.mark.parametrize(("width", "shown"), [(60, 59), (80, 79), (200, 79)])
 def test_a_long_stage_is_cut_to_the_terminal(
     now: list[float],
@@ -123,26 +116,25 @@ def test_a_long_stage_is_cut_to_the_terminal(
     shown: int,
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
-    stages = Stages()
-    stages.begin("one")
+    stage("one")
     now[0] = 2.0
-    stages.begin("x" * 200, 0.5)
+    stage("x" * 200, 0.5)
     line = capsys.readouterr().err.lstrip("\r")
     assert (len(line), line.endswith("x  0:02 left")) == (shown, True)
-    stages.begin("y", 0.75)  # what is shorter blots out what was there
+    stage("y", 0.75)  # what is shorter blots out what was there
     assert len(capsys.readouterr().err.lstrip("\r")) == shown
 
 
+@pytest.mark.usefixtures("stages")
 @pytest.mark.parametrize(("encoding", "rest"), [("utf-8", "·"), ("ascii", ".")])
 def test_the_bar_is_of_letters_that_the_terminal_has(
     now: list[float], monkeypatch: pytest.MonkeyPatch, encoding: str, rest: str
 ) -> None:
     stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
     monkeypatch.setattr("sys.stderr", stream)
-    stages = Stages()
-    stages.begin("one")
+    stage("one")
     now[0] = 2.0
-    stages.begin("two", 0.25)
+    stage("two", 0.25)
     stream.flush()
     shown = stream.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
     assert shown == f"\r[{'#' * 5}{rest * 15}] 25 %  two  0:06 left"

@@ -30,7 +30,7 @@ def documented(name: str) -> dict[str, list[str]]:
 
 def computed(names: tuple[str, ...], *, fast: bool):
     jobs = jobs_of(HUANG, names, fast)
-    return gather(HUANG, names, run_jobs(jobs, lambda *_: None, workers=2))
+    return gather(HUANG, names, run_jobs(jobs, workers=2))
 
 
 def ends(text: str) -> tuple[float, float]:

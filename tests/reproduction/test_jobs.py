@@ -4,6 +4,7 @@ import pytest
 
 from vftcli.reproduction.experiments import Job, gather, jobs_of, run_jobs
 from vftcli.reproduction.paper import CORRECTED, PAPERS, RunResult
+from vftcli.signals.progress import heard_by
 
 HUANG = PAPERS["huang2025"]
 
@@ -25,9 +26,13 @@ def test_fast_takes_the_first_seed_of_each() -> None:
 
 def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
     jobs, reported = jobs_of(cheap, tuple(cheap.items), fast=False), []
-    results = run_jobs(jobs, lambda *words: reported.append(words), workers=0)
+    with heard_by(lambda *words: reported.append(words)):
+        results = run_jobs(jobs, workers=0)
     assert list(results) == jobs
-    assert reported[-1] == (6, 6, "timed, seed 0")  # what takes the time has the machine for itself
+    assert reported[-1] == (
+        "6 of 6 runs done: timed, seed 0",
+        1.0,
+    )  # what takes the time has the machine for itself
     found = gather(cheap, tuple(cheap.items), results)
     assert found["fig1"].values["a"][CORRECTED] == [3.0, 4.0, 5.0]
     assert found["fig1"].values["b"][CORRECTED] == [-1.0, None, None]
@@ -49,7 +54,7 @@ def test_numbers_do_not_depend_on_how_many_run_at_once() -> None:
     def nobody(done: int, of: int, what: str) -> None:
         pass
 
-    one, two = (run_jobs(jobs, nobody, workers=n) for n in (0, 2))
+    one, two = (run_jobs(jobs, workers=n) for n in (0, 2))
     assert list(one) == list(two)
     for job in jobs:
         assert one[job].values == two[job].values

@@ -24,7 +24,7 @@ from vftcli.reproduction.experiments import (
 @pytest.fixture
 def made(cheap):
     jobs = jobs_of(cheap, tuple(cheap.items), fast=False)
-    results = run_jobs(jobs, lambda *_: None, workers=0)
+    results = run_jobs(jobs, workers=0)
     return gather(cheap, tuple(cheap.items), results), jobs
 
 

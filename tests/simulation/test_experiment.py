@@ -11,6 +11,7 @@ from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.progress import heard_by
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
 from vftcli.simulation.arm import build_arm
 from vftcli.simulation.experiment import simulate_pair
@@ -212,11 +213,12 @@ def test_a_run_has_as_many_steps_as_fit_and_tells_of_them(duration: float, steps
     assert len(reference.q) == steps + 1
 
 
-def test_progress_is_told_every_500_steps_and_at_the_end() -> None:
-    told = []
-    scenario = load_scenario("ur5-circle", ["duration=0.6", "contacts=[]"])
-    simulate(scenario, 1, lambda done, of: told.append((done, of)))
-    assert told == [(0, 600), (500, 600), (600, 600)]
+def test_every_step_says_how_far_the_run_is() -> None:
+    told: list[tuple[str, float]] = []
+    scenario = load_scenario("ur5-circle", ["duration=0.06", "contacts=[]"])
+    with heard_by(lambda *words: told.append(words)):
+        simulate(scenario, 1)
+    assert told == [("simulating", 0.0), *(("", k / 60) for k in range(60))]
 
 
 def test_pair_is_one_motion_with_and_without_the_payload() -> None:

@@ -22,10 +22,11 @@ from vftcli.robots.running_friction import RunningFriction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
+from vftcli.signals.progress import stage, steps
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.simulation.arm import Arm
-from vftcli.simulation.experiment import Progress, Simulation, observe
+from vftcli.simulation.experiment import Simulation, observe
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants, log_rate, noise_sizes, rounded
 from vftcli.simulation.trajectories import Reference, plan
@@ -219,7 +220,6 @@ def run_closed_loop(
     torque: str = "average",
     zero: tuple[float, float] | None = None,
     anyway: bool = False,
-    progress: Progress | None = None,
 ) -> ClosedLoop:
     """A scenario's contacts against an arm under admittance control, from the trajectory's start.
 
@@ -235,7 +235,8 @@ def run_closed_loop(
     log = list[dict[str, Any]]()
     every_sample = steps_in(loop.interval, arm.scenario.step, "sampling interval")
     every_control = steps_in(period, arm.scenario.step, "control period")
-    for k in range(arm.steps):
+    stage("simulating")
+    for k in steps(range(arm.steps)):
         if k % every_sample == 0:
             loop.sample()
         if k % every_control == 0:
@@ -246,8 +247,6 @@ def run_closed_loop(
             near = np.isfinite(x).all() and np.linalg.norm(x[:3]) <= FARTHEST
             if not near or fastest > 50.0:  # the arm has run away
                 break
-            if progress is not None:
-                progress(k, arm.steps)
         arm.command(reference.q[0], reference.dq[0], reference.ddq[0], forward)
     columns = {name: np.array([row[name] for row in log]) for name in log[0]}
     t, simulation = columns["t"], observe(arm) if arm.made == arm.steps else None

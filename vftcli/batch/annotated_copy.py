@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -38,13 +38,13 @@ from vftcli.outputs.run_record import envelope, to_json
 from vftcli.readers import FORMATS
 from vftcli.readers.opening import open_log
 from vftcli.signals.errors import LogError
+from vftcli.signals.progress import stage
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
 #: Episodes, and files to write, for which no processes are started unasked: that takes
 #: seconds.
 FEW = 32
 HERE = WorkersChoice(jobs=0)  #: This process alone.
-Progress = Callable[[str, float, float], None]  #: Receives the stage, and its share of the work.
 Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes that a copy is made of.
 
 
@@ -63,7 +63,6 @@ def annotate(
     workers: WorkersChoice,
     command: str,
     tell: Tell,
-    progress: Progress,
     *,
     force: bool = False,
 ) -> Record:
@@ -91,7 +90,7 @@ def annotate(
         place = HERE if few and workers == WorkersChoice() else workers
         groups = planned(dataset, work, key, expected, rows, sources)
         outcomes = run(groups, partial(estimate_episodes, choice), place)
-        made = gathered(outcomes, choice, progress)
+        made = gathered(outcomes, choice)
         derived, names = any(one.get("derived") for one in made["episodes"]), joint_names(made)
         columns = force_columns(choice, names, derived=derived, valid=choice.anyway)
         write = partial(write_file, dataset, columns, choice.suffix)
@@ -99,9 +98,9 @@ def annotate(
         each = (tasks[k : k + TOGETHER] for k in range(0, len(tasks), TOGETHER))
         statistics: dict[int, Mapping[str, Statistics]] = {}
         for outcome in run(each, write, workers if len(tasks) > FEW else HERE):
-            progress(f"writing {value_of(outcome)['place']}", 0.8, 1.0)
+            stage(f"writing {value_of(outcome)['place']}", 0.8, 1.0)
             statistics |= outcome.value["statistics"]
-        progress("writing descriptions", 0.9, 1.0)
+        stage("writing descriptions", 0.9, 1.0)
         if path.is_dir():
             copy_others(path, folder, {file.place for file in rows})
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
@@ -178,11 +177,7 @@ def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work retu
     raise LogError(f"{place}: {outcome.failure.line} ({outcome.failure.stage})")
 
 
-def gathered(
-    outcomes: Iterable[Outcome[Any]],
-    choice: ForceChoice,
-    progress: Progress,
-) -> Record:
+def gathered(outcomes: Iterable[Outcome[Any]], choice: ForceChoice) -> Record:
     """Results of all episodes as of `estimate_episodes`, in the order of their files."""
     episodes: list[Record] = []
     made: Record = {"episodes": episodes, "robot": None, "observer": None}
@@ -193,7 +188,7 @@ def gathered(
         episodes += some["episodes"]
         for name in ("robot", "observer"):
             made[name] = made[name] or some[name]
-        progress(f"{len(episodes)} episodes estimated", 0.0, 0.8)
+        stage(f"{len(episodes)} episodes estimated", 0.0, 0.8)
     episodes.sort(key=lambda record: (record["file"], record["episode"]))
     return made
 

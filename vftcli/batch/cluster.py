@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from vftcli.batch.choice import EXTRA, MEMORY, MOST_WORKERS, WorkersChoice
 from vftcli.signals.errors import VftError
+from vftcli.signals.progress import heard_by, nobody
 from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
@@ -107,7 +108,8 @@ def perform(work: Work[Task], task: Task) -> Outcome[Task]:
     started, wall, cpu = time.time(), time.monotonic(), time.thread_time()
     value, failure = None, None
     try:
-        value = work(task)
+        with heard_by(nobody):
+            value = work(task)
     except Exception as error:  # noqa: BLE001 - one log must not stop the others
         failure = failure_of(error)
     seconds, cpu_seconds = time.monotonic() - wall, time.thread_time() - cpu

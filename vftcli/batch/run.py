@@ -1,6 +1,6 @@
 """A batch: every log of a collection done once, on an engine, and gathered in one table."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -18,6 +18,7 @@ from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.page.pages import batch_lines, render_batch
 from vftcli.outputs.run_record import envelope, versions
 from vftcli.readers.library import LogEntry, absolute, labelled
+from vftcli.signals.progress import stage
 
 SMALL = 300_000  #: Logs of fewer bytes go to a worker together. [B]
 TOGETHER = 64  #: At most so many.
@@ -48,8 +49,6 @@ class BatchRun:
     workers: WorkersChoice  #: Where it is done.
     command: str  #: The command line, for the records.
     tell: Tell = field(repr=False)  #: Receives a sentence on each step.
-    #: Receives the number of finished logs after each.
-    progress: Callable[[BatchCount], None] = field(repr=False)
 
     def __post_init__(self) -> None:
         # A worker of a cluster may stand in another folder.
@@ -121,7 +120,6 @@ class BatchRun:
         groups = self.groups()
         first = next(groups, None)
         if first is None:
-            self.progress(self.count())
             return
         # What every worker has to see: the folder, the first log, and what the options
         # name.
@@ -137,7 +135,9 @@ class BatchRun:
         with closing(ended):  # type: ignore[type-var]
             for outcome in ended:
                 self.take(outcome)
-                self.progress(self.count())
+                count = self.count()
+                over = count.logs - count.left
+                stage(f"{over}/{count.logs} logs, {count.failed} failed", over / count.logs)
 
     def take(self, outcome: Outcome[LogTask]) -> None:
         """Keep what a log came to: why it failed, what it took."""

@@ -16,7 +16,6 @@ from vftcli.cli.console import (
     say,
     say_json,
     say_left_out,
-    steps_of,
 )
 from vftcli.signals.option import WRITE, Asked, Option
 
@@ -67,10 +66,8 @@ def admit(
     if output is not None:
         OutputFolder(output, force, names).check()
     give_back()
-    library, progress = Library([log] if log else []), steps_of("simulating")
-    found = replayed(
-        log, asked, lambda words: choice_for(words, library), release or (), seed, progress
-    )
+    library = Library([log] if log else [])
+    found = replayed(log, asked, lambda words: choice_for(words, library), release or (), seed)
     show(found, json=json, latex=latex)
     if output is not None:
         write_admittance(

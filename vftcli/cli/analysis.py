@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from vftcli.bias.choice import RefinementChoice
-from vftcli.cli.console import health_of, stages
+from vftcli.cli.console import health_of
 from vftcli.cli.options import Anyway, Talk
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
@@ -65,11 +65,11 @@ def choice_for(
     on_screen: bool = False,
     **others: Any,  # noqa: ANN401 - choices
 ) -> "AnalysisChoice":
-    """What is asked of a command's logs: their health is said, and how far the work is shown."""
+    """What is asked of a command's logs; their health is said."""
     from vftcli.pipeline import choice_of
 
     examiner = health_of(library, anyway=bool(asked.words.get("anyway")), on_screen=on_screen)
-    return choice_of(asked, library, examiner, **{"progress": stages(), **others})
+    return choice_of(asked, library, examiner, **others)
 
 
 def outputs_of(asked: Asked) -> OutputChoice:

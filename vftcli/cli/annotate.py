@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LOG
-from vftcli.cli.console import detail, echo_data, say, stages
+from vftcli.cli.console import detail, echo_data, say
 from vftcli.observers.choice import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
@@ -81,7 +81,6 @@ def annotate_dataset(
         engine,
         command=asked.line,
         tell=detail,
-        progress=stages(),
         force=force,
     )
     if json:

@@ -1,24 +1,19 @@
 """`vftcli batch`: the same question to many logs."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import ANALYSIS, choice_for, give_back, outputs_of
-from vftcli.cli.console import say, stages
+from vftcli.cli.console import say
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs import OutputChoice
 from vftcli.signals.option import Asked, Option, names_at
-
-if TYPE_CHECKING:
-    from vftcli.batch.run import BatchCount
 
 #: What is asked of logs without comparing them with anything.
 WITHOUT_REFERENCE = ("estimate", "contacts")
@@ -57,7 +52,6 @@ def batch(
     from vftcli.outputs.batch_folder import BatchFolder
     from vftcli.readers.library import Library, LogCollection, absolute
     from vftcli.signals.errors import LogError, ParameterError
-    from vftcli.signals.progress import no_stage
 
     give_back()
     choice, anyway = choice_for(asked, Library()), asked.words["anyway"]
@@ -70,7 +64,7 @@ def batch(
     if narrowed := {"estimate": for_estimates, "compare": for_comparison}.get(do):
         choice = narrowed(choice)
     # These are of each worker.
-    choice = replace(choice, library=Library(), examiner=Examiner(), progress=no_stage)
+    choice = replace(choice, library=Library(), examiner=Examiner())
     job = LogJob(do=do, choice=choice, anyway=anyway, written=outputs_of(asked))
     engine = asked.of(WorkersChoice)
     engine.check_closed(anyway=anyway)
@@ -89,7 +83,6 @@ def batch(
         workers=engine,
         command=asked.line,
         tell=say,
-        progress=partial(show_count, stages()),
     )
     failures, count = run.run(force=force)
     STAGES.end()
@@ -116,9 +109,3 @@ def say_passed(names: list[str]) -> None:
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     what = "1 file is not a log" if len(names) == 1 else f"{len(names)} files are not logs"
     say(f"note: {what}: {', '.join(sorted(names)[:3])}{more}")
-
-
-def show_count(show: Callable[[str, float, float], None], count: "BatchCount") -> None:
-    """Show how far the batch is."""
-    ended = count.logs - count.left
-    show(f"{ended}/{count.logs} logs, {count.failed} failed", ended / max(count.logs, 1), 1.0)

@@ -9,7 +9,7 @@ import typer
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.batch import SOME_FAILED
-from vftcli.cli.console import echo, echo_data, open_made, say, say_json, show, stages
+from vftcli.cli.console import echo, echo_data, open_made, say, say_json, show
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import LOG, Asked, Choice, Option, setting
@@ -84,7 +84,7 @@ def benchmark(
         return
     marked, output = unfair(manifest, rivals, anyway=anyway), output or Path("benchmark.vft")
     engine.check_closed(anyway=anyway)
-    run = BenchmarkRun(manifest, rivals, output, engine, asked.line, marked, say, stages())
+    run = BenchmarkRun(manifest, rivals, output, engine, asked.line, marked, say)
     results = run.run(force=force)
     print_results(results, form, manifest.absent(), every=asked.words["details"])
     for name, failure in run.failures:

@@ -4,7 +4,7 @@ import os
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -17,6 +17,7 @@ from vftcli.cli.progress import STAGES, is_terminal, is_watched
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import printable
+from vftcli.signals.progress import heard_by, nobody
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -35,12 +36,13 @@ _level: ContextVar[int] = ContextVar("level", default=USUAL)
 
 @contextmanager
 def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
-    """Say as much as is asked for a block."""
+    """Say as much as is asked for a block, and on a terminal how far its work is."""
     if details and quiet:
         raise typer.BadParameter("choose one of --details, --quiet")
     token = _level.set(DETAILS if details else QUIET if quiet else USUAL)
     try:
-        yield
+        with heard_by(STAGES.hear if is_watched() and not quiet else nobody):
+            yield
     finally:
         _level.reset(token)
 
@@ -242,14 +244,3 @@ def say_remarks(remarks: "Iterable[Remark]") -> None:
             say(f"warning: {remark}")
         else:
             detail(f"note: {remark}")
-
-
-def stages() -> "Callable[[str, float, float], None]":
-    """Who shows on stderr what is being done, if somebody watches and it takes a while."""
-    return STAGES.begin if _level.get() > QUIET and is_watched() else lambda *_: None
-
-
-def steps_of(stage: str) -> "Callable[[int, int], None]":
-    """Who shows how many of the steps of a run are done."""
-    begin = stages()
-    return lambda done, steps: begin(stage, done / steps, done / steps)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import command_line, echo, say, say_json, say_left_out, steps_of
+from vftcli.cli.console import command_line, echo, say, say_json, say_left_out
 from vftcli.readers.reader import ReadChoice
 from vftcli.signals.option import Asked, Option, names_at
 
@@ -106,7 +106,7 @@ def simulate_log(
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
     usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
-    runs = simulate_pair(setup, seed, steps_of("simulating"))
+    runs = simulate_pair(setup, seed)
     places = dict(zip(paths, runs, strict=True))
     files = [str(f) for f in save(places, log_format, force, command_line())]
     say_left_out(files)

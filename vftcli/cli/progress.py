@@ -8,7 +8,6 @@ import sys
 import textwrap
 import threading
 import time
-from functools import partial
 from typing import TextIO
 
 import typer
@@ -32,21 +31,21 @@ class Stages:
         self._shown = 0  # characters that stand on the line
         self._lock = threading.RLock()  # who prints and who shows the line take turns
 
-    def begin(self, stage: str, begin: float = 0.0, end: float = 1.0) -> None:
-        """Say what is done now, and which part of the whole work that is."""
-        from vftcli.signals.progress import enter, watch
-
+    def hear(self, stage: str, share: float) -> None:
+        """Hear what is done now, "" for the same as before, and the share that is done."""
+        if not stage:
+            self._share = share
+            return
         is_new, self._stage = stage != self._stage, stage
         now = time.monotonic()
         if self._begun is None:
             self._begun = now
-            watch(partial(setattr, self, "_share"))
             atexit.register(self.end)
             self._wait(QUICK)
-            self._from = (now, begin)
-        if begin < self._share:  # of the next log
-            self._from = (now, begin)
-        enter(begin, end)
+            self._from = (now, share)
+        if share < self._share:  # of the next log
+            self._from = (now, share)
+        self._share = share
         if is_new and now - self._begun > QUICK:
             self._show()
 

@@ -10,6 +10,7 @@ from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_wri
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs import OutputChoice
 from vftcli.signals.option import WRITE, Asked, Choice, Option, setting
+from vftcli.signals.progress import stage
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -82,7 +83,7 @@ def report(
     failed = left_out.reasons
     if not json:  # the answer first: a file that cannot be written does not cost it
         show_answers(analyses, failed, details=details)
-    choice.progress("writing", WRITING, 1.0)
+    stage("writing", WRITING, 1.0)
     record = write_report(
         output,
         [sense(made, choice) for made in analyses],

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import say, show, stages
+from vftcli.cli.console import say, show
 from vftcli.signals.option import Asked, Option
 
 
@@ -50,13 +50,8 @@ def reproduce(
     output = output or Path(f"{paper}.vft")
     folder = OutputFolder(output, force, files_of(wanted, names, figures))
     folder.check()
-    jobs, progress = jobs_of(wanted, names, fast), stages()
-    progress(f"{len(jobs)} runs", 0.0, 0.0)
-
-    def watch(done: int, of: int, what: str) -> None:
-        progress(f"{done} of {of} runs done: {what}", done / of, done / of)
-
-    found = gather(wanted, names, run_jobs(jobs, watch))
+    jobs = jobs_of(wanted, names, fast)
+    found = gather(wanted, names, run_jobs(jobs))
     with folder:
         write_reproduction(folder, wanted, found, jobs, asked.line, figures)
     show(terminal(short_overview(found)))

@@ -32,6 +32,7 @@ from vftcli.reproduction.manifest import PUSHED, BenchmarkLog, Manifest, Rival, 
 from vftcli.reproduction.scoring import SCHEMA, ScoreTask, planted, score_log
 from vftcli.signals.option import interval
 from vftcli.signals.packages import check_installed
+from vftcli.signals.progress import stage
 from vftcli.signals.shown import frame_of, per_joint
 from vftcli.signals.wrench import per_axis
 from vftcli.simulation import load_scenario, simulate
@@ -48,8 +49,6 @@ class BenchmarkRun:
     command: str  #: The command line, for the records.
     marked: frozenset[str]  #: Names of logs that are scored in spite of a complaint.
     tell: Tell = field(repr=False)
-    #: Hears what is done, how far that is, and how far all is.
-    progress: Callable[[str, float, float], None] = field(repr=False)
     failures: list[tuple[str, Failure]] = field(default_factory=list)
     efforts: list[dict[str, Any]] = field(default_factory=list)
     files: dict[str, Path] = field(default_factory=dict)  #: Name → file of each log that is there.
@@ -98,7 +97,7 @@ class BenchmarkRun:
     def make(self, name: str, path: Path, work: Callable[[Path], object]) -> bool:
         """Whether a file is there, made now unless it was."""
         if not path.exists():
-            self.progress(f"making {name}", 0.0, 0.0)
+            stage(f"making {name}")
             self.note(name, perform(work, path))
         return path.exists()
 
@@ -168,7 +167,7 @@ class BenchmarkRun:
         with closing(ended):  # type: ignore[type-var]
             for done, outcome in enumerate(ended, 1):
                 self.note(outcome.task.label, outcome)
-                self.progress(f"{done} of {len(left)} scored", done / len(left), done / len(left))
+                stage(f"{done} of {len(left)} scored", done / len(left))
 
     def tasks(self, logs: Sequence[BenchmarkLog]) -> Iterator[ScoreTask]:
         """One a log and protocol, and one a log of an arm that outside estimates have."""

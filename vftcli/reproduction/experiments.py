@@ -28,6 +28,7 @@ from vftcli.reproduction.control import closed_loop, latest_turns, released
 from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle
 from vftcli.reproduction.paper import FLOOR, Paper, RunResult, ShownItem, paper_of
 from vftcli.reproduction.timing import computing_time
+from vftcli.signals.progress import stage
 
 #: Name of an experiment's `run` → what it gives of a seed and the experiment's own
 #: arguments.
@@ -59,8 +60,6 @@ class Job(NamedTuple):
     seed: int  #: Of everything drawn.
 
 
-#: Hears how many jobs are done, how many there are, and which one ended.
-Hearer = Callable[[int, int, str], None]
 Result = RunResult | str  #: What a job gave, or the one line on why it failed.
 
 
@@ -82,8 +81,9 @@ def run_job(job: Job) -> RunResult:
     return made if job.seed == experiment.seeds[0] else replace(made, charts={})
 
 
-def run_jobs(jobs: Sequence[Job], tell: Hearer, workers: int | None = None) -> dict[Job, Result]:
+def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> dict[Job, Result]:
     """Run jobs, those that take the time last and by themselves; what fails is one line."""
+    stage(f"{len(jobs)} runs")
     experiments = {job: paper_of(job.paper).experiments[job.experiment] for job in jobs}
     alone = [job for job in jobs if experiments[job].alone]
     beside = ([job] for job in jobs if job not in alone)
@@ -92,7 +92,8 @@ def run_jobs(jobs: Sequence[Job], tell: Hearer, workers: int | None = None) -> d
         for job, value, failure, _ in chain(ended, (perform(run_job, job) for job in alone)):
             where = f"{experiments[job].title}, seed {job.seed}"
             found[job] = value if failure is None else f"{where}: {failure.line}"
-            tell(len(found), len(jobs), f"{job.experiment}, seed {job.seed}")
+            done = f"{len(found)} of {len(jobs)} runs done"
+            stage(f"{done}: {job.experiment}, seed {job.seed}", len(found) / len(jobs))
     return {job: found[job] for job in jobs}
 
 

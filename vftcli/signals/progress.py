@@ -1,33 +1,37 @@
-"""How far a long piece of work is: loops say it to whoever watches."""
+"""How far a long piece of work is: stages and loops say it to whoever hears."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
 
 Item = TypeVar("Item")
+#: Hears what is done now, "" for the same as before, and the share of the work that is done.
+Hearer = Callable[[str, float], None]
 
 
-def nobody(_share: float) -> None:
-    """Tell nobody."""
+def nobody(_stage: str, _share: float) -> None:
+    """Hear nothing."""
 
 
-def no_stage(_stage: str, _begin: float, _end: float) -> None:
-    """Tell nobody what is being done."""
-
-
-_watcher: ContextVar[Callable[[float], None]] = ContextVar("watcher", default=nobody)
+_hearer: ContextVar[Hearer] = ContextVar("hearer", default=nobody)
 _part: ContextVar[tuple[float, float]] = ContextVar("part", default=(0.0, 1.0))
 
 
-def watch(watcher: Callable[[float], None]) -> None:
-    """From now on tell someone the share of the work that is done, 0 to 1."""
-    _watcher.set(watcher)
+@contextmanager
+def heard_by(hearer: Hearer) -> Iterator[None]:
+    """Within a block tell someone else, or `nobody`."""
+    token = _hearer.set(hearer)
+    try:
+        yield
+    finally:
+        _hearer.reset(token)
 
 
-def enter(begin: float, end: float) -> None:
-    """What is done now is the work from one share to another."""
+def stage(name: str, begin: float = 0.0, end: float = 1.0) -> None:
+    """Say what is done now: the work from one share to another."""
     _part.set((begin, end - begin))
-    _watcher.get()(begin)
+    _hearer.get()(name, begin)
 
 
 def steps(items: Sequence[Item]) -> Iterator[Item]:
@@ -36,6 +40,6 @@ def steps(items: Sequence[Item]) -> Iterator[Item]:
     for k, item in enumerate(items):
         first = begin + width * k / len(items)
         _part.set((first, width / len(items)))
-        _watcher.get()(first)
+        _hearer.get()("", first)
         yield item
     _part.set((begin, width))

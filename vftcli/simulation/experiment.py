@@ -1,6 +1,6 @@
 """One simulated experiment from scenario and seed to the log and its truth."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -11,6 +11,7 @@ from vftcli.robots import Robot, load_robot
 from vftcli.robots.chain import Chain, flange_jacobian, link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.progress import stage, steps
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
 from vftcli.signals.series import resample_columns
@@ -27,10 +28,8 @@ from vftcli.simulation.sensing import (
 from vftcli.simulation.trajectories import Reference, plan
 
 MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
-REPORT_STEPS = 500  #: Inner steps between two reports of progress.
 #: Offset between the seeds of the two runs' sensors, so that their noise differs.
 PAIR_SEED = 1_000_003
-Progress = Callable[[int, int], None]  #: Called with the steps done and the steps in all.
 
 
 def flat(name: str, values: Array, axes: Sequence[str] = ()) -> dict[str, Array]:
@@ -135,17 +134,13 @@ def prepare(scenario: Scenario, seed: int) -> tuple[Arm, Reference]:
 
 
 def simulate(
-    scenario: Scenario,
-    seed: int | None = None,
-    progress: Progress | None = None,
-    noise_seed: int | None = None,
+    scenario: Scenario, seed: int | None = None, noise_seed: int | None = None
 ) -> Simulation:
     """Run an experiment: same scenario and seed, same numbers on the same platform.
 
     Args:
         scenario: The experiment.
         seed: Seed of everything drawn; the scenario's own if not given.
-        progress: Told now and then how far the run is.
         noise_seed: Seed of the sensors alone, for another log of the same arm and contacts.
 
     Raises:
@@ -155,12 +150,9 @@ def simulate(
     if noise_seed is not None:
         arm.seeds["sensing"] = np.random.SeedSequence(noise_seed)
     forward = arm.servo.feed_forward(reference)
-    for k in range(arm.steps):
+    stage("simulating")
+    for k in steps(range(arm.steps)):
         arm.command(reference.q[k], reference.dq[k], reference.ddq[k], forward[k])
-        if progress is not None and k % REPORT_STEPS == 0:
-            progress(k, arm.steps)
-    if progress is not None:
-        progress(arm.steps, arm.steps)
     return observe(arm)
 
 
@@ -179,22 +171,18 @@ def observe(arm: Arm) -> Simulation:
     )
 
 
-def simulate_pair(
-    scenario: Scenario,
-    seed: int | None = None,
-    progress: Progress | None = None,
-) -> list[Simulation]:
+def simulate_pair(scenario: Scenario, seed: int | None = None) -> list[Simulation]:
     """Run an experiment, and if it is one of a pair also the free run of the same arm.
 
     The free run has the same arm and motion, no payload and no contacts; its noise differs.
     """
-    run = simulate(scenario, seed, progress)
+    run = simulate(scenario, seed)
     if not scenario.pair:
         return [run]
     if scenario.payload is None and not scenario.contacts:
         raise ParameterError("pair = true needs a payload or contacts that the free run lacks")
     free = replace(scenario, payload=None, contacts=(), pair=False)
-    return [run, simulate(free, run.seed, progress, noise_seed=run.seed + PAIR_SEED)]
+    return [run, simulate(free, run.seed, noise_seed=run.seed + PAIR_SEED)]
 
 
 def truth_of(arm: Arm, samples: Samples) -> Truth:
