@@ -23,7 +23,7 @@ from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
-    from vftcli.evaluation import evaluate, rmse
+    from vftcli.evaluation.errors import evaluate, rmse
     from vftcli.free_motion.two_cycle import two_cycle_difference
     from vftcli.notebook import (
         admit,
@@ -58,7 +58,7 @@ else:
         "robots.run",
         "robots.chain",
         "observers",
-        "evaluation",
+        "evaluation.errors",
         "free_motion.two_cycle",
         "analysis",
         "notebook",

@@ -265,39 +265,17 @@ def force_of(
 
 
 def looped(
-    name: str,
-    seed: int | None,
-    choice: AnalysisChoice,
-    control: ControlChoice,
-    *,
-    anyway: bool,
+    name: str, seed: int | None, choice: AnalysisChoice, control: ControlChoice, *, anyway: bool
 ) -> Replayed:
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
-    from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
+    from vftcli.admittance.closed_loop import UNLOADED, loop_of
     from vftcli.admittance.replay import replay
-    from vftcli.observers import KalmanObserver
-    from vftcli.robots import load_robot
-    from vftcli.simulation import load_scenario
-    from vftcli.simulation.sensing import log_rate
 
     assert choice.wrench is not None, "`replayed` asks for one"
     zero = choice.wrench.zero
     if zero.start:
         raise ParameterError("the closed loop holds still over a span: give it as --zero A:B")
-    scenario = load_scenario(name, ())
-    arm = load_robot(scenario.robot)
-    controllers = control.controllers(arm)
-    observer = choice.observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
-    if not isinstance(observer, KalmanObserver):
-        raise ParameterError("the closed loop runs kfo-fe or kfo-zoh; choose one with --observer")
-    run = run_closed_loop(
-        scenario,
-        controllers[-1],
-        observer,
-        seed=seed,
-        torque=control.loop_torque,
-        zero=zero.spans[0] if zero.spans else UNLOADED,
-        anyway=anyway,
-    )
-    made = replay(run.wrench, run.q, arm, controllers, source=fact("force-of-loop"), anyway=anyway)
-    return Replayed(made, run=run)
+    still = zero.spans[0] if zero.spans else UNLOADED
+    run, arm = loop_of(name, control, choice.observers, seed=seed, zero=still, anyway=anyway)
+    laws, source = control.controllers(arm), fact("force-of-loop")
+    return Replayed(replay(run.wrench, run.q, arm, laws, source=source, anyway=anyway), run=run)

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import SCHEMA, evaluate, rmse
+from vftcli.evaluation.errors import SCHEMA, evaluate, rmse
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 

@@ -5,12 +5,13 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import stdtrit
 
-from vftcli.evaluation import evaluate, paired_significance
+from vftcli.evaluation.errors import evaluate
 from vftcli.evaluation.intervals import (
     Resampled,
     block_lengths,
     correlation_time,
     interval,
+    paired_significance,
     resample,
     student_quantile,
 )

@@ -3,8 +3,7 @@
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation import SCHEMA
-from vftcli.evaluation.errors import joint_means
+from vftcli.evaluation.errors import SCHEMA, joint_means
 
 
 def table(*rows: tuple[str, int, float | None, bool | None]) -> pl.DataFrame:

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.evaluation import evaluate, evaluate_pooled
-from vftcli.evaluation.errors import POOLED, PoolMember
+from vftcli.evaluation.errors import POOLED, PoolMember, evaluate, evaluate_pooled
 from vftcli.signals.external_torque import ExternalTorque
 
 T = 0.008 * np.arange(1500)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.evaluation import paired_significance
-from vftcli.evaluation.intervals import p_value
+from vftcli.evaluation.intervals import p_value, paired_significance
 from vftcli.signals.external_torque import ExternalTorque
 
 T = 0.01 * np.arange(500)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.evaluation import rmse
+from vftcli.evaluation.errors import rmse
 from vftcli.identification import Task, identify
 from vftcli.identification.methods import chosen_method
 from vftcli.identification.training import prepare_training

@@ -6,7 +6,7 @@ Scored from the first to the last sample that moves, 8 Hz zero-phase on the log'
 import numpy as np
 import pytest
 
-from vftcli.evaluation import rmse
+from vftcli.evaluation.errors import rmse
 from vftcli.identification import Task, identify
 from vftcli.identification.fitting import REPEATED, repeated_share
 from vftcli.identification.training import prepare

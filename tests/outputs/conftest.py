@@ -12,7 +12,7 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation import evaluate
+from vftcli.evaluation.errors import evaluate
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of

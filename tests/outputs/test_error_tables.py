@@ -8,7 +8,8 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation import SCHEMA, WRENCH_SCHEMA
+from vftcli.evaluation.errors import SCHEMA
+from vftcli.evaluation.wrenches import WRENCH_SCHEMA
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.error_tables import (
     axis_grids,

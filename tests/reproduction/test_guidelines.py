@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import SCHEMA
+from vftcli.evaluation.errors import SCHEMA
 from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.observer import Observer
 from vftcli.reproduction.estimates import guideline_numbers, step_response

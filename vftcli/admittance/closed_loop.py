@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.joints import FlangeSolver
 from vftcli.admittance.law import Controller, check_stable
 from vftcli.admittance.motion import Recursion, phases
 from vftcli.admittance.replay import deviation_of
+from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.paper import KalmanObserver
 from vftcli.robots import load_robot
 from vftcli.robots.robot import Robot
@@ -27,7 +29,7 @@ from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Simulation, observe
-from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.scenario import Scenario, load_scenario
 from vftcli.simulation.sensing import drive_constants, log_rate, noise_sizes, rounded
 from vftcli.simulation.trajectories import Reference, plan
 from vftcli.wrench.solvers import wrench_of
@@ -209,6 +211,25 @@ class Loop:
 
 #: In all built-in closed-loop scenarios nothing touches the arm in this span. [s]
 UNLOADED = (0.5, 3.0)
+
+
+def loop_of(
+    name: str,
+    control: ControlChoice,
+    observers: ObserverChoice,
+    **how: Any,  # noqa: ANN401 - of `run_closed_loop`
+) -> tuple[ClosedLoop, Robot]:
+    """A scenario with the last of the controllers in the loop, on the first observer; its arm.
+
+    The rest is as `run_closed_loop` has it; the arm holds still while nothing touches it.
+    """
+    scenario = load_scenario(name, ())
+    arm = load_robot(scenario.robot)
+    observer = observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
+    if not isinstance(observer, KalmanObserver):
+        raise ParameterError("the closed loop runs kfo-fe or kfo-zoh; choose one with --observer")
+    law, how = control.controllers(arm)[-1], {"zero": UNLOADED, **how}
+    return run_closed_loop(scenario, law, observer, torque=control.loop_torque, **how), arm
 
 
 def run_closed_loop(

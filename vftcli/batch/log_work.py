@@ -15,7 +15,7 @@ from polars import Boolean, Float64, Int64, String
 from vftcli.analysis import Analysis
 from vftcli.batch.cluster import begin
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation import WRENCH_SCHEMA
+from vftcli.evaluation.wrenches import WRENCH_SCHEMA
 from vftcli.observers.table import BEST
 from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.batch_folder import BatchFolder

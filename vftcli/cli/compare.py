@@ -61,7 +61,7 @@ def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, detai
     """The errors for the terminal, with details the pairs of observers below them."""
     import polars as pl
 
-    from vftcli.evaluation import paired_significance
+    from vftcli.evaluation.intervals import paired_significance
     from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.grids import pairs_text
 

@@ -6,20 +6,17 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.admittance.choice import ControlChoice
-from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, Latency, latencies, run_closed_loop
+from vftcli.admittance.closed_loop import ClosedLoop, Latency, latencies, loop_of
 from vftcli.admittance.law import AXES, UnstableError
 from vftcli.admittance.motion import release, releases_of, rows_of
 from vftcli.admittance.motion import run as follow_force
 from vftcli.admittance.replay import Replay, replay, settling
-from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance import charts as replay_charts
 from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, RunResult
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
-from vftcli.simulation import load_scenario
-from vftcli.simulation.sensing import log_rate
 
 #: Variant → how the sensor's Kalman filter reads R and Q.
 CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
@@ -64,22 +61,16 @@ def looped(
     name: str, variant: str, alphas: Sequence[float], seed: int
 ) -> tuple[ClosedLoop, Replay]:
     """A scenario with Table III's controller in the loop, and force replays."""
-    scenario = load_scenario(name, ())
-    arm = load_robot(scenario.robot)
-    alone = ControlChoice(as_printed=variant == AS_PRINTED)
+    control = ControlChoice(as_printed=variant == AS_PRINTED)
     observers = ObserverChoice.parsed(
         observer=["kfo-fe"], settings={"kfo.noise_convention": CONVENTIONS[variant]}
     )
-    observer = observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
-    assert isinstance(observer, KalmanObserver)
-    inner = alone.controllers(arm)[-1]
-    run = run_closed_loop(scenario, inner, observer, seed=seed, zero=UNLOADED)
+    run, arm = loop_of(name, control, observers, seed=seed)
     if not run.stable:
         raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
     # One force enters every controller.
-    everything = replace(alone, alphas=tuple(alphas)).controllers(arm)
-    source = fact("force-of-loop")
-    return run, replay(run.wrench, run.q, arm, everything, source=source)
+    laws = replace(control, alphas=tuple(alphas)).controllers(arm)
+    return run, replay(run.wrench, run.q, arm, laws, source=fact("force-of-loop"))
 
 
 def ungated(found: Replay) -> Replay:

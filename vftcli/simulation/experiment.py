@@ -1,6 +1,5 @@
 """One simulated experiment from scenario and seed to the log and its truth."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -15,7 +14,8 @@ from vftcli.signals.progress import stage, steps
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
 from vftcli.signals.series import resample_columns
-from vftcli.signals.wrench import AXES, WrenchFrame
+from vftcli.signals.shown import per_joint
+from vftcli.signals.wrench import WrenchFrame, per_axis
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import (
@@ -32,12 +32,6 @@ MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gi
 PAIR_SEED = 1_000_003
 
 
-def flat(name: str, values: Array, axes: Sequence[str] = ()) -> dict[str, Array]:
-    """Columns of values (M, k), called by their axes or by numbers from 1. (M,) each"""
-    labels = axes or [str(k) for k in range(1, values.shape[1] + 1)]
-    return {f"{name}/{label}": c for label, c in zip(labels, values.T, strict=True)}
-
-
 @dataclass(frozen=True, kw_only=True)
 class Truth:
     """True torques and wrenches at each sample, on the log's clock."""
@@ -51,11 +45,12 @@ class Truth:
 
     def columns(self) -> dict[str, Array]:
         """The columns of the truth file, flat, in order, t from the first sample. (M,) each"""
-        table = {"t": self.t} | flat("tau_ext", self.tau_ext) | flat("wrench", self.wrench, AXES)
+        table = {"t": self.t}
+        table |= [*per_joint("tau_ext", self.tau_ext), *per_axis("wrench", self.wrench)]
         for name, values in self.contacts.items():
-            table |= flat(f"contact/{name}", values, AXES)
+            table |= per_axis(f"contact/{name}", values)
         for name, values in self.walks.items():
-            table |= flat(f"contact/{name}", values)
+            table |= per_joint(f"contact/{name}", values)
         return table
 
 

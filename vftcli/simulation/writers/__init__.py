@@ -19,8 +19,9 @@ from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.pose import log_matrix
-from vftcli.signals.wrench import AXES
-from vftcli.simulation.experiment import FlangeMotion, Simulation, Truth, flat
+from vftcli.signals.shown import per_joint
+from vftcli.signals.wrench import per_axis
+from vftcli.simulation.experiment import FlangeMotion, Simulation, Truth
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
@@ -194,7 +195,7 @@ def write_parquet(path: Path, simulation: Simulation) -> None:
     for name, values in signals.items():
         if name != "target_current" or "current" in signals:
             label = "tau" if name == "torque" else name
-            columns |= flat(label, values, AXES if name == "wrench" else ())
+            columns |= (per_axis if name == "wrench" else per_joint)(label, values)
     write_columns(path, {name: values[rows] for name, values in columns.items()})
 
 
