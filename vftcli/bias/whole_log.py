@@ -232,7 +232,7 @@ def remarks_of(found: Guarded, changed: Array, free_share: float) -> tuple[Remar
     """Joints that were corrected, by how much (n,) [N·m] rms, and those left alone."""
     applied, remarks = found.weight > 0.0, []
     for code, joints in {"applied": applied, "left-alone": ~applied}.items():
-        values: dict[str, object] = {"unseen_share": found.share[joints].tolist()}
+        values = {"unseen_share": found.share[joints].tolist()}
         if code == "applied":
             values |= {"changed_Nm": changed[joints].tolist(), "free_share": free_share}
         if joints.any():

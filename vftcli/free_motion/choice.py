@@ -138,8 +138,8 @@ class FreeChoice(Choice):
 
         A word of `free` is a log or a span ``A:B``.
         """
-        spans: list[tuple[float, float]] = []
-        logs: list[Path] = []
+        spans = []
+        logs = []
         for word in free or ():
             # What reads as a span is one: a file of such a name can be given as ./A:B.
             try:

@@ -146,7 +146,7 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
     remarks = []
     for run in motion.runs:
         found, code = run.alignment, "free-run-aligned"
-        values: dict[str, Any] = {
+        values = {
             "shift_s": found.shift,
             "deviation_mrad": 1e3 * found.deviation,
             "covered_s": float(np.count_nonzero(run.pairing.known)) * recording.median_step,

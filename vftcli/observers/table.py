@@ -347,7 +347,7 @@ def build_observers(
         check_known(name, OBSERVERS, f"no observer {name!r}")
     built = [OBSERVERS[name].build(setup, name) for name in dict.fromkeys(names)]
     # Several observers may miss one gain: remark on it once.
-    remarks: list[Remark] = []
+    remarks = []
     for _, own in built:
         remarks += [remark for remark in own if remark not in remarks]
     return tuple(observer for observer, _ in built), tuple(remarks)

@@ -310,7 +310,7 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
     if goal.name == "auto":
         curve = error_curve(momentum, spectra)
         shared = float(curve.omega_n[curve.rmse.mean(axis=1).argmin()])
-    lines: dict[str, tuple[Observer, Array, dict[str, Any]]] = {
+    lines = {
         "fdo": (FilteredDynamicsObserver(omega=shared), np.full(n, shared), {"omega": shared}),
         "gmo": (momentum(first_order), first_order, {"gain": first_order.tolist()}),
     }

@@ -280,7 +280,7 @@ class LumpedArm:
     def groups(self) -> dict[str, tuple[int, Pose]]:
         """Link → the joint that moves it, from 0, or `BASE`, and its pose there."""
         index = {joint: j for j, joint in enumerate(self.joints)}
-        found: dict[str, tuple[int, Pose]] = {self.tree.root: (BASE, IDENTITY)}
+        found = {self.tree.root: (BASE, IDENTITY)}
         for joint in self.tree.inner:
             group, pose = found[joint.parent]
             if joint in index:

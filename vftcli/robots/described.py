@@ -163,7 +163,7 @@ def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]
 def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
     """Which joints, flange and locked parts the arm has."""
     locked = {joint.name: lumped.position(joint) for joint in lumped.locked}
-    values: dict[str, Any] = {
+    values = {
         "robot": lumped.tree.name,
         "count": chain.joints,
         "joints_taken": list(chain.names),
@@ -273,7 +273,7 @@ def xml_root(text: str, path: Path) -> ET.Element:
     parser = ET.XMLParser(target=GuardedBuilder(path))
     try:
         parser.feed(text)
-        root: ET.Element = parser.close()
+        root = parser.close()
     except (ET.ParseError, ValueError) as error:
         raise RobotError(f"{path}: not a URDF, xacro or MJCF, which is XML: {error}") from None
     return root

@@ -105,7 +105,7 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
     r = [constants(translation) for translation in chain.translation]
 
     omega, v, gamma = NOTHING, NOTHING, constants(chain.gravity)
-    motion: list[tuple[Vector, Vector, Vector]] = []
+    motion = []
     for j in range(n):
         v = on.add(v, on.cross(omega, r[j]))
         omega, v, gamma = (
@@ -114,7 +114,7 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
         omega = on.add(omega, (ZERO, ZERO, dq[j]))
         motion.append((omega, v, gamma))
 
-    results: list[dict[str, Value]] = []
+    results = []
     K, L, H = NOTHING, NOTHING, NOTHING  # of the links behind, in the axes of this one
     for j in range(n - 1, -1, -1):
         omega, v, gamma = motion[j]
@@ -277,7 +277,7 @@ def load_wrench(chain: Chain, q: Array) -> Array:
     A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange
     point.
     """
-    gravity = np.asarray(chain.gravity)
+    gravity = chain.gravity
     wrench = np.zeros((len(q), 6, 4))
     wrench[:, :3, 0] = gravity
     # v × g₀ = −[g₀]× v

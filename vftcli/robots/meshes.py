@@ -53,7 +53,7 @@ def meshes_of(arm: LumpedArm, root: ET.Element) -> tuple[Mesh, ...]:
     packages |= packages_near(arm.tree.path) if asked else ()
     links = {link.get("name", ""): UrdfPart(arm.tree.path, link) for link in root.iterfind("link")}
     turns = [IDENTITY, *(Pose(turn.T, np.zeros(3)) for turn, _ in arm.turned)]
-    found: list[Mesh] = []
+    found = []
     for name, (joint, pose) in arm.groups.items():
         each = [list(named(links[name], tag, packages)) for tag in ("visual", "collision")]
         whole = (some for some in each if some and all(mesh.file for mesh in some))
@@ -120,7 +120,7 @@ def read_mesh(mesh: Mesh) -> Array:
     corners = found @ (mesh.pose.rotation * mesh.scale).T + mesh.pose.translation
     # Six times its volume: turned over where it or its scale is mirrored.
     volume = np.linalg.det(corners - corners.mean(axis=(0, 1))).sum()
-    return np.asarray(corners if volume >= 0.0 else corners[:, ::-1])
+    return corners if volume >= 0.0 else corners[:, ::-1]
 
 
 def stl_corners(contents: bytes) -> Array:
@@ -140,7 +140,7 @@ def obj_corners(contents: bytes) -> Array:
             at = [int(word.split(b"/")[0]) for word in words]
             at = [k - 1 if k > 0 else len(points) + k for k in at]
             fans += ([at[0], *pair] for pair in pairwise(at[1:]))
-    every: Array = np.array(points).astype(float).reshape(-1, 3)
+    every = np.array(points).astype(float).reshape(-1, 3)
     return np.asarray(every[np.array(fans)])
 
 
@@ -186,7 +186,7 @@ def geometry_corners(triangles: ET.Element, named: Mapping[str, ET.Element]) -> 
     (places,) = triangles.iterfind("p")
     width = 1 + max(int(each.attrib["offset"]) for each in triangles.iterfind("input"))
     at = np.array((places.text or "").split(), dtype=int).reshape(-1, 3, width)
-    every: Array = np.array((points.text or "").split(), dtype=float).reshape(-1, 3)
+    every = np.array((points.text or "").split(), dtype=float).reshape(-1, 3)
     return np.asarray(every[at[:, :, int(vertex.attrib["offset"])]])
 
 

@@ -330,7 +330,7 @@ def kept_or_new(old: Table, payload: Payload) -> Table:
 def xyz_rpy_document(robot: Robot) -> Table:
     """A document for a robot that came from a URDF: its chain, stated as xyz and rpy."""
     chain = robot.chain
-    joints: list[Table] = []
+    joints = []
     figures = {**vars(robot.limits), **{f"noise_{k}": v for k, v in vars(robot.noise).items()}}
     for j, name in enumerate(chain.names):
         rpy = list(rpy_angles(chain.rotation[j]))

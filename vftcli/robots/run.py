@@ -226,7 +226,7 @@ def paired(recording: Recording, robot: Robot) -> Recording:
             remarks = [fact("joints-by-name", joints=[named[k] for k in order])]
             remarks += [fact("joints-left-out", joints=left)] if left else []
             there = set(JOINT_SIGNALS).intersection(recording.signals)
-            fields: dict[str, Any] = {x: getattr(recording, x)[:, order] for x in there}
+            fields = {x: getattr(recording, x)[:, order] for x in there}
             names = tuple(named[k] for k in order)
             recording = recording.changed(*remarks, joint_names=names, **fields)
     done = {remark.code for remark in recording.source.remarks}
@@ -251,7 +251,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
     if recording.joints != robot.joints:
         return recording
-    changed: dict[str, Any] = {}
+    changed = {}
     jumping = set[int]()
     for signal in ("q", "target_q"):
         if (values := getattr(recording, signal)) is not None:

@@ -143,7 +143,7 @@ class Program:
         """Plan the operations."""
         # The row of each output, None for constants: made by an operation, without sign,
         # once.
-        rows: list[int | None] = []
+        rows = []
         for sign, row in outputs:
             if row is None or (sign > 0.0 and row >= tape.inputs and row not in rows):
                 rows.append(row)

@@ -199,7 +199,7 @@ def raw_disturbance(terms: DynamicsTerms, room: Array | None = None) -> Array:
     sample of the external torque and of everything else that the model leaves
     unexplained.
     """
-    d: Array = np.subtract(terms.p[1:], terms.p[:-1], out=room)
+    d = np.subtract(terms.p[1:], terms.p[:-1], out=room)
     d /= np.diff(terms.t)[:, None]
     for j, mu in enumerate(terms.mu.T):
         d[:, j] -= 0.5 * (mu[1:] + mu[:-1])

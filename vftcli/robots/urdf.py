@@ -45,7 +45,7 @@ def urdf_tree(path: Path, root: ET.Element) -> BodyTree:
         )
     if not links:
         raise RobotError(f"{path}: the <robot> is empty: it has no link and no joint")
-    bodies: dict[str, Body] = {}
+    bodies = {}
     for link in links:
         if link.name in bodies:
             link.refuse("another link has this name; each needs its own")

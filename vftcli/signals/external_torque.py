@@ -99,7 +99,7 @@ class DynamicsTerms(Shown):
 
 def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
     """Series "p" or "mu" a sample earlier; the first is its own. (T, n)"""
-    series: Array = getattr(terms, name)
+    series = getattr(terms, name)
     first = series[:1] if terms.before is None else getattr(terms.before, name)[None]
     return np.concatenate([first, series[:-1]])
 

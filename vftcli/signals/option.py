@@ -172,7 +172,7 @@ class Choice:
     def words_of(cls, settings: Mapping[str, str]) -> dict[str, Any]:
         """The words that settings state, by name; those of other choices are left out."""
         own = {name: text for name, text in settings.items() if cls.takes(name)}
-        words: dict[str, Any] = {name: own.pop(name) for name in cls.options() if name in own}
+        words = {name: own.pop(name) for name in cls.options() if name in own}
         return words | ({NUMBERS: [f"{name}={text}" for name, text in own.items()]} if own else {})
 
     @classmethod

@@ -42,7 +42,7 @@ def adjoint(pose: Pose) -> Array:
     With R the orientation and p the origin of S in F it is [[R, 0], [[p]×R, R]],
     Pinocchio's ``SE3(R, p).act(Force)``.
     """
-    R, p = np.asarray(pose.rotation), np.asarray(pose.translation)
+    R, p = pose.rotation, pose.translation
     X = np.zeros((*R.shape[:-2], 6, 6))
     X[..., :3, :3] = X[..., 3:, 3:] = R
     X[..., 3:, :3] = skew(p) @ R

@@ -294,7 +294,7 @@ class Recording(TimeSeries):
                 f"be read as {kind}; name the column with --columns"
             )
         source = source or there[0]
-        value: Array = getattr(self, source)
+        value = getattr(self, source)
         remark = fact("effort-taken", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
         # 0 + x: no zero of the other sign.
         return self.changed(remark, **{**dict.fromkeys(there), kind: 0.0 + factor * value})

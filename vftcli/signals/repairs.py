@@ -89,7 +89,7 @@ def without_isolated(recording: Recording) -> Recording:
     """
     there = [name for name in ("q", "dq", *EFFORTS) if getattr(recording, name) is not None]
     changed = np.zeros(recording.q.shape, bool)
-    values: dict[str, Any] = {}
+    values = {}
     for name in there:
         x = getattr(recording, name)
         with np.errstate(all="ignore"):  # what no arm does overflows, and is left as it is

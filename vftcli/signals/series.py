@@ -95,5 +95,5 @@ def near(mask: Mask, count: int) -> Mask:
     mask.cumsum(axis=0, out=total[1:])
     k = np.arange(len(mask))
     first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(mask))
-    found: Mask = total[last] > total[first]
+    found = total[last] > total[first]
     return found
