@@ -9,19 +9,12 @@ import numpy as np
 import pytest
 from known_errors import drawn_error, wrong_run
 
-from vftcli.bias import refine
-from vftcli.bias.baseline import Baselines, baseline_of
 from vftcli.doctor.examination import Examiner
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.free_motion.free_motion import FreeMotion
-from vftcli.observers import MomentumObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.tuning import noise_level
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.robots import load_robot
-from vftcli.robots.run import Run
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 
 BEST = AnalysisChoice(observers=ObserverChoice(names=("best",)), contacts=False)
@@ -92,7 +85,6 @@ def test_every_joint_of_the_best_is_a_number(slow, panda, seed, stale, jitter, g
     (best,) = analysis.estimates
     assert np.isfinite(best.tau).all()
     assert best.error_sd is None or np.all(best.error_sd > 0.0)
-    assert "estimate-without-number" not in {r.code for r in analysis.remarks}
 
 
 def test_an_hour_without_samples_costs_no_band(slow, panda):
@@ -114,40 +106,3 @@ def test_no_noise_in_the_loaded_part_still_leaves_a_filter():
     np.testing.assert_allclose(r[0], 1e-6 * heard[0], rtol=1e-12)
     # R is the variance of a sample's momentum times Ts: that of 1e-6 N·m over .03 s
     np.testing.assert_allclose(r[1], (1e-6 * 0.03) ** 2 * 0.03, rtol=1e-12)
-
-
-class Numberless:
-    """A momentum observer that knows nothing of joint 3."""
-
-    name = "best"
-    inner = MomentumObserver(gain=np.full(7, 10.0))
-
-    def estimate(self, terms):
-        tau = np.array(self.inner.estimate(terms).tau)
-        tau[50:, 2] = np.nan
-        return ExternalTorque(name=self.name, t=terms.t, tau=tau)
-
-    def tuning(self, step, joints):
-        return self.inner.tuning(step, joints)
-
-    def frequency_response(self, frequency, step, joints):
-        return self.inner.frequency_response(frequency, step, joints) * np.where(
-            np.arange(7) == 2, np.nan, 1.0
-        )
-
-
-def test_a_joint_without_a_number_is_the_momentum_observers_and_named(slow, panda):
-    run = Run(recording=slow, robot=panda)
-    found = baseline_of(FreeMotion(log=run, choice=FreeChoice.parsed(free=["0:6"])))
-    observer = Numberless()
-    both = Baselines(plain=found, best=found)
-    made = refine.refine(both, [observer], [observer.estimate(run.terms)])
-    (estimate,) = made.estimates
-    (gmo,), _ = ObserverChoice(names=("gmo",)).build(panda, slow.median_step)
-    np.testing.assert_array_equal(estimate.tau[:, 2], gmo.estimate(run.terms).tau[:, 2])
-    others = np.arange(7) != 2
-    own = observer.inner.estimate(run.terms).tau
-    np.testing.assert_array_equal(estimate.tau[:, others], own[:, others])
-    assert np.isfinite(estimate.error_sd).all()
-    (said,) = [r for r in made.remarks if r.code == "estimate-without-number"]
-    assert (said.where.about, said.where.joints) == ("best", (3,))

@@ -2,9 +2,7 @@
 
 Bands come from the log's own free samples and spectra, and say what an estimate's error
 is expected to be without a reference: the root mean square of their standard deviation
-over the log, the mean over the joints. Gains from a log's spectra and a clock with gaps
-may together be more than numbers can hold. On such a joint the momentum observer, which
-adds up its input, replaces it.
+over the log, the mean over the joints.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +16,7 @@ from vftcli.bias.choice import AUTOMATIC
 from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.bias.whole_log import stride_of
 from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.observer import Complex, Observer, Tuning
+from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import (
     ENOUGH,
     UNSEEN,
@@ -32,7 +30,7 @@ from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
 from vftcli.robots.friction import HELD, ONE_STOP
 from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares
 from vftcli.signals.errors import ClockError
-from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.series import resample_columns
 from vftcli.signals.shown import Shown
@@ -247,53 +245,6 @@ def gap_remark(
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class SparedObserver(Shown):
-    """An observer with some of its joints left to another."""
-
-    observer: Observer  #: Whose name it has.
-    spare: Observer  #: Who does those joints.
-    lost: Mask  #: Which they are. (n,)
-
-    @property
-    def name(self) -> str:
-        """Its name at the command line."""
-        return self.observer.name
-
-    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
-        """Run over a whole log; without the filter's own deviation, which the spare has not."""
-        own, spare = (o.estimate(terms).tau for o in (self.observer, self.spare))
-        tau = handed_over(np.where(self.lost, spare, own))
-        return ExternalTorque(name=self.name, t=terms.t, tau=tau)
-
-    def tuning(self, step: float, joints: int) -> Tuning:
-        """What the first one's parameters mean at a sample time. [s]"""
-        return self.observer.tuning(step, joints)
-
-    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
-        with np.errstate(all="ignore"):  # skip what is no number
-            own, spare = (
-                o.frequency_response(frequency, step, joints) for o in (self.observer, self.spare)
-            )
-        return np.where(self.lost, spare, own)
-
-
-def with_spare(
-    found: Baseline, observer: Observer, estimate: ExternalTorque
-) -> tuple[Observer, ExternalTorque, tuple[Remark, ...]]:
-    """An observer and its estimate, their lost joints left to the momentum observer, said so."""
-    lost = np.any(~estimate.known, axis=0)
-    if not lost.any():
-        return observer, estimate, ()
-    log = found.motion.log
-    (spare,), _ = ObserverChoice(names=("gmo",)).build(log.robot, log.recording.median_step)
-    made = SparedObserver(observer=observer, spare=spare, lost=lost)
-    where = on_joints(lost)._replace(about=observer.name)
-    remark = caution("estimate-without-number", where)
-    return made, made.estimate(found.log.terms), (remark,)
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
 class Refinement(Shown):
     """What the complete log makes of its estimates."""
 
@@ -319,9 +270,7 @@ def refine(
     for observer, estimate in zip(observers, estimates, strict=True):
         # Observers may run on different terms: each is measured on its own.
         on = found.of(observer.name)
-        runs, complete, lost = with_spare(on, observer, estimate)
-        reading = free_reading(on, runs, complete)
-        remarks += lost
+        reading = free_reading(on, observer, estimate)
         if on.spectra is not None:
             budgets.append(budget(on, on.spectra, reading))
         shown.append(with_band(on, reading))
