@@ -184,10 +184,6 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "gain 2d": (r"\(n,\)", lambda: vft.MomentumObserver(gain=[[5, 3]])),
     "gain text": ("array of numbers", lambda: vft.MomentumObserver(gain="fast")),
     "kalman": (r"\(6,\)", lambda: vft.KalmanObserver(r_diag=[1, 2]).estimate(TERMS)),
-    "covariance": (
-        r"\(3, 6\)",
-        lambda: vft.KalmanObserver(initial_covariance=np.zeros((2, 2))).estimate(TERMS),
-    ),
     "omega": ("one number", lambda: vft.FilteredDynamicsObserver(omega=[1, 2])),
     "no terms": ("Run", lambda: vft.MomentumObserver().estimate(RECORDING)),
     "q one joint": (r"\(T, n\)", lambda: vft.Recording(t=T, q=Q[:, 0])),

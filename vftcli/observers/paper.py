@@ -57,8 +57,7 @@ from vftcli.signals.arrays import Array, frozen, handed_over, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, one_sample_earlier
 from vftcli.signals.parsing import check_known
-from vftcli.signals.remarks import Where, caution, warning
-from vftcli.signals.series import Clock
+from vftcli.signals.remarks import caution, on_joints, warning
 from vftcli.signals.steady_filter import recursion, steady_filter
 
 GAP = 3.0  #: A step of more than this many nominal ones is a gap.
@@ -216,9 +215,9 @@ class MomentumObserver(FirstOrderObserver):
         gain = self.rates(terms.joints)
         start = np.zeros((2, terms.joints)) if state is None else state.states
         tau, end = printed_momentum(terms, gain, start)
-        unstable = np.flatnonzero(0.5 * terms.clock.step * gain >= 1.0)
-        joints = Where(joints=tuple(int(j) + 1 for j in unstable))
-        remarks = (warning("unstable-as-printed", joints),) if len(unstable) else ()
+        unstable = 0.5 * terms.clock.step * gain >= 1.0
+        said = warning("unstable-as-printed", on_joints(unstable))
+        remarks = (said,) if unstable.any() else ()
         return self.estimated(terms, tau, remarks=remarks), FirstOrderState(end)
 
 
@@ -245,9 +244,6 @@ class KalmanObserver(BlockObserver):
     #: a in A_τ = −a, of either sign. (n,) [1/s]
     decay: Array | float = 0.0
     noise_convention: str = "density"  #: A key of `NOISE_CONVENTIONS`.
-    #: P⁻ of the first sample: P₁₁, P₁₂, P₂₂ of each joint; None for the stationary one.
-    #: (3, n)
-    initial_covariance: Array | None = None
     #: Use μᵗ alone (40), the literal noise convention, (44)'s printed block.
     as_printed: bool = False
 
@@ -278,7 +274,7 @@ class KalmanObserver(BlockObserver):
         """A block's estimate after the last block's state; None at the log's start."""
         n, step, begins, d = terms.joints, terms.clock.step, state is None, self.unexplained(terms)
         zero, densities, settled = np.zeros((2, n)), self.densities(n), self.steady(step, n)
-        if self.is_steady(terms.clock):
+        if terms.clock.uniform:
             F, g = error_filter(settled, self.model(step, n))
             start = zero if state is None else state.error
             tau, end = steady_filter(F, g, d, start, wanted=TORQUE)
@@ -287,10 +283,7 @@ class KalmanObserver(BlockObserver):
         elif self.prints_hold:
             every = self.model(np.broadcast_to(terms.dt, (len(d), 1)), n)
             if state is None:
-                P = np.stack(self.first_prior(step, n))[[[0, 1], [1, 2]]]
-                if self.initial_covariance is None:
-                    P = settled_prior(self.model(step, n), densities)
-                state = KalmanState(zero, P)
+                state = KalmanState(zero, settled_prior(self.model(step, n), densities))
             tau, sd, state = printed_hold_steps(d, every, densities, state, begins=begins)
         else:
             if state is None:
@@ -329,10 +322,6 @@ class KalmanObserver(BlockObserver):
         """Whether its noise is (44)'s as printed."""
         return self.as_printed and self.discretisation == "zoh"
 
-    def is_steady(self, clock: Clock) -> bool:
-        """Whether a log's clock gives stationary gains from its start."""
-        return clock.uniform and self.initial_covariance is None
-
     def unexplained(self, terms: DynamicsTerms) -> Array:
         """Input pᵗ − pᵗ⁻¹ − Ts·u: `DynamicsTerms.d`, or u = μᵗ (40). (T, n)"""
         if not self.as_printed:
@@ -340,14 +329,8 @@ class KalmanObserver(BlockObserver):
         return terms.d + 0.5 * terms.dt * (one_sample_earlier(terms, "mu") - terms.mu)
 
     def first_prior(self, step: float, joints: int) -> Covariance:
-        """Covariance before the first update: given, or stationary at a sample time [s]. (n,)"""
-        if self.initial_covariance is None:
-            return predict(self.steady(step, joints).posterior, self.model(step, joints))
-        given = np.asarray(self.initial_covariance, float)
-        if given.shape not in {(3,), (3, 1), (3, joints)}:
-            words = f"initial_covariance of {self.name} has shape {given.shape}"
-            raise ShapeError(f"{words}; expected (3, {joints}): P₁₁, P₁₂, P₂₂ of each joint")
-        return Covariance(*np.broadcast_to(given.reshape(3, -1), (3, joints)))
+        """Covariance before the first update, the stationary one at a sample time [s]. (n,)"""
+        return predict(self.steady(step, joints).posterior, self.model(step, joints))
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)), exact delay.

@@ -52,7 +52,7 @@ class KalmanSmoother(Shown):
         """A smoothed log; `sd` is the smoother's own √P₂₂."""
         kalman, step, n = self.filter, terms.clock.step, terms.joints
         model, gains, d = kalman.model(step, n), kalman.steady(step, n), kalman.unexplained(terms)
-        if not (even := kalman.is_steady(terms.clock)):
+        if not (even := terms.clock.uniform):
             model = kalman.model(np.broadcast_to(terms.dt, (terms.samples, 1)), n)
             gains = gain_sequence(model, kalman.first_prior(step, n), gains.posterior)
         (_, p12, p22), a12, S = gains.posterior, model.a12, gains.S
@@ -85,7 +85,7 @@ class KalmanSmoother(Shown):
         weights = np.array([p12**2, 2.0 * p12 * p22, p22**2])
         gained, known = from_the_end(information, shown, np.ones_like(tau), weights)
         variance = p22 - gained
-        if kalman.initial_covariance is None and len(d) > 1 and model.a22.all():
+        if len(d) > 1 and model.a22.all():
             # Whatever was before the log: x⁰ is x̂⁰ − M⁻¹λ̃⁰ ± M⁻¹, M = Λ̃⁰ + S/R² of p⁰
             # alone.
             first = np.s_[...] if even else np.s_[..., 0, :]
