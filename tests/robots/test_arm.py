@@ -20,7 +20,7 @@ from made_urdfs import (
 )
 
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.chain import improper, nearest_tensor, unphysical
+from vftcli.robots.chain import nearest_tensor, unphysical
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import rotation_about
 
@@ -190,7 +190,7 @@ def test_the_nearest_tensor_is_valid_and_no_farther_than_it_must_be() -> None:
     R = rotation_about("x", 0.4) @ rotation_about("z", -1.1)
     bad = R @ np.diag([1.0, 2.0, 4.0]) @ R.T
     assert "triangle" in unphysical(1.0, bad)
-    assert not improper(1.0, bad)
+    assert not unphysical(1.0, bad, triangle=False)
     near = nearest_tensor(bad)
     assert not unphysical(1.0, near)
     np.testing.assert_allclose(near, R @ np.diag([1.5, 2.5, 4.0]) @ R.T, atol=1e-14)

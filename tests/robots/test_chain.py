@@ -110,12 +110,12 @@ ANGLES = (0.3, -0.8, 1.9)
 DOCUMENT = {"flange_d": 0.15, "ee_xyz": [0.01, 0.02, 0.03], "ee_rpy": [0.1, 0.2, 0.3]}
 
 
-def flange(found: tuple[list[Pose], list[Pose], Pose], angles: tuple[float, ...]) -> Pose:
+def flange(found: tuple[list[Pose], list[Pose]], angles: tuple[float, ...]) -> Pose:
     """The tip's pose in the base at joint angles [rad], frame by frame."""
-    pose = IDENTITY
-    for placement, angle in zip(found[0], angles, strict=True):
+    pose, (*placements, tip) = IDENTITY, found[0]
+    for placement, angle in zip(placements, angles, strict=True):
         pose = pose @ placement @ Pose(rotation_about("z", angle), np.zeros(3))
-    return pose @ found[2]
+    return pose @ tip
 
 
 def along(d: float) -> Pose:
@@ -159,16 +159,17 @@ def test_modified_dh_moves_first() -> None:
         pose = pose @ Pose(rotation_about("z", angle + j["theta"]), np.zeros(3)) @ along(j["d"])
     same(flange(found, ANGLES), pose @ tip())
     same(found[1][1], IDENTITY)
-    same(kinematics("modified-dh", TABLE, {})[2], IDENTITY)  # no tip is stated
+    same(kinematics("modified-dh", TABLE, {})[0][-1], IDENTITY)  # no tip is stated
 
 
 @pytest.mark.parametrize("name", ["standard-dh", "modified-dh"])
 def test_xyz_rpy_states_any_other_s_placements(name: str) -> None:
     given = kinematics(name, TABLE, {})
+    *placements, tip = given[0]
     joints = [
-        {"xyz": p.translation.tolist(), "rpy": list(rpy_angles(p.rotation))} for p in given[0]
+        {"xyz": p.translation.tolist(), "rpy": list(rpy_angles(p.rotation))} for p in placements
     ]
-    end = {"ee_xyz": given[2].translation, "ee_rpy": rpy_angles(given[2].rotation)}
+    end = {"ee_xyz": tip.translation, "ee_rpy": rpy_angles(tip.rotation)}
     same(flange(kinematics("xyz-rpy", joints, end), ANGLES), flange(given, ANGLES))
 
 

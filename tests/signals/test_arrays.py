@@ -16,7 +16,6 @@ from vftcli.signals.arrays import (
     median,
     number_array,
     seal,
-    seal_mask,
 )
 from vftcli.signals.errors import ClockError, ShapeError
 
@@ -54,7 +53,7 @@ class Sealed:
 
     def __post_init__(self) -> None:
         seal(self, "values", "maybe")
-        seal_mask(self, "mask")
+        seal(self, "mask", kind=bool)
 
 
 def test_a_type_seals_its_arrays_and_leaves_what_is_none() -> None:

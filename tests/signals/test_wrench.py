@@ -69,7 +69,7 @@ def test_without_a_mask_all_is_known() -> None:
 
 
 def test_a_mask_has_one_entry_a_sample() -> None:
-    with pytest.raises(ShapeError, match="mask of x"):
+    with pytest.raises(ShapeError, match="masked of x"):
         wrench(np.zeros(3, dtype=bool))
 
 

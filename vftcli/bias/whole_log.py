@@ -32,7 +32,7 @@ from vftcli.bias.robust_fit import (
     slow_loads,
 )
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares, seal, seal_mask
+from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares, seal
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution, fact, on_joints
@@ -88,7 +88,7 @@ class WholeLogBias:
 
     def __post_init__(self) -> None:
         seal(self, "weight", "bias", "sd", "load")
-        seal_mask(self, "free")
+        seal(self, "free", kind=bool)
 
     @property
     def applied(self) -> Mask:

@@ -123,7 +123,7 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
     low, high = float(grid[0]), float(grid[-1])
     reached = (("slowest", rate <= low, low), ("fastest", rate >= high, high))
     return tuple(
-        warning(f"gain-at-{end}", on_joints(joints)._replace(about=name), rate_rad_s=bound)
+        warning(f"gain-at-{end}", on_joints(joints, name), rate_rad_s=bound)
         for end, joints, bound in reached
         if joints.any()
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.robots.chain import NO_BODY, Body, Chain, improper, merge_bodies, nearest_tensor
+from vftcli.robots.chain import NO_BODY, Body, Chain, merge_bodies, nearest_tensor, unphysical
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean
@@ -55,9 +55,8 @@ class TreeJoint:
         if position == 0.0:
             return self.placement
         along = position * self.axis
-        if self.kind == "prismatic":
-            return self.placement @ Pose(np.eye(3), along)
-        return self.placement @ Pose(exp_matrix(along), np.zeros(3))
+        slides = self.kind == "prismatic"
+        return self.placement @ (Pose(np.eye(3), along) if slides else Pose(exp_matrix(along)))
 
 
 def first_twice(names: Iterable[str]) -> str:
@@ -316,12 +315,12 @@ class LumpedArm:
                 parts[group].append(self.tree.bodies[link].moved(pose))
         found = []
         for joint, body in zip(self.joints, map(merge_bodies, parts), strict=True):
-            if why := improper(body.mass, body.inertia):
+            if why := unphysical(body.mass, body.inertia, triangle=False):
                 raise RobotError(
                     f"{self.tree.path}: the link of joint {joint.name!r} is unphysical: {why}"
                 )
             turn = rotation_onto(joint.axis)
-            found.append((turn, body.moved(Pose(turn.T, np.zeros(3)))))
+            found.append((turn, body.moved(Pose(turn.T))))
         return found
 
     @cached_property
@@ -347,25 +346,16 @@ class LumpedArm:
     @cached_property
     def chain(self) -> Chain:
         """The arm's constants, each frame turned so that z is the axis."""
-        turn = np.eye(3)
-        rotations, translations = [], []
+        back, frames = IDENTITY, []
         for joint, (after, _) in zip(self.joints, self.turned, strict=True):
-            place = self.groups[joint.parent][1] @ joint.placement
-            rotations.append(turn.T @ place.rotation @ after)
-            translations.append(turn.T @ place.translation)
-            turn = after
-        _, flange = self.flange
-        return Chain(
-            names=tuple(joint.name for joint in self.joints),
-            rotation=np.array(rotations),
-            translation=np.array(translations),
-            mass=np.array([body.mass for _, body in self.turned]),
-            com=np.array([body.com for _, body in self.turned]),
-            inertia=np.array([nearest_tensor(body.inertia) for _, body in self.turned]),
+            frames.append(back @ self.groups[joint.parent][1] @ joint.placement @ Pose(after))
+            back = Pose(after.T)
+        return Chain.of(
+            (joint.name for joint in self.joints),
+            [*frames, back @ self.flange[1]],
+            [body._replace(inertia=nearest_tensor(body.inertia)) for _, body in self.turned],
             rotor_inertia=np.array([joint.rotor_inertia for joint in self.joints]),
             gravity=self.tree.gravity,
-            flange_rotation=turn.T @ flange.rotation,
-            flange_translation=turn.T @ flange.translation,
         )
 
 

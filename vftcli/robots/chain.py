@@ -14,7 +14,7 @@ A robot file states its kinematics in one of three ways:
 - ``xyz-rpy``: T_j = Trans(xyz) R(rpy) Rz(q), as in a URDF with all axes z.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -72,6 +72,26 @@ class Chain(Shown):
         """Number of joints n."""
         return len(self.names)
 
+    @classmethod
+    def of(
+        cls, names: Iterable[str], frames: Sequence[Pose], links: "Sequence[Body]", **more: Array
+    ) -> "Chain":
+        """The chain of its joints' names, frames and links.
+
+        Each frame is its pose in the one before, the last the flange's; `more` are
+        `rotor_inertia` and `gravity`.
+        """
+        rotation, translation = map(np.array, zip(*frames, strict=True))
+        return cls(
+            names=tuple(names),
+            rotation=rotation[:-1],
+            translation=translation[:-1],
+            flange_rotation=rotation[-1],
+            flange_translation=translation[-1],
+            **stacked(links),
+            **more,
+        )
+
     @property
     def bodies(self) -> list["Body"]:
         """The links, base to tip, each in the axes of its frame."""
@@ -83,13 +103,8 @@ class Chain(Shown):
             return self
         flange = Pose(self.flange_rotation, self.flange_translation)
         load = Body(payload.mass, payload.com, payload.inertia).moved(flange)
-        mass, com, inertia = merge_bodies([self.bodies[-1], load])
-        return replace(
-            self,
-            mass=np.append(self.mass[:-1], mass),
-            com=np.vstack([self.com[:-1], com]),
-            inertia=np.concatenate([self.inertia[:-1], inertia[None]]),
-        )
+        *others, last = self.bodies
+        return replace(self, **stacked([*others, merge_bodies([last, load])]))
 
     def to_pinocchio(self, name: str = "arm") -> Any:  # noqa: ANN401 - Pinocchio is untyped
         """The Pinocchio model of this chain, with a frame ``flange``; rotors are `armature`."""
@@ -129,13 +144,15 @@ NO_BODY = Body(0.0, np.zeros(3), np.zeros((3, 3)))  #: That of a link without ma
 def merge_bodies(bodies: Sequence[Body]) -> Body:
     """One body of those that are joined rigidly, all in one frame (parallel axes)."""
     mass = float(sum(body.mass for body in bodies))
-    if mass == 0.0:
-        return Body(0.0, np.zeros(3), np.sum([body.inertia for body in bodies], axis=0))
-    com = np.sum([body.mass * body.com for body in bodies], axis=0) / mass
-    inertia = np.zeros((3, 3))
-    for m, c, tensor in bodies:
-        inertia += tensor + m * point_tensor(c - com)
-    return Body(mass, com, inertia)
+    com = np.sum([body.mass * body.com for body in bodies], axis=0) / (mass or 1.0)
+    inertias = [tensor + m * point_tensor(c - com) for m, c, tensor in bodies]
+    return Body(mass, com, np.sum(inertias, axis=0))
+
+
+def stacked(bodies: Sequence[Body]) -> dict[str, Any]:
+    """Masses (n,), centres (n, 3) and tensors (n, 3, 3), by a chain's names of them."""
+    values = map(np.array, zip(*bodies, strict=True))
+    return dict(zip(Body._fields, values, strict=True))
 
 
 def point_tensor(d: Array) -> Array:
@@ -144,45 +161,33 @@ def point_tensor(d: Array) -> Array:
     return tensor
 
 
-def symmetric(entries: list[float]) -> Array:
+def symmetric(entries: Sequence[float] | Array) -> Array:
     """Return the tensor of (xx, xy, xz, yy, yz, zz). (3, 3)"""
     xx, xy, xz, yy, yz, zz = entries
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def unphysical(mass: float, inertia: Array) -> str:
+def unphysical(mass: float, inertia: Array, *, triangle: bool = True) -> str:
     """Why no body can have this mass and tensor about its centre, or "".
 
     A tensor of a real mass distribution has non-negative principal moments, none larger
-    than the sum of the other two. Published tables are rounded, so 1e-6 of the largest
-    moment is let pass.
+    than the sum of the other two, the inequality of a `triangle`. Published tables are
+    rounded, so 1e-6 of the largest moment is let pass.
     """
-    if why := improper(mass, inertia):
-        return why
+    if not np.isfinite(mass) or mass < 0:
+        return f"mass is {mass:g} kg; it must be zero or positive"
+    if not np.isfinite(inertia).all():
+        return "inertia is not finite"
     low, middle, high = np.linalg.eigvalsh(inertia)
-    if high > low + middle + slack_of(inertia):
+    slack = 1e-6 * max(-low, high, 1e-12)
+    if low < -slack:
+        return f"inertia has the negative principal moment {low:.4g} kg·m²"
+    if triangle and high > low + middle + slack:
         return (
             f"inertia breaks the triangle inequality: principal moment {high:.4g} is larger than "
             f"{low:.4g} + {middle:.4g} kg·m²"
         )
     return ""
-
-
-def improper(mass: float, inertia: Array) -> str:
-    """Why these are no mass and no tensor at all, or ""."""
-    if not np.isfinite(mass) or mass < 0:
-        return f"mass is {mass:g} kg; it must be zero or positive"
-    if not np.isfinite(inertia).all():
-        return "inertia is not finite"
-    low = float(np.linalg.eigvalsh(inertia)[0])
-    if low < -slack_of(inertia):
-        return f"inertia has the negative principal moment {low:.4g} kg·m²"
-    return ""
-
-
-def slack_of(inertia: Array) -> float:
-    """How far a rounded tensor may be beyond what a body can have. [kg·m²]"""
-    return 1e-6 * max(float(abs(np.linalg.eigvalsh(inertia)).max()), 1e-12)
 
 
 def nearest_tensor(inertia: Array) -> Array:
@@ -194,7 +199,7 @@ def nearest_tensor(inertia: Array) -> Array:
     if not unphysical(0.0, inertia):
         return inertia
     moments, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
-    second: Array = (axes * np.maximum(moments, 0.0)) @ axes.T
+    second = (axes * np.maximum(moments, 0.0)) @ axes.T
     nearest: Array = np.trace(second) * np.eye(3) - second
     return nearest
 
@@ -211,15 +216,15 @@ CONVENTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 def kinematics(
     convention: str, joints: Sequence[Mapping[str, Any]], document: Mapping[str, Any]
-) -> tuple[list[Pose], list[Pose], Pose]:
-    """Chain frames of a table, the poses of its inertial frames in them, and its tip's."""
-    out = Pose(np.eye(3), np.array([0.0, 0.0, float(document.get("flange_d", 0.0))]))
+) -> tuple[list[Pose], list[Pose]]:
+    """Chain frames of a table, the flange's last, and the inertial frames in those of joints."""
+    out = Pose(np.eye(3), np.array([0.0, 0.0, document.get("flange_d", 0.0)]))
     turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
-    tip = out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), float))
+    tip = out @ Pose(turn, np.array(document.get("ee_xyz", (0.0, 0.0, 0.0)), float))
     placements, inertial_frames = [], [IDENTITY] * len(joints)
     for k, joint in enumerate(joints):
         if convention == "xyz-rpy":
-            placements.append(Pose(rpy_matrix(joint["rpy"]), np.asarray(joint["xyz"], float)))
+            placements.append(Pose(rpy_matrix(joint["rpy"]), np.array(joint["xyz"], float)))
             continue
         R, about = rotation_about("x", joint["alpha"]), rotation_about("z", joint["theta"])
         if convention == "modified-dh":
@@ -227,11 +232,9 @@ def kinematics(
             placements.append(along @ Pose(about, np.array([0.0, 0.0, joint["d"]])))
         else:  # the table's frame is at the far end of its link
             before = inertial_frames[k - 1] if k else IDENTITY
-            placements.append(before @ Pose(about, np.zeros(3)))
+            placements.append(before @ Pose(about))
             inertial_frames[k] = Pose(R, np.array([joint["a"], 0.0, joint["d"]]))
-    if convention == "standard-dh":
-        tip = inertial_frames[-1] @ tip
-    return placements, inertial_frames, tip
+    return [*placements, inertial_frames[-1] @ tip], inertial_frames
 
 
 def along(R: Array, vector: Array) -> Array:

@@ -40,7 +40,7 @@ from vftcli.robots.urdf import mjcf_tree, urdf_tree
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import did_you_mean, shown
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, caution, fact, on_joints
 
 #: First element of a description → who reads it.
 READERS: dict[str, Callable[[Path, ET.Element], BodyTree]] = {
@@ -196,22 +196,23 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
 
 def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
     """What is odd about the links' inertia, and the rotors' where there is any."""
-    if bare := tuple(j + 1 for j, mass in enumerate(chain.mass) if mass == 0.0):
-        yield caution("links-without-mass", Where(joints=bare))
+    bare = chain.mass == 0.0
+    if bare.any():
+        yield caution("links-without-mass", on_joints(bare))
     # What the nearest tensors that a body can have differ by, zero where the tensor was
     # right.
     given = replace(chain, inertia=np.array([body.inertia for _, body in lumped.turned]))
-    changes = chain.inertia != given.inertia
-    if changed := tuple(j + 1 for j, change in enumerate(changes) if change.any()):
-        links = [lumped.joints[j - 1].child for j in changed]
+    changed = np.any(chain.inertia != given.inertia, axis=(1, 2))
+    if changed.any():
+        links = [lumped.joints[j].child for j in np.flatnonzero(changed)]
         parameters = chain_parameters(chain) - chain_parameters(given)
         rng = np.random.default_rng(0)
         q = rng.uniform(-np.pi, np.pi, (POSES, chain.joints))
         sign = rng.choice([-1.0, 1.0], (2, *q.shape))
         regressor = torque_regressor(chain, q, SPEED * sign[0], ACCELERATION * sign[1])
         worst = float(abs(regressor @ parameters).max())
-        yield caution("tensors-changed", Where(joints=changed), links=links, worst_Nm=worst)
-    if bare:
+        yield caution("tensors-changed", on_joints(changed), links=links, worst_Nm=worst)
+    if bare.any():
         n = chain.joints
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (8, n))
         M = momentum_terms(chain, q.repeat(n, axis=0), np.tile(np.eye(n), (8, 1))).p

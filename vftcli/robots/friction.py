@@ -28,7 +28,7 @@ import numpy as np
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.parsing import check_known
-from vftcli.signals.remarks import Remark, Where, warning
+from vftcli.signals.remarks import Remark, on_joints, warning
 
 #: Keys of the presliding friction that may stand beside every model: a [N·m] and s₀
 #: [rad].
@@ -311,9 +311,8 @@ def falling_friction(friction: Sequence[JointFriction], limits: Array) -> list[R
     falls = np.flatnonzero(np.isfinite(speeds))
     if not falls.size:
         return []
-    where = Where(joints=tuple(int(j) + 1 for j in falls))
     values = {"speeds_rad_s": [speeds[j] for j in falls], "limits_rad_s": limits[falls].tolist()}
-    return [warning("falling-friction", where, **values)]
+    return [warning("falling-friction", on_joints(falls), **values)]
 
 
 def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:

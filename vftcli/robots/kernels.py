@@ -35,8 +35,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.chain import Chain, flange_jacobian, link_poses, point_tensor
-from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, Vector, constants
+from vftcli.robots.chain import (
+    Body,
+    Chain,
+    flange_jacobian,
+    link_poses,
+    point_tensor,
+    stacked,
+    symmetric,
+)
+from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, constants
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import cross, skew
 
@@ -302,13 +310,9 @@ def chain_parameters(chain: Chain) -> Array:
 def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:
     """The chain with other parameters φ (10n,) and rotor inertias. (n,)"""
     bodies = []
-    for row in phi.reshape(chain.joints, LINK):
-        mass = float(row[0])
-        com = row[1:4] / mass if mass > 0 else np.zeros(3)
-        tensor = np.empty((3, 3))
-        for value, (r, c) in zip(row[4:], TENSOR, strict=True):
-            tensor[r, c] = tensor[c, r] = value
-        bodies.append((mass, com, tensor - mass * point_tensor(com)))
-    masses, coms, inertias = map(np.array, zip(*bodies, strict=True))
+    for mass, *moment, xx, xy, yy, xz, yz, zz in phi.reshape(chain.joints, LINK).tolist():
+        com = np.array(moment) / mass if mass > 0 else np.zeros(3)
+        tensor = symmetric([xx, xy, xz, yy, yz, zz]) - mass * point_tensor(com)
+        bodies.append(Body(mass, com, tensor))
     rotors = chain.rotor_inertia if rotor_inertia is None else rotor_inertia
-    return replace(chain, mass=masses, com=coms, inertia=inertias, rotor_inertia=rotors)
+    return replace(chain, **stacked(bodies), rotor_inertia=rotors)

@@ -52,7 +52,7 @@ def meshes_of(arm: LumpedArm, root: ET.Element) -> tuple[Mesh, ...]:
     packages = {folder.name: str(folder) for folder in above}
     packages |= packages_near(arm.tree.path) if asked else ()
     links = {link.get("name", ""): UrdfPart(arm.tree.path, link) for link in root.iterfind("link")}
-    turns = [IDENTITY, *(Pose(turn.T, np.zeros(3)) for turn, _ in arm.turned)]
+    turns = [IDENTITY, *(Pose(turn.T) for turn, _ in arm.turned)]
     found = []
     for name, (joint, pose) in arm.groups.items():
         each = [list(named(links[name], tag, packages)) for tag in ("visual", "collision")]

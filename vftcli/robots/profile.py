@@ -52,7 +52,7 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     source = root.choice("torque_source", TORQUE_SOURCES, "joint_torque")
     payloads = {}
     for own, section in root.section("payload").named_sections("mass").items():
-        turn = Pose(rpy_matrix(section.vector("rpy", 3, ORIGIN).tolist()), np.zeros(3))
+        turn = Pose(rpy_matrix(section.vector("rpy", 3, ORIGIN)))
         body = checked_body(section, default=[0.0] * 6).moved(turn)
         payloads[own] = Payload(**body._asdict())
     friction = tuple(friction_of(joint) for joint in joints)
@@ -133,33 +133,22 @@ def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
     ]
     end: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}
     end |= {key: root.vector(key, 3, ORIGIN) for key in ("ee_xyz", "ee_rpy")}
-    placements, inertial_frames, tip = kinematics(convention, frames, end)
+    placements, inertial_frames = kinematics(convention, frames, end)
     bodies = [
         checked_body(joint).moved(frame)
         for joint, frame in zip(joints, inertial_frames, strict=True)
     ]
-    mass, com, inertia = map(np.array, zip(*bodies, strict=True))
-    if why := weightless(float(sum(mass))):
+    if why := weightless(sum(body.mass for body in bodies)):
         root.refuse(why)
-    rotation, translation = map(np.array, zip(*placements, strict=True))
-    return Chain(
-        names=joint_names(joints),
-        rotation=rotation,
-        translation=translation,
-        mass=mass,
-        com=com,
-        inertia=inertia,
-        rotor_inertia=column(joints, "rotor_inertia", default=0.0),
-        gravity=root.vector("gravity", 3, UPRIGHT),
-        flange_rotation=tip.rotation,
-        flange_translation=tip.translation,
-    )
+    rotors, gravity = column(joints, "rotor_inertia", 0.0), root.vector("gravity", 3, UPRIGHT)
+    names = joint_names(joints)
+    return Chain.of(names, placements, bodies, rotor_inertia=rotors, gravity=gravity)
 
 
 def checked_body(table: Section, default: Sequence[float] | None = None) -> Body:
     """The body of a table, with a mass and a tensor that a body can have."""
     mass, com = table.number("mass"), table.vector("com", 3, default and default[:3])
-    tensor = symmetric(table.vector("inertia", 6, default).tolist())
+    tensor = symmetric(table.vector("inertia", 6, default))
     if why := unphysical(mass, tensor):
         table.refuse(why, "mass" if why.startswith("mass") else "inertia")
     return Body(mass, com, tensor)
@@ -264,7 +253,7 @@ def poses(section: Section) -> dict[str, Pose]:
     """The poses that ``[name]``, under "", and each ``[name.NAME]`` state."""
     found = {}
     for name, table in section.named_sections("xyz", "rpy").items():
-        turn = rpy_matrix(table.vector("rpy", 3, ORIGIN).tolist())
+        turn = rpy_matrix(table.vector("rpy", 3, ORIGIN))
         found[name] = Pose(turn, table.vector("xyz", 3, ORIGIN))
     return found
 
@@ -296,7 +285,7 @@ def robot_document(robot: Robot) -> Table:
     if old.get("convention") not in CONVENTIONS:
         old = xyz_rpy_document(robot)
     tables = [dict(table) for table in old["joints"]]
-    chain, (_, frames, _) = robot.chain, kinematics(old["convention"], tables, old)
+    chain, (_, frames) = robot.chain, kinematics(old["convention"], tables, old)
     for j, (table, frame, link) in enumerate(zip(tables, frames, chain.bodies, strict=True)):
         mass, com, inertia = link.moved(inverse(frame))
         values = {"mass": np.array(mass), "com": com, "inertia": inertia[np.triu_indices(3)]}

@@ -255,8 +255,7 @@ class Section(NamedTuple):
         self, key: str, kind: ValueKind, default: Sequence[float] | None = None
     ) -> list[float]:
         """The numbers of a key, each of them such as robots have."""
-        value = self.value(key, kind, default)
-        found = [float(item) for item in (value if isinstance(value, list) else [value])]
+        found: list[float] = np.ravel(self.value(key, kind, default)).astype(float).tolist()
         if why := out_of_bounds(key, found):
             self.refuse(why, key)
         return found
@@ -269,8 +268,7 @@ class Section(NamedTuple):
 
     def vector(self, key: str, length: int, default: Sequence[float] | None = None) -> Array:
         """So many finite numbers, `default` if the key is absent. (length,)"""
-        given = None if default is None else list(default)
-        return np.array(self.bounded(key, vector(length), given))
+        return np.array(self.bounded(key, vector(length), default))
 
     def text(self, key: str, default: str = "") -> str:
         """A word or a sentence, `default` if the key is absent."""

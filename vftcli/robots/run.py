@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
-from vftcli.signals.remarks import Where, fact
+from vftcli.signals.remarks import fact, on_joints
 from vftcli.signals.repairs import without_isolated
 from vftcli.signals.rest import duration, resting, standing
 from vftcli.signals.series import median_step
@@ -264,8 +264,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
                 jumping.update(turns)
     if not changed:
         return recording
-    said = fact("endless-joint-unwound", Where(joints=tuple(j + 1 for j in sorted(jumping))))
-    return recording.changed(said, **changed)
+    return recording.changed(fact("endless-joint-unwound", on_joints(sorted(jumping))), **changed)
 
 
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:

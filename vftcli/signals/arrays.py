@@ -17,13 +17,14 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]  #: Numbers of rows or samples, counted from 0.
 
 
-def frozen(value: ArrayLike) -> Array:
-    """A read-only float64 array that nobody else can write to; not copied where it is one."""
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and is_sealed(value):
+def frozen(value: ArrayLike, kind: type = float) -> Array:
+    """A read-only array that nobody else can write to; not copied where it is one.
+
+    Of float64, or as a mask of `bool`, non-zero true.
+    """
+    if isinstance(value, np.ndarray) and value.dtype == kind and is_sealed(value):
         return value
-    copy = np.array(value, float, order="K")
-    copy.setflags(write=False)
-    return copy
+    return handed_over(np.array(value, kind, order="K"))
 
 
 def is_sealed(value: NDArray[Any]) -> bool:
@@ -73,33 +74,26 @@ def handed_over(value: NDArray[Any]) -> NDArray[Any]:
     return value
 
 
-def number_array(value: ArrayLike, name: str, owner: str) -> Array:
+def number_array(value: ArrayLike, name: str, owner: str, kind: type = float) -> Array:
     """Return `frozen` of what a user gives for an array."""
     try:
-        return frozen(value)
+        return frozen(value, kind)
     except (TypeError, ValueError):
-        kind = "rows of unequal length, or no numbers" if np.iterable(value) else "no number"
-        kind = f"the text {value!r}" if isinstance(value, str) else kind
-        raise ShapeError(f"{name} of {owner} is {kind}; expected an array of numbers") from None
+        what = "rows of unequal length, or no numbers" if np.iterable(value) else "no number"
+        what = f"the text {value!r}" if isinstance(value, str) else what
+        raise ShapeError(f"{name} of {owner} is {what}; expected an array of numbers") from None
 
 
-def seal(owner: object, *names: str, shape: tuple[int, ...] = (), called: str = "") -> None:
+def seal(
+    owner: object, *names: str, shape: tuple[int, ...] = (), called: str = "", kind: type = float
+) -> None:
     """Make arrays of a frozen dataclass read-only, and check their shape; None stays None."""
     for name in names:
         if (value := getattr(owner, name)) is not None:
             # The one way past a frozen dataclass, for its own __post_init__ only.
-            object.__setattr__(owner, name, number_array(value, name, type(owner).__name__))
+            object.__setattr__(owner, name, number_array(value, name, type(owner).__name__, kind))
             if shape:
                 check_shape(value, shape, name, called)
-
-
-def seal_mask(owner: object, name: str) -> None:
-    """Make a mask of a frozen dataclass read-only, non-zero true; None stays None."""
-    if (value := getattr(owner, name)) is not None:
-        if not (isinstance(value, np.ndarray) and value.dtype == bool and is_sealed(value)):
-            value = np.array(value, bool)
-            value.setflags(write=False)
-        object.__setattr__(owner, name, value)
 
 
 def empty_series(samples: int, columns: int) -> Array:

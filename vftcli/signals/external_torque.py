@@ -16,7 +16,6 @@ from vftcli.signals.arrays import (
     handed_over,
     root_mean_square,
     seal,
-    seal_mask,
 )
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import Clock, clock_of
@@ -125,15 +124,13 @@ class ExternalTorque(TimeSeries):
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
     def __post_init__(self) -> None:
-        seal(self, "t", "tau", "floor")
-        seal_mask(self, "moving")
+        seal(self, "t", "tau")
         check_shape(self.tau, ("T", "n"), "tau", self.name)
         check_clock(self.t, self.name)
         shape = len(self.t), self.joints
         seal(self, "tau", "sd", "error_sd", shape=shape, called=self.name)
         seal(self, "floor", shape=shape[1:], called=self.name)
-        if self.moving is not None:
-            check_shape(self.moving, shape, "moving", self.name)
+        seal(self, "moving", shape=shape, called=self.name, kind=bool)
 
     def _headline(self) -> str:
         rms = np.sqrt(np.nanmean(np.where(self.known.any(axis=0), self.tau, 0.0) ** 2, axis=0))

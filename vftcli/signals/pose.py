@@ -12,14 +12,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, handed_over
 
 
 class Pose(NamedTuple):
     """Orientation (3, 3) and origin (3,) [m] of one frame in another."""
 
     rotation: Array
-    translation: Array
+    translation: Array = handed_over(np.zeros(3))
 
     def __matmul__(self, other: "Pose") -> "Pose":
         return Pose(
@@ -27,7 +27,7 @@ class Pose(NamedTuple):
         )
 
 
-IDENTITY = Pose(np.eye(3), np.zeros(3))  #: The pose of a frame in itself.
+IDENTITY = Pose(np.eye(3))  #: The pose of a frame in itself.
 
 
 def inverse(pose: Pose) -> Pose:
@@ -75,7 +75,7 @@ def rotation_about(axis: Literal["x", "y", "z"], angle: float) -> Array:
     return R
 
 
-def rpy_matrix(angles: Sequence[float]) -> Array:
+def rpy_matrix(angles: Sequence[float] | Array) -> Array:
     """Rz(yaw) Ry(pitch) Rx(roll), the URDF's fixed-axis angles [rad]. (3, 3)"""
     roll, pitch, yaw = angles
     return rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll)

@@ -149,8 +149,7 @@ def words(code: str) -> Mapping[str, str]:
     for text in catalogue():
         # Reading TOML takes longer than finding the one file of a room that has the code.
         if f"[{code}]" in text:
-            entry = parsed(text)[code]
-            return entry
+            return parsed(text)[code]
     raise LookupError(f"no words for the remark {code!r} in {WORDS}")
 
 

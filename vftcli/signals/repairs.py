@@ -10,14 +10,13 @@ References:
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import EFFORTS, Recording
-from vftcli.signals.remarks import Where, caution, fact
+from vftcli.signals.remarks import caution, fact, on_joints
 
 #: Where the derivative is cut off, twice. [Hz]
 #:
@@ -102,9 +101,8 @@ def without_isolated(recording: Recording) -> Recording:
             values[name] = handed_over(even)
     if not values:
         return recording
-    where = Where(joints=tuple(int(j) + 1 for j in np.flatnonzero(changed.any(axis=0))))
     count = int(np.count_nonzero(changed.any(axis=1)))
-    said = fact("isolated-samples-evened", where, samples=count)
+    said = fact("isolated-samples-evened", on_joints(np.any(changed, axis=0)), samples=count)
     return recording.changed(said, **values)
 
 

@@ -95,5 +95,4 @@ def near(mask: Mask, count: int) -> Mask:
     mask.cumsum(axis=0, out=total[1:])
     k = np.arange(len(mask))
     first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(mask))
-    found = total[last] > total[first]
-    return found
+    return total[last] > total[first]

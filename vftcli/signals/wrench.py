@@ -11,9 +11,7 @@ from vftcli.signals.arrays import (
     Array,
     Mask,
     check_clock,
-    check_shape,
     seal,
-    seal_mask,
 )
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
@@ -130,16 +128,14 @@ class Wrench(TimeSeries):
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
     def __post_init__(self) -> None:
-        seal(self, "t", "values", "null_space")
+        seal(self, "t", "null_space")
         samples = len(self.t)
+        check_clock(self.t, self.name)
         if self.masked is None:
             object.__setattr__(self, "masked", np.zeros(samples))
-        seal_mask(self, "masked")
-        check_clock(self.t, self.name)
-        check_shape(self.values, (samples, 6), "wrench", self.name)
-        seal(self, "sd", shape=(samples, 6), called=self.name)
+        seal(self, "values", "sd", shape=(samples, 6), called=self.name)
         seal(self, "sigma_min", shape=(samples,), called=self.name)
-        check_shape(self.hidden, (samples,), "mask", self.name)
+        seal(self, "masked", shape=(samples,), called=self.name, kind=bool)
 
     def _headline(self) -> str:
         most = self.size[np.isfinite(self.size)].max(initial=0.0)
