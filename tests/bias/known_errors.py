@@ -77,7 +77,7 @@ def drawn_error(robot, seed=2, size=1.0):
     rng = np.random.default_rng(seed)
     values = {
         name: size * rng.normal(size=value.shape) * value
-        for name, value in vars(expected_error(robot)).items()
+        for name, value in expected_error(robot)._asdict().items()
     }
     return ModelError(**values)
 

@@ -16,7 +16,7 @@ from vftcli.free_motion.difference import (
     rms,
 )
 from vftcli.free_motion.paired_runs import PairedRuns, pair_with_run
-from vftcli.robots.run import Run, band
+from vftcli.robots.run import Run, signal_edge
 from vftcli.signals.filters import low_pass
 
 STEP = 0.008
@@ -78,7 +78,7 @@ def test_what_a_differentiated_noise_leaves() -> None:
     p = np.random.default_rng(3).standard_normal((6000, 1))
     slope = np.gradient(low_pass(T, p, 8.0), T, axis=0)
     shown = float(np.sqrt(np.mean(slope[50:-50] ** 2)))
-    found = noise_below(T, p, MOVING, STEP, band(STEP, 8.0), 8.0, slope=1)
+    found = noise_below(T, p, MOVING, STEP, (8.0, 16.0), 8.0, slope=1)
     assert found == pytest.approx(shown, rel=0.1)
 
 
@@ -113,11 +113,10 @@ def test_the_rms_of_no_sample_is_that_of_all() -> None:
     np.testing.assert_allclose(rms(x, where), [3.0, np.sqrt(2.5)])
 
 
-def test_the_noise_band_lies_above_the_signal_and_below_half_the_rate() -> None:
-    assert band(0.001, 12.0) == (12.0, 24.0)
-    assert band(0.001, None) == (12.0, 24.0)
-    low, high = band(0.02, 12.0)
-    assert (low, high) == (pytest.approx(11.0), pytest.approx(22.0))  # 0.22 and 0.44 of 50 Hz
+def test_the_signal_s_edge_leaves_room_for_noise_below_half_the_rate() -> None:
+    assert signal_edge(0.001) == 12.0
+    assert signal_edge(0.001, 8.0) == 8.0
+    assert signal_edge(0.02) == pytest.approx(11.0)  # 0.22 of 50 Hz
 
 
 def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_move() -> None:

@@ -134,7 +134,7 @@ def test_another_number_of_gains_is_refused() -> None:
 
 def test_an_unknown_observer_lists_what_there_is() -> None:
     with pytest.raises(ParameterError, match="there is best, fdo, gmo, kfo-fe, kfo-zoh"):
-        build_observers(["kalman"], setup("ur5"))
+        ObserverChoice(names=("kalman",))
 
 
 def test_sections_are_read_as_a_robot_file_s(tmp_path: Path) -> None:

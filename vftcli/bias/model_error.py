@@ -8,7 +8,6 @@ friction to a fifth.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,9 +27,9 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.robots.running_friction import play
 from vftcli.robots.terms import GAP
-from vftcli.signals.arrays import Array, Indices, seal
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.filters import derivative, zero_phase
-from vftcli.signals.series import median_step
+from vftcli.signals.series import median_step, summed
 
 CUTOFF = 6.0  #: What is faster is noise, or contact: the model's error follows the motion. [Hz]
 PLAY = 0.3e-3  #: Presliding length of the friction that may be missing. [rad]
@@ -69,7 +68,7 @@ def without_waits(t: Array) -> Array:
     longest = max(WAIT, GAP * median_step(t)) if len(t) > 1 else WAIT
     if not np.any(steps > longest):
         return t
-    return np.asarray(t[0] + np.concatenate([[0.0], np.minimum(steps, longest).cumsum()]))
+    return np.asarray(summed(np.minimum(steps, longest)) + t[0])
 
 
 def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Array]:
@@ -115,8 +114,7 @@ def usual_friction(robot: Robot) -> Array:
     return found.T
 
 
-@dataclass(frozen=True, kw_only=True)
-class ModelError:
+class ModelError(NamedTuple):
     """One value for each column: an error of the model, or how large each is expected to be."""
 
     inertial: Array  #: Of the links' inertial parameters, in the regressor's order. (10n,)
@@ -124,9 +122,6 @@ class ModelError:
     drive: Array  #: Of the drive constants, as a share. (n,)
     friction: Array  #: Of the friction's shapes. (5, n)
     offset: Array  #: Of a constant torque. (n,) [N·m]
-
-    def __post_init__(self) -> None:
-        seal(self, *vars(self))
 
     @property
     def values(self) -> Array:
@@ -149,14 +144,9 @@ class ModelError:
 
 def error_of(values: Array, joints: int) -> ModelError:
     """The model error with these values, in the order of `column_numbers`."""
-    inertial, own = values[: LINK * joints], values[LINK * joints :].reshape(joints, -1)
-    return ModelError(
-        inertial=inertial,
-        rotor=own[:, 0],
-        drive=own[:, 1],
-        friction=own[:, 2 : 2 + SHAPES].T,
-        offset=own[:, -1],
-    )
+    inertial, own = np.split(values, [LINK * joints])
+    rotor, drive, *friction, offset = own.reshape(joints, -1).T
+    return ModelError(inertial, rotor, drive, np.array(friction), offset)
 
 
 def column_numbers(joint: int, joints: int) -> Indices:
@@ -175,21 +165,18 @@ def expected_error(robot: Robot) -> ModelError:
         reach = float(np.dot(c, c))
         tensor = 0.2 * (np.trace(chain.inertia[j]) + m * reach) + 0.02 * m * np.sqrt(reach) + 1e-4
         inertial[j] = [0.05 * m, *(0.01 * m + 0.05 * m * abs(c)), *[tensor] * len(TENSOR)]
-    rotor = 0.2 * chain.rotor_inertia
-    ones = np.ones(chain.joints)
+    shapes = [
+        0.2 * dry + 0.05,
+        0.7 * dry + 0.05,
+        0.0 * dry + 0.03,
+        0.4 * abs(viscous) + 0.1,
+        0.4 * abs(quadratic) + 0.05,
+    ]
     return ModelError(
         inertial=inertial.ravel(),
-        rotor=0.0 * rotor if robot.torque_source == "link_torque" else rotor,
-        drive=0.02 * ones,
-        friction=np.array(
-            [
-                0.2 * dry + 0.05,
-                0.7 * dry + 0.05,
-                0.03 * ones,
-                0.4 * abs(viscous) + 0.1,
-                0.4 * abs(quadratic) + 0.05,
-            ]
-        ),
+        rotor=(0.0 if robot.torque_source == "link_torque" else 0.2) * chain.rotor_inertia,
+        drive=np.full(chain.joints, 0.02),
+        friction=np.array(shapes),
         offset=0.15 * dry + 0.02,
     )
 
@@ -197,8 +184,8 @@ def expected_error(robot: Robot) -> ModelError:
 def friction_alone(robot: Robot) -> ModelError:
     """The expected error of the shapes of friction, and none of anything else."""
     expected = expected_error(robot)
-    none = {name: 0.0 * value for name, value in vars(expected).items() if name != "friction"}
-    return replace(expected, **none)
+    none = ModelError(*(0.0 * values for values in expected))
+    return none._replace(friction=expected.friction)
 
 
 def error_columns(run: Run, motion: SmoothMotion, expected: ModelError, stride: int) -> list[Array]:

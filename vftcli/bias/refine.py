@@ -17,14 +17,7 @@ from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.bias.whole_log import stride_of
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import (
-    ENOUGH,
-    UNSEEN,
-    FreeError,
-    Spectra,
-    error_band,
-    free_error,
-)
+from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, Spectra, error_band, free_error
 from vftcli.observers.table import BEST, PAPER
 from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
 from vftcli.robots.friction import HELD, ONE_STOP
@@ -209,7 +202,7 @@ def expected_gap(
     if BEST not in known or known[BEST].error_sd is None:
         return None
     log = found.motion.log
-    step, n = log.recording.median_step, log.robot.joints
+    step, n = log.step, log.robot.joints
     observers, _ = ObserverChoice(names=PAPER).build(log.robot, step)
     paper = [o for o in observers if gains_of_file and o.name in known]
     if not paper:

@@ -28,7 +28,7 @@ from vftcli.robots.chain import Chain, flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.least_squares import FOLDS, SD_PER_MEDIAN, NormalEquations, huber, robust_sd
 from vftcli.signals.rest import faster
-from vftcli.signals.series import covered, runs_of
+from vftcli.signals.series import covered, runs_of, summed
 
 FORCE = 50.0  #: Standard deviation of an external force. [N]
 MOMENT = 10.0  #: Standard deviation of an external moment. [N·m]
@@ -191,7 +191,7 @@ class Rows:
         matrix.flat[:: len(matrix) + 1] += 1.0
         factor = np.asarray(np.linalg.cholesky(matrix), float)
         z = forward_solved(factor, scales * sums.right)
-        gained = np.concatenate([[0.0], np.cumsum(z**2)])
+        gained = summed(z**2)
         loads = min(self.loads.sizes, key=lambda size: PENALTY * size - gained[unknowns + size])
         size = unknowns + loads
         factor, z = factor[:size, :size], z[:size]

@@ -9,7 +9,7 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.lag import lag_fit
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import covered, intervals, resample_columns
+from vftcli.signals.series import covered, intervals, resample_columns, summed
 
 LEAST_OVERLAP = 0.3  #: Least overlap, by the shorter log.
 #: A larger difference after alignment means another trajectory. [rad]
@@ -119,9 +119,8 @@ def pace(recording: Recording) -> float | None:
         return None
     t = recording.t
     steps = 0.5 * (recording.dq[1:] + recording.dq[:-1]) * np.diff(t)[:, None]
-    summed = np.vstack([np.zeros(recording.joints), steps.cumsum(axis=0)])
     ends = t.searchsorted(np.arange(t[0], t[-1], TRAVEL))
-    by_position, by_velocity = (np.diff(x[ends], axis=0) for x in (recording.q, summed))
+    by_position, by_velocity = (np.diff(x[ends], axis=0) for x in (recording.q, summed(steps)))
     power = float(np.sum(by_position**2))
     along = float(np.sum(by_position * by_velocity))
     return along / power if power > 0.0 and along > 0.0 else None

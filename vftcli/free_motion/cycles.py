@@ -6,16 +6,16 @@ import numpy as np
 
 from vftcli.free_motion.difference import difference
 from vftcli.free_motion.paired_runs import PairedRuns, Pairing, in_gap
-from vftcli.robots.run import Run, band
+from vftcli.robots.run import Run, signal_edge
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
-from vftcli.signals.lag import overlap_energy, sliding
+from vftcli.signals.lag import overlap_energy, parabola, sliding
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import standing
-from vftcli.signals.series import resample_columns
+from vftcli.signals.series import resample_columns, summed
 
 LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.
 
@@ -103,8 +103,6 @@ def check_stated(recording: Recording, stated: float | None, duration: float) ->
     """Raise unless a stated period fits into the moving part of the log."""
     if stated is None:
         return
-    if not (np.isfinite(stated) and stated > 0):
-        raise ReferenceTorqueError(f"two-cycle.period is {stated:g} s; it must be positive")
     if stated > (1.0 - LEAST_REPEATED) * duration:
         raise ReferenceTorqueError(
             f"{recording.name}: a period of {stated:g} s does not fit into the {duration:.4g} s "
@@ -158,10 +156,9 @@ def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
     found = lags[(here <= before) & (here <= after)]
     if stated is not None and len(lags) and not len(found):
         found = lags[[int(here.argmin())]]
-    deep = np.sort(found[distance[found].argsort()[:CANDIDATES]])
-    bend = distance[deep - 1] - 2.0 * distance[deep] + distance[deep + 1]
-    tilt = 0.5 * (distance[deep - 1] - distance[deep + 1])
-    return [float(x) for x in deep + np.clip(tilt / np.where(bend > 0, bend, np.inf), -0.5, 0.5)]
+    deep = np.sort(found[distance[found].argsort()[:CANDIDATES]]).tolist()
+    moved = (parabola(*-distance[k - 1 : k + 2]) for k in deep)
+    return [k + min(max(shift, -0.5), 0.5) for k, shift in zip(deep, moved, strict=True)]
 
 
 def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
@@ -260,8 +257,7 @@ def comes_back(t: Array, q: Array, shift: float) -> Mask:
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:
     """First instant with three quarters of the next cycle on the path. [s]"""
-    count = np.concatenate([[0], on_path.cumsum()])
-    stop = t.searchsorted(t + seconds)
+    count, stop = summed(on_path), t.searchsorted(t + seconds)
     here = np.arange(len(t))
     share = (count[stop] - count[here]) / np.maximum(stop - here, 1)
     good = np.flatnonzero(on_path & (share >= 0.75))
@@ -334,7 +330,7 @@ def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
         span = slice(int(inside[0]), int(inside[-1]) + 1)
         if cycle != freest:
             pair = PairedRuns(motion=motion.part(span), pairings=[Pairing(free, times[span])])
-            found = difference(pair, "model", band(pair.motion.step, None)[0])
+            found = difference(pair, "model", signal_edge(pair.motion.step))
             shown = found.error.rms_moving(found.tau)
             if not np.all(shown <= ALIKE * found.error.floor_moving):
                 continue
@@ -351,7 +347,7 @@ def residuals(motion: Run, cycles: Cycles) -> Array:
     A cycle of which a gap takes more than half has none: ∞.
     """
     # Below 5 Hz a push exceeds the drives' ripple.
-    cutoff = min(5.0, band(motion.step, None)[0])
+    cutoff = signal_edge(motion.step, 5.0)
     gap = low_pass(motion.t, motion.drive_torque - motion.model_torque, cutoff)
     number = cycles.number(motion.t)
     held = np.bincount(number[(number >= 0) & (number < cycles.whole)], minlength=cycles.whole)

@@ -11,11 +11,12 @@ import numpy as np
 
 from vftcli.free_motion.paired_runs import PairedRuns, Pairing, by_phase
 from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
-from vftcli.robots.run import Run, band
+from vftcli.robots.run import Run, signal_edge
 from vftcli.signals.arrays import Array, Mask, at, empty_series
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.series import summed
 
 LOW_PASS = 12.0  #: Default cutoff of the zero-phase low-pass. [Hz]
 #: A rung further up, or the low-pass, must bring the expected error down to this share.
@@ -210,14 +211,14 @@ def error_model(
     noise = np.maximum(
         noise_of(t, signal, moving, step, cutoff), noise_when_quiet(t, smooth, moving, step, cutoff)
     )
-    low, high = band(step, cutoff)
+    low = signal_edge(step) if cutoff is None else signal_edge(step, cutoff)
 
     def motion_torque() -> Array:
         return local_rms(low_pass(t, at(known, pair.model_difference), low), step)
 
     def slope_noise() -> Array:
         momentum = at(known, motion.momentum - pair.of_free("momentum"))
-        return noise_below(t, momentum, moving, step, (low, high), low, slope=1)
+        return noise_below(t, momentum, moving, step, (low, 2.0 * low), low, slope=1)
 
     motion_error = pair.cached("motion", low, motion_torque)
     missed, own = np.maximum(LEAST_SHARE, pair.misfit), np.zeros(len(noise))
@@ -316,8 +317,8 @@ def local_rms(x: Array, step: float) -> Array:
     width = max(1, round(0.05 / step))
     here = np.arange(len(x))
     first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))
-    out, total = empty_series(*x.shape), np.zeros(len(x) + 1)
+    out = empty_series(*x.shape)
     for column, mean in zip(x.T, out.T, strict=True):
-        np.cumsum(column**2, out=total[1:])
+        total = summed(column**2)
         np.sqrt((total[last] - total[first]) / (last - first), out=mean)
     return out

@@ -142,14 +142,13 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
             "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
             "away with --free"
         )
-    recording = motion.log.recording
     remarks = []
     for run in motion.runs:
         found, code = run.alignment, "free-run-aligned"
         values = {
             "shift_s": found.shift,
             "deviation_mrad": 1e3 * found.deviation,
-            "covered_s": float(np.count_nonzero(run.pairing.known)) * recording.median_step,
+            "covered_s": float(np.count_nonzero(run.pairing.known)) * motion.log.step,
         }
         if abs(found.rate - 1.0) > 1e-4:
             code, values["rate"] = "free-run-on-another-clock", found.rate

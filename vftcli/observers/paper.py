@@ -45,14 +45,7 @@ from vftcli.observers.kalman_model import (
     steady,
     update,
 )
-from vftcli.observers.observer import (
-    BlockObserver,
-    Complex,
-    Tuning,
-    angular,
-    numbers_of,
-    per_joint,
-)
+from vftcli.observers.observer import BlockObserver, Complex, Tuning, angular, numbers_of, per_joint
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, one_sample_earlier

@@ -37,7 +37,7 @@ from vftcli.robots.terms import disturbance_stretches
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import welch
-from vftcli.signals.series import grown, intervals, median_step
+from vftcli.signals.series import grown, intervals, median_step, summed
 
 SEGMENT = 4.0  #: Length of a segment: what changes more slowly counts as constant. [s]
 LEAST_SEGMENT = 32  #: Fewest samples of a segment; a shorter free or loaded part has no spectrum.
@@ -140,8 +140,8 @@ def neighbour_mean(spectrum: Array) -> Array:
     bins = np.arange(len(spectrum))
     reach = (NEIGHBOURS * bins).astype(int)
     reach = np.minimum(reach, len(spectrum) - 1 - bins)
-    total = np.concatenate([np.zeros((1, spectrum.shape[1])), spectrum.cumsum(axis=0)])
-    mean: Array = (total[bins + reach + 1] - total[bins - reach]) / (2.0 * reach + 1.0)[:, None]
+    total = summed(spectrum)
+    mean: Array = (total[bins + reach + 1] - total[bins - reach]) / (2 * reach + 1)[:, None]
     return mean
 
 

@@ -219,9 +219,7 @@ def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ..
     given = parameters_given(read_as("discrete", setup), "kfo", name)
     convention = str(given.pop("noise_convention", "density"))
     values = {
-        key: spread(value, setup.joints, "joints", f"kfo.{key}")
-        for key, value in given.items()
-        if key in PARAMETERS["kfo"]
+        key: spread(value, setup.joints, "joints", f"kfo.{key}") for key, value in given.items()
     }
     observer = KalmanObserver(
         discretisation="fe" if name == "kfo-fe" else "zoh",
@@ -338,14 +336,12 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 def build_observers(
     names: Sequence[str], setup: Setup
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
-    """Build observers by name, with remarks on gains that nobody gave.
+    """Build observers by name, keys of `OBSERVERS`, with remarks on gains that nobody gave.
 
     Raises:
-        ParameterError: If a name or a parameter is not one there is, or is out of range.
+        ParameterError: If a parameter is not one there is, or is out of range.
     """
-    for name in names:
-        check_known(name, OBSERVERS, f"no observer {name!r}")
-    built = [OBSERVERS[name].build(setup, name) for name in dict.fromkeys(names)]
+    built = [OBSERVERS[name].build(setup, name) for name in names]
     # Several observers may miss one gain: remark on it once.
     remarks = []
     for _, own in built:

@@ -60,12 +60,7 @@ class Chain(Shown):
     flange_translation: Array  #: Origin of the flange in frame n. (3,) [m]
 
     def __post_init__(self) -> None:
-        n = self.joints
-        seal(self, "rotation", "inertia", shape=(n, 3, 3), called="the chain")
-        seal(self, "translation", "com", shape=(n, 3), called="the chain")
-        seal(self, "mass", "rotor_inertia", shape=(n,), called="the chain")
-        seal(self, "gravity", "flange_translation", shape=(3,), called="the chain")
-        seal(self, "flange_rotation", shape=(3, 3), called="the chain")
+        seal(self, *(name for name in vars(self) if name != "names"))
 
     @property
     def joints(self) -> int:

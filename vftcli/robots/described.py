@@ -28,18 +28,16 @@ from vftcli.robots.meshes import meshes_of, packages_near
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.robot import JointFriction, Limits, Robot
 from vftcli.robots.robot_file import (
-    BOUNDS,
     DESCRIPTIONS,
     RobotFile,
     Section,
-    is_finite,
     robot_text,
     weightless,
 )
 from vftcli.robots.urdf import mjcf_tree, urdf_tree
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
-from vftcli.signals.parsing import did_you_mean, shown
+from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.remarks import Remark, caution, fact, on_joints
 
 #: First element of a description → who reads it.
@@ -135,14 +133,11 @@ def locked_angles(file: Section, tree: BodyTree) -> dict[str, float]:
     """The joints that `lock = {joint = angle}` holds, whatever they are. [rad or m]"""
     table = file.section("lock")
     names = [joint.name for joint in tree.joints if joint.kind != "fixed"]
-    for name, value in table.values.items():
+    for name in table.values:
         if name not in names:
             meant = did_you_mean(name, names)
             file.refuse(f"lock: no joint {name!r}.{meant} There is {shortened(names)}", "lock")
-        if not is_finite(value) or (why := BOUNDS["q_min"].broken(name, [float(value)])):
-            why = f"{name} is {shown(value)}; it must be a finite number"
-            file.refuse(f"lock: {why}", "lock")
-    return {name: float(value) for name, value in table.values.items()}
+    return {name: table.number(name) for name in table.values}
 
 
 def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]:

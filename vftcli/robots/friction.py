@@ -61,13 +61,10 @@ def coulomb_viscous(
     gravity torque [N·m], like `dq`), f_s dry torque at breakaway above f_c [N·m], which
     fades over v_s.
     """
-    torque = dq * (1.0 / smoothing)
-    np.tanh(torque, out=torque)
+    torque = np.tanh(dq * (1.0 / smoothing))
     dry: Array | float = coulomb
     if load is not None and load_coulomb:
-        dry = abs(load)
-        dry *= load_coulomb
-        dry += coulomb
+        dry = coulomb + load_coulomb * abs(load)
     if stribeck:
         dry = dry + stribeck * np.exp(-((dq / stribeck_velocity) ** 2))
     torque *= dry
@@ -94,13 +91,8 @@ def coulomb_logarithmic(
     (Coulomb torque, a, b) it follows the joint tests of UR arms to .01–.3 N·m, where a
     signed quadratic falls from 1.1–1.6 rad/s on.
     """
-    rise = abs(dq)
-    rise /= logarithmic_velocity
-    np.log1p(rise, out=rise)
-    np.copysign(rise, dq, out=rise)
-    rise *= logarithmic
-    rise += coulomb_viscous(dq, **others)
-    return rise
+    rise = np.copysign(np.log1p(abs(dq) / logarithmic_velocity), dq)
+    return np.asarray(rise * logarithmic + coulomb_viscous(dq, **others))
 
 
 def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:
@@ -112,14 +104,9 @@ def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:
         C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
         feasible parameters using penalty-based optimization", IEEE RA-L 2019, Sec. II.
     """
-    torque = -slope * dq
-    torque -= slope * shift
     with np.errstate(over="ignore"):  # far below zero: A/∞ is 0, as it should be
-        np.exp(torque, out=torque)
-    torque += 1.0
-    np.divide(amplitude, torque, out=torque)
-    torque -= amplitude / (1.0 + np.exp(-slope * shift))
-    return torque
+        rise = amplitude / (1.0 + np.exp(-slope * dq - slope * shift))
+    return np.asarray(rise - amplitude / (1.0 + np.exp(-slope * shift)))
 
 
 def bent_line(
@@ -143,13 +130,9 @@ def bent_line(
     ]
     # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last
     # slope.
-    torque = coulomb_viscous(dq, torques[0], **others)
-    part = dq * slopes[-1]
-    torque += part
+    torque = coulomb_viscous(dq, torques[0], **others) + slopes[-1] * dq
     for speed, slope, before in zip(speeds, slopes, [0.0, *slopes], strict=False):
-        dq.clip(-speed, speed, out=part)
-        part *= slope - before
-        torque -= part
+        torque -= (slope - before) * dq.clip(-speed, speed)
     return torque
 
 
@@ -220,15 +203,13 @@ def friction_factor(friction: Sequence[JointFriction], temperature: Array) -> Ar
     Where a joint's temperature [°C] is NaN, not measured, it is 1, as at the reference
     temperature.
     """
-    joints = [j for j, joint in enumerate(friction) if joint.temperature]
-    if not joints:
+    if not any(joint.temperature for joint in friction):
         return None
     factor = np.ones(temperature.shape, order="F")
-    for j in joints:
-        law = friction[j].temperature
-        share = warmth(law, temperature[:, j])
-        share /= warmth(law, friction[j].reference_temperature)
-        factor[:, j] = np.where(np.isnan(share), 1.0, share)
+    for joint, own, T in zip(friction, factor.T, temperature.T, strict=True):
+        if law := joint.temperature:
+            share = warmth(law, T) / warmth(law, joint.reference_temperature)
+            own[:] = np.where(np.isnan(share), 1.0, share)
     return factor
 
 
@@ -334,7 +315,7 @@ def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     would count in it. Presliding friction is held at rest, in full or in part.
     """
     known = joint.parameters
-    coulomb = known.get("coulomb", 0.0) + known.get("stribeck", 0.0) + known.get("presliding", 0.0)
+    coulomb = sum(known.get(key, 0.0) for key in ("coulomb", "stribeck", "presliding"))
     # A sigmoid runs from one saturation to the other, which lie one amplitude apart.
     coulomb += 0.5 * abs(known.get("amplitude", 0.0)) + sum(joint.torques[:1])
     return coulomb + known.get("load_coulomb", 0.0) * np.abs(load)

@@ -147,11 +147,6 @@ class Robot(Shown):
         seal(self, "torque_constant", "gear", "efficiency", shape=(n,), called=self.name)
         if self.friction and len(self.friction) != n:
             raise RobotError(f"{self.name}: {len(self.friction)} friction models for {n} joints")
-        if self.torque_source not in TORQUE_SOURCES:
-            raise RobotError(
-                f"{self.name}: torque_source {self.torque_source!r} is unknown; "
-                f"there is {', '.join(TORQUE_SOURCES)}"
-            )
 
     def _headline(self) -> str:
         friction = ", ".join(dict.fromkeys(joint.model for joint in self.friction)) or "none"

@@ -96,12 +96,12 @@ class Run(Shown):
     @cached_property
     def smooth_gap(self) -> Array:
         """What the model misses of the torque, below the band of the noise. (T, n) [N·m]"""
-        return low_pass(self.t, self.drive_torque - self.model_torque, band(self.step, None)[0])
+        return low_pass(self.t, self.drive_torque - self.model_torque, signal_edge(self.step))
 
     @cached_property
     def smooth_model(self) -> Array:
         """The model's torque, below the band of the noise. (T, n) [N·m]"""
-        return low_pass(self.t, self.model_torque, band(self.step, None)[0])
+        return low_pass(self.t, self.model_torque, signal_edge(self.step))
 
     @cached_property
     def smooth_dq(self) -> Array:
@@ -194,10 +194,9 @@ class Runs:
         return self._runs[-1]
 
 
-def band(step: float, cutoff: float | None) -> tuple[float, float]:
-    """The band above the signal in which noise is measured. [Hz]"""
-    low = min(12.0 if cutoff is None else cutoff, 0.22 / step)
-    return low, min(2.0 * low, 0.45 / step)
+def signal_edge(step: float, cutoff: float = 12.0) -> float:
+    """The frequency above the signal, from which on noise is measured. [Hz]"""
+    return min(cutoff, 0.22 / step)
 
 
 NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
@@ -248,23 +247,21 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     A position that changes by more than half a turn between two samples was wrapped into
     one.
     """
-    columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
+    endless, changed = np.isin(robot.chain.names, robot.endless), {}
     if recording.joints != robot.joints:
         return recording
-    changed = {}
-    jumping = set[int]()
+    jumping = np.zeros_like(endless)
     for signal in ("q", "target_q"):
         if (values := getattr(recording, signal)) is not None:
             # A sample that is missing is no number; what is wound up behind it would be
             # none.
-            steps = abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
-            if turns := [j for j in columns if steps[j] > np.pi]:
-                changed[signal] = smooth = values.copy()
-                smooth[:, turns] = np.unwrap(values[:, turns], axis=0)
-                jumping.update(turns)
+            turns = endless & (abs(np.diff(values, axis=0)).max(axis=0, initial=0.0) > np.pi)
+            if turns.any():
+                changed[signal] = np.where(turns, np.unwrap(values, axis=0), values)
+                jumping |= turns
     if not changed:
         return recording
-    return recording.changed(fact("endless-joint-unwound", on_joints(sorted(jumping))), **changed)
+    return recording.changed(fact("endless-joint-unwound", on_joints(jumping)), **changed)
 
 
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:

@@ -12,13 +12,7 @@ import numpy as np
 from vftcli.robots.kernels import MomentumTerms, momentum_chunks, momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature
-from vftcli.signals.arrays import (
-    Array,
-    Mask,
-    empty_series,
-    handed_over,
-    is_uniform,
-)
+from vftcli.signals.arrays import Array, Mask, empty_series, handed_over, is_uniform
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.external_torque import DynamicsTerms, Instant
 from vftcli.signals.packages import needed
@@ -76,14 +70,13 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
     gravity get the gravity torque g(q) of the arm with its payload: τ = e + g(q).
     """
     check_joints(recording, robot)
-    name = effort_name(recording, robot)
-    if getattr(recording, name) is None:
+    effort: Array | None = getattr(recording, name := effort_name(recording, robot))
+    if effort is None:
         raise MissingSignalError(
             f"{recording.name}: the log has no joint torques and no motor currents, and "
             f"positions alone carry no force; it has {', '.join(recording.signals)}. Record "
             "them, or name their columns with --columns"
         )
-    effort = recording.require(name)
     if name == "torque_without_gravity":
         return effort + gravity_torque(robot, recording.q)
     if name == "torque":
@@ -111,12 +104,7 @@ class RunningTerms:
         """
         check_joints(recording, self.robot)
         q, dq = recording.q, recording.require("dq")
-        constant = self.robot.torque_constant
-        if constant is not None and uses_current(recording, self.robot):
-            effort = recording.require("current")
-        else:
-            effort, constant = drive_torque(recording, self.robot), None
-        temperature = measured_temperature(recording)
+        effort, temperature = drive_torque(recording, self.robot), measured_temperature(recording)
         p, mu = empty_series(*q.shape), empty_series(*q.shape)
         chunks: Iterable[tuple[slice, Array, list[Array]]]
         if self.literal:
@@ -128,20 +116,14 @@ class RunningTerms:
         for span, velocity, (momentum, bias, *loads) in chunks:
             p[span] = momentum
             mu[span] = effort[span]
-            if constant is not None:
-                mu[span] *= constant
             mu[span] += bias
             if self.robot.friction:
                 load = loads[0] if loads else None
                 warm = None if temperature is None else temperature[span]
                 mu[span] -= self._friction.torque(q[span], velocity, load, warm)
-        terms = DynamicsTerms(
-            t=recording.t,
-            p=handed_over(p),
-            mu=handed_over(mu),
-            log_clock=self.clock,
-            before=self.before,
-        )
+        clock, before = self.clock, self.before
+        p, mu = handed_over(p), handed_over(mu)
+        terms = DynamicsTerms(t=recording.t, p=p, mu=mu, log_clock=clock, before=before)
         self.before = terms.last
         return terms
 
@@ -171,19 +153,17 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
     weightless = model.copy()
     weightless.gravity.linear = np.zeros(3)
     data, free = model.createData(), weightless.createData()
-    samples, n = q.shape
-    zero = np.zeros(n)
-    p, coriolis, gravity = (np.empty((samples, n)) for _ in range(3))
-    for k in range(samples):
-        p[k] = pin.rnea(weightless, free, q[k], zero, dq[k])
-        rate = np.zeros(n)
-        for i in range(n):
-            moved = q[k].copy()
-            moved[i] += STEP
-            rate += (pin.rnea(weightless, free, moved, zero, dq[k]) - p[k]) / STEP * dq[k, i]
-        coriolis[k] = rate - pin.rnea(weightless, free, q[k], dq[k], zero)
-        gravity[k] = pin.rnea(model, data, q[k], zero, zero)
-    return MomentumTerms(p, coriolis, gravity)
+    zero = np.zeros(q.shape[1])
+    found = MomentumTerms(*np.empty((3, *q.shape)))
+    for k, (here, velocity) in enumerate(zip(q, dq, strict=True)):
+        found.p[k] = momentum = pin.rnea(weightless, free, here, zero, velocity)
+        rate = -pin.rnea(weightless, free, here, velocity, zero)
+        for move, speed in zip(STEP * np.eye(len(zero)), velocity, strict=True):
+            moved = pin.rnea(weightless, free, here + move, zero, velocity)
+            rate += (moved - momentum) / STEP * speed
+        found.coriolis_transpose_dq[k] = rate
+        found.gravity[k] = pin.rnea(model, data, here, zero, zero)
+    return found
 
 
 #: What rounding changes at most, of a speed as a share or of a number of blocks, up to
@@ -192,17 +172,15 @@ TIE = 1e-6
 GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch reaches across.
 
 
-def raw_disturbance(terms: DynamicsTerms, room: Array | None = None) -> Array:
+def raw_disturbance(terms: DynamicsTerms) -> Array:
     """The unfiltered external torque d of every sample but the first. (T−1, n) [N·m]
 
     d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times: the mean over a
     sample of the external torque and of everything else that the model leaves
     unexplained.
     """
-    d = np.subtract(terms.p[1:], terms.p[:-1], out=room)
-    d /= np.diff(terms.t)[:, None]
-    for j, mu in enumerate(terms.mu.T):
-        d[:, j] -= 0.5 * (mu[1:] + mu[:-1])
+    d = np.diff(terms.p, axis=0) / np.diff(terms.t)[:, None]
+    d -= 0.5 * (terms.mu[1:] + terms.mu[:-1])
     return d
 
 
@@ -213,10 +191,8 @@ def disturbance_impulse(terms: DynamicsTerms) -> Array:
     """
     total = empty_series(*terms.p.shape)
     total[:1] = 0.0
-    gained = raw_disturbance(terms, total[1:])
-    gained *= np.diff(terms.t)[:, None]
-    for column in gained.T:
-        column.cumsum(out=column)
+    gained = raw_disturbance(terms) * np.diff(terms.t)[:, None]
+    gained.cumsum(axis=0, out=total[1:])
     return total
 
 
@@ -286,17 +262,14 @@ def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> li
     On an uneven clock the integral of d is interpolated, which averages d over each new
     step [s].
     """
-    t, d = terms.t, raw_disturbance(terms)
-    whole = inside[1:] & inside[:-1]
+    t, whole = terms.t, inside[1:] & inside[:-1]
     if len(t) > 1 and is_uniform(t):
+        d = raw_disturbance(terms)
         return [d[start:stop] for start, stop in runs_of(whole)]
     # Across a gap the mean of two μ says nothing of what was between them.
     whole[gaps_of(t, GAP)] = False
-    stretches = []
+    total, stretches = disturbance_impulse(terms), []
     for start, stop in runs_of(whole):
-        clock = t[start : stop + 1]
-        total = np.concatenate([np.zeros((1, d.shape[1])), d[start:stop] * np.diff(clock)[:, None]])
-        total.cumsum(axis=0, out=total)
-        even = np.arange(clock[0], clock[-1], step)
-        stretches.append(np.diff(resample_columns(even, clock, total), axis=0) / step)
+        own, even = slice(start, stop + 1), np.arange(t[start], t[stop], step)
+        stretches.append(np.diff(resample_columns(even, t[own], total[own]), axis=0) / step)
     return stretches

@@ -103,10 +103,7 @@ def empty_series(samples: int, columns: int) -> Array:
 
 def at(chosen: Mask, x: Array) -> Array:
     """The chosen samples (T,) of a series (T, n), its columns contiguous. (S, n)"""
-    out = empty_series(int(np.count_nonzero(chosen)), x.shape[1])
-    for column, values in zip(out.T, x.T, strict=True):
-        np.compress(chosen, values, out=column)
-    return out
+    return np.compress(chosen, x.T, axis=1).T
 
 
 def check_clock(t: Array, what: str) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, Indices, Mask, is_uniform
-from vftcli.signals.series import median_step, resample_columns
+from vftcli.signals.series import median_step, resample_columns, summed
 
 LONGEST = 1.0  #: Longest delay looked for. [s]
 LEAD = 0.2  #: Longest lead looked for: a two-sided estimate may come early. [s]
@@ -190,6 +190,5 @@ def overlap_energy(series: Array, lags: Indices, other: int) -> Array:
 
     Without it a fit would favour small lags, which overlap longer.
     """
-    total = np.concatenate([[0.0], np.sum(series**2, axis=1).cumsum()])
-    energy: Array = total[np.minimum(len(series), other + lags)] - total[np.maximum(0, lags)]
-    return energy
+    total = summed(np.sum(series**2, axis=1))
+    return total[np.minimum(len(series), other + lags)] - total[np.maximum(0, lags)]

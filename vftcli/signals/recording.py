@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import (
-    Array,
-    Indices,
-    Mask,
-    check_clock,
-    check_shape,
-    release,
-    seal,
-)
+from vftcli.signals.arrays import Array, Indices, Mask, check_clock, check_shape, release, seal
 from vftcli.signals.errors import (
     ClockError,
     MissingSignalError,

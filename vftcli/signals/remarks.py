@@ -21,6 +21,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
+import numpy as np
+
 from vftcli.signals.shown import Shown
 
 if TYPE_CHECKING:
@@ -98,9 +100,9 @@ class Remarks(Shown, tuple[Remark, ...]):
 
 def on_joints(joints: "Iterable[int] | Mask", about: str = "") -> Where:
     """The place of a remark about some joints: a mask, or their numbers from zero."""
-    is_mask = str(getattr(joints, "dtype", "")) == "bool"
-    numbers = (j for j, one in enumerate(joints) if one) if is_mask else joints
-    return Where(about, tuple(int(j) + 1 for j in numbers))
+    numbers = np.array([*joints])
+    numbers = np.flatnonzero(numbers) if numbers.dtype == bool else numbers
+    return Where(about, tuple((numbers + 1).tolist()))
 
 
 def fact(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008 - immutable

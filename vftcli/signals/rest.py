@@ -6,7 +6,7 @@ In every function t is a clock (T,) [s], and dq are joint velocities (T, n) [rad
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import grown, median_step, runs_of
+from vftcli.signals.series import grown, median_step, runs_of, summed
 
 #: Speeds between rest and motion, by what each decides. Above the first, more than noise
 #: and last digits, a joint has a direction, and a log's motion begins. [rad/s]
@@ -59,10 +59,10 @@ def resting(t: Array, dq: Array) -> Mask:
     """
     first = t.searchsorted(t - AROUND, side="left")
     last = t.searchsorted(t + AROUND, side="right")
-    rests, count = np.zeros(dq.shape, bool), np.zeros(len(t) + 1, int)
+    rests = np.zeros(dq.shape, bool)
     for j, slow in enumerate(slower(dq).T):
-        slow.cumsum(out=count[1:])
-        rests[:, j] = 2 * (count[last] - count[first]) > last - first
+        count = summed(slow)
+        rests[:, j] = 2.0 * (count[last] - count[first]) > last - first
     return rests
 
 

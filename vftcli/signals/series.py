@@ -89,10 +89,15 @@ def grown(t: Array, mask: Mask, margin: float) -> Mask:
     return found
 
 
+def summed(x: Array | Mask) -> Array:
+    """The sum of all rows before each, and of all. (T + 1, …) of (T, …)"""
+    total = np.zeros((len(x) + 1, *x.shape[1:]))
+    np.cumsum(x, axis=0, out=total[1:])
+    return total
+
+
 def near(mask: Mask, count: int) -> Mask:
     """Samples within `count` samples of a true one, column by column. (T, n)"""
-    total = np.zeros((len(mask) + 1, mask.shape[1]), np.int32)
-    mask.cumsum(axis=0, out=total[1:])
-    k = np.arange(len(mask))
+    total, k = summed(mask), np.arange(len(mask))
     first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(mask))
     return total[last] > total[first]

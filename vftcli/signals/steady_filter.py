@@ -43,12 +43,7 @@ def filtered(
         each = [steady_filter(F, g, d, start, weights) for weights in wanted]
         return [found for found, _ in each], each[0][1]
     states = recursion(F, g * d, start)
-    found = []
-    for weights in wanted:
-        total = weights[0] * states[0]
-        for weight, state in zip(weights[1:], states[1:], strict=True):
-            total += weight * state
-        found.append(total)
+    found = [sum(w * s for w, s in zip(weights, states, strict=True)) for weights in wanted]
     return found, states[:, -1]
 
 

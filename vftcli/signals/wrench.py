@@ -7,12 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from vftcli.signals.arrays import (
-    Array,
-    Mask,
-    check_clock,
-    seal,
-)
+from vftcli.signals.arrays import Array, Mask, check_clock, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
 from vftcli.signals.shown import ALL, TimeSeries

@@ -21,7 +21,7 @@ from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.series import covered, median_step, resample_columns, runs_of
+from vftcli.signals.series import covered, median_step, resample_columns, runs_of, summed
 from vftcli.wrench.model_error import (
     UNKNOWN,
     ErrorProcess,
@@ -371,7 +371,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     known = 1.0 / coasted(quiet, v, kept, half) + 1.0 / behind - 1.0 / nothing
     first = np.maximum(np.arange(count) - half, 0)
     last = np.minimum(np.arange(count) + half + 1, count)
-    total = np.vstack([np.zeros(known.shape[1]), known.cumsum(axis=0)])
+    total = summed(known)
     known = (total[last] - total[first]) / (last - first)[:, None]
     # In a gap of the clock nothing would be known of it.
     weight = blocks.known[:, None] / (1.0 / known + R * min(length / UNLISTED, 1.0))
