@@ -1,7 +1,7 @@
 """Analysis: everything one run over one log made, ready to be shown."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks
-from vftcli.signals.shown import Shown, joined
+from vftcli.signals.shown import Shown, joined, record
 
 if TYPE_CHECKING:
     import polars as pl
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from vftcli.wrench.sensor_reading import SensorReading
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Analysis(Shown):
     """One log, one robot, its observers' estimates, and how they compare with the reference."""
 

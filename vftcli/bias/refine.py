@@ -6,7 +6,7 @@ over the log, the mean over the joints.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.series import resample_columns
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 
 #: The cause that is not part of an error's sum: it says what a standing joint may hide.
 STICTION = "stiction at rest"
@@ -237,7 +237,7 @@ def gap_remark(
     )
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Refinement(Shown):
     """What the complete log makes of its estimates."""
 

@@ -1,7 +1,7 @@
 """Contact and ContactList: the answer to what touched the arm."""
 
 from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.rest import faster
-from vftcli.signals.shown import UNKNOWN, Shown, joined, value_text
+from vftcli.signals.shown import UNKNOWN, Shown, joined, record, value_text
 
 if TYPE_CHECKING:
     import polars as pl
@@ -59,7 +59,7 @@ class ForceCourse(NamedTuple):
     band: Array  #: Half width of its 95 % band. (K,) [N]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Contact(Shown):
     """One contact: force and moment ON the robot, base axes, the moment about the flange point.
 
@@ -228,7 +228,7 @@ class Unexplained(NamedTuple):
     at: float  #: When. [s]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class ContactModel(Shown):
     """Noise model behind a list, for `run.json`."""
 
@@ -243,7 +243,7 @@ class ContactModel(Shown):
         seal(self, "noise_sd", "error_sd", "error_time")
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class ContactList(Shown):
     """What touched the arm along a log: a sequence of `Contact`."""
 

@@ -16,7 +16,7 @@ from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.shown import Shown, joined
+from vftcli.signals.shown import Shown, joined, record
 from vftcli.signals.wrench import AXES, unit_of
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ class SignalThreshold(NamedTuple):
         return max(blocks / len(self.tail.maxima) - 1.0, 0.0)
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Thresholds(Shown):
     """Thresholds of an arm."""
 

@@ -1,7 +1,6 @@
 """Interface of every observer: parameters in, external torque out."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,12 +10,12 @@ from vftcli.signals.arrays import Array, frozen, handed_over, number_array, seal
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.parsing import check_kind
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Tuning(Shown):
     """Meaning of an observer's parameters, joint by joint."""
 

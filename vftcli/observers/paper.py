@@ -16,7 +16,6 @@ returns its state; a whole log is one block.
 
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar, NamedTuple
 
@@ -51,6 +50,7 @@ from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, one_sample_earlier
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import caution, on_joints, warning
+from vftcli.signals.shown import record
 from vftcli.signals.steady_filter import recursion, steady_filter
 
 GAP = 3.0  #: A step of more than this many nominal ones is a gap.
@@ -130,7 +130,7 @@ class FirstOrderObserver(BlockObserver):
         return response
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class FilteredDynamicsObserver(FirstOrderObserver):
     r"""FDO (19)–(29): low-pass filtered :math:`\dot p - \mu`, no derivative.
 
@@ -171,7 +171,7 @@ class FilteredDynamicsObserver(FirstOrderObserver):
         return self.run_corrected(terms, state, d, afresh=self.omega * terms.p)
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class MomentumObserver(FirstOrderObserver):
     r"""GMO (30)–(35): residual of the momentum balance, :math:`\dot r = K(\dot p - \mu - r)`.
 
@@ -214,7 +214,7 @@ class MomentumObserver(FirstOrderObserver):
         return self.estimated(terms, tau, remarks=remarks), FirstOrderState(end)
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class KalmanObserver(BlockObserver):
     r"""KFO (36)–(44): Kalman filter on x = [p; τ_ext], ṗ = μ + τ_ext + w_p, τ̇_ext = A_ττ_ext + w_τ.
 

@@ -17,7 +17,7 @@ References:
     Int. J. Control 18(1), 1973, for the form used here.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,11 +34,11 @@ from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 from vftcli.signals.steady_filter import Fold, filtered, spans
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class KalmanSmoother(Shown):
     """Fixed-interval smoother with a disturbance Kalman filter's parameters.
 

@@ -10,7 +10,7 @@ with the filter's exact complex response H, or the smoother's real one.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -24,7 +24,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.option import numbers
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 
 SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
 #: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the
@@ -151,7 +151,7 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     return np.asarray(np.maximum(scale, FINEST**2 * spectra.step**3))
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class AutoTuned(Shown):
     """An observer with gains from the log, or set by hand."""
 

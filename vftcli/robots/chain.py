@@ -15,7 +15,7 @@ A robot file states its kinematics in one of three ways:
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,10 +25,10 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.pose import IDENTITY, Pose, rotation_about, rpy_matrix
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Payload(Shown):
     """A rigid load on the flange."""
 
@@ -43,7 +43,7 @@ class Payload(Shown):
             raise RobotError(f"the payload is unphysical: {why}")
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Chain(Shown):
     """Geometry and inertia of an n-joint revolute serial arm at rest on its base."""
 

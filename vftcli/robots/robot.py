@@ -1,7 +1,7 @@
 """Robot: everything known about one arm, whatever file it came from."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +12,7 @@ from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose
 from vftcli.signals.remarks import Remark
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,7 +23,7 @@ REFERENCE = 35.0
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class JointFriction(Shown):
     """Friction of one joint: a model's name and its parameters."""
 
@@ -62,7 +62,7 @@ class PerJoint(Shown):
         seal(self, *vars(self))
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Limits(PerJoint):
     """Joint limits; NaN where the description gives none."""
 
@@ -73,7 +73,7 @@ class Limits(PerJoint):
     qdd_max: Array  #: Acceleration limits. (n,) [rad/s²]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class SensorNoise(PerJoint):
     """Standard deviations of the joint measurements; NaN where unknown."""
 
@@ -93,7 +93,7 @@ class Mesh(NamedTuple):
     scale: Array  #: Its size, as a factor along each of its axes. (3,)
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Robot(Shown):
     """One arm: chain, drives, friction, limits and the gains its observers start from."""
 

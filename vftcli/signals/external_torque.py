@@ -1,7 +1,6 @@
 """What an observer takes and gives: dynamics terms in, external torque out."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from vftcli.signals.arrays import (
 )
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import Clock, clock_of
-from vftcli.signals.shown import ALL, Shown, TimeSeries, joined, per_joint
+from vftcli.signals.shown import ALL, Shown, TimeSeries, joined, per_joint, record
 
 COVERS = 1.96  #: Half width of a 95 % band, in standard deviations.
 
@@ -32,7 +31,7 @@ class Instant(NamedTuple):
     mu: Array  #: μ. (n,) [N·m]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class DynamicsTerms(Shown):
     r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33)."""
 
@@ -103,7 +102,7 @@ def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
     return np.concatenate([first, series[:-1]])
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class ExternalTorque(TimeSeries):
     """Torque the environment exerts on the robot, positive along each joint axis."""
 

@@ -1,7 +1,7 @@
 """Recording: one log, in SI units, on one strictly increasing clock; Source: where it is from."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,7 +19,7 @@ from vftcli.signals.errors import (
 from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
-from vftcli.signals.shown import ALL, Shown, TimeSeries, per_joint
+from vftcli.signals.shown import ALL, Shown, TimeSeries, per_joint, record
 from vftcli.signals.wrench import WrenchFrame, per_axis
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Awaited:
         instance.__dict__[self._key] = value
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Source(Shown):
     """Where a recording came from and what was done to it on the way in."""
 
@@ -141,7 +141,7 @@ EXAMINED = frozenset(
 )
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Recording(TimeSeries):
     """Measurements of n joints at T instants; a missing signal is None."""
 

@@ -1,10 +1,10 @@
 """Shown: what a notebook shows of a thing, one line and a small table instead of its arrays."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -20,10 +20,19 @@ ALL = slice(None)  #: All rows of a table.
 UNKNOWN = "–"  #: The text for a number that is not known.
 
 
+Kind = TypeVar("Kind")
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
+def record(kind: type[Kind]) -> type[Kind]:
+    """The class as a frozen dataclass of named fields that keeps the `repr` of `Shown`."""
+    return dataclass(frozen=True, kw_only=True, repr=False)(kind)
+
+
 class Shown:
     """A thing with a `repr` of one line, which a notebook shows as a small table.
 
-    A dataclass that is one is made with ``repr=False``. It says what it is by
+    A dataclass that is one is a `record`. It says what it is by
     `_headline`, and what is in it by `_rows`; else both are made of its fields.
     """
 

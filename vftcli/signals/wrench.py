@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, Mask, check_clock, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
-from vftcli.signals.shown import ALL, TimeSeries
+from vftcli.signals.shown import ALL, TimeSeries, record
 
 #: Names of the six components, force first, as in column names and tables.
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -102,7 +102,7 @@ def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
         yield f"{name}/{axis}", column
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class Wrench(TimeSeries):
     """Force and moment that the environment exerts on the robot."""
 

@@ -12,7 +12,7 @@ from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import covered, runs_of
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.wrench.choice import SMOOTHER, ZeroChoice
 from vftcli.wrench.smoother import SmoothedWrench
@@ -80,7 +80,7 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
     return (caution("contact-elsewhere", Where(wrench.name), share=share, threshold_Nm=limit),)
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class SensorReading(Shown):
     """Everything the virtual sensor says of one log."""
 

@@ -6,7 +6,7 @@ w_s = S⁻¹w.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import RobotError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
-from vftcli.signals.shown import Shown
+from vftcli.signals.shown import Shown, record
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench.frames import Mounting, check_frame, frame_pose, from_base
 
@@ -151,7 +151,7 @@ def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrenc
 CHUNK = 4096  #: Samples that are solved at once: about 10 MB of 6×6 matrices.
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@record
 class VirtualSensor(Shown):
     """How joint torques become a wrench."""
 
