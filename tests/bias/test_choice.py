@@ -13,12 +13,11 @@ def test_nothing_said_asks_for_no_complete_log_by_itself() -> None:
 
 
 @pytest.mark.parametrize(
-    ("word", "best", "everyone"),
-    [("auto", True, False), ("whole-log", True, True), ("none", False, False)],
+    ("word", "everyone"), [("auto", False), ("whole-log", True), ("none", False)]
 )
-def test_what_is_taken_off(word: str, best: bool, everyone: bool) -> None:
+def test_what_is_taken_off(word: str, everyone: bool) -> None:
     asked = RefinementChoice.parsed(settings={"bias.method": word})
-    assert (asked.corrects_best, asked.corrects_all) == (best, everyone)
+    assert asked.corrects_all == everyone
 
 
 def test_the_words_are_all_there_is() -> None:

@@ -160,7 +160,7 @@ def by_friction(robot, seconds, external=None):
     error = drawn_error(robot, size=0.0)
     friction = np.array(error.friction)
     friction[0] = 0.2 * usual_friction(robot)[0]
-    return wrong_run(robot, replace(error, friction=friction), external, seconds, noise=0.3)
+    return wrong_run(robot, error._replace(friction=friction), external, seconds, noise=0.3)
 
 
 def test_a_short_log_loses_friction_alone():

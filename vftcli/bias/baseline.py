@@ -96,6 +96,10 @@ class Baseline:
             RunSamples(without_load(self.of(run), self.load), inside) for run, inside in self.pieces
         ]
 
+    def measured(self, part: FreePart) -> Spectra:
+        """The spectra of the log outside of the free part, and of the free samples."""
+        return spectra_of(RunSamples(self.log, ~part.own), self.samples)
+
     @property
     def pieces(self) -> tuple[RunSamples, ...]:
         """The free samples, of the log itself and of free runs; none without a free part."""
@@ -122,7 +126,6 @@ class Baseline:
 
 def baseline_of(motion: FreeMotion) -> Baseline:
     """Find the free part of a log and its spectra, or say why there are none."""
-    log = motion.log
     bare = Baseline(motion=motion)
     try:
         part = motion.part
@@ -130,13 +133,13 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         return replace(bare, missing=caution("no-free-part", reason=str(error)))
     known = replace(bare, part=part, load=free_load(part.pieces))
     try:
-        spectra = spectra_of(RunSamples(log, ~part.own), known.samples)
+        spectra = known.measured(part)
     except ParameterError as error:
         return replace(known, missing=caution("no-spectra", reason=str(error)))
     if not part.doubted or looks_free(spectra):
         return replace(known, spectra=spectra)
     residuals = motion.free_cycles.residuals
-    listed = [] if residuals is None else residuals[np.isfinite(residuals)].tolist()
+    listed = np.zeros(0) if residuals is None else residuals[np.isfinite(residuals)]
     return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
 
 
@@ -204,7 +207,7 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
     """Input of a log's observers: `best` and, if asked, all less the bias."""
     motion, as_read = motion.steadied, motion.log
     found = baseline_of(motion)
-    if not (choice.corrects_all or (best and choice.corrects_best)):
+    if choice.bias == "none" or not (best or choice.corrects_all):
         return Baselines(plain=found, best=found)
     try:
         bias = whole_log_bias(motion.log)
@@ -223,17 +226,16 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
     """A baseline without spectra with the bias fit's free part (T,), where that is enough."""
-    log = found.motion.log
     share = float(quiet.mean())
     remark = fact("free-by-the-fit", share=share)
     if found.motion.choice.is_given and found.missing is not None:
         # What was given is dropped, and why has to be said.
         reason = found.missing.values["reason"]
         remark = caution("free-by-the-fit-instead", share=share, reason=reason)
-    part = FreePart((RunSamples(log, quiet),), quiet, (remark,))
+    part = FreePart((RunSamples(found.motion.log, quiet),), quiet, (remark,))
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
-        return replace(made, spectra=spectra_of(RunSamples(log, ~quiet), made.samples))
+        return replace(made, spectra=made.measured(part))
     except ParameterError:  # all of it or nothing is assumed free, or never long enough
         return found
 
@@ -244,4 +246,4 @@ def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
     made = replace(found, on_correction=bias.remarks, correction=fitted)
     if not bias.applied.any() or made.part is None or made.spectra is None:
         return made
-    return replace(made, spectra=spectra_of(RunSamples(made.log, ~made.part.own), made.samples))
+    return replace(made, spectra=made.measured(made.part))

@@ -38,8 +38,3 @@ class RefinementChoice(Choice):
     def corrects_all(self) -> bool:
         """Whether every observer runs on what is left without the whole log's bias."""
         return self.bias == WHOLE_LOG
-
-    @property
-    def corrects_best(self) -> bool:
-        """Whether `best` does."""
-        return self.bias in {AUTOMATIC, WHOLE_LOG}

@@ -191,7 +191,7 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
     size = [float(found.parts[cause][j]) for j, cause in enumerate(named)]
     total = np.hypot(found.total, np.where(stuck, stiction, 0.0))
     where = Where(about=found.name)
-    return fact("limits", where, causes=named, size_Nm=size, total_Nm=total.tolist())
+    return fact("limits", where, causes=named, size_Nm=size, total_Nm=total)
 
 
 def expected_gap(
@@ -269,9 +269,8 @@ def refine(
         shown.append(with_band(on, reading))
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
     for name, curve in curves.items():
-        omega, rmse = curve.best.tolist(), curve.least.tolist()
-        about = Where(about=name)
-        remarks.append(fact("tuned", about, omega_n_rad_s=omega, expected_rmse_Nm=rmse))
+        values = {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
+        remarks.append(fact("tuned", Where(name), **values))
     for name, curve in curves.items():
         remarks += bound_remarks(name, curve.best, curve.omega_n)
     remarks += band_remarks(plain)

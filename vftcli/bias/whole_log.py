@@ -230,11 +230,8 @@ def bias_of(
 
 def remarks_of(found: Guarded, changed: Array, free_share: float) -> tuple[Remark, ...]:
     """Joints that were corrected, by how much (n,) [N·m] rms, and those left alone."""
-    applied, remarks = found.weight > 0.0, []
-    for code, joints in {"applied": applied, "left-alone": ~applied}.items():
-        values = {"unseen_share": found.share[joints].tolist()}
-        if code == "applied":
-            values |= {"changed_Nm": changed[joints].tolist(), "free_share": free_share}
-        if joints.any():
-            remarks.append(fact(f"whole-log-{code}", on_joints(joints), **values))
-    return tuple(remarks)
+    on, share = found.weight > 0.0, found.share
+    values = {"changed_Nm": changed[on], "free_share": free_share}
+    applied = fact("whole-log-applied", on_joints(on), unseen_share=share[on], **values)
+    left = fact("whole-log-left-alone", on_joints(~on), unseen_share=share[~on])
+    return tuple(remark for remark in (applied, left) if remark.where.joints)

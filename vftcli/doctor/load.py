@@ -1,7 +1,6 @@
 """Findings about what a model assumes: load, payload, drive constants, joint temperatures."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -208,7 +207,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
     temperature = measured_temperature(recording)
     lawful = np.array([j for j, joint in enumerate(robot.friction) if joint.temperature], int)
     reference = [robot.friction[j].reference_temperature for j in lawful]
-    values: dict[str, Any] = {"reference_C": sorted(set(reference)), "robot": robot.name}
+    values = {"reference_C": sorted(set(reference)), "robot": robot.name}
     if temperature is not None:
         unknown = np.isnan(temperature[:, lawful])
         if unknown.any():

@@ -297,7 +297,7 @@ class FreeCycles(NamedTuple):
         if self.residuals is None:
             found = fact(f"{code}-given", cycles=named, whole=whole)
         else:
-            residuals = self.residuals[np.isfinite(self.residuals)].tolist()
+            residuals = self.residuals[np.isfinite(self.residuals)]
             found = fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
         if count <= MOST_PAIRED:
             return [found]

@@ -114,7 +114,7 @@ class Difference(NamedTuple):
 
     def floor_remark(self) -> Remark:
         """The floor on this rung."""
-        return self.remark("alignment-floor", floor_Nm=self.error.floor.tolist())
+        return self.remark("alignment-floor", floor_Nm=self.error.floor)
 
 
 def differences(

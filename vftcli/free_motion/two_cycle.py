@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 
@@ -114,7 +113,7 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     period, cycles, stated = motion.period, motion.cycles, motion.choice.period
     free = motion.free_cycles
     clocks = {"found": cycles.period}
-    values: dict[str, Any] = {
+    values = {
         "period_s": cycles.period,
         "deviation_rad": period.deviation,
         "whole": cycles.whole,
@@ -224,13 +223,14 @@ def floor_remarks(chosen: Difference, measured: Array | None, change: Array) -> 
     """Origin of the floor, joints without one, and joints with changed friction."""
     remarks = [fact("floor-propagated")]
     if measured is not None:
-        remarks = [fact("floor-measured", ratio=measured.tolist())]
+        remarks = [fact("floor-measured", ratio=measured)]
     share, error = chosen.error.standing_share, chosen.error
     for j in np.flatnonzero(share > 0.02):
         code = "joint-stands" if share[j] > 1.0 - TRUSTED_SHARE else "joint-stands-at-times"
         values = {"share": float(share[j]), "stiction_Nm": float(error.floor_standing[j])}
         remarks.append(caution(code, on_joints([int(j)]), **values))
-    if len(changed := np.flatnonzero(change)):
-        values = change[changed].tolist()
-        remarks.append(caution("friction-changed", on_joints(changed), change_Nm=values))
+    changed = change != 0.0
+    if changed.any():
+        size = change[changed]
+        remarks.append(caution("friction-changed", on_joints(changed), change_Nm=size))
     return remarks

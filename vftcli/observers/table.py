@@ -170,7 +170,7 @@ def build_fdo(setup: Setup, name: str) -> Built:
     # One cutoff for all joints: the one with the joints' mean delay.
     cutoff = float(1.0 / np.mean(1.0 / omega) if origin else omega[0])
     observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
-    said: dict[str, Any] = {"parameter": "fdo.omega", "gain": cutoff, "unit": "rad/s"}
+    said = {"parameter": "fdo.omega", "gain": cutoff, "unit": "rad/s"}
     return observer, tuple(fact(code, **said) for code in origin)
 
 
@@ -178,7 +178,7 @@ def build_gmo(setup: Setup, name: str) -> Built:
     """The momentum observer, its gains given or left over from the Kalman filter."""
     gain, origin = first_order_gain(setup, name, "gain")
     observer = MomentumObserver(gain=gain, as_printed=setup.as_printed)
-    said = {"parameter": "gmo.gain", "gain": gain.tolist(), "unit": "1/s"}
+    said = {"parameter": "gmo.gain", "gain": gain, "unit": "1/s"}
     return observer, tuple(fact(code, **said) for code in origin)
 
 

@@ -163,7 +163,7 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         "count": chain.joints,
         "joints_taken": list(chain.names),
         "flange": lumped.flange[0],
-        "gravity_m_s2": chain.gravity.tolist(),
+        "gravity_m_s2": chain.gravity,
         "root": lumped.tree.root,
     }
     if not locked:

@@ -288,11 +288,11 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
 
 def falling_friction(friction: Sequence[JointFriction], limits: Array) -> list[Remark]:
     """A warning on friction that falls below the speed limits [rad/s]."""
-    speeds = [falling_speed(joint, limit) for joint, limit in zip(friction, limits, strict=False)]
-    falls = np.flatnonzero(np.isfinite(speeds))
-    if not falls.size:
+    speeds = np.array([*map(falling_speed, friction, limits)])
+    falls = np.isfinite(speeds)
+    if not falls.any():
         return []
-    values = {"speeds_rad_s": [speeds[j] for j in falls], "limits_rad_s": limits[falls].tolist()}
+    values = {"speeds_rad_s": speeds[falls], "limits_rad_s": limits[falls]}
     return [warning("falling-friction", on_joints(falls), **values)]
 
 

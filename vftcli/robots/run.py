@@ -224,8 +224,8 @@ def paired(recording: Recording, robot: Robot) -> Recording:
             left = [name for k, name in enumerate(named) if k not in order]
             remarks = [fact("joints-by-name", joints=[named[k] for k in order])]
             remarks += [fact("joints-left-out", joints=left)] if left else []
-            there = set(JOINT_SIGNALS).intersection(recording.signals)
-            fields = {x: getattr(recording, x)[:, order] for x in there}
+            there = (name for name in recording.signals if name in JOINT_SIGNALS)
+            fields = {name: getattr(recording, name)[:, order] for name in there}
             names = tuple(named[k] for k in order)
             recording = recording.changed(*remarks, joint_names=names, **fields)
     done = {remark.code for remark in recording.source.remarks}
@@ -236,9 +236,9 @@ def paired(recording: Recording, robot: Robot) -> Recording:
     torque = robot.gear if robot.efficiency is None else robot.gear * robot.efficiency
     scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / robot.gear)
     scales |= dict.fromkeys(("torque", "torque_without_gravity", "target_torque"), torque)
-    there = set(scales).intersection(recording.signals)
-    fields = {name: getattr(recording, name) * scales[name] for name in there}
-    return recording.changed(fact("gear-applied", ratios=robot.gear.tolist()), **fields)
+    each = scales.keys() & recording.signals
+    fields = {name: getattr(recording, name) * scales[name] for name in each}
+    return recording.changed(fact("gear-applied", ratios=robot.gear), **fields)
 
 
 def unwound(recording: Recording, robot: Robot) -> Recording:

@@ -105,17 +105,17 @@ def on_joints(joints: "Iterable[int] | Mask", about: str = "") -> Where:
     return Where(about, tuple((numbers + 1).tolist()))
 
 
-def fact(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008 - immutable
+def fact(code: str, where: Where = Where(), /, **values: object) -> Remark:  # noqa: B008 - immutable
     """A remark that informs."""
     return Remark(code, "fact", values, where)
 
 
-def caution(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008
+def caution(code: str, where: Where = Where(), /, **values: object) -> Remark:  # noqa: B008
     """A remark on what limits the result."""
     return Remark(code, "caution", values, where)
 
 
-def warning(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008
+def warning(code: str, where: Where = Where(), /, **values: object) -> Remark:  # noqa: B008
     """A remark on what can make the result wrong."""
     return Remark(code, "warning", values, where)
 

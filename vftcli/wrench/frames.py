@@ -14,7 +14,7 @@ what it leaves open is assumed, and the assumption is a remark.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -224,7 +224,7 @@ def controller_point(
         point: unexplained(beyond, np.einsum("tij,ti->tj", J, np.hstack([force, turned])))
         for point, turned in about.items()
     }
-    values: dict[str, Any] = {point: float(np.sqrt(share.mean())) for point, share in left.items()}
+    values = {point: float(np.sqrt(share.mean())) for point, share in left.items()}
     pieces = recording.duration / PIECE
     evidence = 0.5 * pieces * float(np.log(left["flange"] / left["tool"]).sum())
     if abs(evidence) <= SURE:

@@ -12,7 +12,7 @@ the same.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain as chained
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -268,7 +268,7 @@ def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
     count = int(np.count_nonzero(hidden))
     if not count or sigma is None:
         return ()
-    values: dict[str, Any] = {"masked": count, "samples": len(hidden), "share": count / len(hidden)}
+    values = {"masked": count, "samples": len(hidden), "share": count / len(hidden)}
     return (caution("pose-hides-wrench", **values, sigma_min_m=float(sigma.min())),)
 
 
