@@ -19,6 +19,7 @@ import numpy as np
 from vftcli.readers.aliases import CLOCKS
 from vftcli.readers.hdf5 import level_of, opened, table_of
 from vftcli.readers.objects import (
+    Data,
     columns_of,
     columns_of_lines,
     flat,
@@ -45,13 +46,11 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if layout.name == "ur-binary":
         return read_layout(binary_table(file), UR, request)
     if layout.name == "npz":
-        return _read_arrays(file, request, _npz_arrays(file))
+        return _read_arrays(file, _npz_arrays(file), request)
     if layout.name == "npy":
         array = _npy_array(file)
-        if not array.dtype.names:
-            return _read_rows(file, array, request)
-        columns = {name: array[name] for name in array.dtype.names}
-        return from_table(ArrayTable(path=file.path, columns=columns), request)
+        fields = array.dtype.names or ()
+        return _read_arrays(file, {name: array[name] for name in fields} or array, request)
     lines = list(lines_of(file.content))
     states = [each for each in lines if each[1].startswith(b"{")]
     columns, remarks = columns_of_lines(file, states)
@@ -72,50 +71,41 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
     first = file.first_line.strip()
     # One object a line: the first line is one by itself, and is not all.
     if not packed and len(file.lines) > 1 and first.startswith(b"{") and first.endswith(b"}"):
-        yield {0: lambda r: _read_arrays(file, r, *columns_of_lines(file, lines_of(file.content)))}
+        columns, remarks = columns_of_lines(file, lines_of(file.content))
+        yield {0: partial(_read_arrays, file, columns, remarks=remarks)}
         return
     log = load_arrays_only(file) if packed else parsed(file)
-    if not isinstance(log, dict):
-        if packed:
-            raise LogError(
-                f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of "
-                "arrays. Save the log with np.savez."
-            )
-        if log and all(isinstance(row, dict) for row in log):
-            yield {0: lambda request: _read_arrays(file, request, columns_of(file, log, 1))}
-        else:
-            rows = _arrays_of_lists(file, {"rows": log})["rows"]
-            yield {0: partial(_read_rows, file, rows)}
-        return
-    inner = [value for value in log.values() if isinstance(value, dict)]
-    skills = [value[SKILL] for value in inner if isinstance(value.get(SKILL), dict)]
-    logs = skills or (inner if len(inner) == len(log) == 1 else [log])
-    yield {k: partial(_read_states, file, states) for k, states in enumerate(logs)}
-
-
-def _read_states(file: LogFile, states: Mapping[Any, Any], request: ReadChoice) -> RawLog:
-    return _read_arrays(file, request, _arrays_of_lists(file, states))
-
-
-def _read_rows(file: LogFile, rows: Column, request: ReadChoice) -> RawLog:
-    if rows.ndim != 2 or rows.size == 0:
-        raise NoLogError(
-            f"{file.path}: an array of shape {rows.shape}; a log is a matrix, a row a sample."
+    logs = [log]
+    if isinstance(log, dict):
+        inner = [value for value in log.values() if isinstance(value, dict)]
+        skills = [value[SKILL] for value in inner if isinstance(value.get(SKILL), dict)]
+        logs = skills or (inner if len(inner) == len(log) == 1 else logs)
+    elif packed:
+        raise LogError(
+            f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of "
+            "arrays. Save the log with np.savez."
         )
-    columns = {str(k): rows[:, k] for k in range(rows.shape[1])}
-    return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
+    elif log and all(isinstance(row, dict) for row in log):
+        logs = [columns_of(file, log, 1)]
+    yield {k: partial(_read_arrays, file, each) for k, each in enumerate(logs)}
 
 
-def _read_arrays(
-    file: LogFile,
-    request: ReadChoice,
-    arrays: Mapping[str, Column],
-    remarks: Notes = (),
-) -> RawLog:
-    """Read named arrays as panda-py's log, by --columns, or by alias."""
-    # Rows of matrices become flat, a column of single numbers is a row of them.
-    shaped = {n: a.reshape(len(a), -1) if a.ndim == 3 else a for n, a in arrays.items() if a.ndim}
-    shaped = {n: a[:, 0] if a.shape[1:] == (1,) else a for n, a in shaped.items() if a.ndim < 3}
+def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes = ()) -> RawLog:
+    """Read named arrays as panda-py's log, by --columns, or by alias; or the rows of one."""
+    named = isinstance(log, dict)
+    arrays = _arrays_of(file, log if named else {"rows": log})
+    if not named and (arrays["rows"].ndim != 2 or not arrays["rows"].size):
+        raise NoLogError(
+            f"{file.path}: an array of shape {arrays['rows'].shape}; a log is a matrix, a row a "
+            "sample."
+        )
+    if not named:
+        columns = {str(k): column for k, column in enumerate(arrays["rows"].T)}
+        return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
+    # Rows of matrices become flat.
+    shaped = {
+        n: a.reshape(len(a), -1) if a.ndim == 3 else a for n, a in arrays.items() if a.ndim < 4
+    }
     table = ArrayTable(path=file.path, columns=shaped, remarks=remarks)
     if request.columns is not None and not request.spec.named:
         raise LogError(
@@ -128,17 +118,17 @@ def _read_arrays(
     return from_table(table, request)
 
 
-def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> Columns:
+def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:
+    """What of a log are numbers, as arrays with a row or more."""
     arrays = {}
     for name, value in log.items():
-        rows = value.shape[0] if isinstance(value, np.ndarray) and value.ndim else 0
-        if not (rows or (isinstance(value, list) and value)):
+        if not isinstance(value, np.ndarray | list):
             continue
         try:
             array = np.asarray(value)
         except ValueError:
             raise LogError(f"{file.path}: {name!s:.40} holds rows of different lengths.") from None
-        if array.dtype.kind in "fiub":
+        if array.dtype.kind in "fiub" and array.ndim and len(array):
             arrays[str(name)] = array
     if not arrays:
         raise NoLogError(f"{file.path}: holds no arrays of numbers, so no log.")

@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -98,11 +98,6 @@ class Hdf5Table(ArrayTable):
     Images, texts, references, links to other files and what claims more than it stores
     are left out; nothing is read before it is asked for.
     """
-
-    @cached_property
-    def lists(self) -> Mapping[int, int]:
-        """Column → length of its rows, of matrices of several columns."""
-        return {k: width for k, width in super().lists.items() if width != 1}
 
     def within(self, group: str, also: Sequence[str] = ()) -> "Hdf5Table":
         """The datasets below a group, by their paths from there on, and others by theirs."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.readers.aliases import ALIASES, AXES, kinematic_order
+from vftcli.readers.aliases import ALIASES, AXES
 from vftcli.readers.columns import SIGNALS
 from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
@@ -90,7 +90,7 @@ def read_episode(
         each_of = each_of.items() if isinstance(each_of, dict) else ()
         features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
         usual, names, side, remarks = _columns_of(file.path, table, features, request)
-    raw = from_table(table, request, usual=usual, joint_names=names, remarks=remarks)
+    raw = from_table(table, request, usual=usual, names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
     return replace(
         _by_frames(raw, table, info.get("fps")),
@@ -125,7 +125,6 @@ def _columns_of(
         )
     names = tuple(element.joint for element in by_signal["q"])
     names = names if all(names) and len(set(names)) == len(names) else ()
-    names = tuple(names[k] for k in kinematic_order(names))
     grammar = {field: word for word, field in SIGNALS.items()}
     items = [
         f"{grammar[signal]}={'|'.join(e.column for e in _in_order(path, signal, found, names))}"

@@ -155,9 +155,9 @@ class ArrayTable(Table):
 
     @cached_property
     def lists(self) -> Mapping[int, int]:
-        """Column → length of its rows, of matrices."""
-        arrays = enumerate(self.columns.values())
-        return {k: array.shape[1] for k, array in arrays if array.ndim == 2}
+        """Column → length of its rows, of matrices of several columns."""
+        widths = enumerate(array.shape[1:] for array in self.columns.values())
+        return {k: width[0] for k, width in widths if width and width != (1,)}
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """All rows of some columns; whole stamps stay whole."""

@@ -7,9 +7,8 @@ are required to be equal too, so that joint names hold for every message of a gr
 """
 
 from collections.abc import Container, Mapping, Sequence
-from contextlib import suppress
 from functools import cache, lru_cache
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,16 +31,8 @@ SIZES = {
 }  # fmt: skip
 
 
-class Field(NamedTuple):
-    """One field of a message type."""
-
-    name: str  #: Its name.
-    type: str  #: A primitive, `string`, or another message type as package/Name.
-    many: int | None  #: How many: None for one, a number for a fixed array, −1 for a sequence.
-
-
-Types = dict[str, tuple[Field, ...]]  #: Message type as package/Name → its fields.
-Described = Any  #: Fields or their type as nested tuples of rosbags.
+#: Message type as rosbags names it, package/msg/Name → constants, and each field's name and type.
+Types = dict[str, Any]
 
 
 class LayoutError(ValueError):
@@ -84,7 +75,7 @@ class MessageLayout:
             self._order = "<" if message[1] == 1 else ">"
             self._fixed.append((0, 2))
             self._position = 4
-        self._walk("", kind, 0)
+        self._walk("", long_name(kind), 0)
         # Some writers pad a message at its end.
         if len(message) - self._position > (8 if cdr else 0):
             raise LayoutError(f"{len(message) - self._position} bytes too many")
@@ -116,23 +107,22 @@ class MessageLayout:
             raise LayoutError("more parts than bytes")
         if kind not in self._types:
             raise LayoutError(f"no definition of {kind}")
-        for part in self._types[kind]:
-            inner = f"{path}.{part.name}" if path else part.name
-            many = self._count() if part.many == -1 else part.many
-            count = 1 if many is None else many
-            if part.type in SIZES:
-                code, size = self._order + SIZES[part.type], int(SIZES[part.type][1])
+        for name, described in self._types[kind][1]:
+            inner, (part, many) = f"{path}.{name}" if path else name, element_of(described)
+            count = 1 if many is None else many if many >= 0 else self._count()
+            if part in SIZES:
+                code, size = self._order + SIZES[part], int(SIZES[part][1])
                 if count:
                     self._align(size)
                 start = self._take(count * size, inner)
                 if len(self.paths) > MAX_LEAVES:
                     raise LayoutError(f"{inner} is outside the message")
                 self.paths[inner] = (code, (count,)), start
-            elif part.type == "string":
+            elif part == "string":
                 self.texts[inner] = tuple(self._text(inner) for _ in range(count))
             else:
                 for k in range(count):
-                    self._walk(inner if many is None else f"{inner}[{k}]", part.type, depth + 1)
+                    self._walk(inner if many is None else f"{inner}[{k}]", part, depth + 1)
 
     def _take(self, size: int, what: str) -> int:
         start, self._position = self._position, self._position + size
@@ -175,25 +165,20 @@ def types_of(definition: str, name: str, *, idl: bool) -> Types:
         parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
     except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:
         raise LayoutError(f"no message definition: {reason_of(error)[:60]}") from None
-    return {type_name(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
+    return parsed
 
 
-def fields_of(fields: Described) -> tuple[Field, ...]:
-    """Fields as rosbags describes them, in our terms."""
-    return tuple(Field(str(name), *_described(kind)) for name, kind in fields)
-
-
-def _described(kind: Described) -> tuple[str, int | None]:
-    node, inner = int(kind[0]), kind[1]
+def element_of(described: Any) -> tuple[str, int | None]:  # noqa: ANN401 - nested tuples of rosbags
+    """A field's type, or its elements', and their number: None for one, −1 for any number."""
+    node, inner = described
     if node == 1:  # a primitive with a bound
         return str(inner[0]), None
     if node == 2:  # another message
-        return type_name(str(inner)), None
-    element, bound = inner
-    name, many = _described(element)
+        return str(inner), None
+    name, many = element_of(inner[0])
     if many is not None:
         raise LayoutError("an array of arrays")
-    return name, int(bound) if node == 3 else -1
+    return name, int(inner[1]) if node == 3 else -1
 
 
 #: The definitions of types that ROS 2 has not, by package/Name: Franka's state,
@@ -218,16 +203,6 @@ def type_store() -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
     return store
 
 
-@cache
-def known_types() -> Types:
-    """The fields of every type of the store."""
-    found = {}
-    for name, (_, fields) in type_store().fielddefs.items():
-        with suppress(LayoutError):
-            found[type_name(name)] = fields_of(fields)
-    return found
-
-
 def schema_text(kind: str) -> str:
     """A type's definition followed by those of the types it is made of, as bags embed them."""
     text: str = type_store().generate_msgdef(long_name(kind), ros_version=2)[0]
@@ -236,15 +211,15 @@ def schema_text(kind: str) -> str:
 
 def types_for(channel: Channel) -> Types:
     """All types that a channel's messages are made of: the container's own first."""
-    known = dict(known_types())
+    known: Types = dict(type_store().fielddefs)
     if channel.definition:
         known |= types_of(channel.definition, long_name(channel.type), idl=channel.idl)
     if channel.encoding == "ros1":
         # ROS 1 has no int32 seconds in a message of their own: time is a primitive of two
         # words.
-        time = known["builtin_interfaces/Time"]
-        known |= {"builtin_interfaces/Time": time, "builtin_interfaces/Duration": time}
-    if channel.type not in known:
+        time = type_store().fielddefs["builtin_interfaces/msg/Time"]
+        known |= {f"builtin_interfaces/msg/{name}": time for name in ("Time", "Duration")}
+    if long_name(channel.type) not in known:
         raise LogError(
             f"topic {channel.topic}: the bag holds no definition of {channel.type}. Convert it "
             "with ros2 bag convert on a machine that has the package."
@@ -263,7 +238,7 @@ def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
     are put in column by column.
     """
     template = bytes(type_store().serialize_cdr(template_of(kind, values), long_name(kind)))
-    layout = MessageLayout(known_types(), template, kind, cdr=True)
+    layout = MessageLayout(type_store().fielddefs, template, kind, cdr=True)
     if unknown := sorted({*values} - {*layout.paths, *layout.texts}):
         raise OutputError(f"{kind} has no field {unknown[0]}")
     out = np.tile(np.frombuffer(template, np.uint8), (rows, 1))
@@ -277,17 +252,18 @@ def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
 def template_of(kind: str, values: Mapping[str, Value], path: str = "") -> Any:  # noqa: ANN401
     """A message with the texts of values, and as many zeros as they have numbers."""
     made: dict[str, Any] = {}
-    for field in known_types()[kind]:
-        inner = f"{path}.{field.name}" if path else field.name
+    for name, described in type_store().fielddefs[long_name(kind)][1]:
+        inner, (part, many) = f"{path}.{name}" if path else name, element_of(described)
         given: Any = values.get(inner)
         # A sequence is as long as the rows that it is given.
-        many = field.many if field.many != -1 else 0 if given is None else np.shape(given)[-1]
-        if field.type in SIZES:
-            made[field.name] = 0 if many is None else np.zeros(many, SIZES[field.type])
-        elif field.type == "string":
-            made[field.name] = str(given or "") if many is None else [*map(str, given or ())]
+        if many == -1:
+            many = 0 if given is None else np.shape(given)[-1]
+        if part in SIZES:
+            made[name] = 0 if many is None else np.zeros(many, SIZES[part])
+        elif part == "string":
+            made[name] = str(given or "") if many is None else [*map(str, given or ())]
         else:  # sequences of messages stay empty
-            made[field.name] = template_of(field.type, values, inner) if many is None else []
+            made[name] = template_of(type_name(part), values, inner) if many is None else []
     return type_store().types[long_name(kind)](**made)
 
 
