@@ -39,6 +39,8 @@ COUNTED = re.compile(rf"(joint)[_.]({WORDS})[_.](\d{{1,4}})$")  #: joint_positio
 SIDE = re.compile(rf"(?:^|[._/ ])({'|'.join(ARMS)})(?:$|[._/ ])")
 NO_JOINT = re.compile(r"(?i)grip|finger")
 MEASURED = ("q", "dq", "torque", "current", "tau_ext")  #: Signals that are looked for.
+#: Word → the signal that it names.
+SIGNAL_OF = {word: signal for signal in reversed(MEASURED) for word in ALIASES[signal]}
 #: Values of robot_type that are a profile's name.
 ROBOTS = ("panda", "fr3", "ur5", "ur5e", "ur10e")
 
@@ -81,16 +83,14 @@ def read_episode(
     """Read an episode of a dataset, of which meta/info.json says this."""
     path = data_file(file.path, episode)
     table = _rows_of(open_log(path), episode)
-    names: Names = ()
-    remarks: Notes = ()
-    if request.spec.item("q"):
-        usual, side = "t=timestamp,q=observation.state", ""
-    else:
+    known: dict[str, Any] = {"usual": "t=timestamp,q=observation.state"}
+    side = ""
+    if not request.spec.item("q"):
         each_of = info.get("features")
         each_of = each_of.items() if isinstance(each_of, dict) else ()
         features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
-        usual, names, side, remarks = _columns_of(file.path, table, features, request)
-    raw = from_table(table, request, usual=usual, names=names, remarks=remarks)
+        known, side = _columns_of(file.path, table, features, request)
+    raw = from_table(table, request, **known)
     robot = str(info.get("robot_type", "")).lower()
     return replace(
         _by_frames(raw, table, info.get("fps")),
@@ -102,12 +102,13 @@ def read_episode(
 
 def _columns_of(
     path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
-) -> tuple[str, Names, str, Notes]:
-    """The --columns text, the joints' names or none, the arm of two or "", what is to be said."""
-    there = [e for name in table.names for e in _elements_of(name, table, features.get(name))]
+) -> tuple[dict[str, Any], str]:
+    """What `from_table` has to know of the columns, and the arm of two or ""."""
+    # What is commanded is no measurement.
+    observed = [name for name in table.names if name.startswith("observation.")]
+    there = [e for name in observed for e in _elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
     # Nothing tells a sensor's wrench from an estimate.
-    observed = [name for name in table.names if name.startswith("observation.")]
     left = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
     remarks: Notes = ()
     if left and not request.spec.item("wrench"):
@@ -131,7 +132,8 @@ def _columns_of(
         for signal, found in by_signal.items()
         if found
     ]
-    return ",".join(["t=timestamp", *items]), names, side, remarks
+    usual = ",".join(["t=timestamp", *items])
+    return {"usual": usual, "names": names, "remarks": remarks}, side
 
 
 def _in_order(path: Path, signal: str, elements: list[Element], names: Names) -> list[Element]:
@@ -148,28 +150,21 @@ def _in_order(path: Path, signal: str, elements: list[Element], names: Names) ->
 
 
 def _elements_of(name: str, table: ParquetTable, labels: Json) -> Iterable[Element]:
-    """The joints' elements of a feature; none of a gripper, a pose, an action."""
-    if not name.startswith("observation."):
-        return
+    """The joints' elements of a feature; none of a gripper or a pose."""
     width = table.lists.get(table.names.index(name))
     *_, last = ["", *(part for part in name.lower().split(".")[1:] if part not in ARMS)]
-    of_feature = "q" if last == "state" else signal_of(last)
+    of_feature = "q" if last == "state" else SIGNAL_OF.get(last, "")
     if isinstance(labels, dict):
         labels = next(iter(labels.values()), None)
     good = isinstance(labels, list) and len(labels) == (width or 1)
     for k in range(width or 1):
         label = COUNTED.sub(r"\1_\3.\2", str(labels[k])) if good else ""
         match = NAMED.fullmatch(label)
-        joint, signal = (match[1], signal_of(match[2])) if match else (label, of_feature)
+        joint, signal = (match[1], SIGNAL_OF.get(match[2], "")) if match else (label, of_feature)
         pose = AXES.fullmatch(re.split("[_.]", joint)[-1])
         if signal and not pose and not NO_JOINT.search(joint):
             side = SIDE.search(label.replace("_", ".")) or SIDE.search(name)
             yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
-
-
-def signal_of(word: str) -> str:
-    """The signal that a word names, "" where it names none that is looked for."""
-    return next((signal for signal in MEASURED if word in ALIASES[signal]), "")
 
 
 def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:

@@ -175,6 +175,10 @@ class ArrayUnpickler(pickle.Unpickler):
     """
 
     def __init__(self, content: bytes) -> None:
+        # A memo index allocates a list of its size; nothing is built before they are known.
+        for opcode, argument, _ in pickletools.genops(content):
+            if isinstance(argument, int) and "PUT" in opcode.name and argument > len(content):
+                raise Refused("a memo larger than the file")
         super().__init__(io.BytesIO(content))
         self._left = max(BUILT_LIMIT, len(content))
         self._known: dict[int, Built | None] = {}
@@ -188,21 +192,16 @@ class ArrayUnpickler(pickle.Unpickler):
         return lambda *arguments: Stub(name, *arguments)
 
     def _ordered(self, items: Data = ()) -> dict[Data, Data]:
-        self._claim(len(items))
+        self.claim(len(items))
         return dict(items)
 
-    def _claim(self, size: int) -> None:
+    def claim(self, size: int) -> None:
+        """Count what is built, which a pickle of this size has to hold."""
         self._left -= size
         if self._left < 0:
             raise Refused(TOO_MUCH)
 
-    def built(self, value: Data) -> Data:
-        """What was loaded, with arrays for pickled arrays, once its size is known to be bounded."""
-        built, size = self._settled(value, 0)
-        self._claim(size)
-        return built
-
-    def _settled(self, value: Data, depth: int) -> Built:
+    def settled(self, value: Data, depth: int = 0) -> Built:
         """A value with arrays for pickled arrays, and how many numbers it has in full.
 
         A part that is named again is not walked again: a few lists that hold one another
@@ -221,7 +220,7 @@ class ArrayUnpickler(pickle.Unpickler):
             built = self._array(value)
         else:
             inner = value.values() if isinstance(value, dict) else value
-            parts = [self._settled(part, depth + 1) for part in inner]
+            parts = [self.settled(part, depth + 1) for part in inner]
             whole = [part for part, _ in parts]
             keyed = dict(zip(value, whole, strict=True)) if isinstance(value, dict) else whole
             built = keyed, 1 + sum(size for _, size in parts)
@@ -236,7 +235,7 @@ class ArrayUnpickler(pickle.Unpickler):
             text, encoding = (*stub.arguments, "latin1")[:2]
             if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
                 raise Refused("an odd encoding")
-            self._claim(len(text))
+            self.claim(len(text))
             return text.encode("latin1"), 1
         if stub.name == "_reconstruct":
             shape, kind, fortran, content = stub.state[-4:]
@@ -247,7 +246,7 @@ class ArrayUnpickler(pickle.Unpickler):
             kind, content = stub.arguments
         else:
             raise Refused("an array of its own making")
-        dtype, content = dtype_of(kind), self._settled(content, DEPTH)[0]
+        dtype, content = dtype_of(kind), self.settled(content, DEPTH)[0]
         if not isinstance(content, bytes | bytearray):
             raise Refused("an array of objects")
         if dtype is None:  # of no plain numbers
@@ -269,11 +268,10 @@ def load_arrays_only(file: LogFile) -> Data:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # old opcodes' escapes: refused or read
-            # Looked over as a whole first: loading builds objects on the way to what it
-            # refuses.
-            _check_opcodes(content)
             unpickler = ArrayUnpickler(content)
-            return unpickler.built(unpickler.load())
+            log, size = unpickler.settled(unpickler.load())
+            unpickler.claim(size)
+            return log
     except Refused as refusal:
         raise LogError(f"{file.path}: refused, the pickle asks for {refusal}. {remedy}") from None
     except RecursionError:
@@ -282,17 +280,3 @@ def load_arrays_only(file: LogFile) -> Data:
         raise LogError(
             f"{file.path}: a damaged pickle ({reason_of(error)[:80]}). {remedy}"
         ) from None
-
-
-def _check_opcodes(content: bytes) -> None:
-    """Raise Refused for opcodes that no array needs, before anything is built.
-
-    Extension codes and persistent ids reach outside the file; a memo index or a claimed
-    length far beyond the file's size would only fill memory.
-    """
-    for opcode, argument, _ in pickletools.genops(content):
-        if opcode.name in {"EXT1", "EXT2", "EXT4", "PERSID", "BINPERSID", "INST", "OBJ"}:
-            raise Refused(f"the opcode {opcode.name}")
-        # A memo index allocates a list of its size.
-        if isinstance(argument, int) and "PUT" in opcode.name and argument > len(content):
-            raise Refused("a memo larger than the file")

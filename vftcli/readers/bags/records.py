@@ -290,13 +290,12 @@ def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Messages
                 raise budget.error("its rows hold more than the file does; damaged.")
             yield row
 
-    definitions = {}
-    if "message_definitions" in tables:
-        columns = "topic_type, encoding, encoded_message_definition"
-        definitions = {row[0]: row[1:] for row in rows("message_definitions", columns)}
+    known = "message_definitions" in tables
+    columns = "topics.id, name, type, serialization_format, "
+    columns += "encoding, encoded_message_definition" if known else "NULL, NULL"
+    joined = "topics LEFT JOIN message_definitions ON topic_type = type" if known else "topics"
     channels = {}
-    for number, topic, kind, encoding in rows("topics", "id, name, type, serialization_format"):
-        language, text = definitions.get(kind, (b"", b""))
+    for number, topic, kind, encoding, language, text in rows(joined, columns):
         channels[number] = Channel(
             topic=printable(_text(topic)),
             type=type_name(_text(kind)),

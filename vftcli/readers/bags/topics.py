@@ -76,15 +76,10 @@ class Gathering:
         self.signals: dict[str, Array] = {}
         self.used: set[str] = set()
         self.remarks: list[Remark] = []
-        self._take_lead()
-        self._settle_effort()
-
-    def _take_lead(self) -> None:
-        lead, width = self.lead, self.lead.width
         if lead.mixed:
             self.remarks.append(fact("joints-reordered", topic=lead.topic))
         for signal, value in lead.signals.items():
-            if signal != "wrench" and value.shape[1] != width:
+            if signal != "wrench" and value.shape[1] != lead.width:
                 continue
             if signal == "wrench" or not np.isnan(value[0]).all() or not np.isnan(value).all():
                 self.signals[signal] = value
@@ -97,6 +92,7 @@ class Gathering:
                 self.remarks.append(fact("signal-empty", signal=signal))
         if lead.kind.franka and "tau_ext" in self.signals:
             self.remarks.append(RESIDUAL_TURNED)
+        self._settle_effort()
 
     def _settle_effort(self) -> None:
         """Decide what effort is: what --columns says, else current for UR joints, else torque.
@@ -113,10 +109,9 @@ class Gathering:
             last = (item.pattern or "").rpartition(".")[2] or own
             source = FIELDS.get(last, last)
             if source not in there:
-                fields = [next((f for f, s in FIELDS.items() if s == name), name) for name in there]
-                raise LogError(
-                    f"--columns: {lead.topic} has no field {last!r}; it has {', '.join(fields)}."
-                )
+                fields = {signal: name for name, signal in FIELDS.items()}
+                listed = ", ".join(fields.get(name, name) for name in there)
+                raise LogError(f"--columns: {lead.topic} has no field {last!r}; it has {listed}.")
             self.signals.pop(source, None)
             self.signals[signal] = there[source] * item.factor + 0.0
             code = "field-taken-turned" if item.factor < 0 else "field-taken"
