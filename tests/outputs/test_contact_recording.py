@@ -13,10 +13,9 @@ from vftcli.contacts.contact_list import Unexplained
 from vftcli.outputs.charts import PLACES
 from vftcli.outputs.rerun_arm import painted_links
 from vftcli.outputs.rerun_recording import (
-    best_wrench,
     contact_log,
-    force_plot,
     newton_per_metre,
+    plot_groups,
     write_rrd,
 )
 from vftcli.outputs.shapes import touched_point
@@ -24,8 +23,7 @@ from vftcli.signals.remarks import Where, caution
 
 
 def test_the_force_stands_in_its_band_above_the_spans(touched: Analysis) -> None:
-    plot, wrench = force_plot(touched), best_wrench(touched)
-    assert plot is not None
+    ((plot,), wrench) = plot_groups(touched)["Contacts"], touched.wrench
     assert wrench is not None
     lines = {line.name: line.values[:, 0] for line in plot.series}
     size = np.linalg.norm(wrench.known[:, :3], axis=1)
@@ -45,13 +43,12 @@ def test_the_force_stands_in_its_band_above_the_spans(touched: Analysis) -> None
 
 
 def test_without_a_wrench_there_is_no_force(touched: Analysis) -> None:
-    assert force_plot(replace(touched, virtual_sensor=None)) is None
+    assert not list(plot_groups(replace(touched, virtual_sensor=None))["Contacts"])
 
 
 def test_a_load_has_no_peak(touched: Analysis) -> None:
     load = contact_list(contact(start=1.0, stop=4.0, peak=2.0, is_load=True))
-    plot = force_plot(replace(touched, contacts=load))
-    assert plot is not None
+    (plot,) = plot_groups(replace(touched, contacts=load))["Contacts"]
     assert all(line.x is None for line in plot.series)
     assert "load 1 begins" in contact_log(load)[0].text
 

@@ -305,7 +305,7 @@ class ContactList(Shown):
     def plot(self) -> "Figure":
         """A matplotlib figure of |F| of every contact with its band, neither shown nor saved."""
         figures = import_module("vftcli.outputs.figures")
-        figure: Figure = figures.on_paper(figures.force_drawing(self).draw)
+        figure: Figure = figures.on_paper(figures.force_drawing(self))
         return figure
 
     def weighed(self, load: tuple[float, float] | None, doubts: Set[str]) -> "ContactList":

@@ -56,8 +56,12 @@ CONVENTIONS = {
     "row": "a deviation follows from the force of the row before it",
     "units": "s, m, rad, N, N·m, J",
 }
-#: Chart → unit of a translational and of a rotational axis.
-UNITS = {"x": ("m", "rad"), "v": ("m/s", "rad/s"), "force": ("N", "N·m"), "energy": ("J", "J")}
+#: Key of a controller's record → its field.
+CONTROLLER = {
+    "name": "name", "kind": "kind", "alpha": "alpha", "xi": "xi", "recovery_damping": "damping",
+    "discrete_number_drag": "drag", "discrete_number_recovery": "recovery",
+    "escape_bound": "escape",
+}  # fmt: skip
 
 
 def files_of_replay(form: str | None) -> list[str]:
@@ -123,8 +127,7 @@ def admittance_record(
     examinations: Sequence[Examination] = (),
 ) -> dict[str, Any]:
     """Everything that `run.json` of a replay holds."""
-    p, logs = replay.parameters, [recording] if recording is not None else []
-    loop: dict[str, Any] | None = None
+    p, logs, loop = replay.parameters, [recording] if recording else [], None
     if run is not None:
         made = run.simulation
         loop = {
@@ -138,7 +141,7 @@ def admittance_record(
     found = {
         "rows": replay.rows,
         "examination": health_record(examinations),
-        "input": input_record(recording) if recording is not None else None,
+        "input": recording and input_record(recording),
         "robot": robot_record(replay.robot),
         "force": replay.source,
         "closed_loop": loop,
@@ -152,16 +155,7 @@ def admittance_record(
             "source": p.source,
         },
         "controllers": [
-            {
-                "name": controller.name,
-                "kind": controller.kind,
-                "alpha": controller.alpha,
-                "xi": controller.xi,
-                "recovery_damping": controller.damping,
-                "discrete_number_drag": controller.drag,
-                "discrete_number_recovery": controller.recovery,
-                "escape_bound": controller.escape,
-            }
+            {key: getattr(controller, field) for key, field in CONTROLLER.items()}
             for controller in replay.controllers
         ],
         "conventions": CONVENTIONS,
@@ -178,8 +172,7 @@ def render_admittance(
     examinations: Sequence[Examination] = (),
 ) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
-    drawn, t, p = charts(replay, run), replay.motion.t, replay.parameters
-    lost = int(np.count_nonzero(~replay.path.reached))
+    t, p, lost = replay.motion.t, replay.parameters, np.count_nonzero(~replay.path.reached)
     eyebrow = (
         title,
         replay.robot.title or replay.robot.name,
@@ -194,19 +187,19 @@ def render_admittance(
     variable = [c for c in replay.controllers if c.kind == "variable"]
     names = {(axis, c.alpha[k]): c.name for c in variable[::-1] for k, axis in enumerate(AXES)}
     named = [
-        {**row, "controller": names.get((row["axis"], row["alpha"]), str(row["controller"]))}
+        row | {"controller": names.get((row["axis"], row["alpha"]), str(row["controller"]))}
         for row in replay.rows
     ]
     return page(
         "admittance.html",
         f"{title}: admittance",
-        drawn,
+        charts(replay, run),
         {controller.name: (colour, "") for controller, colour in painted(replay)},
         eyebrow=eyebrow,
         headline=f"The same force through {controllers}.",
         warnings=[sentence(remark) for remark in replay.remarks if remark.level == "warning"],
         run=run,
-        latencies=None if run is None else latency_grid(run),
+        latencies=run and latency_grid(run),
         comparison=comparison_grid(named, TITLE),
         parameters=parameter_grid(replay),
         stability=stability_grid(replay),
@@ -245,26 +238,26 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
         force.insert(0, ChartLine("true force", padded(run.truth), dash="2 2"))
     limit = np.where(np.isfinite(p.speed_limit), p.speed_limit, np.nan)
     w, v = replay.lyapunov.corrected, replay.lyapunov.printed
-    found: list[tuple[str, str, Sequence[ChartLine], Array | None, str]] = [
-        ("x", "Deviation", deviation, None, ""),
-        ("force", "Force on the robot", force, np.asarray(p.threshold), "± threshold"),
-        ("v", "Velocity", lines(replay.motion.v), limit, "± speed limit"),
-        ("energy-w", "Lyapunov function W (recovery phases)", lines(w), None, ""),
-        ("energy-v", "The printed V (52): it rises", lines(v), None, ""),
-    ]
+    force_band, speed_band = (x if np.isfinite(x).any() else None for x in (p.threshold, limit))
     return [
         Chart(
             key,
             title,
-            tuple(UNITS[key.split("-")[0]][k // 3] for k in range(6)),
+            (unit,) * 3 + (turning,) * 3,
             AXES,
             replay.motion.t,
             tuple(shown),
-            families=(1, 1, 1, 2, 2, 2),
-            band=band if band is not None and np.isfinite(band).any() else None,
-            band_label=label,
+            (1, 1, 1, 2, 2, 2),
+            band,
+            label,
         )
-        for key, title, shown, band, label in found
+        for key, title, unit, turning, shown, band, label in (
+            ("x", "Deviation", "m", "rad", deviation, None, ""),
+            ("force", "Force on the robot", "N", "N·m", force, force_band, "± threshold"),
+            ("v", "Velocity", "m/s", "rad/s", lines(replay.motion.v), speed_band, "± speed limit"),
+            ("energy-w", "Lyapunov function W (recovery phases)", "J", "J", lines(w), None, ""),
+            ("energy-v", "The printed V (52): it rises", "J", "J", lines(v), None, ""),
+        )
     ]
 
 
@@ -283,11 +276,10 @@ def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, D
         """Deviations under every controller, above them the force where there is one."""
         deviation, force, *_ = charts(replay, run)
         columns = min(len(shown), 3 if width > NARROW else 2)
-        drawn = [force, deviation] if np.any(replay.wrench) else [deviation]
         plots = []
         # The plots of an axis are below one another.
         for k in range(0, len(shown), columns):
-            for chart in drawn:
+            for chart in (force, deviation) if np.any(replay.wrench) else (deviation,):
                 plots += plots_of(chart, only=shown[k : k + columns])
         return line_figure(width, plots, columns=columns)
 

@@ -101,35 +101,24 @@ def latency_text(run: ClosedLoop) -> str:
         return f"closed loop: the arm ran away at {run.t[-1]:.2f} s"
     lines = []
     for row in latency_rows(run):
-        detection, motion, withdrawal, reaction, turn = (
-            "never" if row[key] is None else f"{row[key]:.3f} s"
-            for key in [f"{name}_s" for name in LATENCIES][1:]
-        )
+        said = {k: "never" if x is None else f"{x:.3f} s" for k, x in row.items() if k[-2:] == "_s"}
         moving = "" if row["at_rest_before"] else " (the arm was moving already)"
         lines.append(
             f"closed loop: force past the threshold of {row['axis']} at {row['force_s']:.2f} s, "
-            f"detected after {detection}, moved after {motion}{moving}, "
-            f"withdrawal seen after {withdrawal}; from detection to motion {reaction}, from "
-            f"withdrawal to turn {turn}"
+            f"detected after {said['detection_s']}, moved after {said['motion_s']}{moving}, "
+            f"withdrawal seen after {said['withdrawal_s']}; from detection to motion "
+            f"{said['reaction_s']}, from withdrawal to turn {said['turn_s']}"
         )
     return "\n".join(lines) or "closed loop: no force passed a threshold"
 
 
 def parameter_text(replay: Replay) -> str:
     """Mass, damping, stiffness, threshold and control period in use, on one line."""
-    p = replay.parameters
-    named = {
-        "M": p.mass,
-        "B": p.damping,
-        "K": p.stiffness,
-        "ξ": p.damping_ratio,
-        "F_tsd": p.threshold,
-        "limit": p.speed_limit,
-    }
-    words = []
-    for label, values in named.items():
+    p, words = replay.parameters, []
+    values = (p.mass, p.damping, p.stiffness, p.damping_ratio, p.threshold, p.speed_limit)
+    for label, each in zip(("M", "B", "K", "ξ", "F_tsd", "limit"), values, strict=True):
         # Six numbers as position / rotation, three equal ones once.
-        texts = [f"{value:.3g}" for value in np.broadcast_to(values, 6)]
+        texts = [f"{value:.3g}" for value in np.broadcast_to(each, 6)]
         halves = (half[:1] if len(set(half)) == 1 else half for half in (texts[:3], texts[3:]))
         words.append(f"{label} {' / '.join(map(','.join, halves))}")
     return f"{', '.join(words)}; Ts {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
@@ -139,9 +128,8 @@ def parameter_grid(replay: Replay) -> Grid:
     """Tables III and IV of the paper with the values used."""
     p = replay.parameters
     rows: Rows = []
-    for k, axis in enumerate(AXES):
+    for k, (axis, limit) in enumerate(zip(AXES, np.broadcast_to(p.speed_limit, 6), strict=True)):
         force, speed = ("N", "m/s") if k < 3 else ("N·m", "rad/s")
-        limit = float(np.broadcast_to(p.speed_limit, 6)[k])
         numbers = (float(v[k]) for v in (p.mass, p.damping, p.stiffness, p.alpha))
         ratio, threshold = f"{p.damping_ratio[k]:.3g}", f"{p.threshold[k]:g} {force}"
         bound = f"{limit:g} {speed}" if np.isfinite(limit) else "none"

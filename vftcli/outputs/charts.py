@@ -5,7 +5,8 @@ for readers without a script; the page's script draws a living one in its place.
 log the lowest and the highest sample of every stretch stay.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from itertools import cycle, groupby
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -101,38 +102,30 @@ class Chart(NamedTuple):
 
         About ±1 where no value is known.
         """
-        low, high = np.inf, -np.inf
-        for j in range(len(self.panels)):
-            if not self.families or self.families[j] == self.families[panel]:
-                for values in self._drawn_values(j):
+        low, high, families = np.inf, -np.inf, self.families or (0,) * len(self.panels)
+        for j in np.flatnonzero(np.equal(families, families[panel])).tolist():
+            # What is drawn at once, line by line: of a long log all have no room.
+            for line in (line for line in self.series if line.shown):
+                half = 0.0 if line.half is None else np.nan_to_num(line.half[:, j])
+                for values in (line.values[:, j] - half, line.values[:, j] + half):
                     known = np.isfinite(values)
                     low = min(low, float(np.min(values, where=known, initial=np.inf)))
                     high = max(high, float(np.max(values, where=known, initial=-np.inf)))
+            if self.band is not None and np.isfinite(self.band[j]):
+                low, high = min(low, -float(self.band[j])), max(high, float(self.band[j]))
         # A line that does not change has no scale of its own.
         room = 0.05 * (high - low) if high > low else abs(high) or 1.0
         low, high = (low - room, high + room) if low <= high else (-1.0, 1.0)
         low = low if self.lowest is None else max(min(low, 0.0), self.lowest)
         return Span(low, high if self.highest is None else self.highest)
 
-    def _drawn_values(self, panel: int) -> Iterator[Array]:
-        """What is drawn at once in a panel, line by line: of a long log all have no room."""
-        for line in self.series:
-            if line.shown:
-                half = 0.0 if line.half is None else np.nan_to_num(line.half[:, panel])
-                yield line.values[:, panel] - half
-                yield line.values[:, panel] + half
-        if self.band is not None:
-            yield np.array([self.band[panel], -self.band[panel]])
-
 
 def colours_of_names(names: Sequence[str]) -> dict[str, str]:
     """One colour for each estimate's name; two share one only if none is left."""
     # An estimate without a colour of its own does not get one that another has.
-    own = {COLOURS[name] for name in names if name in COLOURS}
-    free = [colour for colour in SPARE if colour not in own] or list(SPARE)
-    others = [name for name in names if name not in COLOURS]
-    spare = {name: free[k % len(free)] for k, name in enumerate(others)}
-    return {name: COLOURS.get(name) or spare[name] for name in names}
+    own = {COLOURS.get(name) for name in names}
+    spare = cycle([colour for colour in SPARE if colour not in own] or SPARE)
+    return {name: COLOURS.get(name) or next(spare) for name in names}
 
 
 def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
@@ -149,12 +142,8 @@ def paint(colour: str) -> str:
 
 def families_of(limits: Array) -> tuple[int, ...]:
     """Joints of one drive size, by their torque limits: neighbours of one limit are a family."""
-    numbers, last = [], 0
-    for j, limit in enumerate(limits):
-        same = j > 0 and (limit == limits[j - 1] or not np.isfinite([limit, limits[j - 1]]).any())
-        last += not same
-        numbers.append(last)
-    return tuple(numbers)
+    runs = groupby(limits.tolist(), lambda limit: limit if np.isfinite(limit) else None)
+    return tuple(number for number, (_, run) in enumerate(runs, 1) for _ in run)
 
 
 def drawn_line(
@@ -184,15 +173,14 @@ def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tu
     clock.
     """
     gaps = np.empty(0, dtype=np.intp) if log else gaps_of(t, GAP_STEPS)
-    x, y = t, values
+    x, y, kept = t, values, np.zeros(len(t), dtype=bool)
     if len(t) > 2 * stretches:
         starts = even_starts(len(t), stretches)
         if log:
             starts = np.unique(np.searchsorted(t, np.geomspace(t[0], t[-1], stretches)))
         # Samples beside a gap stay, or a line would be drawn up to the wrong place.
-        ends = [0, len(t) - 1]
-        index = np.unique(np.concatenate([ends, extremes(values[:, None], starts), gaps, gaps + 1]))
-        x, y = t[index], values[index]
+        kept[np.concatenate([[0, -1], extremes(values[:, None], starts), gaps, gaps + 1])] = True
+        x, y = t[kept], values[kept]
     after = np.searchsorted(x, t[gaps], side="right")
     return np.insert(x, after, 0.5 * (t[gaps] + t[gaps + 1])), np.insert(y, after, np.nan)
 

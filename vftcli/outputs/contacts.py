@@ -37,11 +37,14 @@ MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
-#: Field of a list → its key in the record, where both hold one thing.
+#: Field of a list, and of its model → its key in the record, where both hold one thing.
 LIST_KEYS = {
     "recording": "recording", "duration": "duration_s", "basis": "basis", "free_seconds": "free_s",
     "false_on_free": "false_on_free", "threshold": "evidence_threshold_nats",
     "smallest_force": "smallest_force_N",
+}  # fmt: skip
+MODEL_KEYS = {
+    "noise_sd": "noise_sd_Nm", "error_sd": "friction_sd_Nm", "error_time": "friction_time_s",
 }  # fmt: skip
 
 
@@ -93,7 +96,7 @@ def list_words(found: ContactList) -> str:
     if not found.contacts:
         return none_words(found)
     first, hardest = found.contacts[0], found.hardest
-    if first.is_load and first.peak_force is not None and first.mean_force is not None:
+    if first.is_load and first.mean_force is not None:
         size = f"below {most_force(first)} on average"
         if first.size_known:
             size = f"{force_size(first)} on average, {direction(first.mean_force)}"
@@ -125,11 +128,11 @@ def none_words(found: ContactList) -> str:
     known = found.basis == "free motion"
     if known and not found.candidates:
         return "Nothing touched the arm, as far as this log shows."
-    felt = [c for c in found.candidates if c.peak_force is not None]
+    felt = {c.peak_force: c for c in found.candidates[::-1] if c.peak_force is not None}
     if not felt:
         return "No contact stands out."
-    hardest = max(felt, key=lambda c: c.peak_force or 0.0)
-    most = (hardest.peak_force or 0.0) + (hardest.place_band or 0.0)
+    hardest = felt[max(felt)]
+    most = max(felt) + (hardest.place_band or 0.0)
     return (
         f"No contact stands out. Up to {most:.0f} N near {hardest.peak:.1f} s this model cannot "
         f"explain: {'' if known else 'name free motion (--free) or '}measure your friction (vftcli "
@@ -144,15 +147,13 @@ def most_force(contact: Contact) -> str:
 
 def force_size(contact: Contact) -> str:
     """|F| with its band, or its range where the place is unknown."""
-    if contact.place_unknown and contact.anywhere is not None:
-        return ranged(*contact.anywhere)
-    return banded(contact.peak_force, contact.peak_band)
+    apart = contact.anywhere if contact.place_unknown else None
+    return ranged(*apart) if apart else banded(contact.peak_force, contact.peak_band)
 
 
 def hardest_words(found: ContactList) -> str:
     """The hardest contact of a log in a few words."""
-    contact = found.hardest
-    if contact is None or contact.peak_force is None:
+    if (contact := found.hardest) is None:
         return DASH
     size = f"{force_size(contact)} at {contact.peak:.1f} s"
     return size if contact.size_known else f"unknown ({size})"
@@ -220,31 +221,23 @@ def contact_name(contact: Contact) -> str:
 
 def contacts_record(found: ContactList) -> dict[str, Any]:
     """A log's contacts for machines, units in the names."""
-    model = found.model
+    model, prior = found.model, found.model.prior
     return {
-        "recording": found.recording,
+        **{key: getattr(found, field) for field, key in LIST_KEYS.items()},
         "frame": FRAME,
         "sign": SIGN,
         "free_part": free_words(found) or None,
-        "free_s": found.free_seconds,
-        "smallest_force_N": found.smallest_force,
-        "evidence_threshold_nats": found.threshold,
-        "false_on_free": found.false_on_free,
-        "basis": found.basis,
-        "load": None if found.load is None else found.load.record(),
-        "largest_unexplained": None if found.unexplained is None else found.unexplained._asdict(),
-        "duration_s": found.duration,
-        "stops_s": list(found.stops),
+        "load": found.load and found.load.record(),
+        "largest_unexplained": found.unexplained and found.unexplained._asdict(),
+        "stops_s": found.stops,
         "model": {
-            "tau_w_s": model.prior.time if model.prior else None,
-            "sigma_force_N": model.prior.force if model.prior else None,
-            "sigma_moment_Nm": model.prior.moment if model.prior else None,
-            "noise_sd_Nm": model.noise_sd,
-            "friction_sd_Nm": model.error_sd,
-            "friction_time_s": model.error_time,
+            "tau_w_s": prior and prior.time,
+            "sigma_force_N": prior and prior.force,
+            "sigma_moment_Nm": prior and prior.moment,
+            **{key: getattr(model, field) for field, key in MODEL_KEYS.items()},
             "block_s": model.block,
         },
-        "remarks": list(found.remarks),
+        "remarks": found.remarks,
         "contacts": [contact.record() for contact in found.contacts],
         "candidates": [contact.record() for contact in found.candidates],
     }
@@ -257,8 +250,7 @@ def contacts_csv(lists: Sequence[ContactList]) -> str:
         for found in lists
         for contact in found.contacts
     ]
-    keys = list(dict.fromkeys(key for row in rows for key in row))
-    keys = keys or ["recording", *FIRST_COLUMNS]
+    keys = dict.fromkeys(key for row in rows for key in row) or ("recording", *FIRST_COLUMNS)
     return csv_rows([{key: row.get(key) for key in keys} for row in rows], keys)
 
 
@@ -327,22 +319,18 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
     model, torque, load = record["model"], record["largest_unexplained"], record["load"]
     prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
     if load is not None:
-        start, stop = load["span_s"]
         mass = load["mass_kg"], load["mass_sd_kg"]
-        load = CarriedLoad(*mass, load["robot"], load["payload"], (start, stop))
+        load = CarriedLoad(*mass, load["robot"], load["payload"], tuple(load["span_s"]))
     return ContactList(
         **{field: record[key] for field, key in LIST_KEYS.items()},
         contacts=tuple(map(stored_contact, record["contacts"])),
         candidates=tuple(map(stored_contact, record["candidates"])),
-        free=(),
-        unexplained=None if torque is None else Unexplained(**torque),
+        unexplained=torque and Unexplained(**torque),
         load=load,
         stops=tuple(record["stops_s"]),
         model=ContactModel(
             prior=None if None in prior else WrenchPrior(*prior),
-            noise_sd=numbers(model["noise_sd_Nm"]),
-            error_sd=numbers(model["friction_sd_Nm"]),
-            error_time=numbers(model["friction_time_s"]),
+            **{field: numbers(model[key]) for field, key in MODEL_KEYS.items()},
             block=model["block_s"],
         ),
         remarks=tuple(map(stored_remark, record["remarks"])),
@@ -351,19 +339,17 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
 
 def stored_contact(row: Mapping[str, Any]) -> Contact:
     """One contact from its record."""
-    stored = {field.name for field in fields(Contact)} & KEYS.keys()
-    given: dict[str, Any] = {
-        name: row[KEYS[name]] for name in stored - {"places", "anywhere", "remarks"}
-    }
+    apart = {"places", "anywhere", "remarks"}
+    stored = {field.name for field in fields(Contact)} & KEYS.keys() - apart
+    given: dict[str, Any] = {name: row[KEYS[name]] for name in stored}
     for name, unit in (("wrench", ""), ("wrench_sd", "_sd")):
         force = row[f"force{unit}_N"]
-        given[name] = None if force is None else [*force, *row[f"moment{unit}_Nm"]]
-    anywhere = row["anywhere_N"]
+        given[name] = force and [*force, *row[f"moment{unit}_Nm"]]
     given |= {name: numbers(v) for name, v in given.items() if isinstance(v, list)}
     return Contact(
         **given,
         is_load=row["kind"] == "load",
-        anywhere=None if anywhere is None else (anywhere[0], anywhere[1]),
+        anywhere=row["anywhere_N"] and tuple(row["anywhere_N"]),
         places=tuple(0 if place == "flange" else place for place in row["places"]),
         remarks=tuple(map(stored_remark, row["remarks"])),
     )

@@ -15,6 +15,7 @@ import json
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -79,13 +80,8 @@ class OutputTopic(NamedTuple):
         return serialised(self.kind, {**stamped(times), **part}, len(times))
 
 
-class Event(NamedTuple):
-    """One message of a topic that has few."""
-
-    stamp: int  #: When. [ns]
-    topic: str  #: The topic's name.
-    kind: str  #: The type, as package/Name.
-    values: Mapping[str, Value]  #: Dotted path of a field → its value.
+#: One message of a topic that has few: its stamp [ns], topic, type and values.
+Event = tuple[int, str, str, Mapping[str, Value]]
 
 
 def joint_topic(
@@ -138,16 +134,16 @@ def events(analysis: Analysis, start: int) -> list[Event]:
     if found is None:
         return []
     record = json.dumps(jsonable(contacts_record(found)), ensure_ascii=False, allow_nan=False)
-    made = [Event(start, "/vftcli/contacts", TEXT, {"data": record})]
+    made: list[Event] = [(start, "/vftcli/contacts", TEXT, {"data": record})]
     for contact in found.contacts:
         level = WARNING if contact.trust == "weak" else INFO
         end = f"{contact_name(contact)} ends"
         for t, words in ((contact.start, beginning(contact)), (contact.stop, end)):
             stamp = start + round(t * 1e9)
-            values: dict[str, Value] = {"level": level, "message": words, "name": "vftcli"}
-            values |= stamped(np.array([stamp]), "timestamp")
-            made.append(Event(stamp, "/vftcli/contacts/log", LOG, values))
-    return sorted(made, key=lambda event: event.stamp)
+            values = stamped(np.array([stamp]), "timestamp")
+            values |= {"level": level, "message": words, "name": "vftcli"}
+            made.append((stamp, "/vftcli/contacts/log", LOG, values))
+    return sorted(made, key=itemgetter(0))
 
 
 def ros_name(name: str) -> str:
@@ -187,26 +183,26 @@ def write_topics(
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="vftcli")
         waiting = deque(events)
-        of_events = {e.topic: channel(writer, e.topic, e.kind) for e in events}
+        of_events = {topic: channel(writer, topic, kind) for _, topic, kind, _ in events}
         channels = [channel(writer, topic.name, topic.kind) for topic in found]
+
+        def add_events(until: float) -> None:
+            """Write the events up to a time. [ns]"""
+            while waiting and waiting[0][0] <= until:
+                stamp, topic, kind, values = waiting.popleft()
+                body = serialised(kind, values, 1).tobytes()
+                writer.add_message(of_events[topic], stamp, body, stamp)
+
         # In blocks: all messages of an hour at 1 kHz at once would not fit in memory.
         for start in range(0, len(stamps), BLOCK):
             span = slice(start, start + BLOCK)
             bodies = [topic.messages(stamps, span) for topic in found]
             for k, stamp in enumerate(stamps[span].tolist()):
-                while waiting and waiting[0].stamp <= stamp:
-                    add_event(writer, of_events, waiting.popleft())
+                add_events(stamp)
                 for number, body in zip(channels, bodies, strict=True):
                     writer.add_message(number, stamp, body[k].tobytes(), stamp, start + k)
-        for event in waiting:
-            add_event(writer, of_events, event)
+        add_events(np.inf)
         writer.finish()
-
-
-def add_event(writer: Any, channels: Mapping[str, int], event: Event) -> None:  # noqa: ANN401
-    """Write one message of a topic that has few."""
-    body = serialised(event.kind, event.values, 1).tobytes()
-    writer.add_message(channels[event.topic], event.stamp, body, event.stamp)
 
 
 def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401
@@ -252,9 +248,9 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "format": recording.source.format,
         "sha256": recording.source.sha256,
         "joint_names": recording.joint_names,
-        "wrench_frame": frame.notation if frame is not None else None,
+        "wrench_frame": frame and frame.notation,
         "robot": recording.robot_hint,
-        "repairs": [str(repair) for repair in recording.source.repairs],
+        "repairs": list(map(str, recording.source.repairs)),
     }
     stated = {"wrench": StatedFrame(str(frame), frame.sign)} if frame is not None else None
     table = pl.DataFrame(dict(columns_of(recording)))
@@ -286,7 +282,7 @@ def recorded_topics(recording: Recording) -> Iterator[OutputTopic]:
             yield joint_topic(f"/vftcli/{COLUMN_NAMES.get(name, name)}", names, effort=value)
     if recording.wrench is not None:
         frame = recording.wrench_frame
-        notation = frame.notation if frame is not None else ""
+        notation = "" if frame is None else frame.notation
         yield wrench_topic("/vftcli/wrench", notation, recording.wrench)
 
 
@@ -319,8 +315,7 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
         if not path.name:
             raise OutputError(f"{path} is a folder; give the name of a log file with -o")
         # A bag is a folder: the files of the one that is there go when the new ones come.
-        files = path.rglob("*") if path.is_dir() else ()
-        inside = [file for file in files if not file.is_dir()]
+        inside = [file for file in path.rglob("*") if not file.is_dir()]
         # A killed run may have left it without its metadata, or empty.
         if any(file.suffix not in {".mcap", ".db3", ".yaml"} for file in inside):
             raise OutputError(f"{path} is a folder and no bag; give another -o")
@@ -330,10 +325,8 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
             )
         if inside and not force:
             raise OutputError(f"{path} exists; give another -o, or --force to overwrite it")
-        names += [
-            file.relative_to(path.parent).as_posix()
-            for file in (*(inside if path.is_dir() else [path]), *companions(path))
-        ]
+        own = inside if path.is_dir() else [path]
+        names += [f.relative_to(path.parent).as_posix() for f in (*own, *companions(path))]
     folder = OutputFolder(path.parent, force, names)
     folder.check()
     return folder

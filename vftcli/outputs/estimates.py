@@ -90,17 +90,11 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
     """Write the table as Parquet (zstd), that of a long log in groups of rows."""
     if len(analysis.t) > LONG and installed("pyarrow"):
         starts = range(0, len(analysis.t), GROUP_ROWS)
-        groups = ((analysis, slice(start, start + GROUP_ROWS)) for start in steps(starts))
-        write_groups(path, groups)
+        write_groups(path, ((analysis, slice(at, at + GROUP_ROWS)) for at in steps(starts)))
         return
-    put_table(
-        path,
-        estimates_table(analysis),
-        frames_of(analysis),
-        metadata=doubts_of(analysis) or None,
-        compression_level=1,
-        statistics=False,
-    )
+    how: Any = {"compression_level": 1, "statistics": False}
+    table, doubts = estimates_table(analysis), doubts_of(analysis)
+    put_table(path, table, frames_of(analysis), metadata=doubts or None, **how)
 
 
 def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:

@@ -1,6 +1,6 @@
 """The figures of one log, as force, torque, wrench, errors, spectra; gains with theirs."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,11 +62,11 @@ BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
 def log_figures(analysis: Analysis) -> dict[str, Drawing]:
     """Every figure that a log has something to show in."""
     name, numbers = analysis.recording.name, numbers_of(analysis.contacts)
-    plots = plots_of(drawn_lines(analysis, torque_chart(analysis)))
-    title = f"{name}: external torque on the robot about each joint's axis"
     found = {}
     if analysis.contacts is not None and analysis.contacts.hardest is not None:
         found["force"] = force_drawing(analysis.contacts, analysis.t)
+    title = f"{name}: external torque on the robot about each joint's axis"
+    plots = plots_of(drawn_lines(analysis, torque_chart(analysis)))
     found["torque"] = Drawing(title, partial(line_figure, plots=plots, numbers=numbers))
     if analysis.errors is not None:
         found |= error_figures(analysis.errors)
@@ -87,7 +87,8 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
             lead = next((o for o in analysis.observers if o.name == BEST), analysis.observers[0])
             found["spectra"] = spectra_drawing(spectra, {lead.name: lead})
         if refined.curves:
-            found["tuning"] = tuning_drawing(refined.curves)
+            best = {key: (curve.best, curve.least) for key, curve in refined.curves.items()}
+            found["tuning"] = tuning_drawing(refined.curves, best)
     responses = [plot for chart in response_charts(analysis) for plot in plots_of(chart)]
     found["responses"] = Drawing(
         "Gain, phase and delay of the observers, joint 1",
@@ -111,38 +112,35 @@ def plot(
 ) -> "Figure":
     """A figure for a notebook: `what` is one of `PLOTS`, joints count from 1, None for all."""
     check_known(str(what), PLOTS, f"no plot {what!r}")
-    asked = (joints, observers)
-    numbers, names = ([] if x is None else np.atleast_1d(x).tolist() for x in asked)
+    found, errors, drawing = analysis.contacts, analysis.errors, None
+    numbers, names = ([] if x is None else np.atleast_1d(x).tolist() for x in (joints, observers))
     for name in names:
         check_known(str(name), [e.name for e in analysis.estimates], f"no estimate of {name!r}")
     for joint in numbers:
         if joint not in range(1, analysis.recording.joints + 1):
             raise ParameterError(f"no joint {joint!r}; there is 1 to {analysis.recording.joints}")
-    drawing = None
-    if what == "contacts" and analysis.contacts is not None:
-        drawing = force_drawing(analysis.contacts, analysis.t)
-    elif what == "errors" and analysis.errors is not None:
-        errors = analysis.errors
+    if what == "contacts" and found is not None:
+        drawing = force_drawing(found, analysis.t)
+    elif what == "errors" and errors is not None:
         rows = [
             observer in (names or [observer]) and joint in (numbers or [joint])
             for observer, joint in errors.select("observer", "joint").iter_rows()
         ]
         drawing = error_figures(errors.filter(rows)).get("errors")
     elif (draw := PLOTS[what]) is not None and (chart := draw(analysis)) is not None:
-        only = [int(j) - 1 for j in numbers] if numbers and what == "torques" else None
-        plots = plots_of(drawn_lines(analysis, chart, names), only=only)
-        spans = numbers_of(analysis.contacts)
-        drawing = Drawing(chart.title, partial(line_figure, plots=plots, numbers=spans))
+        only = [int(j) - 1 for j in numbers] if what == "torques" else []
+        plots = plots_of(drawn_lines(analysis, chart, names), only=only or None)
+        drawing = Drawing("", partial(line_figure, plots=plots, numbers=numbers_of(found)))
     if drawing is None:
         raise ParameterError(f"the analysis holds no {what} to plot")
-    return on_paper(drawing.draw)
+    return on_paper(drawing)
 
 
-def on_paper(draw: "Callable[[float], Figure]") -> "Figure":
+def on_paper(drawing: Drawing) -> "Figure":
     """A figure as wide as two columns of a paper."""
     check_installed("matplotlib", "a plot")
     with paper_style():
-        return draw(WIDTHS["double"])
+        return drawing.draw(WIDTHS["double"])
 
 
 def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Drawing:
@@ -166,22 +164,15 @@ def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> 
     """The chart with the lines of these observers and the reference; a band only of one alone."""
     estimated = [line.name for line in analysis.estimates]
     wanted = names or ([BEST] if BEST in estimated else estimated)
-    plain = {}
-    if analysis.reference is not None:
-        # Of a file only that it is one: its path has no room.
-        kind = analysis.reference.name.split(":")[0]
-        plain[reference_name(analysis)] = f"reference ({kind})"
-    own = [line.name for line in chart.series if line.name in wanted]
-    series = tuple(
-        line._replace(
-            name=plain.get(line.name, line.name),
-            shown=True,
-            half=line.half if len(own) == 1 else None,
-        )
-        for line in chart.series
-        if line.name in own or line.name not in estimated
-    )
-    return chart._replace(series=series)
+    kept = [x for x in chart.series if x.name in wanted or x.name not in estimated]
+    alone, series = sum(line.name in wanted for line in kept) == 1, []
+    for line in kept:
+        name = line.name
+        if analysis.reference is not None and name == reference_name(analysis):
+            # Of a file only that it is one: its path has no room.
+            name = f"reference ({analysis.reference.name.split(':')[0]})"
+        series.append(line._replace(name=name, shown=True, half=line.half if alone else None))
+    return chart._replace(series=tuple(series))
 
 
 def numbers_of(contacts: ContactList | None) -> dict[int, float]:
@@ -205,16 +196,15 @@ def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
         groups = [rows for rows in groups if rows["recording"][0] == POOLED]
     if not 0 < len(groups) <= MOST:
         return {}
-    plots, names = [], list[str]()
+    plots, names = [], dict[str, None]()
     for rows in groups:
         found, ends = block(rows), ("rmse_low_Nm", "rmse_high_Nm")
-        intervals = (block(rows.with_columns(rmse_Nm=pl.col(end))).rmse for end in ends)
-        dots = zip(found.observers, found.rmse, np.stack([*intervals], axis=1), strict=True)
+        intervals = [block(rows.with_columns(rmse_Nm=pl.col(end))).rmse for end in ends]
+        dots = zip(found.observers, found.rmse, np.stack(intervals, axis=1), strict=True)
         title = f"{found.recording}, {found.reference}"
         plots.append(DotPlot(title, found.joint_heads, list(dots), found.floor))
-        names += found.observers
-    paints = colours_of_names(list(dict.fromkeys(names)))
-    draw = partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)")
+        names |= dict.fromkeys(found.observers)
+    draw = partial(dot_figure, plots=plots, paints=colours_of_names([*names]), label="RMSE (N·m)")
     return {"errors": Drawing("RMSE of the external torque with its 95 % interval", draw)}
 
 
@@ -240,21 +230,17 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
 
 
 def tuning_drawing(
-    curves: "Mapping[str, Curve]",
-    chosen: "Mapping[str, tuple[Array, Array]] | None" = None,
+    curves: "Mapping[str, Curve]", chosen: "Mapping[str, tuple[Array, Array]]"
 ) -> Drawing:
     """Expected error over the natural frequency, and what was chosen.
 
-    That is of an observer its rates [rad/s] and errors [N·m], None for each curve's
-    least. 2 × (n,)
+    That is of an observer its rates [rad/s] and errors [N·m]. 2 × (n,)
     """
-    if chosen is None:
-        chosen = {name: (curve.best, curve.least) for name, curve in curves.items()}
     chart = tuning_chart(curves, lines_of_names(list(curves)))
     marks = {name: (rate / (2.0 * np.pi), least) for name, (rate, least) in chosen.items()}
-    plots = plots_of(chart)
     below = "Natural frequency (Hz)"
-    return Drawing(chart.title, partial(line_figure, plots=plots, marks=marks, below=below))
+    draw = partial(line_figure, plots=plots_of(chart), marks=marks, below=below)
+    return Drawing(chart.title, draw)
 
 
 def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:

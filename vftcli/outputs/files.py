@@ -219,14 +219,29 @@ class OutputFolder:
             earlier = self._earlier()
             for path in places:
                 refuse_existing(path, self.force)
-            with kept_aside({*places, *earlier}, self.temporary / EARLIER):
+            (aside := self.temporary / EARLIER).mkdir()
+            paths = sorted({*places, *earlier}, key=last_sealed)
+            there = [p for p in paths[::-1] if p.exists() or p.is_symlink()]
+            kept = [(path, aside / str(k)) for k, path in enumerate(there)]
+            try:
+                for path, place in kept:
+                    path.replace(place)
                 to_disk([self.path])
-                for path in sorted(places, key=last_sealed):
+                for path in (p for p in paths if p in places):
                     path.parent.mkdir(parents=True, exist_ok=True)
                     if is_seal(path):
                         to_disk({p.parent for p in places})
                     # Renaming within a file system is atomic for each file.
                     places[path].replace(path)
+            except BaseException:
+                # Everything goes back to where it was, and only that.
+                for path in (p for p in paths[::-1] if p not in there):
+                    path.unlink(missing_ok=True)
+                for path, place in kept[::-1]:
+                    # A file that could not be moved is where it was.
+                    if place.exists() or place.is_symlink():
+                        place.replace(path)
+                raise
             to_disk([self.path])
             # Folders that an earlier run filled and nothing is left in.
             for folder in sorted({path.parent for path in earlier} - {self.path}, reverse=True):
@@ -267,16 +282,12 @@ def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:
         listed = {str(name): str(sha) for name, sha in files.items()}
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return  # an earlier version's, or none of ours
-    top = seal.parent if at is None else at
-    folder = top.resolve()
-    for name, sha in listed.items():
-        path = top / name
-        try:
-            inside = path.resolve().is_relative_to(folder)
+    top = at or seal.parent
+    for path, sha in ((top / name, sha) for name, sha in listed.items()):
+        with suppress(OSError, ValueError):
+            inside = path.resolve().is_relative_to(top.resolve())
             if inside and path.is_file() and digest(path) == sha:
                 yield path
-        except (OSError, ValueError):
-            continue
 
 
 def last_sealed(path: Path) -> tuple[bool, int, str]:
@@ -285,27 +296,6 @@ def last_sealed(path: Path) -> tuple[bool, int, str]:
     They leave their places in the opposite order.
     """
     return is_seal(path), -len(path.parts), str(path)
-
-
-@contextmanager
-def kept_aside(paths: Iterable[Path], aside: Path) -> Iterator[None]:
-    """Move files out of the way for a block; put them back, and only them, if the block fails."""
-    paths = set(paths)
-    aside.mkdir()
-    there = sorted((p for p in paths if p.exists() or p.is_symlink()), key=last_sealed)[::-1]
-    places = [aside / str(k) for k in range(len(there))]
-    try:
-        for path, place in zip(there, places, strict=True):
-            path.replace(place)
-        yield
-    except BaseException:
-        for path in sorted(paths.difference(there), key=last_sealed, reverse=True):
-            path.unlink(missing_ok=True)
-        for path, place in list(zip(there, places, strict=True))[::-1]:
-            # A file that could not be moved is where it was.
-            if place.exists() or place.is_symlink():
-                place.replace(path)
-        raise
 
 
 def refuse_existing(path: Path, force: bool) -> None:
@@ -322,25 +312,22 @@ def refuse_input(path: Path) -> None:
 
     Links count: what is read through one name would be lost under all.
     """
-    if path.exists() and any(is_read(path, given) for given in _inputs.get()):
-        raise OutputError(
-            f"{path} is what this command reads, and --force does not overwrite that either; give "
-            "another -o"
-        )
-
-
-def is_read(path: Path, given: Path) -> bool:
-    """Whether a file is one that was given to the command to read, or in a folder that was."""
-    with suppress(OSError, ValueError):
-        if given.samefile(path):
-            return True
-        if given.is_dir():
-            files = [file for file in given.iterdir() if file.is_file()]
-            inside = path.resolve().is_relative_to(given.resolve())
-            if inside or any(path.samefile(file) for file in files):
-                # A report may be in the folder of its own log.
-                return not is_seal(path) and path not in sealed_files(path.with_name(SEAL))
-    return False
+    for given in _inputs.get() if path.exists() else ():
+        is_read = False
+        with suppress(OSError, ValueError):
+            is_read = given.samefile(path)
+            if given.is_dir() and not is_read:
+                files = [file for file in given.iterdir() if file.is_file()]
+                inside = path.resolve().is_relative_to(given.resolve())
+                if inside or any(path.samefile(file) for file in files):
+                    # A report may be in the folder of its own log.
+                    own = is_seal(path) or path in sealed_files(path.with_name(SEAL))
+                    is_read = not own
+        if is_read:
+            raise OutputError(
+                f"{path} is what this command reads, and --force does not overwrite that either; "
+                "give another -o"
+            )
 
 
 def check_letters(path: Path) -> None:
@@ -351,13 +338,16 @@ def check_letters(path: Path) -> None:
 
 def left_out(names: Iterable[str]) -> list[str]:
     """Files not written for want of a package, a line each."""
-    lines = []
-    for name in dict.fromkeys(names):
-        if name.endswith(".rrd") and not installed("rerun"):
-            lines.append(f"{name} not written: {remedy('rerun')}")
-        elif name.endswith(".parquet") and not installed("pyarrow"):
-            lines.append(f"{name} without units beside its columns: {remedy('pyarrow')}")
-    return lines
+    lacks = {
+        ".rrd": ("rerun", "not written"),
+        ".parquet": ("pyarrow", "without units beside its columns"),
+    }
+    each = (
+        (name, *lacks[end]) for name in dict.fromkeys(names) if (end := Path(name).suffix) in lacks
+    )
+    return [
+        f"{name} {what}: {remedy(module)}" for name, module, what in each if not installed(module)
+    ]
 
 
 def numbered(names: Iterable[str]) -> list[str]:

@@ -39,21 +39,16 @@ def partial_folder(parent: Path) -> Iterator[Path]:
         if found is None or other.is_symlink() or not other.is_dir():
             continue
         with suppress(OSError), held(other, wait=False):
-            if not is_running(int(found[1])) or time.time() - other.stat().st_mtime > UNSURE:
+            gone = time.time() - other.stat().st_mtime > UNSURE
+            if sys.platform != "win32":  # where asking would end it
+                try:
+                    os.kill(int(found[1]), 0)
+                except (ProcessLookupError, OverflowError):
+                    gone = True
+                except PermissionError:
+                    pass  # another user's
+            if gone:
                 shutil.rmtree(other, ignore_errors=True)
-
-
-def is_running(process: int) -> bool:
-    """Whether a process has this number on this machine, if visible."""
-    if sys.platform == "win32":
-        return True  # asking would end it
-    try:
-        os.kill(process, 0)
-    except PermissionError:
-        return True
-    except (ProcessLookupError, OverflowError):
-        return False
-    return True
 
 
 @contextmanager

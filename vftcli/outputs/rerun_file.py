@@ -6,11 +6,11 @@ the timeline `t` in seconds from the log's first sample; words are Markdown docu
 
 import hashlib
 import re
-import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
+from unicodedata import combining, normalize
 from uuid import UUID
 
 import numpy as np
@@ -199,8 +199,8 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     # The path says nothing that the words do not.
     shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
     columns = rrb.TextLogColumns(text_log_columns=shown)
-    paths = list(dict.fromkeys(line.path for line in tab.log))
-    log = rrb.TextLogView(origin="/", contents=paths, name="Log", columns=columns)
+    paths = dict.fromkeys(line.path for line in tab.log)
+    log = rrb.TextLogView(origin="/", contents=[*paths], name="Log", columns=columns)
     return rrb.Vertical(plots, log, row_shares=[2, 1], name=tab.name)
 
 
@@ -213,10 +213,19 @@ def title_of(tab: Tab, plot: Chart, ends: Span) -> str:
 def send_plot(stream: Stream, plot: Chart) -> None:
     """Send one plot: names and colours once, then all samples in one batch; then its points."""
     lines = lines_of(plot)
+    # An edge is thin and a bar thick; of the others the reference, then the one to look at.
+    widths = [
+        0.6 if line.name.endswith(EDGES)
+        else 6.0 if line.name.startswith(BAR)
+        else 2.5 if line.colour == REFERENCE
+        else 2.0 if line.leads
+        else 1.2
+        for line in lines
+    ]  # fmt: skip
     style = rr.SeriesLines(
         names=[drawable(line.name) for line in lines],
         colors=rgba(*(GREY if line.colour in {INK, REFERENCE} else line.colour for line in lines)),
-        widths=[width_of(line) for line in lines],
+        widths=widths,
         aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
     )
     stream.log(plot.key, style, static=True)
@@ -234,15 +243,6 @@ def send_plot(stream: Stream, plot: Chart) -> None:
             stream.send_columns(path, [rr.TimeColumn("t", duration=points.x)], single)
 
 
-def width_of(line: ChartLine) -> float:
-    """Width of a line. [px]"""
-    if line.name.endswith(EDGES):
-        return 0.6
-    if line.name.startswith(BAR):
-        return 6.0
-    return 2.5 if line.colour == REFERENCE else 2.0 if line.leads else 1.2
-
-
 #: How to write what the viewer's font may lack.
 SPELLED = str.maketrans({
     "ᵀ": "^T", "⁻": "^-", "√": "sqrt ", "≤": "<=", "≥": ">=", "≈": "~", "→": "->", "−": "-",
@@ -257,14 +257,5 @@ def drawable(text: str) -> str:
 
     The viewer stops at the first letter that its font lacks.
     """
-    return LACKED.sub(without_accents, text.translate(SPELLED))
-
-
-def without_accents(found: re.Match[str]) -> str:
-    """What a letter is made of, as far as that is plain ASCII or Greek."""
-    parts = unicodedata.normalize("NFKD", found.group())
-    return "".join(
-        part if " " <= part <= "~" or "\u0391" <= part <= "\u03c9" else "?"
-        for part in parts
-        if not unicodedata.combining(part)
-    )
+    apart = LACKED.sub(lambda found: normalize("NFKD", found[0]), text.translate(SPELLED))
+    return LACKED.sub(lambda found: "" if combining(found[0]) else "?", apart)

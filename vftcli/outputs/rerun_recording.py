@@ -64,26 +64,25 @@ BAND = "#e98aa2"  #: The band of |F|: the colour of `best`, paler.
 
 def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     """Write the recording with its blueprint, so that it opens arranged."""
-    robot, errors, found = analysis.robot, analysis.errors, analysis.contacts
+    robot, found = analysis.robot, analysis.contacts
     tabs = tabs_of(analysis, detail)
-    words, marked, arrow = {"Summary": summary(analysis)}, None, None
-    if errors is not None and (table := to_markdown(errors, [analysis])):
+    words, marked, arrow, painted = {"Summary": summary(analysis)}, None, None, {}
+    if analysis.errors is not None and (table := to_markdown(analysis.errors, [analysis])):
         words["Errors"] = table
     if found is not None:
         tabs[0] = tabs[0]._replace(log=contact_log(found))
         marked = next(((c.start, c.stop) for c in found.contacts), None)
+        painted = painted_links(found, robot.joints)
     poses = motion(robot.chain, analysis.t, analysis.recording.q)
-    sampled = np.searchsorted(analysis.t, poses.t)
-    if found is None or best_wrench(analysis) is not None:
-        arrow = force_arrow(analysis, poses, sampled)
+    if found is None or any(wrench.name == BEST for wrench in analysis.wrenches):
+        arrow = force_arrow(analysis, poses, np.searchsorted(analysis.t, poses.t))
     scale, name = newton_per_metre(analysis), analysis.recording.name
     space = f"Arm (arrow: 1 m is {scale:g} N)"
     analysis.recording.release()
     with rerun_file(path, name, tabs, words, poses, space, marked) as stream:
-        send_arm(stream, robot, poses, {} if found is None else painted_links(found, robot.joints))
+        send_arm(stream, robot, poses, painted)
         if found is not None:
-            force = None if arrow is None else arrow.force
-            send_contacts(stream, found, poses, force, scale)
+            send_contacts(stream, found, poses, arrow and arrow.force, scale)
         elif arrow is not None:
             send_force(stream, "/robot/flange_force", poses.t, arrow.origin, arrow.force)
 
@@ -97,7 +96,8 @@ def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
     for name, group in steps(list(plot_groups(analysis).items())):
         # One plot after the other: of a long log all of them have no room at once.
         shown = group if detail == FULL else (thinned(plot, STRETCHES, whole) for plot in group)
-        tabs.append(Tab(name, list(shown)))
+        if plots := list(shown):
+            tabs.append(Tab(name, plots))
     return tabs
 
 
@@ -112,9 +112,6 @@ def newton_per_metre(analysis: Analysis) -> float:
 def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
     """All plots, tab by tab: the force, torques and residuals joint by joint, then the motion."""
     reference, joints = analysis.reference, range(analysis.recording.joints)
-    groups: dict[str, Iterable[Chart]] = {}
-    if best_wrench(analysis) is not None:
-        groups["Contacts"] = filter(None, map(force_plot, [analysis]))
     # One 95 % band, that of `best`, else of the last: all would hide each other.
     banded = [e.name for e in analysis.estimates if e.error_sd is not None]
     last = BEST if BEST in banded else next(reversed(banded), "")
@@ -122,18 +119,20 @@ def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
     lines = [line if line.name == last else line._replace(half=None) for line in found]
     bare = tuple(line._replace(half=None) for line in found)
     if reference is not None:
-        name = reference_name(analysis)
-        lines.insert(0, ChartLine(name, reference.tau, REFERENCE))
+        lines.insert(0, ChartLine(reference_name(analysis), reference.tau, REFERENCE))
     torque = torque_chart(analysis)._replace(series=tuple(lines))
-    groups["Joint torques"] = (plot_of(torque, j, f"/tau_ext/J{j + 1}") for j in joints)
-    if reference is not None:
-        left = torque._replace(title="estimate − reference", series=bare)
-        groups["Residual"] = (
-            plot_of(left, j, f"/residual/J{j + 1}", reference.tau[:, j : j + 1]) for j in joints
-        )
-    if any(wrench.name != "reference" for wrench in analysis.wrenches):
-        groups["Wrench"] = wrench_plots(analysis)
-    return {**groups, "Motion": motion_plots(analysis)}
+    left = torque._replace(title="estimate − reference", series=bare)
+    return {
+        "Contacts": (force_plot(analysis, w) for w in analysis.wrenches if w.name == BEST),
+        "Joint torques": (plot_of(torque, j, f"/tau_ext/J{j + 1}") for j in joints),
+        "Residual": (
+            plot_of(left, j, f"/residual/J{j + 1}", reference.tau[:, j : j + 1])
+            for j in joints
+            if reference is not None
+        ),
+        "Wrench": wrench_plots(analysis),
+        "Motion": motion_plots(analysis),
+    }
 
 
 def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart:
@@ -175,24 +174,13 @@ def wrench_plots(analysis: Analysis) -> Iterator[Chart]:
         yield Chart.of_one("/wrench/null_space", title, "N·m", t, lines)
 
 
-def best_wrench(analysis: Analysis) -> Wrench | None:
-    """The wrench of `best`, None where there is none."""
-    return next((w for w in analysis.wrenches if w.name == BEST), None)
-
-
-def force_plot(analysis: Analysis) -> Chart | None:
-    """|F| with its 95 % band, the spans of the contacts below it, their peaks as points.
-
-    None where no wrench of `best` is known, as of an arm of less than six joints.
-    """
-    wrench, found, sensed = best_wrench(analysis), analysis.contacts, analysis.virtual_sensor
-    if wrench is None:
-        return None
+def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
+    """|F| with its 95 % band, the spans of the contacts below it, their peaks as points."""
+    found, sensed, t = analysis.contacts, analysis.virtual_sensor, analysis.t
     size, sd = wrench.size[:, None], wrench.size_sd
-    lines = []
+    lines = [ChartLine("|F|", size, COLOURS[BEST], leads=True)]
     if sensed is not None and sensed.reference is not None:
-        lines.append(ChartLine("reference", sensed.reference.size[:, None], REFERENCE))
-    lines.append(ChartLine("|F|", size, COLOURS[BEST], leads=True))
+        lines.insert(0, ChartLine("reference", sensed.reference.size[:, None], REFERENCE))
     if sd is not None:
         half = COVERS * sd[:, None]
         edges = zip(EDGES, (size + half, np.maximum(size - half, 0.0)), strict=True)
@@ -206,33 +194,29 @@ def force_plot(analysis: Analysis) -> Chart | None:
         # The peak of every contact with a force; a load has a mean and no peak.
         felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
         force = np.array([c.peak_force for c in felt], dtype=float)
-        tallest = np.nanmax(np.concatenate([size[:, 0], [1.0], force]))
-        lines += span_lines(analysis.t, found, -BELOW * float(tallest))
+        level = -BELOW * float(np.nanmax(np.concatenate([size[:, 0], [1.0], force])))
+        # A line a part of the arm, so that the legend names them.
+        for where, colour in PLACES.items():
+            bar = np.full((len(t), 1), np.nan)
+            for contact in found.contacts:
+                if contact.where == where:
+                    bar[(t >= contact.start) & (t <= contact.stop)] = level
+            if np.isfinite(bar).any():
+                lines.append(ChartLine(f"{BAR}{where}", bar, colour))
         if felt:
             when = np.array([c.peak for c in felt])
             lines.append(ChartLine("peaks", force[:, None], COLOURS[BEST], x=when))
-    return Chart.of_one("/force", title, "N", analysis.t, lines)
-
-
-def span_lines(t: Array, found: ContactList, level: float) -> Iterator[ChartLine]:
-    """A bar a contact at one level, a line a part of the arm, so that the legend names them."""
-    for where, colour in PLACES.items():
-        bar = np.full((len(t), 1), np.nan)
-        for contact in found.contacts:
-            if contact.where == where:
-                bar[(t >= contact.start) & (t <= contact.stop)] = level
-        if np.isfinite(bar).any():
-            yield ChartLine(f"{BAR}{where}", bar, colour)
+    return Chart.of_one("/force", title, "N", t, lines)
 
 
 def contact_log(found: ContactList) -> list[LogLine]:
     """Start of each contact, its facts, and limits of the list."""
-    lines = []
-    for contact in found.contacts:
-        path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
-        lines.append(LogLine(path, contact.start, beginning(contact), colour))
+    lines = [
+        LogLine(f"{CONTACTS}/{c.number}", c.start, beginning(c), PLACES[c.where])
+        for c in found.contacts
+    ]
     for remark in found.remarks:
-        begins = remark.where.span[0] if remark.where.span is not None else 0.0
+        begins, _ = remark.where.span or (0.0, 0.0)
         lines.append(LogLine("/remarks", begins, sentence(remark), GREY, "WARN"))
     if not found.contacts:
         lines.append(LogLine("/remarks", 0.0, answer(found), GREY))
@@ -256,11 +240,22 @@ def motion_plots(analysis: Analysis) -> Iterator[Chart]:
 
 
 def summary(analysis: Analysis) -> str:
-    """Log, robot, and meaning of numbers and arrow."""
-    recording, robot = analysis.recording, analysis.robot
-    source = recording.source
+    """Log, robot, and meaning of numbers, of the arrow and of the arm's colours."""
+    recording, robot, source = analysis.recording, analysis.robot, analysis.recording.source
     drawing = (remark for remark in robot.remarks if remark.code == "meshes-not-found")
     notes = (*source.remarks, *all_remarks(analysis), *drawing)
+    scale, estimate = f"1 m is {newton_per_metre(analysis):g} N", force_source(analysis)
+    arrow = (
+        f"force on the robot from {'no estimate' if estimate is None else estimate.name}, as in "
+        "the tables of the wrench where one was asked for, else at the flange by the "
+        f"pseudo-inverse of Jᵀ; {scale}; none where the pose leaves it open"
+    )
+    if analysis.contacts is not None:
+        arrow = (
+            "the force on the robot while it is touched, at the flange or in the middle of the "
+            f"link that the list names, which has its colour then; {scale}. On the wrist it is the "
+            "force as it runs, elsewhere that of the contact's peak"
+        )
     lines = [
         f"# {escape_markdown(recording.name)}",
         f"{escape_markdown(robot.title or robot.name)}, {recording.samples} samples in "
@@ -268,29 +263,12 @@ def summary(analysis: Analysis) -> str:
         f"format {source.format}.",
         "",
         *(f"- **{name}**: {escape_markdown(text)}" for name, text in CONVENTIONS.items()),
-        f"- **arrow**: {arrow_words(analysis)}",
+        f"- **arrow**: {arrow}",
         *("", "## Notes"),
         *(f"- {escape_markdown(str(note))}" for note in notes),
         *("", f"Log sha256 {source.sha256 or 'unknown'}", ""),
     ]
     return "\n".join(lines)
-
-
-def arrow_words(analysis: Analysis) -> str:
-    """Meaning of the arrow and the arm's colours."""
-    scale, source = f"1 m is {newton_per_metre(analysis):g} N", force_source(analysis)
-    if analysis.contacts is not None:
-        return (
-            "the force on the robot while it is touched, at the flange or in the middle of the "
-            f"link that the list names, which has its colour then; {scale}. On the wrist it is the "
-            "force as it runs, elsewhere that of the contact's peak"
-        )
-    name = source.name if source is not None else "no estimate"
-    return (
-        f"force on the robot from {name}, as in the tables of the wrench where one was asked for, "
-        f"else at the flange by the pseudo-inverse of Jᵀ; {scale}; none where the "
-        "pose leaves it open"
-    )
 
 
 def force_source(analysis: Analysis) -> ExternalTorque | None:

@@ -45,6 +45,11 @@ PACKAGES = {
     "rosbags": "rosbags",
     "mcap": "mcap",
 }
+#: Key of an observer's record → field of its tuning.
+MEANT = {
+    "omega_n_rad_s": "omega_n", "zeta": "zeta", "delay_s": "delay", "bandwidth_hz": "bandwidth",
+    "dc_gain": "dc_gain", "numbers_to_tune": "parameter_count",
+}  # fmt: skip
 
 
 def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
@@ -60,15 +65,10 @@ def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
             for observer in analysis.observers
         ],
         # What the estimates were judged by, with its own error.
-        "reference": None
-        if reference is None
-        else {
-            "name": reference.name,
-            "floor_Nm": reference.floor,
-            "notes": list(reference.remarks),
-        },
+        "reference": reference
+        and {"name": reference.name, "floor_Nm": reference.floor, "notes": reference.remarks},
         "wrench": wrench_record(analysis),
-        "contacts": None if analysis.contacts is None else contacts_record(analysis.contacts),
+        "contacts": analysis.contacts and contacts_record(analysis.contacts),
         "complete_log": refinement_record(analysis),
         "conventions": CONVENTIONS,
         **log_remarks([analysis.recording]),
@@ -99,8 +99,8 @@ def log_entry(
 ) -> dict[str, Any]:
     """A log by name, path and digest, and what was found in it."""
     source = recording.source
-    path = str(source.path) if source.path is not None else None
-    return {"recording": recording.name, "path": path, "sha256": source.sha256 or None, **found}
+    about = {"path": source.path and str(source.path), "sha256": source.sha256 or None}
+    return {"recording": recording.name, **about, **found}
 
 
 def seal(
@@ -157,11 +157,9 @@ def versions() -> dict[str, str]:
     A package that was not imported had no part in the numbers, and looking its version up
     would cost more than they did.
     """
-    found = {"vftcli": VERSION, "python": platform.python_version()}
-    for package, module in PACKAGES.items():
-        if (loaded := sys.modules.get(module)) is not None:
-            found[package] = str(getattr(loaded, "__version__", "unknown"))
-    return found
+    loaded = {package: sys.modules.get(module) for package, module in PACKAGES.items()}
+    found = {k: str(getattr(v, "__version__", "unknown")) for k, v in loaded.items() if v}
+    return {"vftcli": VERSION, "python": platform.python_version(), **found}
 
 
 def input_record(recording: Recording) -> dict[str, Any]:
@@ -173,11 +171,10 @@ def input_record(recording: Recording) -> dict[str, Any]:
 
 def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
     """What was dropped, turned or derived in reading the logs, and what looks suspicious."""
-    remarks = [remark for log in logs for remark in log.source.remarks]
-    return {
-        "repairs": [remark for remark in remarks if remark.level == "fact"],
-        "warnings": [remark for remark in remarks if remark.level != "fact"],
-    }
+    found: dict[str, list[Remark]] = {"repairs": [], "warnings": []}
+    for remark in (remark for log in logs for remark in log.source.remarks):
+        found["repairs" if remark.level == "fact" else "warnings"].append(remark)
+    return found
 
 
 def robot_record(robot: Robot) -> dict[str, Any]:
@@ -187,13 +184,13 @@ def robot_record(robot: Robot) -> dict[str, Any]:
     return {
         "name": robot.name,
         "title": robot.title,
-        "file": None if built_in or robot.path is None else str(robot.path),
+        "file": None if built_in else robot.path and str(robot.path),
         "sha256": file_sha256(robot.path),
         "torque_source": robot.torque_source,
         "friction": [joint.model for joint in robot.friction] or "none",
-        "payload_kg": robot.payload.mass if robot.payload is not None else None,
-        "gravity_m_s2": robot.chain.gravity.tolist(),
-        "notes": list(robot.remarks),
+        "payload_kg": robot.payload and robot.payload.mass,
+        "gravity_m_s2": robot.chain.gravity,
+        "notes": robot.remarks,
     }
 
 
@@ -208,17 +205,8 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]
     inner: Any = getattr(observer, "observer", observer)
     own = [field.name for field in fields(inner) if field.init] if is_dataclass(inner) else []
     parameters = {name: jsonable(getattr(inner, name)) for name in own}
-    record = {"name": observer.name, "parameters": parameters}
-    if tuning is None:
-        return record
-    return record | {
-        "omega_n_rad_s": tuning.omega_n,
-        "zeta": tuning.zeta,
-        "delay_s": tuning.delay,
-        "bandwidth_hz": tuning.bandwidth,
-        "dc_gain": tuning.dc_gain,
-        "numbers_to_tune": tuning.parameter_count,
-    }
+    meant = {} if tuning is None else {key: getattr(tuning, of) for key, of in MEANT.items()}
+    return {"name": observer.name, "parameters": parameters, **meant}
 
 
 def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
@@ -237,21 +225,40 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
         "masked_share": sensed.masked_share,
         "tool": sensed.sensor.mounting.tool,
         "sensor": sensed.sensor.mounting.sensor,
-        "zero_drift": list(sensed.drifts),
+        "zero_drift": sensed.drifts,
         "warnings": [r for r in sensed.remarks if r.level == "warning"],
     }
 
 
 def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
-    """Results of the complete log: free part, chosen gains, error budget."""
+    """Results of the complete log: free part, chosen gains, error budget.
+
+    `best` is what it is made of: gains, free part, and the bias that is off.
+    """
     found = analysis.refinement
     if found is None:
         return None
-    spectra = found.baselines.plain.spectra
+    spectra, best = found.baselines.plain.spectra, None
+    if any(observer.name == BEST for observer in analysis.observers):
+        under, tuned = found.baselines.best, BEST in found.curves
+        bias = under.correction
+        best = {
+            "observer": "rts-auto" if tuned else "kfo-rts",
+            "gains": "log" if tuned else "robot",
+            "omega_n_rad_s": analysis.tunings[BEST].omega_n,
+            "free_part": under.part and under.part.remarks,
+            "whole_log_bias": {
+                "joints": np.flatnonzero(bias.applied) + 1,
+                "rms_Nm": root_mean_squares(bias.bias),
+                "sd_Nm": root_mean_squares(bias.sd),
+            }
+            if bias is not None and bias.applied.any()
+            else None,
+        }
     return {
         "bias_removed": found.removed,
-        "segments_free_loaded": spectra.segments if spectra is not None else None,
-        "best": best_record(analysis),
+        "segments_free_loaded": spectra and spectra.segments,
+        "best": best,
         "tuned": {
             name: {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
             for name, curve in found.curves.items()
@@ -262,30 +269,7 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
             for e in analysis.estimates
             if e.error_sd is not None
         },
-        "notes": list(found.remarks),
-    }
-
-
-def best_record(analysis: Analysis) -> dict[str, Any] | None:
-    """What `best` is made of: gains, free part, and the bias that is off; None where it is not."""
-    found, ran = analysis.refinement, {o.name: o for o in analysis.observers}
-    best = ran.get(BEST)
-    if found is None or best is None:
-        return None
-    under, tuned = found.baselines.best, BEST in found.curves
-    corrected = under.correction
-    return {
-        "observer": "rts-auto" if tuned else "kfo-rts",
-        "gains": "log" if tuned else "robot",
-        "omega_n_rad_s": analysis.tunings[BEST].omega_n,
-        "free_part": list(under.part.remarks) if under.part is not None else None,
-        "whole_log_bias": None
-        if corrected is None or not corrected.applied.any()
-        else {
-            "joints": [j + 1 for j in np.flatnonzero(corrected.applied)],
-            "rms_Nm": root_mean_squares(corrected.bias),
-            "sd_Nm": root_mean_squares(corrected.sd),
-        },
+        "notes": found.remarks,
     }
 
 

@@ -112,12 +112,19 @@ def log_screen(
 ) -> str:
     """The screen of one log, of so many lines at most."""
     first, *answered = head_lines(analysis, canvas)
-    force, listed, found = forces_of_list(analysis), analysis.contacts, grounds(analysis)
-    bars: list[str] = []
-    if force is not None and listed is not None:
+    listed, found, bars = analysis.contacts, grounds(analysis), list[str]()
+    if listed is not None and listed.hardest is not None:
         shown = [] if listed.contacts[0].is_load else hardest_rows(listed.contacts)
-        bars = force_bars(analysis.t, force, shown, canvas)
-    tail, text = [*doubt_lines(analysis), *against_lines(analysis, canvas)], ""
+        bars = force_bars(analysis.t, forces_of_list(listed, analysis.t), shown, canvas)
+    tail, text = doubt_lines(analysis), ""
+    for block in blocks(analysis.errors)[:1]:
+        tail += canvas.wrapped(against(block, analysis), 2)
+    if analysis.errors is not None:
+        for grid in contact_grids(analysis.errors):
+            tail += terminal(grid).splitlines()
+    if (printed := analysis.published) is not None:
+        why = next((f": {sentence(each)}" for each in printed.remarks), "")
+        tail += canvas.wrapped(f"Beside {printed.published.title}{why} → --details", 2)
     for each, rows in FORMS[:1] if every else FORMS[1:]:
         table = [] if listed is None else list_lines(listed, rows, canvas)
         believed = belief_lines(found, canvas, each)
@@ -139,22 +146,19 @@ def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
 
 def head_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """The facts, and the answer in a sentence."""
-    answered = canvas.wrapped(printable(headline(analysis)), 2)
-    lines = [f"  {line.strip()}" for line in answered]
-    return [canvas.painted(facts(analysis), "bold"), *lines]
+    lines = canvas.wrapped(printable(headline(analysis)), 2)
+    return [canvas.painted(facts(analysis), "bold"), *(f"  {line.strip()}" for line in lines)]
 
 
 def facts(analysis: Analysis) -> str:
     """Log, arm and its fit, duration, rate."""
-    recording, match = analysis.recording, own_match(analysis)
-    fit = ""
+    recording, match, fit = analysis.recording, own_match(analysis), ""
     if match is not None:
-        left = percent(match.misfit)
-        fit = f" (model error {left})" if match.fits else f" (does not fit: model error {left})"
+        fit = f" ({'' if match.fits else 'does not fit: '}model error {percent(match.misfit)})"
     span = f"{recording.duration:.1f} s"
     if rate := rate_of(recording):
-        span += f" at {rate:.0f} Hz" if rate >= 100.0 else f" at {rate:.3g} Hz"
-    return " · ".join((printable(recording.name), f"{printable(analysis.robot.name)}{fit}", span))
+        span += f" at {rate:{'.0f' if rate >= 100.0 else '.3g'}} Hz"
+    return printable(f"{recording.name} · {analysis.robot.name}{fit} · {span}")
 
 
 def doubt_lines(analysis: Analysis) -> list[str]:
@@ -202,8 +206,8 @@ def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> l
         lines.append(f"  {mark} {' · '.join(dict.fromkeys(g.subject for g in good))}")
         found = [ground for ground in found if ground not in good]
     for ground in found:
-        less = ground.standing == "good"
-        lines += ground_lines(ground, canvas, None if most is None else max(most - less, 1))
+        room = None if most is None else max(most - (ground in good), 1)
+        lines += ground_lines(ground, canvas, room)
     return lines
 
 
@@ -226,21 +230,6 @@ def ground_lines(
         yield f"{'':{room}}{printable(ground.remedy)}"
 
 
-def against_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
-    """The errors against a reference on one line, and beside a printed table on another."""
-    if analysis.errors is None:
-        return []
-    lines = []
-    for block in blocks(analysis.errors)[:1]:
-        lines += canvas.wrapped(against(block, analysis), 2)
-    for grid in contact_grids(analysis.errors):
-        lines += terminal(grid).splitlines()
-    if (found := analysis.published) is not None:
-        first = next((f": {sentence(each)}" for each in found.remarks), "")
-        lines += canvas.wrapped(f"Beside {found.published.title}{first} → --details", 2)
-    return lines
-
-
 def against(block: Block, analysis: Analysis) -> str:
     """One line on the errors: the observer in the lead, and the range of the others."""
     means = block.means
@@ -251,12 +240,11 @@ def against(block: Block, analysis: Analysis) -> str:
     text = f"Against {printable(block.reference)}{means.left_out}{floor}: "
     text += f"{significant(least, 2)} N·m ({name})"
     if others:
-        low, high = min(value for _, value in others), max(value for _, value in others)
         paper = any(remark.code in MEASURED for remark in analysis.remarks)
+        sizes = sorted(value for _, value in others)
+        ends = dict.fromkeys(significant(sizes[k], 2) for k in (0, -1))
         group = "the paper's gains" if paper else "the others"
-        size = significant(low, 2)
-        size += f"–{significant(high, 2)}" if significant(high, 2) != size else ""
-        text += f"; {group} {size}"
+        text += f"; {group} {'–'.join(ends)}"
     return f"{text} → --details"
 
 
@@ -271,11 +259,10 @@ def logs_screen(
     found = [(analysis, grounds(analysis)) for analysis in analyses]
     arms = dict.fromkeys(analysis.robot.name for analysis in analyses)
     free = dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs)
-    facts_of_all = [f"{len(analyses) + len(failed)} logs", " and ".join(arms)]
-    facts_of_all += [f"{len(failed)} left out"] * bool(failed)
-    facts_of_all += [f"free motion from {', '.join(free)}"] * bool(free)
-    head = printable(" · ".join(filter(None, facts_of_all)))
-    lines = [canvas.painted(head, "bold"), ""]
+    left_out = f"{len(failed)} left out" if failed else ""
+    source = f"free motion from {', '.join(free)}" if free else ""
+    parts = (f"{len(analyses) + len(failed)} logs", " and ".join(arms), left_out, source)
+    lines = [canvas.painted(printable(" · ".join(filter(None, parts))), "bold"), ""]
     shown = found
     if not every and len(found) > MOST_LOGS:
         # The worst and hardest, in the order of the logs.
@@ -316,26 +303,23 @@ def log_table(
 
     rows: Rows = []
     for analysis, all_grounds in found:
-        summary, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
-        if listed is not None and listed.detectable_force is not None and listed.tells_untouched:
-            rest = at_least_shown(listed.detectable_force)
+        line, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
+        if line.least is not None and listed is not None and listed.tells_untouched:
+            rest = at_least_shown(line.least)
         errors = [e for block in blocks(analysis.errors)[:1] for e in block.means.errors.values()]
         error = f"{significant(errors[0], 2)} N·m" if errors else DASH
-        span, worst = f"{summary.duration:.1f} s", health(all_grounds)
-        row = [summary.name, span, summary.contacts, summary.hardest, rest, error][: len(heads)]
-        state = "sound" if worst.standing == "good" else worst.subject
-        rows.append((*row, healthy(worst.standing, state)))
+        row = (line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, rest, error)
+        state = "sound" if line.standing == "good" else health(all_grounds).subject
+        rows.append((*row[: len(heads)], healthy(line.standing, state)))
     rows += [(name, *[""] * (len(heads) - 1), healthy("bad", "left out")) for name in failed]
     columns = (Column(h, words=h in {"log", "hardest", "health"}) for h in (*heads, "health"))
     return terminal(Grid(tuple(columns), rows), canvas.shown).splitlines()
 
 
-def forces_of_list(analysis: Analysis) -> Array | None:
-    """|F| of the listed contacts along a log, zero outside of them; None without any. (T,) [N]"""
-    if analysis.contacts is None or analysis.contacts.hardest is None:
-        return None
-    t, force = analysis.t, np.zeros(len(analysis.t))
-    for contact in analysis.contacts.contacts:
+def forces_of_list(found: ContactList, t: Array) -> Array:
+    """|F| of the listed contacts along a log, zero outside of them. (T,) [N]"""
+    force = np.zeros(len(t))
+    for contact in found.contacts:
         if (course := contact.course) is not None:
             inside = (t >= contact.start) & (t <= contact.stop)
             force[inside] = np.interp(t[inside], course.t, course.force)

@@ -6,13 +6,28 @@ from typing import Any
 
 from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
-from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
 from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.robot_file import lines_of
 
 #: A threshold in a call is a multiple of a hundredth: no robot tells less of a
 #: newton-metre.
 SHARES = 100
+BLANK = Column("", words=True, width=3)
+#: Columns of every threshold with its interval, and the tail it comes from.
+COLUMNS = (
+    BLANK, Column("threshold"), BLANK, Column("95 %"), Column("tail from"),
+    Column("λ", "1/h", ".0f"), Column("k"), Column("log", "h"), *words("needed by"),
+)  # fmt: skip
+#: Key of a contact in a check → its column.
+CONTACTS = {
+    "number": Column("#"),
+    "start_s": Column("from", "s", ".2f"),
+    "stop_s": Column("to", "s", ".2f"),
+    "peak_force_N": Column("|F|", "N"),
+    "delay_s": Column("delay", "ms", lambda seconds: f"{1e3 * seconds:.0f}"),
+    "by": Column("by", words=True),
+}
 
 
 def thresholds_text(
@@ -21,10 +36,23 @@ def thresholds_text(
     """All of it for the terminal: the tables, and the calls by the names of their interfaces."""
     parts = [terminal(thresholds_grid(thresholds))]
     if counted:
-        parts.append(terminal(left_out_grid(counted)))
-    parts += [f"{terminal(check_grid(check))}{check_line(check)}\n" for check in checks]
-    parts += [f"{name}:\n{text}" for name, text in calls(thresholds).items()]
-    return "\n".join(parts)
+        joints = joint_columns(len(counted[0].joints))
+        any_of = (Column("any joint"), *joints, Column("any axis"))
+        rows: Rows = [
+            (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
+            for one in counted
+        ]
+        title = "each log at the thresholds of the others: false alarms"
+        columns = *words("log"), Column("", "h"), Column("due"), *any_of
+        parts.append(terminal(Grid(columns, rows, title)))
+    for check in checks:
+        contacts = [
+            row | {"by": row["by"] or ("on already" if row["alarm_was_on"] else "missed")}
+            for row in check_rows(check)
+        ]
+        grid = keyed_grid(CONTACTS, contacts, f"{check.log}: what they would have detected")
+        parts.append(f"{terminal(grid)}{check_line(check)}\n")
+    return "\n".join([*parts, *(f"{name}:\n{text}" for name, text in calls(thresholds).items())])
 
 
 def thresholds_grid(thresholds: Thresholds) -> Grid:
@@ -34,58 +62,25 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
         span, t = DASH.join(map(significant, one.interval)), one.tail
         tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.size), t.hours)
         rows.append((name, level, unit, span, *tail, one.log))
-    columns = (
-        Column("", words=True, width=3),
-        Column("threshold"),
-        Column("", words=True, width=3),
-        *map(Column, ("95 %", "tail from")),
-        Column("λ", "1/h", ".0f"),
-        Column("k"),
-        Column("log", "h"),
-        *words("needed by"),
-    )
     title = f"exceeded without contact {thresholds.rate:g} × an hour by any joint, or any axis"
-    return Grid(columns, rows, title)
-
-
-def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
-    """False alarms of every free log at the thresholds of the others."""
-    joints = joint_columns(len(counted[0].joints))
-    any_of = (Column("any joint"), *joints, Column("any axis"))
-    columns = *words("log"), Column("", "h"), Column("due"), *any_of
-    rows: Rows = [
-        (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
-        for one in counted
-    ]
-    return Grid(columns, rows, "each log at the thresholds of the others: false alarms")
-
-
-def check_grid(check: ThresholdDetection) -> Grid:
-    """The contacts of a log, and their evidence."""
-    times = (Column(head, "s", ".2f") for head in ("from", "to"))
-    columns = Column("#"), *times, Column("|F|", "N"), Column("delay", "ms", ".0f"), *words("by")
-    rows: Rows = []
-    for k, c in enumerate(check.contacts, start=1):
-        by = c.by or ("on already" if c.already_above else "missed")
-        rows.append((str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, by))
-    return Grid(columns, rows, f"{check.log}: what they would have detected")
+    return Grid(COLUMNS, rows, title)
 
 
 def check_line(check: ThresholdDetection) -> str:
     """A check in a sentence."""
+    count, detected = len(check.contacts), len(check.detected)
+    weakest, missed = check.smallest_detected, check.largest_missed
     if check.reference is None:
-        count = len(check.contacts)
-        least = f", the weakest at {significant(check.smallest_detected)} N" if count else ""
+        least = f", the weakest at {significant(weakest)} N" if count else ""
         return f"{check.log}: {counted(count, 'alarm')}{least}"
-    detected, all_of_them = len(check.detected), len(check.contacts)
-    words = [f"{check.log}: {detected} of {all_of_them} contacts detected"]
+    words = [f"{check.log}: {detected} of {count} contacts detected"]
     if detected:
         words.append(f"{1e3 * check.median_delay:.0f} ms after they begin (median)")
         words.append(f"at most {1e3 * check.longest_delay:.0f} ms")
-    if not isnan(check.smallest_detected):
-        words.append(f"the weakest detected {significant(check.smallest_detected)} N")
-    if not isnan(check.largest_missed):
-        words.append(f"the hardest missed {significant(check.largest_missed)} N")
+    if not isnan(weakest):
+        words.append(f"the weakest detected {significant(weakest)} N")
+    if not isnan(missed):
+        words.append(f"the hardest missed {significant(missed)} N")
     if on := sum(contact.already_above for contact in check.contacts):
         words.append(f"{on} while an alarm was on already")
     words.append(f"{check.false_alarms} false in {significant(check.untouched_h)} h untouched")
@@ -120,47 +115,42 @@ def thresholds_record(
         "force": rows[-1] if thresholds.force else None,
         "calls": calls(thresholds),
         "left_out": [one._asdict() for one in counted],
-        "checks": list(map(check_record, checks)),
+        "checks": [
+            {
+                "log": check.log,
+                "reference": check.reference,
+                "caught": None if check.reference is None else len(check.detected),
+                "median_delay_s": check.median_delay,
+                "longest_delay_s": check.longest_delay,
+                "smallest_caught_N": check.smallest_detected,
+                "largest_missed_N": check.largest_missed,
+                "false_alarms": check.false_alarms,
+                "untouched_h": check.untouched_h,
+                "contacts": check_rows(check),
+                "remarks": check.remarks,
+            }
+            for check in checks
+        ],
     }
 
 
-def check_record(check: ThresholdDetection) -> dict[str, Any]:
-    """A check for machines."""
-    contacts = [
-        {
-            "number": number,
-            "start_s": contact.start,
-            "stop_s": contact.stop,
-            "peak_force_N": contact.peak_force,
-            "delay_s": contact.delay,
-            "by": contact.by or None,
-            "alarm_was_on": contact.already_above,
-        }
-        for number, contact in enumerate(check.contacts, start=1)
+def check_rows(check: ThresholdDetection) -> list[dict[str, Any]]:
+    """The contacts of a check, a row each."""
+    keys = (*CONTACTS, "alarm_was_on")
+    return [
+        dict(zip(keys, (number, *c[:4], c.by or None, c.already_above), strict=True))
+        for number, c in enumerate(check.contacts, start=1)
     ]
-    return {
-        "log": check.log,
-        "reference": check.reference,
-        "caught": None if check.reference is None else len(check.detected),
-        "median_delay_s": check.median_delay,
-        "longest_delay_s": check.longest_delay,
-        "smallest_caught_N": check.smallest_detected,
-        "largest_missed_N": check.largest_missed,
-        "false_alarms": check.false_alarms,
-        "untouched_h": check.untouched_h,
-        "contacts": contacts,
-        "remarks": list(check.remarks),
-    }
 
 
 def calls(thresholds: Thresholds) -> dict[str, str]:
     """Name of every interface that takes as many joints as there are → its text."""
-    count = len(thresholds.joints)
     # An interface that needs an unknown number gets no text.
     return {
         name: write(thresholds)
         for name, (joints, needed, write) in INTERFACES.items()
-        if joints in (None, count) and (not needed or are_known(getattr(thresholds, needed)))
+        if joints in (None, len(thresholds.joints))
+        and (not needed or are_known(getattr(thresholds, needed)))
     }
 
 
@@ -181,35 +171,32 @@ def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
     return lower([one if isnan(end) else one._replace(value=end) for one, end in ends])
 
 
-#: Side of a threshold → its numbers as a call has them.
-SIDES = {"lower": lower, "upper": upper}
-
-
 def doubt(thresholds: Thresholds) -> str:
     """A comment where the robot compares another estimate than the thresholds are learned from."""
     own = thresholds.of_vendor
     return "" if own else "# learned from gmo, not from the robot's own tau_ext: record that\n"
 
 
+def franka_lists(thresholds: Thresholds, line: str, *phases: str) -> str:
+    """A line for each list of numbers of Franka's interfaces."""
+    return "".join(
+        line.format(f"{side}_{quantity}_thresholds{phase}", rounded(ones))
+        for quantity, ones in (("torque", thresholds.joints), ("force", thresholds.axes))
+        for phase in phases
+        for side, rounded in (("lower", lower), ("upper", upper))
+    )
+
+
 def libfranka_call(thresholds: Thresholds) -> str:
     """`set_collision_behavior` of pylibfranka; the C++ call has these four lists too."""
-    lines = [
-        f"    {rounded(ones)},  # {side}_{quantity}_thresholds\n"
-        for quantity, ones in (("torque", thresholds.joints), ("force", thresholds.axes))
-        for side, rounded in SIDES.items()
-    ]
-    return f"{doubt(thresholds)}robot.set_collision_behavior(\n{''.join(lines)})\n"
+    lists = franka_lists(thresholds, "    {1},  # {0}\n", "")
+    return f"{doubt(thresholds)}robot.set_collision_behavior(\n{lists})\n"
 
 
 def franka_ros_parameters(thresholds: Thresholds) -> str:
     """`collision_config` of franka_control_node.yaml."""
-    lines = [
-        f"  {side}_{quantity}_thresholds_{phase}: {rounded(ones)}\n"
-        for quantity, ones in (("torque", thresholds.joints), ("force", thresholds.axes))
-        for phase in ("acceleration", "nominal")
-        for side, rounded in SIDES.items()
-    ]
-    return "".join([doubt(thresholds), "collision_config:\n", *lines])
+    lists = franka_lists(thresholds, "  {}: {}\n", "_acceleration", "_nominal")
+    return f"{doubt(thresholds)}collision_config:\n{lists}"
 
 
 def ur_script(thresholds: Thresholds) -> str:
