@@ -12,6 +12,7 @@ from vftcli.evaluation.errors import SCHEMA
 from vftcli.evaluation.wrenches import WRENCH_SCHEMA
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.error_tables import (
+    Block,
     axis_grids,
     blocks,
     detail_grids,
@@ -26,6 +27,10 @@ from vftcli.outputs.grids import contact_grids, drift_grid, pairs_text
 from vftcli.outputs.page.shell import part
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.sensor_reading import Drift
+
+
+def marks(*tables: Block) -> str:
+    return "\n".join(marks_in_words(tables))
 
 
 def row(observer: str, joint: int, rmse: float | None, **changed: object) -> dict[str, object]:
@@ -59,8 +64,8 @@ def test_bold_is_only_where_the_reference_can_tell() -> None:
 
 def test_an_observer_that_fails_is_named_with_the_share() -> None:
     (block,) = blocks(errors_of({"missing": 0.12}, {"missing": 0.03}))
-    assert "fdo: no answer in up to 12 %" in marks_in_words([block])
-    assert "no answer" not in marks_in_words(blocks(errors_of()))
+    assert "fdo: no answer in up to 12 %" in marks(block)
+    assert "no answer" not in marks(*blocks(errors_of()))
 
 
 def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
@@ -72,7 +77,7 @@ def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
     for text in (terminal(grid), markdown(grid), latex(grid), part("parts/table", grid)):
         assert "0.600" in text
         assert "1.30" not in text  # the mean of .6 and 2
-    assert "mean: without J2" in terminal(grid) + marks_in_words([block])
+    assert "mean: without J2" in terminal(grid) + marks(block)
     assert "mean: without J2" in latex(grid)
 
 
@@ -102,16 +107,16 @@ def test_a_joint_that_rests_bears_a_dagger() -> None:
     (block,) = blocks(errors_of({}, {"reference_trusted": False}))
     assert block.untrusted == (2,)
     assert block.joint_heads == ["J1", "J2†"]
-    assert "do not trust it" in marks_in_words([block])
+    assert "do not trust it" in marks(block)
     (trusted,) = blocks(errors_of())
-    assert "†" not in marks_in_words([trusted])
+    assert "†" not in marks(trusted)
 
 
 def test_an_unknown_error_is_not_the_best_and_does_not_count_in_the_mean() -> None:
     (block,) = blocks(errors_of({"rmse_Nm": None}))
     assert block.best.tolist() == [[False, False], [True, True]]
     assert block.means.errors["fdo"] == 2.0
-    assert "no sample" in marks_in_words([block])
+    assert "no sample" in marks(block)
 
 
 def test_logs_of_one_label_stay_apart_also_with_other_joints() -> None:

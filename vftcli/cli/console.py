@@ -4,7 +4,7 @@ import os
 import shlex
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -135,14 +135,14 @@ def canvas() -> "Canvas":
 
 
 def say_json(
-    logs: "Sequence[Mapping[str, Any] | Recording]",
+    logs: "Sequence[dict[str, Any] | Recording]",
     remarks: "Iterable[Remark]" = (),
     **found: Any,  # noqa: ANN401 - whatever JSON can hold
 ) -> None:
     """Print what a command found to stdout, for machines; what is no finite number is null."""
     from vftcli.outputs.run_record import envelope, log_entry, to_json
 
-    entries = [log if isinstance(log, Mapping) else log_entry(log) for log in logs]
+    entries = [log if isinstance(log, dict) else log_entry(log) for log in logs]
     echo_data(to_json(envelope(command_line(), entries, remarks, found)))
 
 

@@ -86,7 +86,6 @@ def identify_robot(
     from vftcli.answering import identified
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification import (
-        beside,
         files_beside,
         tables_text,
         write_identification,
@@ -112,7 +111,8 @@ def identify_robot(
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")
-    say(f"wrote {', '.join(map(str, beside(output).values()))}")
+    made_files = map(output.with_name, files_beside(output, None))
+    say(f"wrote {', '.join(map(str, made_files))}")
     if json:
         echo_data(record)
     else:

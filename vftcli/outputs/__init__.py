@@ -1,11 +1,13 @@
 """Outputs: screens, pages, tables, figures, recordings and files."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import WRITE, Choice, setting
 
+#: What machines read: key, with its unit → value.
+Record = dict[str, Any]
 #: How much of a log its recording holds: every sample, of a long one its levels, or no
 #: recording.
 #:

@@ -3,9 +3,9 @@
 The page has Figs 6/9, 7/10, 12/13 and Tables III/IV of the paper for the user's log.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
@@ -14,6 +14,7 @@ from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.law import AXES, PER_AXIS, Controller
 from vftcli.admittance.replay import Replay
 from vftcli.doctor.examination import Examination
+from vftcli.outputs import Record
 from vftcli.outputs.admittance_tables import (
     COLUMNS,
     TITLE,
@@ -125,7 +126,7 @@ def admittance_record(
     run: ClosedLoop | None,
     command: str,
     examinations: Sequence[Examination] = (),
-) -> dict[str, Any]:
+) -> Record:
     """Everything that `run.json` of a replay holds."""
     p, logs, loop = replay.parameters, [recording] if recording else [], None
     if run is not None:
@@ -166,7 +167,7 @@ def admittance_record(
 
 def render_admittance(
     replay: Replay,
-    record: Mapping[str, Any],
+    record: Record,
     title: str,
     run: ClosedLoop | None = None,
     examinations: Sequence[Examination] = (),

@@ -1,14 +1,14 @@
 """Tables and lines on an admittance replay: the comparison, latencies, parameters."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.law import AXES
 from vftcli.admittance.replay import Replay
+from vftcli.outputs import Record
 from vftcli.outputs.grid import Column, Grid, Rows, keyed_grid, latex, terminal, words
 from vftcli.outputs.quantity import minus
 
@@ -55,19 +55,19 @@ RETURNS = (
 )
 
 
-def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:
+def comparison_text(rows: Sequence[Record]) -> str:
     """The comparison of all controllers as text for a terminal."""
     return terminal(comparison_grid(rows)).rstrip("\n") if rows else "no axis was dragged"
 
 
-def comparison_grid(rows: Sequence[Mapping[str, Any]], title: str = "") -> Grid:
+def comparison_grid(rows: Sequence[Record], title: str = "") -> Grid:
     """Every controller on one force (Figs 7 and 10), below each other by axis and drag."""
     # Sorting keeps the order of the controllers within a drag.
     ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
     return keyed_grid(COLUMNS, ordered, title, swatches=True)
 
 
-def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
+def latency_rows(run: ClosedLoop) -> list[Record]:
     """The latencies of a closed loop as rows, None where something did not happen."""
     return [
         {

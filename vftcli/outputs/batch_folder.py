@@ -5,11 +5,12 @@ the result is complete. ``logs/<key[:2]>/<key>/`` holds what else was made of th
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from vftcli.outputs import Record
 from vftcli.outputs.files import (
     SEAL,
     atomic,
@@ -58,7 +59,7 @@ class BatchFolder:
         return place
 
     @contextmanager
-    def opened(self, options: str, record: Mapping[str, Any], *, force: bool) -> Iterator[None]:
+    def opened(self, options: str, record: Record, *, force: bool) -> Iterator[None]:
         """Make the folder, or take up the batch in it, for a block; nobody else does meanwhile."""
         try:
             check_letters(self.path)
@@ -110,7 +111,7 @@ class BatchFolder:
         with atomic(path, force=True) as temporary, table_file(temporary) as file:
             rows.write_parquet(file, compression="zstd", statistics=False)
 
-    def gather(self, logs: "pl.DataFrame", schema: "Mapping[str, Any]") -> "Iterator[pl.DataFrame]":
+    def gather(self, logs: "pl.DataFrame", schema: Record) -> "Iterator[pl.DataFrame]":
         """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first."""
         import polars as pl
 
@@ -124,7 +125,7 @@ class BatchFolder:
         tables: "Iterable[pl.DataFrame]",
         failures: "pl.DataFrame",
         page: Callable[[], str],
-        record: Mapping[str, Any],
+        record: Record,
     ) -> None:
         """Write the tables, a row group a piece, and the page, and at last their seal."""
         import polars as pl

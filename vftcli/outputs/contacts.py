@@ -4,10 +4,9 @@ The words are the same on screen, page, index and batch.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from vftcli.contacts.contact_list import (
     ContactModel,
     Unexplained,
 )
+from vftcli.outputs import Record
 from vftcli.outputs.files import SEAL
 from vftcli.outputs.grid import Column, Grid, csv_rows, latex, words
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, ranged
@@ -219,7 +219,7 @@ def contact_name(contact: Contact) -> str:
     return f"{'load' if contact.is_load else 'contact'} {contact.number}"
 
 
-def contacts_record(found: ContactList) -> dict[str, Any]:
+def contacts_record(found: ContactList) -> Record:
     """A log's contacts for machines, units in the names."""
     model, prior = found.model, found.model.prior
     return {
@@ -296,7 +296,7 @@ def contacts_latex(found: ContactList) -> str:
     return latex(replace(grid, columns=columns, title=title, notes=(LEGEND,)))
 
 
-def stored_record(estimates: Path) -> dict[str, Any]:
+def stored_record(estimates: Path) -> Record:
     """The contacts in the ``run.json`` beside an ``estimates.parquet``, as they were written."""
     path = estimates.with_name(SEAL)
     try:
@@ -314,7 +314,7 @@ def stored_record(estimates: Path) -> dict[str, Any]:
     return {**found, **about}
 
 
-def stored_list(record: Mapping[str, Any]) -> ContactList:
+def stored_list(record: Record) -> ContactList:
     """A list from its record; what its free motion was is not kept, but in words."""
     model, torque, load = record["model"], record["largest_unexplained"], record["load"]
     prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
@@ -337,11 +337,11 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
     )
 
 
-def stored_contact(row: Mapping[str, Any]) -> Contact:
+def stored_contact(row: Record) -> Contact:
     """One contact from its record."""
     apart = {"places", "anywhere", "remarks"}
     stored = {field.name for field in fields(Contact)} & KEYS.keys() - apart
-    given: dict[str, Any] = {name: row[KEYS[name]] for name in stored}
+    given: Record = {name: row[KEYS[name]] for name in stored}
     for name, unit in (("wrench", ""), ("wrench_sd", "_sd")):
         force = row[f"force{unit}_N"]
         given[name] = force and [*force, *row[f"moment{unit}_Nm"]]
@@ -355,7 +355,7 @@ def stored_contact(row: Mapping[str, Any]) -> Contact:
     )
 
 
-def stored_remark(record: Mapping[str, Any]) -> Remark:
+def stored_remark(record: Record) -> Remark:
     """A remark from its record."""
     span = record["span_s"]
     where = Where(record["about"] or "", tuple(record["joints"]), tuple(span) if span else None)

@@ -4,16 +4,17 @@ A row is an observer, a column a joint or an axis; forces are in newtons, moment
 newton-metres.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import polars as pl
 
 from vftcli.doctor.examination import doubt
 from vftcli.evaluation.errors import POOLED, JointMeans, joint_means
+from vftcli.outputs import Record
 from vftcli.outputs.examination import refused_codes
 from vftcli.outputs.grid import (
     Column,
@@ -123,8 +124,8 @@ def block(rows: pl.DataFrame) -> Block:
     """The rows of one recording as a matrix."""
     joints = rows["joint"].unique().sort()
     observers = rows["observer"].unique(maintain_order=True)
-    values = {(r["observer"], r["joint"]): r["rmse_Nm"] for r in rows.iter_rows(named=True)}
-    floors = dict(rows.select("joint", "reference_floor_Nm").iter_rows())
+    values = {(o, j): value for o, j, value in rows.select("observer", "joint", "rmse_Nm").rows()}
+    floors = dict(rows.select("joint", "reference_floor_Nm").rows())
     # Joints may differ in how many samples have a reference.
     counts = rows["samples"].drop_nulls().to_list() or [0]
     doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
@@ -139,7 +140,7 @@ def block(rows: pl.DataFrame) -> Block:
         floor=np.array([floors[j] for j in joints], dtype=float),
         samples=(min(counts), max(counts)),
         means=joint_means(rows),
-        missing={name: share for name, share in missing.iter_rows() if share},
+        missing={name: share for name, share in missing.rows() if share},
         untrusted=tuple(doubtful),
     )
 
@@ -148,21 +149,21 @@ def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and their mean across, the floor last."""
     rows: Rows = []
     # The mean |error|, and 1 less the mean RMSE over the reference's rms, where known.
-    each = (("L1", significant, table.means.l1), ("skill", ".2f", table.means.skill))
-    beside = [
-        (Column(head, form=form, seldom=True), known)
-        for head, form, known in each
+    beside = {
+        Column(head, form=form, seldom=True): known
+        for head, form, known in (
+            ("L1", significant, table.means.l1),
+            ("skill", ".2f", table.means.skill),
+        )
         if np.isfinite([*known.values()]).any()
-    ]
-    for name, values, bests, floors in zip(
-        table.observers, table.rmse, table.best, table.at_floor, strict=True
-    ):
+    }
+    for name, *each in zip(table.observers, table.rmse, table.best, table.at_floor, strict=True):
         # A star where the reference is no more accurate than that.
         cells = [
-            GridCell(text, bool(best), "*" * bool(at_floor))
-            for text, best, at_floor in zip(map(significant, values), bests, floors, strict=True)
+            GridCell(significant(value), bool(best), "*" * bool(at_floor))
+            for value, best, at_floor in zip(*each, strict=True)
         ]
-        means = (known.get(name) for _, known in beside)
+        means = (known.get(name) for known in beside.values())
         rows.append((name, *cells, table.means.errors.get(name), *means))
     if table.has_floor:
         blank = [""] * len(beside)
@@ -172,14 +173,14 @@ def rmse_grid(table: Block) -> Grid:
         for j, head in zip(table.joints, table.joint_heads, strict=True)
     )
     return Grid(
-        (*words("observer"), *joints, Column("mean"), *(column for column, _ in beside)),
+        (*words("observer"), *joints, Column("mean"), *beside),
         rows,
         table.title,
-        quantity="RMSE",
-        unit="N·m",
-        summaries=int(table.has_floor),
+        "RMSE",
+        "N·m",
+        int(table.has_floor),
         marked=True,
-        notes=tuple(marks_in_words([table]).splitlines()),
+        notes=tuple(marks_in_words([table])),
         swatches=True,
     )
 
@@ -193,7 +194,7 @@ DETAILS = (
 )
 
 
-def details(row: Mapping[str, Any]) -> tuple[str, ...]:
+def details(row: Record) -> tuple[str, ...]:
     """Texts in the tables of `DETAILS` for one row."""
     low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
     share, unknown = row.get("coverage_95"), low is None or high is None
@@ -218,8 +219,8 @@ def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
                 yield Grid(columns, rows, f"{group['recording'][0]}: {title}", swatches=True)
 
 
-def marks_in_words(found: Sequence[Block]) -> str:
-    """Meaning of floor, star and dash, if present."""
+def marks_in_words(found: Sequence[Block]) -> list[str]:
+    """Meaning of floor, star and dash, a line each, if present."""
     lines = []
     if any(table.has_floor for table in found):
         lines.append("floor: RMSE that the reference itself is known to have")
@@ -237,7 +238,7 @@ def marks_in_words(found: Sequence[Block]) -> str:
     )
     if not all(np.all(np.isfinite(table.rmse)) for table in found):
         lines.append("–: no sample where the reference is known")
-    return "".join(f"{text}\n" for text in lines)
+    return lines
 
 
 def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Iterator[Grid]:
@@ -314,20 +315,20 @@ def to_terminal(
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
-    above, below = (
+    above, marks, below = (
         "".join(f"{printable(line)}\n" for line in lines)
-        for lines in (doubts_of(errors), nothing_to_compare(errors))
+        for lines in (doubts_of(errors), marks_in_words(found), nothing_to_compare(errors))
     )
-    joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
+    joints = "\n".join(terminal(rmse_grid(table)) for table in found)
     details = detail_grids(errors) if every else ()
     grids = (*details, *axis_grids(errors, analyses), *contact_grids(errors))
-    return above + "\n".join([joints + below, *map(terminal, grids)])
+    return above + "\n".join([joints + marks + below, *map(terminal, grids)])
 
 
 def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
     """All tables of the errors as GitHub Markdown, best value of each joint bold."""
     found = blocks(errors)
-    lines = [*marks_in_words(found).splitlines(), *nothing_to_compare(errors)]
+    lines = [*marks_in_words(found), *nothing_to_compare(errors)]
     marks = [f"{escape_markdown(line)}\n" for line in lines]
     below = [*detail_grids(errors), *axis_grids(errors, analyses)]
     doubts = [f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors)]

@@ -3,12 +3,12 @@
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
 from vftcli.doctor import Examination, finding_record, in_words
 from vftcli.doctor.examination import doubt
+from vftcli.outputs import Record
 from vftcli.outputs.quantity import counted
 from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
@@ -17,7 +17,7 @@ from vftcli.signals.remarks import Remark, as_record
 MOST_FITS = 3  #: Profiles that are shown though they do not fit: the nearest.
 
 
-def examination_record(examination: Examination) -> dict[str, Any]:
+def examination_record(examination: Examination) -> Record:
     """Everything the doctor knows, for machines; what the reader warns of is a finding too."""
     recording = examination.recording
     source = recording.source
@@ -40,7 +40,7 @@ def examination_record(examination: Examination) -> dict[str, Any]:
     }
 
 
-def recording_record(recording: Recording) -> dict[str, Any]:
+def recording_record(recording: Recording) -> Record:
     """What was read of a log: its format, digest, clock, samples and signals."""
     source = recording.source
     return {
@@ -143,9 +143,7 @@ def path_of(log: Recording) -> str:
     return str(log.source.path or "LOG")
 
 
-def health_record(
-    examinations: Iterable[Examination], *, fitting: bool = True
-) -> list[dict[str, Any]]:
+def health_record(examinations: Iterable[Examination], *, fitting: bool = True) -> list[Record]:
     """Findings of a run's logs for `run.json`: the log's first, then others'.
 
     `overridden` are the codes with which results mean little, though they were wanted

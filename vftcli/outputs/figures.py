@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
+from vftcli.evaluation.errors import POOLED
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
@@ -45,7 +47,6 @@ from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
-    import polars as pl
     from matplotlib.figure import Figure
 
     from vftcli.signals.arrays import Array
@@ -181,16 +182,12 @@ def numbers_of(contacts: ContactList | None) -> dict[int, float]:
     return {c.number: 0.5 * (c.start + c.stop) for c in found if not c.is_load}
 
 
-def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
+def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:
     """RMSE with its interval, joint by joint and observer by observer, a plot a log.
 
     Empty where no joint has an error, or where more than `MOST` logs have no rows for all
     of them.
     """
-    import polars as pl
-
-    from vftcli.evaluation.errors import POOLED
-
     groups = list(logs_of(errors, "joint"))
     if len(groups) > MOST:
         groups = [rows for rows in groups if rows["recording"][0] == POOLED]

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.outputs import Record
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.parsing import printable
 
@@ -65,7 +66,7 @@ class Column(NamedTuple):
         """An entry as text; a dash where it is not known."""
         if isinstance(entry, GridCell):
             return entry
-        if entry is None or (isinstance(entry, float) and np.isnan(entry)):
+        if entry is None or (isinstance(entry, float) and not np.isfinite(entry)):
             return GridCell(DASH)
         if isinstance(entry, bool):
             return GridCell("yes" if entry else "no")
@@ -107,7 +108,7 @@ class Grid:
 
 def keyed_grid(
     columns: Mapping[str, Column],
-    rows: Iterable[Mapping[str, Any]],
+    rows: Iterable[Record],
     title: str = "",
     *,
     swatches: bool = False,
@@ -215,7 +216,18 @@ def latex(*grids: Grid) -> str:
     letters = re.sub("[^a-z0-9]+", "-", (first.title or caption).lower())[:40].strip("-")
     parts += [rf"\label{{tab:{letters or 'results'}}}", r"\footnotesize"]
     parts += [r"\setlength{\tabcolsep}{4pt}", rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
-    parts += latex_heads(first.columns)
+    # Headings in the middle of their columns, and below them the units that they have.
+    heads = [column.symbol or escape_latex(column.head) for column in first.columns]
+    heads[0] = heads[0][:1].upper() + heads[0][1:]
+    units = [f"[{escape_latex(column.unit)}]" if column.unit else "" for column in first.columns]
+    for line in filter(any, (heads, units)):
+        each = zip(line, first.columns, strict=True)
+        parts.append(
+            latex_line(
+                text if column.words or not text else rf"\multicolumn{{1}}{{c}}{{{text}}}"
+                for text, column in each
+            )
+        )
     for grid in grids:
         lines, texts = list(map(latex_line, texts[: len(grid.rows)])), texts[len(grid.rows) :]
         if grid.summaries:
@@ -232,21 +244,6 @@ def latex(*grids: Grid) -> str:
         parts.append(rf"\\[2pt] \parbox{{\linewidth}}{{\footnotesize {below}}}")
     parts.append(rf"\end{{{place}}}")
     return "".join(f"{line}\n" for line in parts)
-
-
-def latex_heads(columns: Sequence[Column]) -> list[str]:
-    """Headings in the middle of their columns, and below them the units that they have."""
-    heads = [column.symbol or escape_latex(column.head) for column in columns]
-    heads[0] = heads[0][:1].upper() + heads[0][1:]
-    units = [f"[{escape_latex(column.unit)}]" if column.unit else "" for column in columns]
-    return [
-        latex_line(
-            text if column.words or not text else rf"\multicolumn{{1}}{{c}}{{{text}}}"
-            for text, column in zip(line, columns, strict=True)
-        )
-        for line in (heads, units)
-        if any(line)
-    ]
 
 
 def latex_cells(column: Sequence[GridCell]) -> list[str]:
@@ -294,30 +291,28 @@ def escape_latex(text: str) -> str:
     return text.translate(LATEX_LETTERS).replace("$<$ ", r"$<$\,")
 
 
-def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> str:
+#: How a text begins that spreadsheets run: the list of OWASP's "CSV Injection".
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+def csv_rows(rows: Sequence[Record], keys: Iterable[str]) -> str:
     """Rows as CSV under a line of keys; what is not known is empty, truth in small letters.
 
     A text that a spreadsheet would run as a formula, as a file's name may be, begins with
     "'".
     """
+
+    def cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
+        """A value as a cell of CSV holds it."""
+        if isinstance(value, bool):
+            return str(value).lower()
+        if isinstance(value, str):
+            text = value.replace("\r", r"\r")  # unquoted before Python 3.13: it would end the row
+            return f"'{text}" if value.startswith(FORMULA) else text
+        return None if isinstance(value, float) and not np.isfinite(value) else value
+
     text, keys = io.StringIO(), list(keys)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(keys)
-    writer.writerows([csv_cell(row[key]) for key in keys] for row in rows)
+    writer.writerows([cell(row[key]) for key in keys] for row in rows)
     return text.getvalue()
-
-
-#: How a text begins that spreadsheets run: the list of OWASP's "CSV Injection".
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
-
-
-def csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
-    """A value as a cell of CSV holds it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    if not isinstance(value, str):
-        return value
-    text = value.replace("\r", r"\r")  # unquoted before Python 3.13: it would end the row
-    return f"'{text}" if value.startswith(FORMULA) else text

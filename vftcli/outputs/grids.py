@@ -1,8 +1,9 @@
 """Tables that belong to no page: robots, gains, times, drifts, contacts found, pairs, prints."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
+from vftcli.outputs import Record
 from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
 from vftcli.outputs.quantity import significant
 from vftcli.signals.wrench import AXES, unit_of
@@ -51,11 +52,9 @@ def joints_grid(robot: "Robot") -> Grid:
     chain, constants = robot.chain, robot.torque_constant
     rows: Rows = [("", "kg", "kg·m²", "N·m/A", "N·m", "")]
     for j, joint in enumerate(chain.names):
-        table = robot.friction[j].table if robot.friction else {}
         friction = "none"
-        if table:
-            model = table.pop("model")
-            trust = table.pop("confidence", "no confidence stated")
+        if table := robot.friction[j].table if robot.friction else {}:
+            model, trust = table.pop("model"), table.pop("confidence", "no confidence stated")
             numbers = ", ".join(
                 f"{key} {' '.join(f'{v:g}' for v in (x if isinstance(x, list) else [x]))}"
                 for key, x in table.items()
@@ -109,7 +108,7 @@ def robot_text(robot: "Robot") -> str:
     return "\n".join(lines)
 
 
-def bench_grid(result: Mapping[str, Any]) -> Grid:
+def bench_grid(result: Record) -> Grid:
     """Times of dynamics and observers, beside the paper's on its laptop."""
     dynamics = {"name": "dynamics", **result["dynamics"]}
     columns = {

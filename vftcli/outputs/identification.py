@@ -1,16 +1,16 @@
 """Outputs of an identification: robot file, page, figures, `run.json`, and what is printed."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from math import isfinite
+from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
 
 from vftcli.doctor.examination import Examination
 from vftcli.identification.fitting import Identification, Trace
+from vftcli.outputs import Record
 from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder
@@ -26,7 +26,7 @@ from vftcli.outputs.paper import (
     plots_of,
     write_figures,
 )
-from vftcli.outputs.quantity import DASH, counted, signed
+from vftcli.outputs.quantity import counted, signed
 from vftcli.outputs.run_record import (
     CONVENTIONS,
     envelope,
@@ -41,20 +41,31 @@ from vftcli.robots.profile import robot_toml
 from vftcli.signals.errors import OutputError
 
 IDENTIFICATION_FIGURES = ("torque", "residuals")  #: Names of its figures.
+#: Key of an identified number → its column.
+COLUMNS = {
+    "parameter": Column("number", words=True),
+    "joint": Column("joint"),
+    "value": Column("value", form=".5g"),
+    "sd": Column("sd", form=".2g"),
+    "profile": Column("profile", form=".5g"),
+    "unit": Column("unit", words=True),
+}
+#: Key of a base parameter → its column.
+BASE_COLUMNS = {
+    "parameter": Column("parameter", words=True),
+    "value": Column("value (SI)", form=signed),
+    "sd": Column("sd", form=signed),
+    "determined": Column("determined"),
+}
 DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
 
 
-def beside(path: Path) -> dict[str, Path]:
-    """The robot file and what goes with it, by kind."""
+def files_beside(path: Path, form: str | None) -> list[str]:
+    """Names of a robot file and of all that goes with it; `form` is what figures are written as."""
     if path.suffix.lower() != ".toml":
         raise OutputError(f"{path}: -o needs a name that ends in .toml, as my_robot.toml")
-    return {"toml": path, "html": path.with_suffix(".html"), "run": path.with_suffix(f".{SEAL}")}
-
-
-def files_beside(path: Path, form: str | None) -> list[str]:
-    """Names of all files that go with a robot file; `form` is what figures are written as."""
     drawn = figure_files(form, IDENTIFICATION_FIGURES, f"{path.stem}-")
-    return [*(file.name for file in beside(path).values()), *drawn]
+    return [path.name, f"{path.stem}.html", f"{path.stem}.{SEAL}", *drawn]
 
 
 def write_identification(
@@ -69,24 +80,24 @@ def write_identification(
 
     `logs` are the examinations of all that were read, also of those that no fit used.
     """
-    names = {kind: file.name for kind, file in beside(path).items()}
     record = identification_record(found, logs, command)
     heading = [
         *overridden_lines(logs, fitting=False),
         f"{found.robot.title}; written by vftcli identify, keys: docs/robots.md.",
         command,
     ]
-    with OutputFolder(path.parent, force, files_beside(path, form)) as folder:
-        folder.write(names["html"], render_identification(found, record, logs))
-        folder.write(names["toml"], robot_toml(found.robot, heading))
+    with OutputFolder(path.parent, force, names := files_beside(path, form)) as folder:
+        toml, page, run, *_ = names
+        folder.write(page, render_identification(found, record, logs))
+        folder.write(toml, robot_toml(found.robot, heading))
         if form is not None:
             write_figures(folder, identification_figures(found), form, f"{path.stem}-")
-        return seal(folder, names["run"], record)
+        return seal(folder, run, record)
 
 
 def identification_record(
     found: Identification, logs: Sequence[Examination], command: str
-) -> dict[str, Any]:
+) -> Record:
     """Everything `run.json` holds, and `--json` prints."""
     recordings = [one.recording for one in logs]
     about = {
@@ -108,7 +119,7 @@ def identification_record(
 
 
 def render_identification(
-    found: Identification, record: Mapping[str, Any], examinations: Sequence[Examination] = ()
+    found: Identification, record: Record, examinations: Sequence[Examination] = ()
 ) -> str:
     """The page as text: self-contained, nothing is loaded from anywhere."""
     logs = list(dict.fromkeys(t.motion.recording.name for t in found.traces))
@@ -119,16 +130,10 @@ def render_identification(
         "Friction models compared": shape_choice_grid(found.shape_choices),
     }
     if (base := found.base) is not None:
-        columns = {
-            "parameter": Column("parameter", words=True),
-            "value": Column("value (SI)", form=signed),
-            "sd": Column("sd", form=signed),
-            "determined": Column("determined"),
-        }
         above = "Weighted least squares, before physical consistency"
-        rows = base.iter_rows(named=True)
-        grids[f"Base parameters ({len(base)})"] = keyed_grid(columns, rows, above)
-    traces = [(trace, SPARE[k % len(SPARE)]) for k, trace in enumerate(found.traces)]
+        grid = keyed_grid(BASE_COLUMNS, base.iter_rows(named=True), above)
+        grids[f"Base parameters ({len(base)})"] = grid
+    traces = list(zip(found.traces, cycle(SPARE), strict=False))
     return page(
         "identification.html",
         f"{found.robot.name}: identification",
@@ -203,7 +208,7 @@ def identification_figures(found: Identification) -> dict[str, Drawing]:
     if rows:
         joints = [f"J{j}" for j in range(1, found.robot.joints + 1)]
         plot = DotPlot(found.robot.name, joints, rows, np.full(len(joints), np.nan))
-        paints = {name: SPARE[k % len(SPARE)] for k, (name, *_) in enumerate(rows)}
+        paints = dict(zip((name for name, *_ in rows), cycle(SPARE), strict=False))
         draw = partial(dot_figure, plots=[plot], paints=paints, label="Residual rms (N·m)")
         drawings["residuals"] = Drawing("RMS of the measured less the predicted torque", draw)
     return drawings
@@ -231,24 +236,11 @@ def residual_grid(found: Identification) -> Grid:
 
 def parameter_grid(found: Identification) -> Grid:
     """The identified numbers with their spread, and what the profile had."""
-    columns = {
-        "parameter": Column("number", words=True),
-        "joint": Column("joint"),
-        "value": Column("value", form=known_form(".5g")),
-        "sd": Column("sd", form=known_form(".2g")),
-        "profile": Column("profile", form=known_form(".5g")),
-        "unit": Column("unit", words=True),
-    }
     rows = (
         row | {"unit": row["unit"] + ("" if row["determined"] else "  (not determined)")}
         for row in found.parameters.iter_rows(named=True)
     )
-    return keyed_grid(columns, rows)
-
-
-def known_form(form: str) -> Callable[[float], str]:
-    """A dash for what the profile does not have, or the log does not determine: it is no zero."""
-    return lambda value: format(value, form) if isfinite(value) else DASH
+    return keyed_grid(COLUMNS, rows)
 
 
 def shape_choice_grid(choices: pl.DataFrame) -> Grid:

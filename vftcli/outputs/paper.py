@@ -4,7 +4,7 @@ Nothing here loads matplotlib before a figure is drawn; it is an extra (``vftcli
 """
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -103,9 +103,8 @@ class Drawing(NamedTuple):
 
 def figure_files(form: str | None, names: Sequence[str], before: str = "figures/") -> list[str]:
     """The files of these figures in both widths; none where no form is asked for."""
-    if form is None:
-        return []
-    return [f"{before}{name}-{width}.{form}" for name, width in product(names, WIDTHS)]
+    each = product(names, WIDTHS) if form else ()
+    return [f"{before}{name}-{width}.{form}" for name, width in each]
 
 
 def write_figures(
@@ -148,17 +147,14 @@ def sheet(
     """
     from matplotlib.figure import Figure
 
-    rows, lines = -(-cells // columns), 0
-    if handles:
-        widest = SAMPLE + LETTER * max(map(len, handles))
-        lines = -(-len(handles) // max(int(width / widest), 1))
+    rows, widest = -(-cells // columns), SAMPLE + LETTER * max(map(len, handles), default=0)
+    lines = -(-len(handles) // max(int(width / widest), 1))
     above = LINE * lines + 0.05 * bool(lines)
     figure = Figure(figsize=(width, rows * height + above + 0.22), layout="constrained")
     if handles:
         # As many columns as rows of about one length need.
-        columns_of_names = -(-len(handles) // lines)
-        names, drawn = list(handles), list(handles.values())
-        figure.legend(drawn, names, loc="outside upper center", ncols=columns_of_names)
+        wide = -(-len(handles) // lines)
+        figure.legend([*handles.values()], [*handles], loc="outside upper center", ncols=wide)
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
@@ -200,10 +196,8 @@ def line_figure(
     the horizontal axis, None for what its unit says.
     """
     wide = width > NARROW
-    usual = 2 if not wide else 4 if len(plots) > 6 else 3
-    columns = min(len(plots), columns or usual)
-    labels = legend_handles(plots, list(marks or ()))
-    figure, grid = sheet(width, len(plots), columns, HIGH[wide], labels)
+    columns = min(len(plots), columns or (2 if not wide else 4 if len(plots) > 6 else 3))
+    figure, grid = sheet(width, len(plots), columns, HIGH[wide], legend_handles(plots, marks or ()))
     if numbers:
         figure.set_figheight(figure.get_figheight() + 0.12)
     for k, (axes, plot) in enumerate(zip(grid, plots, strict=False)):
@@ -214,8 +208,14 @@ def line_figure(
             axes.set_xlabel(below or AXES[plot.chart.unit])
         else:
             axes.tick_params(labelbottom=False)
-        if numbers and k < columns:
-            write_numbers(axes, numbers, PLOTTED * width / columns)
+        (start, stop), end = axes.get_xlim(), -np.inf
+        for number, at in (numbers or {}).items() if k < columns else ():
+            # As far as they have room.
+            inch = (stop - start) * columns / (PLOTTED * width)
+            half = 0.5 * DIGIT * len(str(number)) * inch
+            if at - half >= end:
+                axes.annotate(str(number), (at, 1.0), **ABOVE)
+                end = at + half + BETWEEN * inch
         for n, (x, y) in enumerate((marks or {}).values()):
             axes.plot(x[plot.panel], y[plot.panel], **dot_look(n))
     # A place without a plot has the numbers and the label of the axis above it.
@@ -294,7 +294,7 @@ def look(series: ChartLine) -> Look:
     }
 
 
-def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any]:
+def legend_handles(plots: Sequence[Plot], marks: Iterable[str]) -> dict[str, Any]:
     """Everything that the legend names: lines, their ribbon, bands, contacts; alone, no line."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -304,12 +304,11 @@ def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any
     for chart in charts.values():
         shown = [series for series in chart.series if series.shown]
         found |= {shortened(series.name): Line2D([], [], **look(series)) for series in shown}
-        for series in shown:
-            if series.half is not None:
-                own, grey = ribbon_looks(series)
-                found["95 % band"] = Patch(**own)
-                if series.quiet is not None:
-                    found[QUIET] = Patch(**grey)
+        for series in (series for series in shown if series.half is not None):
+            own, grey = ribbon_looks(series)
+            found["95 % band"] = Patch(**own)
+            if series.quiet is not None:
+                found[QUIET] = Patch(**grey)
         if chart.band is not None:
             found[chart.band_label] = Line2D([], [], **BAND_LOOK)
         if chart.spans:
@@ -317,17 +316,6 @@ def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any
     for k, name in enumerate(marks):
         found[f"{name}, chosen"] = Line2D([], [], **dot_look(k))
     return found if len(found) > 1 else {}
-
-
-def write_numbers(axes: "Axes", numbers: Mapping[int, float], inches: float) -> None:
-    """Numbers of contacts above a plot of about this width, as far as they have room."""
-    start, stop = axes.get_xlim()
-    end = -np.inf
-    for number, at in numbers.items():
-        half = 0.5 * DIGIT * len(str(number)) * (stop - start) / inches
-        if at - half >= end:
-            axes.annotate(str(number), (at, 1.0), **ABOVE)
-            end = at + half + BETWEEN * (stop - start) / inches
 
 
 class DotPlot(NamedTuple):

@@ -5,10 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+
+import polars as pl
 
 from vftcli.analysis import Analysis
-from vftcli.outputs import NONE, PLAIN, OutputChoice
+from vftcli.outputs import NONE, PLAIN, OutputChoice, Record
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.contacts import contacts_csv, contacts_latex, contacts_record
 from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
@@ -19,9 +20,6 @@ from vftcli.outputs.run_record import envelope, log_entry, run_record, seal, to_
 from vftcli.signals.arrays import trim
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
-
-if TYPE_CHECKING:
-    import polars as pl
 
 #: Files of the errors table, in the order of `tables.FORMS`.
 ERROR_TABLES = ("errors.csv", "errors.json", "errors.md", "errors.tex")
@@ -72,8 +70,6 @@ def write_report(
     All files are written or none. What comes back is the text of `run.json`, of several
     logs one record with their own in it.
     """
-    import polars as pl
-
     from vftcli.outputs.page.pages import render_index
 
     labels, several = [a.recording.name for a in analyses], len(analyses) + len(failed) > 1
@@ -93,8 +89,8 @@ def write_report(
         put_contacts(folder, "", analyses, command)
         if form is not None and together is not None:
             write_figures(folder, error_figures(together), form)
-        left_out = {"left_out": dict(failed)}
         logs = [log_entry(a.recording, {"folder": place}) for place, a in pages]
+        left_out = {"left_out": dict(failed)}
         seal(folder, SEAL, envelope(command, logs, found=left_out))
         return to_json(envelope(command, list(map(json.loads, records)), found=left_out))
 
@@ -150,7 +146,7 @@ def put_contacts(
 
 def contacts_envelope(
     analyses: Sequence[Analysis], command: str, failed: Mapping[str, str] = MappingProxyType({})
-) -> dict[str, Any]:
+) -> Record:
     """What touched the arm along logs, for machines; what `failed` is left out."""
     listed = [(a.recording, a.contacts) for a in analyses if a.contacts is not None]
     logs = [log_entry(recording, contacts_record(found)) for recording, found in listed]
@@ -160,7 +156,7 @@ def contacts_envelope(
 def put_errors(
     folder: OutputFolder,
     place: str,
-    errors: "pl.DataFrame | None",
+    errors: pl.DataFrame | None,
     analyses: Sequence[Analysis],
 ) -> None:
     """Write the error tables, if there are errors."""

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.table import BEST
+from vftcli.outputs import Record
 from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.examination import health_record, recording_record
 from vftcli.outputs.files import OutputFolder, digest
@@ -52,7 +52,7 @@ MEANT = {
 }  # fmt: skip
 
 
-def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
+def run_record(analysis: Analysis, command: str) -> Record:
     """Everything `run.json` holds, the command line as the user typed it."""
     reference = analysis.reference
     found = {
@@ -78,10 +78,10 @@ def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
 
 def envelope(
     command: str,
-    logs: Sequence[Mapping[str, Any]] = (),
+    logs: Sequence[Record] = (),
     remarks: Iterable[Remark] = (),
-    found: Mapping[str, Any] = MappingProxyType({}),
-) -> dict[str, Any]:
+    found: Record | None = None,
+) -> Record:
     """The answer of any command, as `--json` prints it and `run.json` holds it.
 
     Args:
@@ -91,22 +91,25 @@ def envelope(
         found: The result; a table is its `rows`.
     """
     about = {"command": command, "versions": versions(), "logs": list(logs)}
-    return {**about, "remarks": list(remarks), **(logs[0] if len(logs) == 1 else {}), **found}
+    return {
+        **about,
+        "remarks": list(remarks),
+        **(logs[0] if len(logs) == 1 else {}),
+        **(found or {}),
+    }
 
 
-def log_entry(
-    recording: Recording, found: Mapping[str, Any] = MappingProxyType({})
-) -> dict[str, Any]:
+def log_entry(recording: Recording, found: Record | None = None) -> Record:
     """A log by name, path and digest, and what was found in it."""
     source = recording.source
     about = {"path": source.path and str(source.path), "sha256": source.sha256 or None}
-    return {"recording": recording.name, **about, **found}
+    return {"recording": recording.name, **about, **(found or {})}
 
 
 def seal(
     folder: OutputFolder,
     name: str,
-    record: Mapping[str, Any],
+    record: Record,
     files: Mapping[str, str] | None = None,
 ) -> str:
     """Write a run's record with the digest of every file beside it, the last; return its text.
@@ -122,7 +125,7 @@ def seal(
     return text
 
 
-def to_json(record: Mapping[str, Any] | Sequence[Any]) -> str:
+def to_json(record: Record | Sequence[Any]) -> str:
     """A record, or rows, as JSON text; what is not a finite number becomes null."""
     text = json.dumps(jsonable(record), indent=2, ensure_ascii=False, allow_nan=False)
     return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
@@ -162,7 +165,7 @@ def versions() -> dict[str, str]:
     return {"vftcli": VERSION, "python": platform.python_version(), **found}
 
 
-def input_record(recording: Recording) -> dict[str, Any]:
+def input_record(recording: Recording) -> Record:
     """The log by path and digest, its signals, and which part of it was used."""
     path = recording.source.path
     ends = {"start_s": float(recording.t[0]), "end_s": float(recording.t[-1])}
@@ -177,7 +180,7 @@ def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
     return found
 
 
-def robot_record(robot: Robot) -> dict[str, Any]:
+def robot_record(robot: Robot) -> Record:
     """The robot in use: a built-in profile by its name, not its path."""
     # Its path would be another on every machine; name and digest say as much.
     built_in = robot.path in PROFILES.values()
@@ -199,7 +202,7 @@ def file_sha256(path: Path | None) -> str | None:
     return digest(path) if path is not None and path.is_file() else None
 
 
-def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]:
+def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
     """An observer's parameters, and what they mean at the log's sample time."""
     # What ran is the observer inside, with the gains that the log chose.
     inner: Any = getattr(observer, "observer", observer)
@@ -209,7 +212,7 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]
     return {"name": observer.name, "parameters": parameters, **meant}
 
 
-def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
+def wrench_record(analysis: Analysis) -> Record | None:
     """How the wrenches were made and what is known of them, None where none was asked for."""
     sensed = analysis.virtual_sensor
     if sensed is None:
@@ -230,7 +233,7 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
     }
 
 
-def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
+def refinement_record(analysis: Analysis) -> Record | None:
     """Results of the complete log: free part, chosen gains, error budget.
 
     `best` is what it is made of: gains, free part, and the bias that is off.

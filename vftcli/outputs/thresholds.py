@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from math import ceil, isnan
-from typing import Any
 
 from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
+from vftcli.outputs import Record
 from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
 from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.robot_file import lines_of
@@ -89,7 +89,7 @@ def check_line(check: ThresholdDetection) -> str:
 
 def thresholds_record(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
-) -> dict[str, Any]:
+) -> Record:
     """All of it for machines, the unit in the names."""
     rows = []
     for shown, of, level, one in thresholds.named:
@@ -134,7 +134,7 @@ def thresholds_record(
     }
 
 
-def check_rows(check: ThresholdDetection) -> list[dict[str, Any]]:
+def check_rows(check: ThresholdDetection) -> list[Record]:
     """The contacts of a check, a row each."""
     keys = (*CONTACTS, "alarm_was_on")
     return [
@@ -217,7 +217,7 @@ run watch_force()
 
 def toml_text(thresholds: Thresholds) -> str:
     """The thresholds as TOML, units in the names."""
-    table: dict[str, Any] = {
+    table: Record = {
         "rate_per_h": thresholds.rate,
         "joint_torque_Nm": lower(thresholds.joints),
         "joint_torque_upper_Nm": upper(thresholds.joints),

@@ -12,6 +12,7 @@ from vftcli.bias.refine import Budget
 from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.published import Comparison
 from vftcli.observers.table import OBSERVERS
+from vftcli.outputs import Record
 from vftcli.outputs.contacts import hardest_rows
 from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, words
 from vftcli.outputs.page.shell import part
@@ -81,7 +82,7 @@ def model_pairs(found: ContactList) -> dict[str, str]:
     return pairs
 
 
-def observers_view(analysis: Analysis) -> dict[str, Any]:
+def observers_view(analysis: Analysis) -> Record:
     """What each observer's parameters are and mean."""
     rows: Rows = []
     for observer in analysis.observers:

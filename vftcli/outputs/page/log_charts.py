@@ -33,21 +33,33 @@ FREE, LOADED = "#3b7ea1", "#c2410c"
 
 def torque_chart(analysis: Analysis) -> Chart:
     """External torque joint by joint: the best estimate with its band, the reference below it."""
-    n, reference = analysis.recording.joints, analysis.reference
-    found = blocks(analysis.errors)
-    lines = estimate_lines(analysis)
+    n, reference, below = analysis.recording.joints, analysis.reference, list[ChartLine]()
+    if reference is not None:
+        # A broad line below the others; dotted where it is not to be trusted.
+        tau, moving = reference.tau, reference.moving
+        below = [ChartLine(reference_name(analysis), tau, REFERENCE)]
+        if moving is not None and np.any(~moving & np.isfinite(tau)):
+            resting = np.where(moving, np.nan, tau)
+            name = "reference while the joint rests"
+            below = [
+                below[0]._replace(values=np.where(moving, tau, np.nan)),
+                ChartLine(name, resting, "#8a94a0", "1.5 3"),
+            ]
+    heads = [f"J{j + 1}" for j in range(n)]
+    for found in blocks(analysis.errors)[:1]:
+        # A dagger where the reference is not to be trusted, as in the tables.
+        heads = found.joint_heads
     return Chart(
         "tau",
         "External torque on the robot",
         ("N·m",) * n,
-        # A dagger where the reference is not to be trusted, as in the tables.
-        tuple(found[0].joint_heads) if found else joint_panels(lines[0].values),
+        tuple(heads),
         analysis.t,
-        (*reference_lines(analysis), *lines),
-        families=families_of(analysis.robot.limits.tau_max),
-        band=None if reference is None else reference.floor,
-        band_label="± floor of the reference",
-        spans=contact_spans(analysis.contacts),
+        (*below, *estimate_lines(analysis)),
+        families_of(analysis.robot.limits.tau_max),
+        None if reference is None else reference.floor,
+        "± floor of the reference",
+        contact_spans(analysis.contacts),
     )
 
 
@@ -71,21 +83,13 @@ def lines_of(
     every line does, if they are `alike`. Given are name, values and standard deviation.
     (T, n)
     """
-    styles = observer_styles(analysis)
-    names = [name for name, *_ in found]
+    styles, names = observer_styles(analysis), [name for name, *_ in found]
     first = BEST if BEST in names else next(iter(names), "")
-    banded = set(names) if alike and first != BEST else {first}
-    lines = [
-        ChartLine(
-            name,
-            values,
-            *styles[name],
-            half=COVERS * sd if sd is not None and name in banded else None,
-            leads=name == first,
-            shown=name == first,
-        )
-        for name, values, sd in found
-    ]
+    banded, lines = names if alike and first != BEST else [first], []
+    for name, values, sd in found:
+        half = COVERS * sd if sd is not None and name in banded else None
+        leads = name == first
+        lines.append(ChartLine(name, values, *styles[name], half, leads, shown=leads))
     return sorted(lines, key=lambda line: line.leads)
 
 
@@ -93,20 +97,6 @@ def estimate_lines(analysis: Analysis) -> list[ChartLine]:
     """Every observer's torque."""
     each = [(e.name, e.tau, e.error_sd) for e in analysis.estimates]
     return lines_of(analysis, each, alike=True)
-
-
-def reference_lines(analysis: Analysis) -> tuple[ChartLine, ...]:
-    """The reference as a broad line below the others; dotted where it is not to be trusted."""
-    if analysis.reference is None:
-        return ()
-    tau, moving = analysis.reference.tau, analysis.reference.moving
-    whole = ChartLine(reference_name(analysis), tau, REFERENCE)
-    if moving is None or np.all(moving | ~np.isfinite(tau)):
-        return (whole,)
-    trusted = np.where(moving, tau, np.nan)
-    resting = np.where(moving, np.nan, tau)
-    name = "reference while the joint rests"
-    return (whole._replace(values=trusted), ChartLine(name, resting, "#8a94a0", "1.5 3"))
 
 
 def reference_name(analysis: Analysis) -> str:
@@ -135,13 +125,11 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
         delay = -1e3 * phase / (360.0 * frequency[:, None])
         for own, values in zip(lines.values(), (decibel, phase, delay), strict=True):
             own.append(ChartLine(observer.name, values, *styles[observer.name]))
-    gain, *others = (
-        over_frequency(title.lower(), title, unit, frequency, own)._replace(
-            panels=(f"{title}, joint 1",)
-        )
+    return tuple(
+        Chart(title.lower(), title, (unit,), (f"{title}, joint 1",), frequency, tuple(own),
+              unit="Hz", log=True, lowest=LOWEST if unit == "dB" else None)
         for (title, unit), own in lines.items()
-    )
-    return gain._replace(lowest=LOWEST), *others
+    )  # fmt: skip
 
 
 def over_frequency(key: str, title: str, unit: str, x: Array, lines: Sequence[ChartLine]) -> Chart:
@@ -163,12 +151,11 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
         return None
     each = [(wrench.name, wrench.known, wrench.sd) for wrench in found]
     lines = lines_of(analysis, each, alike=False)
-    sensed = analysis.virtual_sensor
+    smoothed = {} if analysis.virtual_sensor is None else analysis.virtual_sensor.smoothed
     for k, line in enumerate(lines):
-        smoothed = None if sensed is None else sensed.smoothed.get(line.name)
-        if smoothed is not None and smoothed.gate:
+        if line.name in smoothed and smoothed[line.name].gate:
             # Samples outside of every listed contact.
-            lines[k] = line._replace(quiet=smoothed.unlisted(analysis.t))
+            lines[k] = line._replace(quiet=smoothed[line.name].unlisted(analysis.t))
     reference = [w for w in analysis.wrenches if w.name == "reference"]
     below = [ChartLine(reference_name(analysis), w.known, REFERENCE) for w in reference]
     return Chart(
@@ -207,32 +194,30 @@ def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
 
 def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
     """Upper end of the axis: peaks with bands, the least visible force, other lines. [N]"""
-    top = max(2.5 * (found.detectable_force or 0.0), 0.0)
-    top = max([top, *(1.05 * float(np.nanmax(line.values, initial=0.0)) for line in others)])
+    tops = [0.0, 2.5 * (found.detectable_force or 0.0)]
+    tops += [1.05 * float(np.nanmax(line.values, initial=0.0)) for line in others]
     for contact in found.contacts:
+        # A band wider than its force leaves the chart.
         if contact.peak_force is not None and contact.peak_band is not None:
-            # A band wider than its force leaves the chart.
-            peak = contact.peak_force + min(contact.peak_band, contact.peak_force)
-            top = max(top, 1.12 * peak)
+            tops.append(1.12 * (contact.peak_force + min(contact.peak_band, contact.peak_force)))
         if contact.is_load and (course := contact.course) is not None:
-            top = max(top, float(np.max(course.force + np.minimum(course.band, course.force))))
-    return top or 1.0
+            tops.append(float(np.max(course.force + np.minimum(course.band, course.force))))
+    return max(tops) or 1.0
 
 
 def spectra_chart(found: Spectra) -> Chart:
     """Spectra of the raw disturbance over both parts of the log; 0 Hz is left out."""
     # In decibels; the least number above 0 replaces zero.
-    free, loaded = (
-        10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny))
-        for power in (found.free, found.loaded)
-    )
-    lines = (
-        ChartLine("free part, S_n", free, FREE),
-        ChartLine("loaded part, S_d", loaded, LOADED, "5 2"),
-    )
+    lines = [
+        ChartLine(name, 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny)), colour, dash)
+        for name, power, colour, dash in (
+            ("free part, S_n", found.free, FREE, ""),
+            ("loaded part, S_d", found.loaded, LOADED, "5 2"),
+        )
+    ]
     title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
     chart = over_frequency("spectra", title, "dB", found.frequency[1:], lines)
-    return chart._replace(families=(1,) * free.shape[1])
+    return chart._replace(families=(1,) * found.free.shape[1])
 
 
 def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.outputs.charts import GAP_STEPS, REFERENCE, Chart, ChartLine, Index, paint
+from vftcli.outputs import Record
+from vftcli.outputs.charts import GAP_STEPS, REFERENCE, Chart, ChartLine, paint
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import gaps_of
 
@@ -46,7 +47,7 @@ class Blob:
         self.steps.append(step)
         return len(self.rows) - 1
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Record:
         """What the script unpacks: high bytes of all differences, then the low ones."""
         changes = [np.diff(row, prepend=np.int16(0)) for row in self.rows]
         joined = np.concatenate(changes or [np.empty(0, np.int16)])
@@ -63,13 +64,22 @@ class PageClock:
     """The samples or stretches of a log that its lines share."""
 
     def __init__(self, blob: Blob, t: Array, spans: Sequence[tuple[float, float]] = ()) -> None:
-        gaps = gaps_of(t, GAP_STEPS) + 1
-        self.blob = blob
-        #: First sample of each stretch, None where every sample is kept. (N,)
-        self.starts = None if len(t) <= WHOLE else stretch_starts(t, spans, gaps)
-        first = np.arange(len(t)) if self.starts is None else self.starts
-        middle = first + np.diff(first, append=len(t)) // 2
-        self.samples = first if self.starts is None else middle  #: A sample of each. (N,)
+        gaps, first, half = gaps_of(t, GAP_STEPS) + 1, np.arange(len(t)), np.array(0)
+        self.blob, self.whole = blob, len(t) <= WHOLE
+        if not self.whole:
+            # Half of the stretches are near the spans; none reaches over a gap.
+            near = np.zeros(len(t), dtype=bool)
+            for start, stop in spans:
+                near |= (t >= start - AROUND) & (t <= stop + AROUND)
+            share, weight = near.mean(), np.ones(len(t))
+            if 0 < share < 1:
+                weight = np.where(near, 0.5 / share, 0.5 / (1.0 - share))
+            ends = np.cumsum(weight)
+            even = np.arange(STRETCHES) * (ends[-1] / STRETCHES)
+            first = np.unique(np.concatenate([[0], np.searchsorted(ends, even, "right"), gaps]))
+            half = np.diff(first, append=len(t)) // 2
+        self.starts = first  #: First sample of each stretch, every one where all are kept. (N,)
+        self.samples = first + half  #: A sample of each. (N,)
         ticks = np.diff(np.rint(t[self.samples] / TICK).astype(np.int64), prepend=0)
         # Two rows hold a difference of 29 bits: a log may have a gap of an hour.
         low, high = ticks % WIDE, ticks // WIDE
@@ -78,8 +88,6 @@ class PageClock:
 
     def index(self, sample: int) -> int:
         """Place of a sample of the log on this clock."""
-        if self.starts is None:
-            return sample
         return int(np.searchsorted(self.starts, sample, side="right")) - 1
 
     def pose(self, values: Array) -> int:
@@ -89,35 +97,32 @@ class PageClock:
     def ends(self, values: Array, unit: str, every: int = 1) -> tuple[int, int | None]:
         """Rows of the lowest value of each stretch, and of the highest above it. (T,)"""
         step, add = step_of(values, unit), self.blob.add
-        if self.starts is None:
+        if self.whole:
             return add(values, step), None
         low, high = (f.reduceat(values, self.starts[::every]) for f in (np.fmin, np.fmax))
         return add(low, step), add(high - low, step)
 
     def most(self, values: Array, unit: str) -> int:
         """Row of the largest value of each stretch: half the width of a band. (T,)"""
-        kept = values if self.starts is None else np.fmax.reduceat(values, self.starts)
-        return self.blob.add(kept, step_of(values, unit))
+        return self.blob.add(np.fmax.reduceat(values, self.starts), step_of(values, unit))
 
-    def line(self, chart: Chart, line: ChartLine) -> dict[str, Any]:
+    def line(self, chart: Chart, line: ChartLine) -> Record:
         """A line of a chart, panel by panel."""
-        every = 1 if line.shown or self.starts is None else COARSE
-        columns = list(zip(line.values.T, chart.units, strict=True))
+        every = 1 if line.shown or self.whole else COARSE
+        columns = zip(line.values.T, chart.units, strict=True)
         lows, spreads = zip(*(self.ends(x, unit, every) for x, unit in columns), strict=True)
         name = re.sub('[",\\s]+', " ", line.name)  # in the head of a CSV
-        data: dict[str, Any] = {
-            "name": line.name,
+        data: Record = {
+            **{key: getattr(line, key) for key in ("name", "leads", "shown")},
             "colour": paint(line.colour),
             "broad": line.colour == REFERENCE,
             "dash": [float(part) for part in line.dash.split()],
-            "leads": line.leads,
-            "shown": line.shown,
             "quiet": line.quiet is not None,
             "every": every,
             "low": lows,
-            "columns": [("low", name if self.starts is None else f"{name} min")],
+            "columns": [("low", name if self.whole else f"{name} min")],
         }
-        if self.starts is not None:
+        if not self.whole:
             data["spread"] = spreads
             data["columns"].append(("high", f"{name} max"))
         if line.half is not None and line.shown:
@@ -133,21 +138,9 @@ def step_of(values: Array, unit: str) -> float:
     return min(LARGEST.get(unit, 0.0), most / FEWEST)
 
 
-def stretch_starts(t: Array, spans: Sequence[tuple[float, float]], gaps: Index) -> Index:
-    """First sample of each stretch, half of them near the spans; none reaches over a gap."""
-    near = np.zeros(len(t), dtype=bool)
-    for start, stop in spans:
-        near |= (t >= start - AROUND) & (t <= stop + AROUND)
-    share = near.mean()
-    weight = np.where(near, 0.5 / share, 0.5 / (1.0 - share)) if 0 < share < 1 else np.ones(len(t))
-    ends = np.cumsum(weight)
-    starts = np.searchsorted(ends, np.arange(STRETCHES) * (ends[-1] / STRETCHES), side="right")
-    return np.unique(np.concatenate([[0], starts, gaps]))
-
-
 def page_data(
-    charts: Sequence[Chart], stage: Callable[[PageClock], dict[str, Any]] | None = None
-) -> dict[str, Any]:
+    charts: Sequence[Chart], stage: Callable[[PageClock], Record] | None = None
+) -> Record:
     """All that the script draws: charts over time, each on the clock of its own samples."""
     blob, clocks, drawn = Blob(), dict[int, PageClock](), []
     for chart in charts:
@@ -157,19 +150,17 @@ def page_data(
         clock, band = clocks[id(chart.x)], chart.band
         drawn.append(
             {
-                "key": chart.key,
-                "title": chart.title,
+                **{
+                    key: getattr(chart, key) for key in ("key", "title", "panels", "units", "spans")
+                },
                 "clock": list(clocks).index(id(chart.x)),
-                "panels": chart.panels,
-                "units": chart.units,
                 "ends": [tuple(chart.ends(j)) for j in range(len(chart.panels))],
                 # JSON has no NaN.
                 "band": band if band is None else np.nan_to_num(band).tolist(),
-                "spans": chart.spans,
                 "lines": [clock.line(chart, line) for line in chart.series],
             }
         )
-    data: dict[str, Any] = {"charts": drawn}
+    data: Record = {"charts": drawn}
     if stage is not None:
         data["stage"] = stage(next(iter(clocks.values())))
     data["clocks"] = [{"t": clock.rows, "gaps": clock.gaps} for clock in clocks.values()]

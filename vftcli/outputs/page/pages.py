@@ -5,10 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+
+import polars as pl
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation.errors import JointMeans
+from vftcli.evaluation.errors import JointMeans, joint_means
+from vftcli.outputs import Record
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
 from vftcli.outputs.contacts import by_force, hardest_words, otherwise
 from vftcli.outputs.error_tables import (
@@ -29,9 +31,6 @@ from vftcli.outputs.shapes import link_surfaces
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.frames import FRAMES
-
-if TYPE_CHECKING:
-    import polars as pl
 
 MOST_NAMED = 6  #: Uncertain contacts that the lead names by number; of more it says how many.
 FORCE_BOX = Box(width=1120, height=250, left=44, bottom=22, top=34, right=10)  #: That of |F|.
@@ -56,7 +55,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
     log, camera = analysis.recording, view_of(analysis)
     torque, wrench = log_charts.torque_chart(analysis), log_charts.wrench_chart(analysis)
     charts = [torque] if wrench is None else [torque, wrench]
-    view: dict[str, Any] = {"grounds": grounds(analysis), "record": record, "force": None}
+    view: Record = {"grounds": grounds(analysis), "record": record, "force": None}
     if found is not None:
         if (force := log_charts.force_chart(analysis, found)) is not None:
             charts.insert(0, force)
@@ -106,10 +105,9 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
 
 def eyebrow(analysis: Analysis) -> tuple[str, str, str]:
     """The log, the robot, and the span at its rate."""
-    recording, robot = analysis.recording, analysis.robot
-    rate = rate_of(recording)
-    span = f"{recording.duration:.1f} s" + (f" at {rate:.0f} Hz" if rate else "")
-    return recording.name, robot.title or robot.name, span
+    log, robot, rate = analysis.recording, analysis.robot, rate_of(analysis.recording)
+    span = f"{log.duration:.1f} s" + (f" at {rate:.0f} Hz" if rate else "")
+    return log.name, robot.title or robot.name, span
 
 
 def lead_sentences(analysis: Analysis) -> list[str]:
@@ -136,10 +134,9 @@ def lead_sentences(analysis: Analysis) -> list[str]:
     return [*said, otherwise(found)]
 
 
-def errors_view(analysis: Analysis) -> dict[str, Any]:
+def errors_view(analysis: Analysis) -> Record:
     """The tables of errors and what they come to, without tables where there is no reference."""
-    table = analysis.errors
-    found = blocks(table)
+    table, found = analysis.errors, blocks(analysis.errors)
     if table is None or not found:
         return {"state": "none given", "first": ()}
     means, state = found[0].means, "no sample in common with the estimates"
@@ -147,7 +144,7 @@ def errors_view(analysis: Analysis) -> dict[str, Any]:
         state = f"{least_error(means)} against {found[0].reference}{means.left_out}"
     return {
         "state": state,
-        "first": [rmse_grid(block) for block in found],
+        "first": list(map(rmse_grid, found)),
         "axes": axis_grids(table, [analysis]),
         "missing": nothing_to_compare(table),
     }
@@ -189,14 +186,14 @@ def index_line(folder: str, analysis: Analysis) -> LogSummary:
 def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
     """Number of logs with contact, and place of the hardest."""
     lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
-    pushed = [found for found in lists if found.contacts and not found.contacts[0].is_load]
-    loads = sum(bool(found.contacts and found.contacts[0].is_load) for found in lists)
+    touched = [found for found in lists if found.contacts]
+    pushed = [found for found in touched if not found.contacts[0].is_load]
+    loads, lead = len(touched) - len(pushed), ""
     if not lists:
         return f"External joint torques from {len(analyses)} logs.", ""
     title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
-    if not pushed and not loads:
+    if not touched:
         title = "Nothing pushed the arm, as far as these logs can tell."
-    lead = ""
     if hard := [(by_force(found.hardest), found) for found in pushed if found.hardest is not None]:
         most = max(hard, key=itemgetter(0))[1]
         lead = f"Hardest in {most.recording}: {hardest_words(most)}."
@@ -225,7 +222,7 @@ def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
     )
 
 
-def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
+def render_batch(lines: Sequence[LogSummary], failures: pl.DataFrame) -> str:
     """The page over a batch."""
     touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
     listed = sum(line.contacts != DASH for line in lines)
@@ -245,10 +242,8 @@ def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
     )
 
 
-def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[LogSummary]:
+def batch_lines(table: pl.DataFrame, pages: Mapping[str, str]) -> Iterator[LogSummary]:
     """The line of every log, made from the table of a batch alone."""
-    from vftcli.evaluation.errors import joint_means
-
     if table.is_empty():
         return
     best = {str(log): least_error(joint_means(rows)) for (log,), rows in table.group_by("log")}

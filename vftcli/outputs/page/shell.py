@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vftcli.doctor import in_words
+from vftcli.outputs import Record
 from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line, paint
 from vftcli.outputs.contacts import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
@@ -101,7 +102,7 @@ def page(
     title: str,
     charts: Sequence[Chart] = (),
     styles: Mapping[str, LineStyle] | None = None,
-    stage: Callable[[PageClock], dict[str, Any]] | None = None,
+    stage: Callable[[PageClock], Record] | None = None,
     about: str = "",
     **view: object,
 ) -> str:

@@ -6,12 +6,14 @@ projection.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs import Record
 from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
 from vftcli.outputs.page.packing import PageClock
 from vftcli.outputs.page.shell import polyline
@@ -103,9 +105,8 @@ def pose_at(analysis: Analysis, t: float) -> Pose:
 def arrow_of(analysis: Analysis, contact: Contact, reach: float) -> Array:
     """Tail and tip of a contact's force at its peak; the tip is where it acts. (2, 3) [m]"""
     (tip,) = touched_point(contact, pose_at(analysis, contact.peak).translation)
-    share = (contact.peak_force or 0.0) / most_force(analysis.contacts)
-    length = reach * (SHARES[0] + SHARES[1] * min(share, 1.0))
-    return np.vstack([tip - length * along(contact), tip])
+    share = min((contact.peak_force or 0.0) / most_force(analysis.contacts), 1.0)
+    return np.vstack([tip - reach * (SHARES[0] + SHARES[1] * share) * along(contact), tip])
 
 
 def along(contact: Contact) -> Array:
@@ -116,8 +117,8 @@ def along(contact: Contact) -> Array:
 
 def most_force(found: ContactList | None) -> float:
     """The largest force of a list, at least 1. [N]"""
-    sizes = [c.peak_force for c in found.contacts if c.size_known] if found is not None else []
-    return max([size for size in sizes if size is not None], default=1.0)
+    rows = found.contacts if found is not None else ()
+    return max((c.peak_force or 0.0 for c in rows if c.size_known), default=1.0)
 
 
 def cone_of(contact: Contact) -> float:
@@ -158,32 +159,28 @@ def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillA
 
 def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
     """Stretches of the log that are known to be without contact. [s]"""
-    found = analysis.contacts
-    if found is None or found.basis != "free motion":
-        return []
-    try:
-        own = analysis.motion.known.own
-    except VftError:
-        # Only other runs are known to be free.
-        return []
-    t = analysis.t
-    return [(float(t[start]), float(t[stop - 1])) for start, stop in runs_of(own)]
+    t, found = analysis.t, analysis.contacts
+    # There is none where only other runs are known to be free.
+    with suppress(VftError):
+        if found is not None and found.basis == "free motion":
+            own = runs_of(analysis.motion.known.own)
+            return [(float(t[start]), float(t[stop - 1])) for start, stop in own]
+    return []
 
 
 def stage_data(
     analysis: Analysis, view: View, surfaces: Mapping[int, Surface], clock: PageClock
-) -> dict[str, Any]:
+) -> Record:
     """What the script needs of arm and contacts, beside the charts; `surfaces` by link."""
-    found, chain = analysis.contacts, analysis.robot.chain
-    contacts = found.contacts if found is not None else ()
+    found, chain, sensed = analysis.contacts, analysis.robot.chain, analysis.virtual_sensor
     least = found.detectable_force if found is not None else None
     hardest = found.hardest if found is not None else None
     sure = found is not None and found.tells_untouched
-    sensed = analysis.virtual_sensor
     # Axes that the script knows; in others the direction is that of the peak.
     turns = sensed is not None and sensed.sensor.frame in {"base", "flange"}
     # A load lasts: what touches the arm meanwhile comes before it.
-    ordered = sorted(contacts, key=lambda contact: contact.is_load)
+    rows = found.contacts if found is not None else ()
+    ordered = sorted(rows, key=lambda contact: contact.is_load)
     turned = np.concatenate([chain.rotation, chain.flange_rotation[None]]).reshape(-1, 9)
     moved = np.vstack([chain.translation, chain.flange_translation])
     return {
@@ -197,10 +194,9 @@ def stage_data(
         # Per link the rows of x, y and z of corners, and of the three corners of
         # triangles.
         "surfaces": [
-            [clock.blob.add(x, MILLIMETRE) for x in surfaces[link].corners.T]
-            + [clock.blob.add(k, 1.0) for k in surfaces[link].faces.T]
-            if link in surfaces
-            else None
+            (surface := surfaces.get(link))
+            and [clock.blob.add(x, MILLIMETRE) for x in surface.corners.T]
+            + [clock.blob.add(k, 1.0) for k in surface.faces.T]
             for link in range(chain.joints + 1)
         ],
         "wrench": {"flange": sensed.sensor.frame == "flange"} if turns and sensed else None,
@@ -235,7 +231,7 @@ def contact_words(contact: Contact) -> str:
     return " · ".join(said)
 
 
-def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> dict[str, Any]:
+def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> Record:
     """A contact for the script: its moment, its words, its place."""
     sized = contact.peak_force is not None and not contact.place_unknown
     cone = cone_of(contact)
