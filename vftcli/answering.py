@@ -22,8 +22,8 @@ from vftcli.wrench.choice import WrenchChoice
 if TYPE_CHECKING:
     import polars as pl
 
-    from vftcli.admittance.closed_loop import ClosedLoop
-    from vftcli.admittance.replay import DrivingForce, Replay
+    from vftcli.admittance.closed_loop import Replayed
+    from vftcli.admittance.replay import DrivingForce
     from vftcli.contacts.thresholds import ComparedSignals, Thresholds
     from vftcli.doctor.examination import Examination
     from vftcli.identification import Identification
@@ -172,22 +172,13 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
 DRIVER = "kfo-fe"
 
 
-class Replayed(NamedTuple):
-    """A force through admittance controllers, and what it is of."""
-
-    replay: "Replay"  #: The comparison.
-    recording: Recording | None = None  #: The log, None without one.
-    run: "ClosedLoop | None" = None  #: A scenario with the controller in the loop, or None.
-    examinations: "tuple[Examination, ...]" = ()  #: What is wrong with the log.
-
-
 def replayed(
     log: Opened | None,
     asked: Asked,
     choice_of: Callable[[Asked], AnalysisChoice],
     release: Sequence[str] = (),
     seed: int | None = None,
-) -> Replayed:
+) -> "Replayed":
     """A log's force, a scenario in the loop, or a release through every controller.
 
     Args:
@@ -197,6 +188,7 @@ def replayed(
         release: Where a release begins, as ``x=0.3``.
         seed: Seed of a scenario.
     """
+    from vftcli.admittance.closed_loop import Replayed
     from vftcli.admittance.replay import release_deviation, replay, replay_release
     from vftcli.signals.packages import check_installed
 
@@ -266,9 +258,9 @@ def force_of(
 
 def looped(
     name: str, seed: int | None, choice: AnalysisChoice, control: ControlChoice, *, anyway: bool
-) -> Replayed:
+) -> "Replayed":
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
-    from vftcli.admittance.closed_loop import UNLOADED, loop_of
+    from vftcli.admittance.closed_loop import UNLOADED, Replayed, loop_of
     from vftcli.admittance.replay import replay
 
     assert choice.wrench is not None, "`replayed` asks for one"

@@ -7,7 +7,7 @@ fall to the turn.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.joints import FlangeSolver
 from vftcli.admittance.law import Controller, check_stable
 from vftcli.admittance.motion import Recursion, phases
-from vftcli.admittance.replay import deviation_of
+from vftcli.admittance.replay import Replay, deviation_of
+from vftcli.doctor.examination import Examination
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.paper import KalmanObserver
 from vftcli.robots import load_robot
@@ -25,6 +26,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
 from vftcli.signals.progress import stage, steps
+from vftcli.signals.recording import Recording
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.simulation.arm import Arm
@@ -307,6 +309,15 @@ def steps_in(interval: float, step: float, what: str) -> int:
             f"{1e3 * step:g} ms; set step to one that divides it"
         )
     return count
+
+
+class Replayed(NamedTuple):
+    """A force through admittance controllers, and what it is of."""
+
+    replay: Replay  #: The comparison.
+    recording: Recording | None = None  #: The log, None without one.
+    run: ClosedLoop | None = None  #: A scenario with the controller in the loop, or None.
+    examinations: tuple[Examination, ...] = ()  #: What is wrong with the log.
 
 
 @dataclass(frozen=True, kw_only=True)

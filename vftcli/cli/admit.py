@@ -20,7 +20,7 @@ from vftcli.cli.console import (
 from vftcli.signals.option import WRITE, Asked, Option
 
 if TYPE_CHECKING:
-    from vftcli.answering import Replayed
+    from vftcli.admittance.closed_loop import Replayed
 
 
 @opt.command(ControlChoice, *ANALYSIS)
@@ -70,16 +70,7 @@ def admit(
     found = replayed(log, asked, lambda words: choice_for(words, library), release or (), seed)
     show(found, json=json, latex=latex)
     if output is not None:
-        write_admittance(
-            output,
-            found.replay,
-            found.recording,
-            found.run,
-            command=asked.line,
-            force=force,
-            examinations=found.examinations,
-            form=figures,
-        )
+        write_admittance(output, found, asked.line, force, figures)
         if not (json or latex):
             say(f"wrote {output}: open {output / 'index.html'}")
         say_left_out(names)

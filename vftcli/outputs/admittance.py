@@ -3,17 +3,15 @@
 The page has Figs 6/9, 7/10, 12/13 and Tables III/IV of the paper for the user's log.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 
-from vftcli.admittance.closed_loop import ClosedLoop
+from vftcli.admittance.closed_loop import ClosedLoop, Replayed
 from vftcli.admittance.law import AXES, PER_AXIS, Controller
 from vftcli.admittance.replay import Replay
-from vftcli.doctor.examination import Examination
 from vftcli.outputs import Record
 from vftcli.outputs.admittance_tables import (
     COLUMNS,
@@ -41,7 +39,6 @@ from vftcli.outputs.run_record import (
     to_json,
 )
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import AXES as FORCES
 
@@ -72,21 +69,18 @@ def files_of_replay(form: str | None) -> list[str]:
 
 def write_admittance(
     path: Path,
-    replay: Replay,
-    recording: Recording | None,
-    run: ClosedLoop | None = None,
+    found: Replayed,
     command: str = "",
     force: bool = False,
-    examinations: Sequence[Examination] = (),
     form: str | None = None,
 ) -> None:
     """Write the folder of a replay, all or nothing; figures in a form, or none."""
-    record = admittance_record(replay, recording, run, command, examinations)
-    title = recording.name if recording is not None else "release"
+    replay, run, record = found.replay, found.run, admittance_record(found, command)
+    title = found.recording.name if found.recording is not None else "release"
     if run is not None and run.simulation is not None:
         title = f"{run.simulation.scenario.name}, closed loop"
     with OutputFolder(path, force, files_of_replay(form)) as folder:
-        folder.write("index.html", render_admittance(replay, record, title, run, examinations))
+        folder.write("index.html", render_admittance(found, record, title))
         keys = replay.rows[0] if replay.rows else COLUMNS
         folder.write("comparison.csv", csv_rows(replay.rows, keys))
         folder.write("comparison.json", to_json(replay.rows))
@@ -120,25 +114,20 @@ def motion_table(replay: Replay) -> pl.DataFrame:
     return pl.DataFrame({k: np.ascontiguousarray(v) for k, v in columns.items()}).fill_nan(None)
 
 
-def admittance_record(
-    replay: Replay,
-    recording: Recording | None,
-    run: ClosedLoop | None,
-    command: str,
-    examinations: Sequence[Examination] = (),
-) -> Record:
+def admittance_record(made: Replayed, command: str) -> Record:
     """Everything that `run.json` of a replay holds."""
+    replay, recording, run, examinations = made
     p, logs, loop = replay.parameters, [recording] if recording else [], None
     if run is not None:
-        made = run.simulation
         loop = {
             "controller": run.controller.name,
             "stable": run.stable,
             "zero_removed": run.zero,
             "poses_out_of_reach": int(np.count_nonzero(~run.reached)),
-            **({"scenario": made.scenario.name, "seed": made.seed} if made is not None else {}),
             "latencies": latency_rows(run),
         }
+        if (simulated := run.simulation) is not None:
+            loop |= {"scenario": simulated.scenario.name, "seed": simulated.seed}
     found = {
         "rows": replay.rows,
         "examination": health_record(examinations),
@@ -165,14 +154,9 @@ def admittance_record(
     return envelope(command, list(map(log_entry, logs)), replay.remarks, found)
 
 
-def render_admittance(
-    replay: Replay,
-    record: Record,
-    title: str,
-    run: ClosedLoop | None = None,
-    examinations: Sequence[Examination] = (),
-) -> str:
+def render_admittance(found: Replayed, record: Record, title: str) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
+    replay, _, run, examinations = found
     t, p, lost = replay.motion.t, replay.parameters, np.count_nonzero(~replay.path.reached)
     eyebrow = (
         title,

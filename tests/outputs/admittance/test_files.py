@@ -5,6 +5,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from vftcli.admittance.closed_loop import Replayed
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance import FILES, admittance_record, motion_table, write_admittance
 from vftcli.outputs.run_record import to_json
@@ -12,18 +13,18 @@ from vftcli.signals.errors import OutputError
 
 
 def test_a_replay_becomes_a_folder(release: Replay, tmp_path: Path) -> None:
-    write_admittance(tmp_path / "out", release, None, command="vftcli admit")
+    write_admittance(tmp_path / "out", Replayed(release), "vftcli admit")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
     record = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))
     assert record["command"] == "vftcli admit"
     assert record["input"] is None
     assert len(record["controllers"]) == len(release.controllers)
     with pytest.raises(OutputError, match="--force"):
-        write_admittance(tmp_path / "out", release, None)
+        write_admittance(tmp_path / "out", Replayed(release))
 
 
 def test_the_source_of_the_force_is_recorded_as_data(push: Replay) -> None:
-    record = json.loads(to_json(admittance_record(push, None, None, "")))
+    record = json.loads(to_json(admittance_record(Replayed(push), "")))
     assert record["force"]["code"] == "force-of-sensor"
     assert record["force"]["values"] == {"frame": "a push"}
     assert len(record["remarks"]) == len(push.remarks) > 0

@@ -4,6 +4,7 @@ import re
 import numpy as np
 import pytest
 
+from vftcli.admittance.closed_loop import Replayed
 from vftcli.admittance.law import from_table, variable
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance import admittance_record, charts, render_admittance
@@ -11,8 +12,9 @@ from vftcli.robots import load_robot
 
 
 def test_the_page_shows_every_part(release: Replay) -> None:
-    record = admittance_record(release, None, None, "vftcli admit --release x=0.1")
-    page = render_admittance(release, record, "<release>")
+    found = Replayed(release)
+    record = admittance_record(found, "vftcli admit --release x=0.1")
+    page = render_admittance(found, record, "<release>")
     assert "<h2>Comparison</h2>" in page
     for heading in ("Deviation", "Parameters", "Stability before motion"):
         assert f"<summary>{heading}" in page
@@ -25,9 +27,13 @@ def test_the_page_shows_every_part(release: Replay) -> None:
     assert json.loads(data.group(1))["charts"][0]["panels"] == ["x", "y", "z", "rx", "ry", "rz"]
 
 
+def page_of(replay: Replay) -> str:
+    found = Replayed(replay)
+    return render_admittance(found, admittance_record(found, ""), "r")
+
+
 def test_rows_bear_the_name_that_the_legend_has(release: Replay) -> None:
-    record = admittance_record(release, None, None, "")
-    page = render_admittance(release, record, "r")
+    page = page_of(release)
     for controller in release.controllers:
         assert f'data-swatch="{controller.name}"' in page
 
@@ -50,13 +56,13 @@ def test_without_a_drag_the_page_says_so(release: Replay) -> None:
     from dataclasses import replace
 
     still = replace(release, drags=())
-    page = render_admittance(still, admittance_record(still, None, None, ""), "r")
+    page = page_of(still)
     assert "No axis was dragged." in page
 
 
 def why(difference: str, release: Replay) -> str:
     """What the page says of a difference from the paper."""
-    page = render_admittance(release, admittance_record(release, None, None, ""), "r")
+    page = page_of(release)
     return page.partition(f"<li>{difference}")[2].partition("</li>")[0]
 
 
@@ -82,7 +88,7 @@ def test_the_escape_bound_of_the_ur5s_rotation(release: Replay) -> None:
 
 
 def test_the_page_draws_its_charts(release: Replay, opened) -> None:
-    tab = opened(render_admittance(release, admittance_record(release, None, None, ""), "r"))
+    tab = opened(page_of(release))
     tab.unfold()
     assert tab.blank_charts() == []
     assert tab.errors == []

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.admittance.closed_loop import Replayed
 from vftcli.admittance.law import controllers
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance import write_admittance
@@ -41,7 +42,7 @@ def test_rows_for_machines_are_not_rounded(release: Replay, tmp_path: Path) -> N
     rows = json.loads(to_json(release.rows))
     assert rows == json.loads(json.dumps(list(release.rows)))
     for name, replay in (("full", release), ("empty", replace(release, drags=()))):
-        write_admittance(tmp_path / name, replay, None)
+        write_admittance(tmp_path / name, Replayed(replay))
     with (tmp_path / "full/comparison.csv").open(encoding="utf-8") as file:
         read = list(csv.DictReader(file))
     assert [float(r["peak"]) for r in read] == [row["peak"] for row in release.rows]
