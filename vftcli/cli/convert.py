@@ -85,7 +85,7 @@ def simulate_log(
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
-    from vftcli.outputs.conversion import free_path, log_folder, save
+    from vftcli.outputs.conversion import log_folder, save
     from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed
     from vftcli.simulation import load_scenario
@@ -103,7 +103,9 @@ def simulate_log(
         raise typer.BadParameter("-o PATH says where the log goes")
     check_installed("pinocchio", "vftcli simulate")
     setup = load_scenario(scenario, changes or ())
-    paths = [output, free_path(output)] if setup.pair else [output]
+    # A pair's free run: ``log.csv`` → ``log.free.csv``.
+    free = output.with_name(f"{output.stem}.free{output.suffix}")
+    paths = [output, free] if setup.pair else [output]
     log_folder(paths, force)
     usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
     runs = simulate_pair(setup, seed)

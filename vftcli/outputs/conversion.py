@@ -13,7 +13,7 @@ channel of JSON messages in a ros2 file ends rosbags' reader.
 
 import json
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
@@ -265,8 +265,8 @@ def write_csv(recording: Recording, path: Path) -> None:
         pl.DataFrame(dict(columns_of(recording))).write_csv(file)
 
 
-def recorded_topics(recording: Recording) -> Iterator[OutputTopic]:
-    """The topics of a log: /joint_states, and one /vftcli/… for each further signal.
+def write_messages(recording: Recording, path: Path) -> None:
+    """Write the topics of a log: /joint_states, and one /vftcli/… for each further signal.
 
     The effort of /joint_states is the torque, or of a log that has no torque the motor
     current or the torque without gravity, as UR's driver publishes them.
@@ -274,29 +274,21 @@ def recorded_topics(recording: Recording) -> Iterator[OutputTopic]:
     names = recording.joint_names or tuple(f"joint_{j + 1}" for j in range(recording.joints))
     efforts = (recording.torque, recording.current, recording.torque_without_gravity)
     effort = next((value for value in efforts if value is not None), None)
-    yield joint_topic("/joint_states", names, recording.q, recording.dq, effort)
+    topics = [joint_topic("/joint_states", names, recording.q, recording.dq, effort)]
     # JointState has no field for these: each is the effort of its own topic.
     for name in JOINT_SIGNALS:
         value = getattr(recording, name)
         if value is not None and name not in {"q", "dq"}:
-            yield joint_topic(f"/vftcli/{COLUMN_NAMES.get(name, name)}", names, effort=value)
+            own = f"/vftcli/{COLUMN_NAMES.get(name, name)}"
+            topics.append(joint_topic(own, names, effort=value))
     if recording.wrench is not None:
-        frame = recording.wrench_frame
-        notation = "" if frame is None else frame.notation
-        yield wrench_topic("/vftcli/wrench", notation, recording.wrench)
+        notation = "" if recording.wrench_frame is None else recording.wrench_frame.notation
+        topics.append(wrench_topic("/vftcli/wrench", notation, recording.wrench))
+    write_topics(path, stamps_of(recording), topics)
 
 
 #: Ending of the file's name → how it is written.
-WRITERS: dict[str, Callable[[Recording, Path], None]] = {
-    ".parquet": write_parquet,
-    ".mcap": lambda log, path: write_topics(path, stamps_of(log), recorded_topics(log)),
-    ".csv": write_csv,
-}
-
-
-def free_path(path: Path) -> Path:
-    """Path of a pair's free run: ``log.csv`` → ``log.free.csv``."""
-    return path.with_name(f"{path.stem}.free{path.suffix}")
+WRITERS = {".parquet": write_parquet, ".mcap": write_messages, ".csv": write_csv}
 
 
 def companions(path: Path) -> tuple[Path, Path, Path]:

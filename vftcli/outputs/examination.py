@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 
 import numpy as np
 
@@ -12,30 +11,26 @@ from vftcli.outputs import Record
 from vftcli.outputs.quantity import counted
 from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, as_record
+from vftcli.signals.remarks import Remark
 
 MOST_FITS = 3  #: Profiles that are shown though they do not fit: the nearest.
 
 
 def examination_record(examination: Examination) -> Record:
     """Everything the doctor knows, for machines; what the reader warns of is a finding too."""
-    recording = examination.recording
-    source = recording.source
+    recording, source = examination.recording, examination.recording.source
     read = [remark for remark in source.remarks if remark.level == "warning"]
     return {
         **recording_record(recording),
         "duration_s": recording.duration,
         "max_gap_s": largest_step(recording),
-        "repairs": list(source.repairs),
-        "warnings": [
-            *source.warnings,
-            *(str(in_words(finding)) for finding in examination.warnings),
-        ],
-        "joint_names": list(recording.joint_names),
+        "repairs": source.repairs,
+        "warnings": [*source.warnings, *map(str, map(in_words, examination.warnings))],
+        "joint_names": recording.joint_names,
         "robot": recording.robot_hint,
-        "wrench_frame": None if recording.wrench_frame is None else str(recording.wrench_frame),
+        "wrench_frame": recording.wrench_frame and str(recording.wrench_frame),
         "payload_kg": recording.payload_mass,
-        "robots": [asdict(fit) for fit in examination.robots],
+        "robots": examination.robots,
         "findings": [finding_record(finding) for finding in (*read, *examination.findings)],
     }
 
@@ -50,11 +45,11 @@ def recording_record(recording: Recording) -> Record:
         "t0_s": source.t0,
         "rows": source.rows,
         "duplicates": source.duplicates,
-        **({"derived": list(source.derived)} if source.derived else {}),
+        **({"derived": source.derived} if source.derived else {}),
         "samples": recording.samples,
         "joints": recording.joints,
         "rate_hz": rate_of(recording),
-        "signals": list(recording.signals),
+        "signals": recording.signals,
     }
 
 
@@ -72,12 +67,12 @@ def holdings(recording: Recording) -> list[str]:
     """What a log holds, for people: its joints, samples, clock and signals."""
     source = recording.source
     rate, gap = rate_of(recording), largest_step(recording)
+    names = f" ({', '.join(recording.joint_names)})" if recording.joint_names else ""
+    pace = f", {rate:.4g} Hz, longest step {1e3 * gap:.4g} ms" if rate and gap else ""
     lines = [
         f"{source.path}: {source.format}",
-        f"  joints    {recording.joints}"
-        + (f" ({', '.join(recording.joint_names)})" if recording.joint_names else ""),
-        f"  samples   {recording.samples} of {source.rows} rows, {recording.duration:.3f} s"
-        + (f", {rate:.4g} Hz, longest step {1e3 * gap:.4g} ms" if rate and gap else ""),
+        f"  joints    {recording.joints}{names}",
+        f"  samples   {recording.samples} of {source.rows} rows, {recording.duration:.3f} s{pace}",
         f"  clock     {source.clock}; first stamp {source.t0:.6f} s",
         f"  signals   {', '.join(recording.signals)}",
     ]
@@ -90,9 +85,8 @@ def holdings(recording: Recording) -> list[str]:
 
 def examination_text(examination: Examination) -> str:
     """The report for people."""
-    recording = examination.recording
-    source = recording.source
-    lines = [*holdings(recording)]
+    recording, source = examination.recording, examination.recording.source
+    lines = holdings(recording)
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
     # How arms miss an effort that is another than it is read as says nothing of them.
     misread = examination.refusals(fitting=False)
@@ -108,7 +102,7 @@ def examination_text(examination: Examination) -> str:
         lines += [f"  {finding.consequence}.", f"  {finding.remedy}."]
     if len(examination.findings) == len(examination.assumptions):
         lines += ["", "nothing suspicious found"]
-    return "\n".join(printable(line) for line in lines)
+    return "\n".join(map(printable, lines))
 
 
 def warnings_of(examination: Examination) -> tuple[Remark, ...]:
@@ -154,8 +148,8 @@ def health_record(examinations: Iterable[Examination], *, fitting: bool = True) 
             "log": one.recording.name,
             "sound": not warnings_of(one),
             "overridden": [finding.code for finding in one.refusals(fitting=fitting)],
-            "read": [as_record(remark) for remark in one.recording.source.remarks],
-            "findings": [finding_record(finding) for finding in one.findings],
+            "read": one.recording.source.remarks,
+            "findings": list(map(finding_record, one.findings)),
         }
         for one in examinations
     ]

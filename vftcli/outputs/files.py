@@ -220,7 +220,8 @@ class OutputFolder:
             for path in places:
                 refuse_existing(path, self.force)
             (aside := self.temporary / EARLIER).mkdir()
-            paths = sorted({*places, *earlier}, key=last_sealed)
+            # Seals come last, that of the whole folder after all, and go first.
+            paths = sorted({*places, *earlier}, key=lambda p: (is_seal(p), -len(p.parts), str(p)))
             there = [p for p in paths[::-1] if p.exists() or p.is_symlink()]
             kept = [(path, aside / str(k)) for k, path in enumerate(there)]
             try:
@@ -288,14 +289,6 @@ def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:
             inside = path.resolve().is_relative_to(top.resolve())
             if inside and path.is_file() and digest(path) == sha:
                 yield path
-
-
-def last_sealed(path: Path) -> tuple[bool, int, str]:
-    """The order in which files take their places: seals last, that of the whole folder after all.
-
-    They leave their places in the opposite order.
-    """
-    return is_seal(path), -len(path.parts), str(path)
 
 
 def refuse_existing(path: Path, force: bool) -> None:

@@ -154,13 +154,11 @@ def terminal(grid: Grid, letters: Callable[[str], str] = str, width: int | None 
 
 def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = False) -> list[str]:
     """Headings and rows as lines, a rule above the summaries; headings `broken` at blanks."""
-    columns: list[list[str]] = []
-    cells = grid.cells
+    columns, cells = list[list[str]](), grid.cells
     for k, column in enumerate(grid.columns):
         # Where numbers may bear a mark, those without one keep its place.
         room = " " * (grid.marked and not column.words)
-        entries = (row[k] for row in cells)
-        texts = [letters(cell.text) + (cell.mark or room) for cell in entries]
+        texts = [letters(row[k].text) + (row[k].mark or room) for row in cells]
         heads = [letters(column.heading)]
         if broken:
             # The unit is not broken: of its blanks textwrap knows nothing.
@@ -169,15 +167,16 @@ def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = Fal
             least = max(1, *map(len, [*head.split(" "), *texts]))
             heads = [h.replace("\N{NO-BREAK SPACE}", " ") for h in textwrap.wrap(head, least)]
         columns.append([*(head + room for head in heads), *texts])
-    heights = [len(texts) - len(grid.rows) for texts in columns]
-    high = max(heights, default=0)
-    for k, (column, height) in enumerate(zip(grid.columns, heights, strict=True)):
-        texts = [""] * (high - height) + columns[k]
-        wide = max(column.width, *map(len, texts))
+    height = max(map(len, columns), default=0)
+    for k, (column, texts) in enumerate(zip(grid.columns, columns, strict=True)):
+        full = [""] * (height - len(texts)) + texts
+        wide = max(column.width, *map(len, full))
         # Words are at the left of their columns, numbers at the right.
-        columns[k] = [text.ljust(wide) if column.words else text.rjust(wide) for text in texts]
+        put = str.ljust if column.words else str.rjust
+        columns[k] = [put(text, wide) for text in full]
     lines = ["  ".join(texts).rstrip() for texts in zip(*columns, strict=True)]
-    lines = lines[high:] if not any(lines[:high]) else lines
+    heads = lines[: len(lines) - len(cells)]
+    lines = lines if any(heads) else lines[len(heads) :]
     if grid.summaries:
         lines.insert(-grid.summaries, "-" * len(lines[0]))
     return lines
@@ -221,21 +220,20 @@ def latex(*grids: Grid) -> str:
     heads[0] = heads[0][:1].upper() + heads[0][1:]
     units = [f"[{escape_latex(column.unit)}]" if column.unit else "" for column in first.columns]
     for line in filter(any, (heads, units)):
-        each = zip(line, first.columns, strict=True)
-        parts.append(
-            latex_line(
-                text if column.words or not text else rf"\multicolumn{{1}}{{c}}{{{text}}}"
-                for text, column in each
-            )
+        shown = (
+            text if column.words or not text else rf"\multicolumn{{1}}{{c}}{{{text}}}"
+            for text, column in zip(line, first.columns, strict=True)
         )
+        parts.append(rf"{' & '.join(shown)} \\")
     for grid in grids:
-        lines, texts = list(map(latex_line, texts[: len(grid.rows)])), texts[len(grid.rows) :]
+        count = len(grid.rows)
+        lines, texts = [rf"{' & '.join(row)} \\" for row in texts[:count]], texts[count:]
         if grid.summaries:
             lines.insert(-grid.summaries, rf"\cmidrule{{1-{len(spec)}}}")
         parts.append(r"\midrule")
         if len(grids) > 1:
             title = rf"\textit{{{escape_latex(grid.title)}}}"
-            parts.append(latex_line([rf"\multicolumn{{{len(spec)}}}{{l}}{{{title}}}"]))
+            parts.append(rf"\multicolumn{{{len(spec)}}}{{l}}{{{title}}} \\")
         parts += lines
     parts += [r"\bottomrule", r"\end{tabular}"]
     notes = [escape_latex(note) for note in dict.fromkeys(n for grid in grids for n in grid.notes)]
@@ -259,11 +257,6 @@ def latex_cells(column: Sequence[GridCell]) -> list[str]:
         missing = DECIMALS[len(found[1] or "") : most] if found else ""
         texts.append(text + (rf"\phantom{{{missing}}}" if missing else ""))
     return texts
-
-
-def latex_line(texts: Iterable[str]) -> str:
-    """Entries as one row of a LaTeX tabular."""
-    return rf"{' & '.join(texts)} \\"
 
 
 def escape_markdown(text: str) -> str:

@@ -25,6 +25,7 @@ from vftcli.signals.parsing import whole
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 from vftcli.signals.version import VERSION
+from vftcli.wrench.frames import FRAMES
 
 #: What every number in an output means.
 CONVENTIONS = {
@@ -54,7 +55,7 @@ MEANT = {
 
 def run_record(analysis: Analysis, command: str) -> Record:
     """Everything `run.json` holds, the command line as the user typed it."""
-    reference = analysis.reference
+    reference, sensed = analysis.reference, analysis.virtual_sensor
     found = {
         # Before any number: what may make all of them wrong.
         "examination": health_record(analysis.examinations),
@@ -67,7 +68,20 @@ def run_record(analysis: Analysis, command: str) -> Record:
         # What the estimates were judged by, with its own error.
         "reference": reference
         and {"name": reference.name, "floor_Nm": reference.floor, "notes": reference.remarks},
-        "wrench": wrench_record(analysis),
+        # How the wrenches were made and what is known of them.
+        "wrench": sensed
+        and {
+            "frame": sensed.sensor.frame,
+            "meaning": f"force and moment ON the robot; {FRAMES[sensed.sensor.frame]}",
+            "solver": sensed.solver,
+            "smoothed": {name: found.record for name, found in sensed.smoothed.items()},
+            "least_sigma_m": sensed.sensor.least_sigma,
+            "masked_share": sensed.masked_share,
+            "tool": sensed.sensor.mounting.tool,
+            "sensor": sensed.sensor.mounting.sensor,
+            "zero_drift": sensed.drifts,
+            "warnings": [r for r in sensed.remarks if r.level == "warning"],
+        },
         "contacts": analysis.contacts and contacts_record(analysis.contacts),
         "complete_log": refinement_record(analysis),
         "conventions": CONVENTIONS,
@@ -210,27 +224,6 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
     parameters = {name: jsonable(getattr(inner, name)) for name in own}
     meant = {} if tuning is None else {key: getattr(tuning, of) for key, of in MEANT.items()}
     return {"name": observer.name, "parameters": parameters, **meant}
-
-
-def wrench_record(analysis: Analysis) -> Record | None:
-    """How the wrenches were made and what is known of them, None where none was asked for."""
-    sensed = analysis.virtual_sensor
-    if sensed is None:
-        return None
-    from vftcli.wrench.frames import FRAMES
-
-    return {
-        "frame": sensed.sensor.frame,
-        "meaning": f"force and moment ON the robot; {FRAMES[sensed.sensor.frame]}",
-        "solver": sensed.solver,
-        "smoothed": {name: found.record for name, found in sensed.smoothed.items()},
-        "least_sigma_m": sensed.sensor.least_sigma,
-        "masked_share": sensed.masked_share,
-        "tool": sensed.sensor.mounting.tool,
-        "sensor": sensed.sensor.mounting.sensor,
-        "zero_drift": sensed.drifts,
-        "warnings": [r for r in sensed.remarks if r.level == "warning"],
-    }
 
 
 def refinement_record(analysis: Analysis) -> Record | None:

@@ -1,7 +1,7 @@
 """Tables in the details of the page of one log: contacts, observers, budget, print."""
 
 from collections.abc import Sequence
-from itertools import groupby
+from itertools import groupby, repeat
 from operator import itemgetter
 from typing import Any
 
@@ -21,6 +21,8 @@ from vftcli.outputs.run_record import observer_record
 from vftcli.signals.arrays import Array
 
 MOST = 40  #: Contacts in numbers at most.
+#: Keys of what has three numbers in a contact's record.
+VECTORS = ("force_N", "force_sd_N", "moment_Nm", "moment_sd_Nm", "mean_force_N", "impulse_Ns")
 #: Columns of the table of contacts.
 WRENCHES = (
     *map(Column, ("#", "from – to [s]", "range [N]")),
@@ -34,24 +36,20 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     """Moments, impulses, evidence and joint torques of the contacts, `MOST` at most."""
     if not found.contacts:
         return ()
-    contacts, title = hardest_rows(found.contacts, MOST), "Wrench at the peak, base axes, "
-    title += "the moment about the flange point"
+    contacts = hardest_rows(found.contacts, MOST)
+    title = "Wrench at the peak, base axes, the moment about the flange point"
     if len(contacts) < len(found.contacts):
         title += f"; the {MOST} hardest, contacts.csv has all"
     wrenches: Rows = []
     torques: Rows = []
     for c in contacts:
-        vectors: list[Array | None] = [None] * 4
-        if c.wrench is not None and c.wrench_sd is not None:
-            vectors = [c.wrench[:3], c.wrench_sd[:3], c.wrench[3:], c.wrench_sd[3:]]
-        shown = (None if v is None else vector(v) for v in (*vectors, c.mean_force, c.impulse))
+        record = c.record()
+        vectors = (None if record[key] is None else vector(record[key]) for key in VECTORS)
         rest = (c.evidence, c.lead, c.vendor_force, c.sensor_force)
-        row = [str(c.number), f"{c.start:.2f} – {c.stop:.2f}"]
-        row.append(DASH if c.anywhere is None else ranged(*c.anywhere, unit=""))
-        wrenches.append((*row, *shown, *rest))
-        each = zip(c.joint_torque, c.joint_torque_sd, strict=True)
-        torque = (banded(tau, sd, ".2f", "") for tau, sd in each)
-        torques.append((str(c.number), *torque, c.at_rest))
+        ends = DASH if c.anywhere is None else ranged(*c.anywhere, unit="")
+        wrenches.append((str(c.number), f"{c.start:.2f} – {c.stop:.2f}", ends, *vectors, *rest))
+        each = map(banded, c.joint_torque, c.joint_torque_sd, repeat(".2f"), repeat(""))
+        torques.append((str(c.number), *each, c.at_rest))
     columns = Column("#"), *joint_columns(len(contacts[0].joint_torque)), Column("at rest")
     below = "Joint torque at the peak in N·m, ± its standard deviation"
     return Grid(WRENCHES, wrenches, title), Grid(columns, torques, below)
@@ -76,20 +74,17 @@ def model_pairs(found: ContactList) -> dict[str, str]:
         "its correlation time": f"{each(model.error_time)} s",
     }
     if prior is not None:
-        pairs["contacts' force and moment"] = (
-            f"{prior.force:.3g} N and {prior.moment:.3g} N·m, which keep for {prior.time:.3g} s"
-        )
+        sizes = f"{prior.force:.3g} N and {prior.moment:.3g} N·m"
+        pairs["contacts' force and moment"] = f"{sizes}, which keep for {prior.time:.3g} s"
     return pairs
 
 
 def observers_view(analysis: Analysis) -> Record:
     """What each observer's parameters are and mean."""
     rows: Rows = []
-    for observer in analysis.observers:
-        name, tuning = observer.name, analysis.tunings.get(observer.name)
-        what = OBSERVERS[name].title if name in OBSERVERS else ""
-        meant: list[Any] = [None] * 5
-        if tuning is not None:
+    for name in (observer.name for observer in analysis.observers):
+        what, meant = OBSERVERS[name].title if name in OBSERVERS else "", list[Any]([None] * 5)
+        if (tuning := analysis.tunings.get(name)) is not None:
             columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
             meant = [GridCell("", html=joint_values(column)) for column in columns]
             meant.append(tuning.parameter_count)

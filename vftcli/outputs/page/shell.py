@@ -145,14 +145,12 @@ class Scales(NamedTuple):
     def across(self, x: Array | float) -> Array:
         """Horizontal places."""
         share = (np.asarray(x) - self.x.low) / ((self.x.high - self.x.low) or 1.0)
-        places: Array = self.box.left + share * (self.side - self.box.left)
-        return places
+        return np.asarray(self.box.left + share * (self.side - self.box.left))
 
     def up(self, y: Array | float) -> Array:
         """Vertical places, which count downwards."""
         share = (np.asarray(y) - self.y.low) / ((self.y.high - self.y.low) or 1.0)
-        places: Array = self.floor - share * (self.floor - self.box.top)
-        return places
+        return np.asarray(self.floor - share * (self.floor - self.box.top))
 
     def near(self, y: Array) -> Array:
         """Vertical places; what is far outside of the chart is drawn just outside of it."""
@@ -210,8 +208,8 @@ def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[
 
 def path_of(scales: Scales, t: Array, y: Array) -> str:
     """A line as the text of an SVG path, broken where a value is not known."""
-    x, z = scales.across(t), scales.near(y)
-    runs, points = runs_of(np.isfinite(z) & np.isfinite(x)), np.column_stack([x, z])
+    points = np.column_stack([scales.across(t), scales.near(y)])
+    runs = runs_of(np.isfinite(points.sum(axis=1)))
     return "".join(polyline(points[start:stop]) for start, stop in runs)
 
 
@@ -233,18 +231,16 @@ def tenth(number: int) -> str:
 
 def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:
     """The area between two lines as a path, broken where either is not known."""
-    x, path = scales.across(t), ""
+    x = scales.across(t)
     above, below = (np.column_stack([x, scales.near(edge)]) for edge in (high, low))
-    for start, stop in runs_of(np.isfinite(low) & np.isfinite(high)):
-        outline = np.vstack([above[start:stop], below[start:stop][::-1]])
-        path += f"{polyline(outline)}Z"
-    return path
+    spans = (slice(*run) for run in runs_of(np.isfinite(low) & np.isfinite(high)))
+    return "".join(f"{polyline(np.vstack([above[s], below[s][::-1]]))}Z" for s in spans)
 
 
 def stripes(scales: Scales, spans: Sequence[tuple[float, float]]) -> str:
     """Many stretches of time from top to floor as one path."""
-    height, path = scales.floor - scales.box.top, ""
-    for left, right in (scales.across(np.asarray(span)) for span in spans):
+    top, height, path = scales.box.top, scales.floor - scales.box.top, ""
+    for left, right in scales.across(np.reshape(spans, (-1, 2))):
         width = max(right - left, 0.5)
-        path += f"M{left:.1f} {scales.box.top:g}h{width:.1f}v{height:g}h{-width:.1f}z"
+        path += f"M{left:.1f} {top:g}h{width:.1f}v{height:g}h{-width:.1f}z"
     return path
