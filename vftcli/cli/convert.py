@@ -103,9 +103,9 @@ def simulate_log(
         raise typer.BadParameter("-o PATH says where the log goes")
     check_installed("pinocchio", "vftcli simulate")
     setup = load_scenario(scenario, changes or ())
-    # A pair's free run: ``log.csv`` → ``log.free.csv``.
-    free = output.with_name(f"{output.stem}.free{output.suffix}")
-    paths = [output, free] if setup.pair else [output]
+    paths = [output]
+    if setup.pair:  # its free run: ``log.csv`` → ``log.free.csv``
+        paths.append(output.with_name(f"{output.stem}.free{output.suffix}"))
     log_folder(paths, force)
     usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
     runs = simulate_pair(setup, seed)
