@@ -1,9 +1,8 @@
 """Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
 from itertools import compress
 from typing import NamedTuple
 
@@ -70,21 +69,50 @@ KINDS = {
 LAYOUTS = 512
 
 
-@dataclass
-class Stream:
-    """Messages of one topic about the same joints, as arrays."""
+TIMES = ("receive", "header", "robot")  #: What a stream has beside its signals.
 
-    channel: Channel  #: The topic.
-    kind: Kind  #: What its type means.
-    names: Names  #: The joints' names, base to tip, or empty.
-    mixed: bool  #: Whether the messages had them in another order, or other joints among them.
-    frame: str  #: Frame of its stamps' headers, or nothing.
-    receive: Integers  #: When each was recorded. (T,) [ns]
-    header: Integers | None  #: Stamp in each header. (T,) [ns]
-    signals: Signals  #: Signal → (T, k).
-    robot: Array | None = None  #: The robot's own clock, or None. (T,) [s]
-    #: Last value of each constant.
-    constants: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+class Stream:
+    """Messages of one topic about the same joints, gathered part by part and then whole.
+
+    Attributes:
+        channel: The topic.
+        names: The joints' names, base to tip, or empty.
+        frame: Frame of its stamps' headers, or nothing.
+        mixed: Whether the messages had the joints in another order, or others among them.
+        constants: Last value of each constant.
+        series: The times and signals that came in, and each message's number among all.
+    """
+
+    def __init__(self, channel: Channel, names: Names, frame: str) -> None:
+        self.channel, self.names, self.frame, self.mixed = channel, names, frame, False
+        self.constants: dict[str, tuple[float, ...]] = {}
+        self.series: dict[str, JoinedRows] = defaultdict(JoinedRows)
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Times and signals that every message has, of one width, in the order of recording."""
+        count = self.series["place"].count
+        found = {
+            name: rows.whole()
+            for name, rows in self.series.items()
+            if len(rows.shapes) == 1 and rows.count == count
+        }
+        place = found.pop("place")
+        if np.any(place[1:] < place[:-1]):  # of several layouts in turn
+            order = np.argsort(place)
+            found = {name: value[order] for name, value in found.items()}
+        return found
+
+    @cached_property
+    def signals(self) -> Signals:
+        """Signal → (T, k)."""
+        return {name: value for name, value in self.columns.items() if name not in TIMES}
+
+    @property
+    def kind(self) -> Kind:
+        """What its type means."""
+        return KINDS[self.channel.type]
 
     @property
     def topic(self) -> str:
@@ -94,7 +122,7 @@ class Stream:
     @property
     def messages(self) -> int:
         """Number of messages."""
-        return len(self.receive)
+        return self.series["place"].count
 
     @property
     def width(self) -> int:
@@ -102,9 +130,14 @@ class Stream:
         return len(self.signals["q"].T)
 
     @property
+    def receive(self) -> Integers:
+        """When each was recorded. (T,) [ns]"""
+        return self.columns["receive"]
+
+    @cached_property
     def host(self) -> Integers:
         """Header stamps if they are set and never run back, else receive stamps. (T,) [ns]"""
-        header = self.header
+        header = self.columns.get("header")
         good = header is not None and header[0] > 0 and runs(header)
         return header if header is not None and good else self.receive
 
@@ -116,19 +149,6 @@ def runs(stamps: Array | Integers) -> bool:
 
 
 Numbers = Callable[[Sequence[str]], Array]
-#: What tells streams of a topic apart: the joints' names, the frame, the signals.
-_Key = tuple[Names, str, Names]
-
-
-@dataclass
-class _Topic:
-    """What is known of a channel while its batches come in."""
-
-    layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
-    #: The times, signals, and numbers among all messages, of all batches.
-    series: dict[_Key, dict[str, JoinedRows]] = field(default_factory=dict)
-    mixed: set[_Key] = field(default_factory=set)
-    constants: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 class Decoder:
@@ -136,7 +156,10 @@ class Decoder:
 
     def __init__(self, budget: ReadBudget) -> None:
         self.budget = budget
-        self.topics: dict[Channel, _Topic] = defaultdict(_Topic)
+        #: By topic, joints' names, frame and signals.
+        self.streams: dict[tuple[Channel, Names, str, Names], Stream] = {}
+        #: Topic → length of a message → layouts of that length.
+        self.layouts: dict[Channel, dict[int, list[MessageLayout]]] = defaultdict(dict)
         self.others: dict[str, str] = {}
 
     def take(self, batch: Batch, places: Integers) -> None:
@@ -159,7 +182,7 @@ class Decoder:
             ) from None
 
     def _take_matrix(self, channel: Channel, messages: Bytes, places: Integers) -> None:
-        layouts = self.topics[channel].layouts
+        layouts = self.layouts[channel]
         known, tried = layouts.setdefault(messages.shape[1], []), 0
         while len(messages):
             if tried == len(known):
@@ -185,18 +208,21 @@ class Decoder:
             texts: Dotted path → strings, the same in each.
             places: Number among all messages, and time of recording [ns], of each. (k, 2)
         """
-        kind, topic = KINDS[channel.type], self.topics[channel]
+        kind = KINDS[channel.type]
         each = {signal: numbers(paths) for signal, paths in kind.signals.items()}
-        for name, paths in kind.constants.items():
-            if (last := numbers(paths)[-1]).size:
-                topic.constants[name] = tuple(last.tolist())
         # Some drivers publish joints alphabetically; every message of a layout has one
         # order.
         own = texts.get(kind.names, ())
         names, signals = along_arm(own, {s: value for s, value in each.items() if value.shape[1]})
         if kind.franka and "tau_ext" in signals:
             signals["tau_ext"] = 0.0 - signals["tau_ext"]
-        key = names, "".join(texts.get(kind.frame, ())), tuple(signals)
+        frame = "".join(texts.get(kind.frame, ()))
+        key = channel, names, frame, tuple(signals)
+        stream = self.streams.setdefault(key, Stream(channel, names, frame))
+        stream.mixed |= names != own
+        for name, paths in kind.constants.items():
+            if (last := numbers(paths)[-1]).size:
+                stream.constants[name] = tuple(last.tolist())
         part: Columns = {**signals, "place": places[:, 0], "receive": places[:, 1]}
         if (clock := numbers(["time"])).size:  # a robot's own [s]
             part["robot"] = clock[:, 0]
@@ -204,36 +230,5 @@ class Decoder:
         stamp = [numbers([f"header.stamp.{p}"]) for p in ("sec", "nanosec")]
         if all(number.size for number in stamp):
             part["header"] = np.hstack(stamp).astype(np.int64) @ (10**9, 1)
-        series = topic.series.setdefault(key, defaultdict(JoinedRows))
         for name, value in part.items():
-            series[name].add(value)
-        if names != own:
-            topic.mixed.add(key)
-
-    def streams(self) -> Iterator[Stream]:
-        """All streams that were decoded, each in the order of recording."""
-        for channel, topic in self.topics.items():
-            for key, series in topic.series.items():
-                names, frame, signals = key
-                # What every message has, and of one width.
-                found = {
-                    name: rows.whole()
-                    for name, rows in series.items()
-                    if len(rows.shapes) == 1 and rows.count == series["receive"].count
-                }
-                place = found["place"]
-                if np.any(place[1:] < place[:-1]):  # of several layouts in turn
-                    order = np.argsort(place)
-                    found = {name: value[order] for name, value in found.items()}
-                yield Stream(
-                    channel=channel,
-                    kind=KINDS[channel.type],
-                    names=names,
-                    mixed=key in topic.mixed,
-                    frame=frame,
-                    receive=found["receive"],
-                    header=found.get("header"),
-                    robot=found.get("robot"),
-                    signals={name: found[name] for name in signals if name in found},
-                    constants=topic.constants,
-                )
+            stream.series[name].add(value)

@@ -41,7 +41,7 @@ def aligned(
     gathering = Gathering(lead, request, path)
     for stream in streams:
         gathering.take(stream)
-        for values in (stream.receive, stream.header, stream.robot, *stream.signals.values()):
+        for values in stream.columns.values():
             release(values)
     frame = gathering.take_wrench(streams)
     gathering.report_left_out(streams, others)
@@ -180,7 +180,7 @@ class Gathering:
         lead, topic = self.lead, stream.topic
         times, own, values = lead.host, stream.host, stream.signals[signal]
         # One of the two may have receive stamps only: like is compared with like.
-        if (times is lead.header) != (own is stream.header):
+        if (times is lead.receive) != (own is stream.receive):
             times, own = lead.receive, stream.receive
         if signal != "wrench":
             # Another topic may hold further joints, or the same in another order.
@@ -278,7 +278,7 @@ def leading(
 
 def clock_of(stream: Stream) -> dict[str, Any]:
     """A stream's best clock, as fields of RawLog: the robot's, its header's or the recorder's."""
-    host, robot, topic = stream.host, stream.robot, stream.topic
+    host, robot, topic = stream.host, stream.columns.get("robot"), stream.topic
     if robot is None or not runs(robot):
         unset = f"receive stamps of {topic} (its header stamps are unset or run back)"
         words = unset if host is stream.receive else f"header stamps of {topic}"
@@ -326,7 +326,7 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     if messages == 0:
         why = "; ".join(["no messages in any whole chunk", *map(str, budget.remarks)])
         raise LogError(f"{file.path}: {why}.")
-    streams = [*decoder.streams()]
+    streams = [*decoder.streams.values()]
     topics = {channel.topic: channel.type or channel.encoding for channel in documents.found}
     # ROS messages go before documents: their types say what they hold.
     if documents.found and not any("q" in stream.signals for stream in streams):
