@@ -204,6 +204,18 @@ def test_databases_without_definitions_know_the_usual_types(tmp_path: Path) -> N
     np.testing.assert_array_equal(recording.q, motion(7)["q"])
 
 
+def test_a_definition_is_read_once_for_all_topics_of_its_type(tmp_path: Path) -> None:
+    """More definitions than the file has bytes, if each topic came with its own."""
+    import sqlite3
+
+    path = bare_db3(tmp_path / "x")
+    with sqlite3.connect(path) as db:
+        first = db.execute("SELECT * FROM topics WHERE id = 1").fetchone()
+        rows = [(k, f"{first[1]}_{k}", *first[2:]) for k in range(10, 1010)]
+        db.executemany(f"INSERT INTO topics VALUES ({', '.join('?' * len(first))})", rows)
+    assert_is_the_motion(read(path))
+
+
 def test_json_documents(tmp_path: Path) -> None:
     recording = read(mcap_json(tmp_path / "x"))
     np.testing.assert_array_equal(recording.q, motion()["q"])

@@ -238,15 +238,6 @@ STEPS = 10_000
 SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
 
 
-def db3_messages(file: LogFile, budget: ReadBudget) -> Messages:
-    """Messages of a db3 file, in the order of recording."""
-    with closing(_opened(file)) as db:
-        yield from _messages(db, len(file.content), budget)
-    journal = file.path.with_name(f"{file.path.name}-wal")
-    if file.wrapping is None and journal.is_file() and (size := journal.stat().st_size):
-        budget.note(warning("journal-left", journal=printable(journal.name), bytes=size))
-
-
 def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""
 
@@ -275,11 +266,10 @@ def _permission(action: int, name: str | None, *_: str | None) -> int:
     return sqlite3.SQLITE_OK if reads or action == sqlite3.SQLITE_SELECT else sqlite3.SQLITE_DENY
 
 
-def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Messages:
-    tables = _checked_tables(db, budget)
-    db.set_authorizer(_permission)
+def db3_messages(file: LogFile, budget: ReadBudget) -> Messages:
+    """Messages of a db3 file, in the order of recording."""
     # Topics and definitions are read beside the messages.
-    left = 2 * size + 4096
+    left = 2 * len(file.content) + 4096
 
     def rows(table: str, columns: str) -> Iterator[tuple[Any, ...]]:
         """Rows of a table; what is read in all cannot be more than the file holds."""
@@ -290,25 +280,31 @@ def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Messages
                 raise budget.error("its rows hold more than the file does; damaged.")
             yield row
 
-    known = "message_definitions" in tables
-    columns = "topics.id, name, type, serialization_format, "
-    columns += "encoding, encoded_message_definition" if known else "NULL, NULL"
-    joined = "topics LEFT JOIN message_definitions ON topic_type = type" if known else "topics"
-    channels = {}
-    for number, topic, kind, encoding, language, text in rows(joined, columns):
-        channels[number] = Channel(
-            topic=printable(_text(topic)),
-            type=type_name(_text(kind)),
-            encoding="cdr" if encoding == b"cdr" else "other",
-            definition=_text(text),
-            idl=language == b"ros2idl",
-        )
-    for number, time, data in rows("messages ORDER BY id", "topic_id, timestamp, data"):
-        if not isinstance(data, bytes) or not isinstance(time, int):
-            raise budget.error(f"a message of topic {number!s:.20} is no bytes; damaged.")
-        packing = "zstd" if data.startswith(ZSTD) else ""  # on its own
-        size = zstandard.frame_content_size(data) if packing else 0
-        yield channels.get(number), time, unpacked(budget, packing, data, size)
+    with closing(_opened(file)) as db:
+        tables = _checked_tables(db, budget)
+        db.set_authorizer(_permission)
+        columns = "topic_type, encoding, encoded_message_definition"
+        of_types = rows("message_definitions", columns) if len(tables) > 2 else ()
+        definitions = {kind: more for kind, *more in of_types}
+        channels = {}
+        for number, topic, kind, encoding in rows("topics", "id, name, type, serialization_format"):
+            language, text = definitions.get(kind, (b"", b""))
+            channels[number] = Channel(
+                topic=printable(_text(topic)),
+                type=type_name(_text(kind)),
+                encoding="cdr" if encoding == b"cdr" else "other",
+                definition=_text(text),
+                idl=language == b"ros2idl",
+            )
+        for number, time, data in rows("messages ORDER BY id", "topic_id, timestamp, data"):
+            if not isinstance(data, bytes) or not isinstance(time, int):
+                raise budget.error(f"a message of topic {number!s:.20} is no bytes; damaged.")
+            packing = "zstd" if data.startswith(ZSTD) else ""  # on its own
+            size = zstandard.frame_content_size(data) if packing else 0
+            yield channels.get(number), time, unpacked(budget, packing, data, size)
+    journal = file.path.with_name(f"{file.path.name}-wal")
+    if file.wrapping is None and journal.is_file() and (size := journal.stat().st_size):
+        budget.note(warning("journal-left", journal=printable(journal.name), bytes=size))
 
 
 def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
