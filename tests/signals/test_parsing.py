@@ -261,7 +261,7 @@ def test_settings_are_named_with_their_defaults() -> None:
     }  # fmt: skip
     assert not Chosen.takes("numbers")
     assert settings_as_typed({"b.count": 5}, [Chosen]) == {"b.count": "5"}
-    with pytest.raises(ParameterError, match=r"--set a.rat: .* no such setting; .* mean a.rate\?"):
+    with pytest.raises(ParameterError, match=r"--set a.rat is no setting here; .* mean a.rate\?"):
         settings_as_typed({"a.rat": 5}, [Chosen], "--set ")
     assert (is_yes("yes"), is_yes("no")) == (True, False)
     with pytest.raises(ParameterError, match="'maybe' is neither yes nor no"):
