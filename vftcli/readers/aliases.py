@@ -58,6 +58,7 @@ JOINT_FIRST = re.compile(
 SIGNAL_WORDS = "pos|position|vel|velocity|eff|effort|tau|torque|current"
 #: A signal's name before or behind a joint's, as in pos_elbow and elbow_joint_vel.
 SIGNAL_OF_JOINT = (
+    JOINT_FIRST,
     re.compile(rf"(?i)(?P<stem>{SIGNAL_WORDS})[_./ ](?P<joint>[A-Za-z][\w ]*)"),
     re.compile(rf"(?i)(?P<joint>[A-Za-z][\w ]*?)[_./ ](?P<stem>{SIGNAL_WORDS})"),
 )
@@ -91,13 +92,9 @@ class NamedColumns:
         by_joint = _joint_columns(table)
         in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
         for column, name in enumerate(table.names):
-            if column in in_joints:
-                continue
             if column in table.lists:
                 found.setdefault(name.lower(), {}).update(enumerate(cells_of(table, column)))
-            elif match := JOINT_FIRST.fullmatch(name):
-                by_joint.setdefault(match["stem"], {})[match["joint"]] = Cell(column)
-            elif match := INDEXED.fullmatch(name):
+            elif column not in in_joints and (match := INDEXED.fullmatch(name)):
                 index = int(match["a"] or match["b"] or match["c"])
                 stem = FIELD.sub("", match["stem"].lower(), count=1)
                 if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
@@ -234,23 +231,27 @@ def picks_by_alias(
 def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
     """Columns that bear a signal's name beside a joint's: signal → joint → cell.
 
-    Names are split so only where two signals have the same joints, and are no axes.
+    But as PlotJuggler writes them names are split only where two signals have the same
+    joints, and are no axes.
     """
     found: dict[str, dict[str, Cell]] = {}
+    sure = set[str]()
     for column, name in enumerate(table.names):
         match = next((m for p in SIGNAL_OF_JOINT if (m := p.fullmatch(name))), None)
         if match is None or column in table.lists:
             continue
+        sure |= {match["stem"].lower()} if match.re is JOINT_FIRST else set()
         # pos_joint1 is found by its number, as pos_1 is.
         if not (name.endswith(match["joint"]) and NUMBERED_JOINT.fullmatch(match["joint"])):
             found.setdefault(match["stem"].lower(), {})[match["joint"]] = Cell(column)
     joints = [cells.keys() for cells in found.values()]
-    return {
-        stem: cells
+    alike = {
+        stem
         for stem, cells in found.items()
         if len(cells) >= FEWEST_JOINTS and joints.count(cells.keys()) > 1
         if not any(map(AXES.fullmatch, cells))
     }
+    return {stem: cells for stem, cells in found.items() if stem in sure | alike}
 
 
 def wrench_pick(table: Table) -> Item | None:
@@ -273,13 +274,13 @@ def clock_pick(table: Table) -> Item | None:
     A message's own stamp goes before the time at which a recorder took it.
     """
     names = [name.lower() for name in table.names]
-    pairs: list[tuple[int, ...]] = []  # whole seconds and nanoseconds, as ROS writes its stamps
+    found: list[tuple[int, ...]] = []  # whole seconds and nanoseconds, as ROS writes its stamps
     for column, name in enumerate(names):
         if match := NANOSECONDS.fullmatch(name):
             wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
             there = [k for k, other in enumerate(names) if other in wanted]
-            pairs += [(there[0], column)] if len(there) == 1 else []
-    found, in_pair = list(pairs), {column for pair in pairs for column in pair}
+            found += [(there[0], column)] if len(there) == 1 else []
+    in_pair = {column for pair in found for column in pair}
     for column, name in enumerate(names):
         bare = re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name)
         called = name in CLOCKS or bare in CLOCKS[:4] or HEADER_STAMP.fullmatch(name)

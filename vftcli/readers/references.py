@@ -3,7 +3,7 @@
 They are tables with a clock and one external torque a joint, but no positions.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from itertools import count, takewhile
 from pathlib import Path
 from typing import NamedTuple
@@ -121,24 +121,21 @@ def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
     table = table_at(path)
     inner = f"/{name}/" if f"{TORQUE}/{name}/1" in table.names else "/"
     columns = {column: Cell(k) for k, column in enumerate(table.names)}
-
-    def cells(kind: str, ends: Iterable[object]) -> tuple[Cell, ...]:
+    picks = {}
+    for kind, ends in {TORQUE: count(1), "band": count(1), "wrench": AXES}.items():
         wanted = (f"{kind}{inner}{end}" for end in ends)
-        return tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
-
-    found = {kind: cells(kind, count(1)) for kind in (TORQUE, "band")}
-    found["wrench"] = cells("wrench", AXES)
-    if "t" not in columns or not found[TORQUE]:
+        cells = tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
+        if cells and (kind != "wrench" or len(cells) == len(AXES)):
+            picks[kind] = Item(kind, cells=cells)
+    if "t" not in columns or TORQUE not in picks:
         raise LogError(
             f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
             f"{listed(table.names)}"
         )
-    picks = {kind: Item(kind, cells=each) for kind, each in found.items() if each}
     picks["t"] = Item("t", unit="s", cells=(columns["t"],))
     raw = load_signals(table, picks, ReadChoice())
-    wrench = raw.signals.get("wrench") if len(found["wrench"]) == len(AXES) else None
     t, tau, sd = program_clock(raw, path), raw.signals[TORQUE], raw.signals.get("band")
-    return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), wrench
+    return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), raw.signals.get("wrench")
 
 
 class ListedRow(NamedTuple):

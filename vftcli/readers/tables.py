@@ -11,7 +11,7 @@ import numpy as np
 
 from vftcli.readers.aliases import (
     RESIDUAL_TURNED,
-    kinematic_order,
+    along_arm,
     picks_by_alias,
     robot_of,
     table_clock,
@@ -74,15 +74,12 @@ def from_table(
     else:
         picks = picks_of(table, spec)
     require_positions(table, picks)
-    if names and len(names) == len(picks["q"].cells):
-        order = kinematic_order(names)
-        for signal, pick in picks.items():
-            if len(pick.cells) == len(names) and signal not in {"wrench", *BESIDE}:
-                picks[signal] = pick._replace(cells=tuple(pick.cells[k] for k in order))
-        names = tuple(names[k] for k in order)
-        more = {"joint_names": names, "robot_hint": robot_of(names), **more}
     more = {"segment": spec.segment, "degrees_possible": picks["q"].unit is None, **more}
-    return load_signals(table, picks, request, **more)
+    raw = load_signals(table, picks, request, **more)
+    if not names or len(names) != len(picks["q"].cells):
+        return raw
+    names, signals = along_arm(names, dict(raw.signals))
+    return replace(raw, signals=signals, joint_names=names, robot_hint=robot_of(names))
 
 
 def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
