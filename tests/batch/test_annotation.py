@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.batch.annotation import ForceChoice, by_row, check_signals, force_columns
 from vftcli.observers.choice import ObserverChoice
-from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
@@ -21,7 +21,7 @@ LOG = Recording(t=T, q=Q, dq=Q, torque=Q + 1.0)
 def test_one_observer_over_whole_episodes() -> None:
     with pytest.raises(ParameterError, match="the torques of one observer"):
         ForceChoice(observers=ObserverChoice(names=("gmo", "fdo")))
-    for read in (ReadChoice(episode=1), ReadChoice(interval=(0, 1)), ReadChoice(all_episodes=True)):
+    for read in (ReadChoice(episode=1), ReadChoice(interval=(0, 1)), ReadChoice(episode=ALL)):
         with pytest.raises(ParameterError, match="every frame of every episode"):
             ForceChoice(read=read)
     usual = ForceChoice()

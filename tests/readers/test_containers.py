@@ -18,6 +18,7 @@ from vftcli.readers import ReadChoice, read, read_first_recording, recognise
 from vftcli.readers.hdf5 import numbers_of
 from vftcli.readers.opening import natural, open_log
 from vftcli.readers.parquet import ArrowTable, claims
+from vftcli.readers.reader import ALL
 from vftcli.readers.reading import episode_numbers
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 
@@ -312,7 +313,7 @@ def test_an_option_that_does_not_apply_is_refused(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="one recording, without episodes"):
         read(seeds.matlab(tmp_path / "y"), episode=0)
     with pytest.raises(ParameterError, match="--episode K"):
-        read_first_recording(path, ReadChoice(all_episodes=True))
+        read_first_recording(path, ReadChoice(episode=ALL))
 
 
 @pytest.mark.parametrize("stream", [False, True])

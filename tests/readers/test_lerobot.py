@@ -10,7 +10,7 @@ from seed_logs import motion
 
 from vftcli.readers import read
 from vftcli.readers.library import Library
-from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.signals.errors import LogError, ParameterError
 
 JOINTS = [f"joint_{j}" for j in range(1, 8)]
@@ -94,11 +94,11 @@ def test_an_episode_is_its_rows(version: int, episode: int, tmp_path: Path) -> N
 
 def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
     path = dataset(tmp_path / "set")
-    logs = Library([path]).open_logs([path], ReadChoice(all_episodes=True))
+    logs = Library([path]).open_logs([path], ReadChoice(episode=ALL))
     assert [log.name for log in logs] == ["set episode 0", "set episode 1", "set episode 2"]
     assert [log.samples for log in logs] == list(ROWS)
     with pytest.raises(ParameterError, match="commands that take several logs"):
-        Library([path]).open(path, ReadChoice(all_episodes=True))
+        Library([path]).open(path, ReadChoice(episode=ALL))
     with pytest.raises(ParameterError, match="are the same run"):
         Library([path]).open_logs([path, path], ReadChoice(episode=1))
 

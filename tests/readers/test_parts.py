@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vftcli.readers import read
-from vftcli.readers.reader import ReadChoice, arm_of, episode_of
+from vftcli.readers.reader import ALL, ReadChoice, arm_of, episode_of
 from vftcli.signals.errors import LogError, ParameterError
 
 PATH = Path("log")
@@ -49,10 +49,9 @@ def test_an_arm_of_a_log_of_one_is_refused(tmp_path: Path) -> None:
         read(seed_logs.table_csv(tmp_path / "x"), arm="left")
 
 
-@pytest.mark.parametrize(("text", "number", "every"), [("3", 3, False), ("all", None, True)])
-def test_the_words_of_the_option(text: str, number: int | None, every: bool) -> None:
-    choice = ReadChoice.parsed(episode=text)
-    assert (choice.episode, choice.all_episodes) == (number, every)
+@pytest.mark.parametrize(("text", "number"), [("3", 3), ("all", ALL), (None, None)])
+def test_the_words_of_the_option(text: str | None, number: int | None) -> None:
+    assert ReadChoice.parsed(episode=text).episode == number
 
 
 @pytest.mark.parametrize("text", ["-1", "last", "", "1.5", "1:3", "٣"])

@@ -55,7 +55,7 @@ class ForceChoice:
             raise ParameterError(
                 "annotate writes the torques of one observer; give --observer once"
             )
-        if self.read.interval or self.read.all_episodes or self.read.episode is not None:
+        if self.read.interval or self.read.episode is not None:
             raise ParameterError(
                 "annotate writes every frame of every episode; leave --interval and --episode out"
             )

@@ -65,7 +65,7 @@ def work_on_log(task: LogTask) -> None:
         return
     begin("reading")
     choice, library = task.job.choice, Library([task.path])
-    read = replace(choice.read, episode=task.episode, all_episodes=False)
+    read = replace(choice.read, episode=task.episode)
     examiner = Examiner(anyway=task.job.anyway)
     choice = replace(choice, read=read, library=library, examiner=examiner)
     if choice.read.columns is None:

@@ -1,11 +1,12 @@
 """Cleaning: what every log goes through on its way to a Recording. Nothing is repaired silently."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.readers.reader import RawLog
 from vftcli.readers.table import joined
@@ -23,19 +24,27 @@ from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import gaps_of, median_step
 
 
+def in_parts(signals: Mapping[str, NDArray[Any]]) -> Iterator[dict[str, NDArray[Any]]]:
+    """Signals, some rows of all at a time."""
+    for values in zip(*map(pieces, signals.values()), strict=True):
+        yield dict(zip(signals, values, strict=True))
+
+
 def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:
     """The log with some of its rows only, and what is to be said of the others."""
     rows = np.arange(len(raw.stamps)) if raw.rows is None else raw.rows
     if isinstance(keep, slice):
         signals = {name: value[keep] for name, value in raw.signals.items()}
     else:
-        parts = zip(pieces(keep), *map(pieces, raw.signals.values()), strict=True)
-        signals = joined(
-            dict(zip(raw.signals, (value[here] for value in values), strict=True))
-            for here, *values in parts
-        )
+        parts = in_parts({**raw.signals, "": keep})
+        signals = joined({name: part[name][part[""]] for name in raw.signals} for part in parts)
     remarks, stamps = (*raw.remarks, *remarks), raw.stamps[keep]
     return replace(raw, rows=rows[keep], stamps=stamps, signals=signals, remarks=remarks)
+
+
+def number_of(raw: RawLog, row: int) -> int:
+    """The number of a sample in the file, counted from 1."""
+    return 1 + (row if raw.rows is None else int(raw.rows[row]))
 
 
 def without_unknown_rows(raw: RawLog) -> RawLog:
@@ -161,28 +170,23 @@ def seconds(raw: RawLog) -> Array:
 
 def _without_empty_joints(raw: RawLog) -> RawLog:
     """Leave out named joints of which a signal is NaN throughout, as a gripper's effort is."""
-    names, width = raw.joint_names, len(raw.joint_names)
-    if "q" not in raw.signals or raw.signals["q"].shape[1] != width:
-        return raw
-    empty = np.zeros(width, dtype=bool)
-    every = raw.signals.items()
-    joints = {name: v for name, v in every if name != "wrench" and v.shape[1] == width}
+    names, empty = np.array(raw.joint_names), np.zeros(len(raw.joint_names), dtype=bool)
+    each = raw.signals.items()
+    joints = {n: v for n, v in each if n != "wrench" and v.shape[1] == names.size}
     for value in joints.values():
         if np.isnan(value[0]).any():
             missing = np.isnan(value).all(axis=0)
             empty |= missing & ~missing.all()
-    if not empty.any() or empty.all():
+    if "q" not in joints or not empty.any() or empty.all():
         return raw
-    keep = np.flatnonzero(~empty)
-    remark = fact("joints-empty", joints=[names[k] for k in np.flatnonzero(empty)])
+    parts = in_parts(raw.signals)
     return replace(
         raw,
         signals=joined(
-            {n: v[:, keep] if n in joints else v for n, v in zip(raw.signals, values, strict=True)}
-            for values in zip(*map(pieces, raw.signals.values()), strict=True)
+            {n: v[:, ~empty] if n in joints else v for n, v in part.items()} for part in parts
         ),
-        joint_names=tuple(names[k] for k in keep),
-        remarks=(*raw.remarks, remark),
+        joint_names=tuple(names[~empty].tolist()),
+        remarks=(*raw.remarks, fact("joints-empty", joints=names[empty].tolist())),
     )
 
 
@@ -223,8 +227,7 @@ def without_leading_garbage(raw: RawLog) -> RawLog:
     if count >= len(raw.stamps) - 1 or absurd[:count].mean() < 0.1:
         return raw
     code = "leading-garbage" if count > 1 else "leading-garbage-row"
-    good = kept(raw, slice(count, None), fact(code, rows=count))
-    return replace(good, first_row=raw.first_row + count)
+    return kept(raw, slice(count, None), fact(code, rows=count))
 
 
 #: What a column of a signal is that is none of a joint.
@@ -233,7 +236,7 @@ COLUMN = {"wrench": "axis", "jacobian": "cell"}
 
 def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
     if not np.isfinite(raw.stamps).all():
-        row = raw.first_row + int(np.argmin(np.isfinite(raw.stamps)))
+        row = number_of(raw, int(np.argmin(np.isfinite(raw.stamps))))
         raise LogError(f"{path}: the clock is not a number in sample {row}. Cut the row out.")
     for name, value in raw.signals.items():
         # the largest tells whether all are finite; the slow look is only for the message
@@ -249,7 +252,7 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
             )
         raise LogError(
             f"{path}: {name} {COLUMN.get(name, 'of joint')} {column + 1} is "
-            f"{value[row, column]:.6g} in sample {raw.first_row + row} (t = "
+            f"{value[row, column]:.6g} in sample {number_of(raw, row)} (t = "
             f"{seconds(raw)[row]:.6g} s), {lost} such in all. Nothing is filled in: cut the rows "
             f"out, or {LEAVING_OUT}."
         )
@@ -278,7 +281,7 @@ def _refuse_backward_steps(raw: RawLog, path: Path) -> None:
         return
     restarts = np.flatnonzero(backward) + 1
     k, t = int(restarts[0]), seconds(raw)
-    where = f"at sample {raw.first_row + k} (from {t[k - 1]:.6f} to {t[k]:.6f} s)"
+    where = f"at sample {number_of(raw, k)} (from {t[k - 1]:.6f} to {t[k]:.6f} s)"
     # A clock that restarts begins near zero; any other step back is disorder.
     usual = median_step(t)
     lengths = np.diff([0, *restarts, len(t)])
@@ -325,14 +328,9 @@ def _segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
     if not 1 <= number < len(edges):
         raise ClockError(f"{path}: there is no segment {number}; the file holds {len(edges) - 1}.")
     first, last = edges[number - 1], edges[number]
-    remark = fact(
-        "segment-taken",
-        number=number,
-        recordings=len(edges) - 1,
-        first_row=first + 1,
-        last_row=last,
-    )
-    return replace(kept(raw, slice(first, last), remark), first_row=raw.first_row + first)
+    count, row = len(edges) - 1, first + 1
+    said = fact("segment-taken", number=number, recordings=count, first_row=row, last_row=last)
+    return kept(raw, slice(first, last), said)
 
 
 def without_repeats(raw: RawLog, path: Path) -> RawLog:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from vftcli.readers import reading
 from vftcli.readers.opening import files_of, open_log
-from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.readers.reading import LogFormat
 from vftcli.readers.references import stored_observers
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
@@ -58,16 +58,16 @@ class Library:
         self, paths: Iterable[str | Path | Recording], choice: ReadChoice, *, whole: bool = False
     ) -> Iterator[Recording]:
         """Read some logs, each episode as a log of its own where all are chosen."""
-        asked = choice.all_episodes or (whole and choice.episode is None)
+        asked = choice.episode == ALL or (whole and choice.episode is None)
         for path in paths:
             numbers: Sequence[int] = ()
             if asked and not isinstance(path, Recording):
                 numbers = reading.episode_numbers(path, choice)
-            if not numbers or (len(numbers) == 1 and not choice.all_episodes):
+            if not numbers or (len(numbers) == 1 and choice.episode != ALL):
                 yield self.open(path, choice)
                 continue
             for number in numbers:
-                yield self.open(path, replace(choice, episode=number, all_episodes=False))
+                yield self.open(path, replace(choice, episode=number))
 
     def label(self, path: str | Path) -> str:
         """What a log is called, a name that no other log of the command has."""
@@ -128,6 +128,7 @@ class LogCollection:
 
     def __init__(self, choice: ReadChoice, leave: Path | None = None) -> None:
         self._choice = choice
+        self._episode = None if choice.episode == ALL else choice.episode
         self._leave = leave and absolute(leave)
         self._searched: set[Path] = set()
         self.passed: list[Path] = []
@@ -145,11 +146,11 @@ class LogCollection:
         try:
             yield from self._episodes(path, reading.recognise(path, self._choice))
         except (LogError, OSError):
-            yield LogEntry(path, self._choice.episode, (path,))
+            yield LogEntry(path, self._episode, (path,))
 
     def _episodes(self, path: Path, reader: LogFormat) -> Iterator[LogEntry]:
         """An entry an episode; one alone where there is one, or one is chosen."""
-        chosen, files = self._choice.episode, tuple(files_of(path))
+        chosen, files = self._episode, tuple(files_of(path))
         if reader.name == "lerobot":
             from vftcli.readers import lerobot
 
@@ -164,11 +165,10 @@ class LogCollection:
 
     def _inside(self, folder: Path) -> Iterator[LogEntry]:
         """A folder that is a log, or the logs in it and below, in the order of their names."""
-        if folder.resolve() in self._searched or folder == self._leave:
+        place = folder.resolve()
+        if folder == self._leave or place in self._searched or (folder / BATCH).is_file():
             return
-        self._searched.add(folder.resolve())
-        if (folder / BATCH).is_file():
-            return
+        self._searched.add(place)
         try:
             reader = reading.recognise(folder, self._choice)
             # Recorders write metadata.yaml beside the pieces of one recording: without it
@@ -185,9 +185,7 @@ class LogCollection:
         if (folder / TRAJECTORY).is_file():
             yield from self._parts(folder / TRAJECTORY)  # what lies beside it describes it
             return
-        for path in sorted(folder.iterdir()):
-            if path.name.startswith("."):
-                continue
+        for path in sorted(p for p in folder.iterdir() if not p.name.startswith(".")):
             if path.is_dir():
                 yield from self._inside(path)
             elif path.name in written or not self._may_be_log(path):

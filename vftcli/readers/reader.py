@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.option import LOG, Choice, Option, setting
@@ -30,7 +30,6 @@ class RawLog:
     #: Which of several recordings in the file is wanted, from 1; None for all.
     segment: int | None = None
     signals: "Mapping[str, Array]"  #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
-    first_row: int = 1  #: Number in the file of the first sample, counted from 1, for messages.
     wrench_frame: "WrenchFrame | None" = None  #: What the log states of its wrench.
     joint_names: tuple[str, ...] = ()  #: The joints' names, base to tip, or empty.
     robot_hint: str | None = None  #: Name of the profile that the log itself settles, or None.
@@ -62,11 +61,14 @@ EFFORT = {
 DERIVE = ("dq", "none")
 
 
+ALL = -1  #: The episode of ``--episode all``: each, as a log of its own.
+
+
 def episode_number(text: str) -> int:
-    """The number of ``--episode``, counted as the file counts."""
-    if not re.fullmatch(r"[0-9]{1,9}", text):
+    """The number of ``--episode``, counted as the file counts, or `ALL`."""
+    if not re.fullmatch(r"[0-9]{1,9}|all", text):
         raise ParameterError(f"--episode {text!r} is neither a number, as in 0, nor all")
-    return int(text)
+    return ALL if text == "all" else int(text)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +105,8 @@ class ReadChoice(Choice):
             "What the log's effort is, whatever its name; auto: what the robot's model explains.",
         ),
     ] = None
-    #: Number of the episode of a file that holds several, None to leave it to the reader.
+    #: Number of the episode of a file that holds several, or `ALL`; None to leave it to the
+    #: reader.
     episode: Annotated[
         int | None,
         Option(
@@ -129,7 +132,6 @@ class ReadChoice(Choice):
     ] = None
     #: The signals that are wanted; None for all. Others may be left unread.
     signals: frozenset[str] | None = None
-    all_episodes: bool = False  #: Whether each episode is wanted, as a log of its own.
     #: Whether the log is only looked at, where a part and a word say more than a refusal.
     examining: bool = False
     #: Whether rows with a value that is no number are left out and said, not refused.
@@ -141,17 +143,6 @@ class ReadChoice(Choice):
                 option = next(o for field, _, o in self.options().values() if field == name)
                 check_known(word, there, f"{option.typed} {word!r}")
 
-    @classmethod
-    def parsed(cls, *, episode: str | None = None, **words: Any) -> Self:  # noqa: ANN401
-        """The choice that ``--columns``, ``--interval A:B``, … state.
-
-        Raises:
-            ParameterError: If the interval or the episode is malformed.
-        """
-        if episode == "all":
-            return replace(super().parsed(**words), all_episodes=True)
-        return super().parsed(episode=episode, **words)
-
     @property
     def spec(self) -> "ColumnSpec":
         """What ``--columns`` says, of nothing where there is no such text."""
@@ -162,7 +153,7 @@ class ReadChoice(Choice):
     @property
     def whole(self) -> "ReadChoice":
         """The same without its interval and episode: a free run is a log of its own, read whole."""
-        return replace(self, interval=None, episode=None, all_episodes=False)
+        return replace(self, interval=None, episode=None)
 
     def with_stated_effort(self, recording: "Recording") -> "Recording":
         """A recording with its effort as `--effort` calls it, and derived velocities.

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
 from vftcli.readers.opening import HEAD_BYTES, LogFile, open_log, sha256_of
-from vftcli.readers.reader import RawLog, ReadChoice, episode_of
+from vftcli.readers.reader import ALL, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import listed
 from vftcli.signals.arrays import number_array
 from vftcli.signals.errors import (
@@ -134,7 +134,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     if not isinstance(path, str | Path):
         raise ParameterError(f"the log is {path!r}; expected the name of a file or folder")
     path = Path(path)
-    if choice.all_episodes:
+    if choice.episode == ALL:
         raise ParameterError(
             f"{path}: --episode all is for commands that take several logs (compare, report, "
             "contacts, thresholds, identify); name one: --episode K"
@@ -159,7 +159,7 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
     """The numbers of the episodes that a file holds, rising; none of one recording."""
     file = open_log(Path(path))
     reader = _reader(file, choice)
-    if choice.all_episodes and not reader.episodes:
+    if choice.episode == ALL and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
     return reader.numbers(file)
 
