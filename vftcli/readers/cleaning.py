@@ -20,7 +20,7 @@ from vftcli.signals.arrays import (
 )
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording, Source
-from vftcli.signals.remarks import Remark, caution, fact
+from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.series import gaps_of, median_step
 
 
@@ -98,6 +98,8 @@ def cleaned(
     sha256: str | Callable[[], str] = "",
     label: str = "",
     columns: str = "",
+    *,
+    examining: bool = False,
 ) -> Recording:
     """Make a Recording of what a reader found.
 
@@ -107,7 +109,9 @@ def cleaned(
     be degrees are refused.
     """
     rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
-    raw = measured(raw, path)
+    before, raw = raw, measured(raw, path, examining=examining)
+    if raw.segment != before.segment:
+        columns = f"{columns},segment=1".lstrip(",")
     fresh = without_repeats(raw, path)
     if raw.degrees_possible:
         _refuse_degrees(fresh, path)
@@ -151,15 +155,21 @@ def cleaned(
     )
 
 
-def measured(raw: RawLog, path: Path) -> RawLog:
-    """Samples that a robot may have given: of the segment that is asked for, without garbage."""
+def measured(raw: RawLog, path: Path, *, examining: bool = False) -> RawLog:
+    """Samples that a robot may have given: of the segment that is asked for, without garbage.
+
+    Of a file of several recordings that is only looked at it is the first, which is said.
+    """
     if len(raw.stamps) == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
-    raw = raw if raw.segment is None else _segment_of(raw, raw.segment, path)
-    raw = without_leading_garbage(_without_empty_joints(raw))
-    for refuse in (_refuse_unknown_numbers, _refuse_backward_steps, _refuse_standing_clock):
-        refuse(raw, path)
-    return raw
+    part = raw if raw.segment is None else _segment_of(raw, raw.segment, path)
+    part = without_leading_garbage(_without_empty_joints(part))
+    _refuse_unknown_numbers(part, path)
+    if rows := _restarts(part, path, examining=examining):
+        said = warning("time-reset", restarts=len(rows), rows=rows)
+        return measured(replace(raw, segment=1, remarks=(said, *raw.remarks)), path)
+    _refuse_standing_clock(part, path)
+    return part
 
 
 def seconds(raw: RawLog) -> Array:
@@ -258,44 +268,32 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         )
 
 
-class RestartError(ClockError):
-    """A file holds several recordings one after another, each with its own clock.
-
-    Attributes:
-        rows: Number of rows before each restart of the clock.
-    """
-
-    def __init__(self, message: str, rows: tuple[int, ...]) -> None:
-        self.rows = rows
-        super().__init__(message)
-
-
 #: A stretch between two restarts of the clock that is shorter is not a recording of its
 #: own.
 SEGMENT_ROWS = 20
 
 
-def _refuse_backward_steps(raw: RawLog, path: Path) -> None:
-    backward = np.diff(raw.stamps) < 0
-    if not backward.any():
-        return
-    restarts = np.flatnonzero(backward) + 1
+def _restarts(raw: RawLog, path: Path, *, examining: bool) -> list[int]:
+    """Rows before each restart of a clock that is only looked at; else any step back is refused."""
+    restarts = np.flatnonzero(np.diff(raw.stamps) < 0) + 1
+    if not restarts.size:
+        return []
     k, t = int(restarts[0]), seconds(raw)
     where = f"at sample {number_of(raw, k)} (from {t[k - 1]:.6f} to {t[k]:.6f} s)"
-    # A clock that restarts begins near zero; any other step back is disorder.
-    usual = median_step(t)
     lengths = np.diff([0, *restarts, len(t)])
-    if np.all(np.abs(t[restarts]) <= 3 * usual) and lengths.min() >= SEGMENT_ROWS:
-        raise RestartError(
-            f"{path}: the clock starts anew {len(restarts)}×, first {where}: the file holds "
-            f"{len(lengths)} recordings one after another. Split it, or take one by its number: "
-            "--columns segment=1 (with the other columns, if they need describing).",
-            tuple(int(row) for row in restarts),
+    # A clock that restarts begins near zero; any other step back is disorder.
+    if np.any(np.abs(t[restarts]) > 3 * median_step(t)) or lengths.min() < SEGMENT_ROWS:
+        raise ClockError(
+            f"{path}: time runs backwards {restarts.size}×, first {where}. Two logs in one file, "
+            "or rows out of order: split or sort it first."
         )
-    raise ClockError(
-        f"{path}: time runs backwards {int(backward.sum())}×, first {where}. Two logs in one file, "
-        "or rows out of order: split or sort it first."
-    )
+    if not examining:
+        raise ClockError(
+            f"{path}: the clock starts anew {restarts.size}×, first {where}: the file holds "
+            f"{len(lengths)} recordings one after another. Split it, or take one by its number: "
+            "--columns segment=1 (with the other columns, if they need describing)."
+        )
+    return list(map(int, restarts))
 
 
 def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
@@ -371,9 +369,9 @@ def _refuse_degrees(raw: RawLog, path: Path) -> None:
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS
     beyond = np.concatenate([np.any(np.abs(rows) > limit, axis=1) for rows in pieces(q)])
     # A few bad samples are no unit; the doctor cuts them out.
-    good = ~beyond if 0 < np.mean(beyond) < BAD_SHARE else np.ones_like(beyond)
-    parts = zip(pieces(q), pieces(good), strict=True)
-    ends = np.array([(x[k].min(axis=0), x[k].max(axis=0)) for x, k in parts if k.any()])
+    few = np.mean(beyond) < BAD_SHARE
+    parts = (x[~k] if few else x for x, k in zip(pieces(q), pieces(beyond), strict=True))
+    ends = np.array([(x.min(axis=0), x.max(axis=0)) for x in parts if len(x)])
     low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
     largest, travel = float(np.max([-low, high])), float(np.max(high - low))
     if largest > limit or travel > TWO_TURNS:

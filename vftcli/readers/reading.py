@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
+from vftcli.readers.cleaning import cleaned, without_unknown_rows
 from vftcli.readers.opening import HEAD_BYTES, LogFile, open_log, sha256_of
 from vftcli.readers.reader import ALL, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import listed
@@ -29,7 +29,6 @@ from vftcli.signals.errors import (
 )
 from vftcli.signals.parsing import did_you_mean, printable, tables_beside
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
-from vftcli.signals.remarks import warning
 
 
 class LogFormat(NamedTuple):
@@ -152,7 +151,9 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     sha256: Callable[[], str] = partial(sha256_of, *(raw.files or (path,)))
     if not raw.part:  # of one of many parts it may never be asked for
         sha256 = ThreadPoolExecutor(1).submit(sha256).result
-    return cleaned(raw, path, reader.name, sha256, label, choice.columns or "")
+    return cleaned(
+        raw, path, reader.name, sha256, label, choice.columns or "", examining=choice.examining
+    )
 
 
 def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
@@ -169,15 +170,7 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
 
     For examining a log, where looking at a part and saying so tells more than refusing.
     """
-    choice = replace(choice or ReadChoice(), examining=True)
-    try:
-        return read_chosen(path, choice)
-    except RestartError as error:
-        segment = f"{choice.columns},segment=1" if choice.columns else "segment=1"
-        first = read_chosen(path, replace(choice, columns=segment))
-        remark = warning("time-reset", restarts=len(error.rows), rows=list(error.rows))
-        remarks = (remark, *first.source.remarks)
-        return replace(first, source=replace(first.source, remarks=remarks))
+    return read_chosen(path, replace(choice or ReadChoice(), examining=True))
 
 
 def recognise(path: str | Path, choice: ReadChoice | None = None) -> LogFormat:
