@@ -57,8 +57,6 @@ EFFORT = {
     "torque": "torque",
     "torque-without-gravity": "torque_without_gravity",
 }
-#: Values of ``log.derive``: the signal that is derived where the log lacks it, or none.
-DERIVE = ("dq", "none")
 
 
 ALL = -1  #: The episode of ``--episode all``: each, as a log of its own.
@@ -138,10 +136,10 @@ class ReadChoice(Choice):
     skips_unknown: bool = False
 
     def __post_init__(self) -> None:
-        for name, there in {"arm": ARMS, "derive": DERIVE, "effort": tuple(EFFORT)}.items():
-            if (word := getattr(self, name)) is not None:
-                option = next(o for field, _, o in self.options().values() if field == name)
-                check_known(word, there, f"{option.typed} {word!r}")
+        for name, _, option in self.options().values():
+            word = getattr(self, name)
+            if name in {"arm", "derive", "effort"} and word is not None:
+                check_known(word, option.values(), f"{option.typed} {word!r}")
 
     @property
     def spec(self) -> "ColumnSpec":

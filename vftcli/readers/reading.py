@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
-from itertools import chain
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -203,14 +202,14 @@ def _recognised(file: LogFile) -> LogFormat:
     found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
     if not found and known_kind(file) is None:
         found = [r for r in FORMATS.values() if r.general and r.recognises(file)]
-    if len(found) == 1:
-        return found[0]
     if not found:
         raise UnknownFormatError(f"{file.path}: not recognised as a log: {description(file)}.")
-    raise UnknownFormatError(
-        f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which: "
-        "--set log.format=NAME."
-    )
+    if len(found) > 1:
+        names = " or ".join(reader.name for reader in found)
+        raise UnknownFormatError(
+            f"{file.path}: could be {names}. Say which: --set log.format=NAME."
+        )
+    return found[0]
 
 
 def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Recording:
@@ -276,13 +275,13 @@ def known_kind(file: LogFile) -> str | None:
     mistakes = tables_beside(__file__, "mistakes.toml")
     # The end of a zip archive names what it holds.
     end = bytes(file.content[-HEAD_BYTES:]) if file.head.startswith(b"PK\x03\x04") else b""
-    named = (words for name, words in mistakes["zip"].items() if name.encode() in end)
-    begun = (
-        words
-        for begins, words in mistakes["begins"].items()
-        if re.match(begins.encode("latin-1"), file.head, re.DOTALL)
-    )
-    return next(chain(named, begun), None)
+    for name, words in mistakes["zip"].items():
+        if name.encode() in end:
+            return str(words)
+    for begins, words in mistakes["begins"].items():
+        if re.match(begins.encode("latin-1"), file.head, re.DOTALL):
+            return str(words)
+    return None
 
 
 def of_folder(path: Path, entries: Sequence[str]) -> str:
