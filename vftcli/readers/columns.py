@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, root_mean_squares
+from vftcli.signals.arrays import Array, root_mean_squares
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import median_step
@@ -228,15 +228,15 @@ def guess_columns(columns: Sequence[Array]) -> Guess | None:
     if len(table) < 2 * STEPS[-1] or not np.isfinite(table).all() or not _is_clock(clock):
         return None
     t = (clock - clock[0]).astype(np.float64) * tick_of(clock, "")[0]
-    matches = _derivatives(t, table)
-    fitting = [n for n in JOINTS if 2 * n < table.shape[1] and _is_layout(matches, table, n)]
+    blocks = {n: _blocks(table, n) for n in JOINTS if 2 * n < table.shape[1]}
+    fitting = [n for n, each in blocks.items() if _begins_with_motion(t, each)]
     if len(fitting) != 1:
         return None
     joints, few = fitting[0], slice(None, None, len(table) // FITTED + 1)
-    blocks, left = divmod(len(columns) - 1, joints)
-    _, dq, *efforts = (table[few, 1 + k * joints :][:, :joints] for k in range(blocks))
+    _, dq, *efforts = (block[few] for block in blocks[joints])
+    left = (len(columns) - 1) % joints
     found, why = _efforts(efforts, dq)
-    rest = left if found else (blocks - 3) * joints + left
+    rest = left if found else (len(efforts) - 1) * joints + left
     skipped = f",_:{rest}" if rest else ""
     texts = [
         ",".join(["t", *(f"{name}:{joints}" for name in ("q", "dq", *names))]) + skipped
@@ -259,43 +259,32 @@ def _is_clock(stamps: Array) -> bool:
     return bool(usual > 0 and np.quantile(steps, 0.95) < EVEN * usual)
 
 
-def _is_layout(matches: Mask, table: Array, joints: int) -> bool:
-    """Whether all that moves in q:n has its derivative in dq:n, and no other column has one."""
-    rows, columns = np.nonzero(matches)
-    inside = (rows >= 1) & (rows <= joints) & (columns == rows + joints)
-    if not rows.size or not inside.all():
-        return False
-    positions = table[:, 1 : 1 + joints]
-    moves = np.ptp(positions, axis=0) > STILL
-    places = np.arange(1, 1 + joints)[moves]
-    return bool(matches[places, places + joints].all())
+def _blocks(table: Array, joints: int) -> list[Array]:
+    """The columns behind the first, as many at a time as there are joints."""
+    starts = range(1, table.shape[1] - joints + 1, joints)
+    return [table[:, start : start + joints] for start in starts]
 
 
-def _derivatives(t: Array, table: Array) -> Mask:
-    """Which column (the first index) has which as its derivative. (k, k)
+def _begins_with_motion(t: Array, blocks: Sequence[Array]) -> bool:
+    """Whether the second block is the derivative of the first, and none is that of another."""
+    pairs = permutations(range(len(blocks)), 2)
+    return _is_derivative(t, *blocks[:2]) and not any(
+        _is_derivative(t, blocks[a], blocks[b]) for a, b in pairs if (a, b) != (0, 1)
+    )
 
-    What the integral of the other column leaves of a position's change over some rows is
-    compared.
+
+def _is_derivative(t: Array, x: Array, dx: Array) -> bool:
+    """Whether all that moves in x is the integral of its own column of dx.
+
+    What the integral leaves of the change over some rows is compared.
     """
-    width = table.shape[1]
-    steps = np.diff(t)[:, None]
-    integral = np.vstack([np.zeros(width), np.cumsum((table[1:] + table[:-1]) / 2 * steps, axis=0)])
-    best = np.full((width, width), np.inf)
+    areas = (dx[1:] + dx[:-1]) / 2 * np.diff(t)[:, None]
+    left = x - np.vstack([np.zeros(x.shape[1]), np.cumsum(areas, axis=0)])
+    own = np.full(x.shape[1], False)
     for step in STEPS:
-        change, area = (np.diff(values[::step], axis=0) for values in (table, integral))
-        own, other = np.sum(change**2, axis=0), np.sum(area**2, axis=0)
-        left = own[:, None] + other[None, :] - 2 * change.T @ area
-        # A column that never changes is the derivative of none.
-        share = np.divide(
-            left, own[:, None], out=np.full_like(left, np.inf), where=own[:, None] > 0
-        )
-        best = np.minimum(best, share)
-    best[0] = best[:, 0] = np.inf
-    np.fill_diagonal(best, np.inf)
-    # A slow joint's change may look like the integral of several columns: the nearest is
-    # its own.
-    alike: Mask = (best < OPEN**2) & (best == best.min(axis=1, keepdims=True))
-    return alike
+        rest, change = (np.sum(np.diff(each[::step], axis=0) ** 2, axis=0) for each in (left, x))
+        own |= rest < OPEN**2 * change
+    return bool(own.any() and own[np.ptp(x, axis=0) > STILL].all())
 
 
 def _efforts(parts: Sequence[Array], dq: Array) -> tuple[list[tuple[str, ...]], str]:
