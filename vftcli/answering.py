@@ -15,7 +15,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Asked
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import EFFORTS, Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.wrench.choice import WrenchChoice
 
@@ -62,7 +62,9 @@ def free_thresholds(
     from vftcli.contacts.threshold_check import compared_signals
     from vftcli.contacts.thresholds import find_thresholds
 
-    runs = [modelled(log, choice) for log in choice.library.open_logs(logs, choice.read)]
+    opened = list(choice.library.open_each(logs, choice.read))
+    refuse_repeated_logs(opened)
+    runs = [modelled(log, choice) for log in opened]
     shown = [remark for run in runs for remark in touched(run, anyway=anyway)]
     signals = [compared_signals(run) for run in runs]
     found = find_thresholds(signals, rate)

@@ -28,7 +28,7 @@ EPISODES = (700, 600, 650)
 def test_a_lerobot_sample_is_read_by_episode(name: str, episodes: int, samples: Path) -> None:
     import pyarrow.parquet as pq
 
-    logs = Library().open_logs([samples / name], ReadChoice(episode=ALL))
+    logs = list(Library().open_each([samples / name], ReadChoice(episode=ALL)))
     assert [log.samples for log in logs] == list(EPISODES[:episodes])
     files = sorted((samples / name / "data").rglob("*.parquet"))
     tables = [pq.read_table(file).to_pydict() for file in files]

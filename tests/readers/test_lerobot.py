@@ -12,6 +12,7 @@ from vftcli.readers import read
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.signals.errors import LogError, ParameterError
+from vftcli.signals.recording import refuse_repeated_logs
 
 JOINTS = [f"joint_{j}" for j in range(1, 8)]
 ROWS = (30, 20, 25)
@@ -94,13 +95,13 @@ def test_an_episode_is_its_rows(version: int, episode: int, tmp_path: Path) -> N
 
 def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
     path = dataset(tmp_path / "set")
-    logs = Library([path]).open_logs([path], ReadChoice(episode=ALL))
+    logs = list(Library([path]).open_each([path], ReadChoice(episode=ALL)))
     assert [log.name for log in logs] == ["set episode 0", "set episode 1", "set episode 2"]
     assert [log.samples for log in logs] == list(ROWS)
     with pytest.raises(ParameterError, match="commands that take several logs"):
         Library([path]).open(path, ReadChoice(episode=ALL))
     with pytest.raises(ParameterError, match="are the same run"):
-        Library([path]).open_logs([path, path], ReadChoice(episode=1))
+        refuse_repeated_logs(list(Library([path]).open_each([path, path], ReadChoice(episode=1))))
 
 
 def test_the_first_is_taken_and_said(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_a_copy_is_the_same_run_under_any_name(folders):
 
 def test_a_log_that_is_read_is_one_log_where_all_episodes_are_asked_for():
     log = Library().open(FIXTURE)
-    assert Library().open_logs([log], ReadChoice(episode=ALL)) == (log,)
+    assert list(Library().open_each([log], ReadChoice(episode=ALL))) == [log]
 
 
 def test_a_part_of_a_log_is_not_read_again(folders, count):

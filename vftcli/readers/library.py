@@ -16,7 +16,7 @@ from vftcli.readers.reading import LogFormat
 from vftcli.readers.references import stored_observers
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 from vftcli.signals.parsing import printable
-from vftcli.signals.recording import Recording, refuse_repeated_logs
+from vftcli.signals.recording import Recording
 
 TRUTH = ".truth.parquet"  #: Ending of what a simulation writes beside its log.
 BATCH = "batch.json"  #: The file by which a folder of `vftcli batch` is known.
@@ -35,7 +35,7 @@ class Library:
     """Reads the logs of one command; a log that two options name is read once."""
 
     def __init__(self, paths: Iterable[str | Path] = ()) -> None:
-        self._labels = labelled(absolute(path) for path in paths)
+        self._labels = labelled(paths)
         self._recordings: dict[tuple[Path, ReadChoice], Recording] = {}
 
     def __len__(self) -> int:
@@ -75,26 +75,17 @@ class Library:
         # A log without a label gets one that no other has.
         return self._labels.setdefault(at, labelled([at, *self._labels])[at])
 
-    def open_logs(
-        self, paths: Iterable[str | Path | Recording], choice: ReadChoice
-    ) -> tuple[Recording, ...]:
-        """Read the logs of a command."""
-        logs = tuple(self.open_each(paths, choice))
-        refuse_repeated_logs(logs)
-        return logs
-
 
 def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
-    """Give every path a label that no other of them has.
+    """Give every path, from the root, a label that no other of them has.
 
     A label is the file's name where that is unique, else as many folders before it as
     tell it from every other path: `a/log.csv` and `b/log.csv`. Spellings of one path have
     one label.
     """
-    given = [Path(path) for path in paths]
     # Spellings of one path count once, or no tail of it would be unique.
-    parts = {path: absolute(path).parts for path in given}
-    tails = Counter(each[-k:] for each in set(parts.values()) for k in range(1, len(each) + 1))
+    parts = {path: path.parts for path in map(absolute, paths)}
+    tails = Counter(each[-k:] for each in parts.values() for k in range(1, len(each) + 1))
     labels = {}
     for path, names in parts.items():
         own = (names[-count:] for count in range(1, len(names) + 1))
