@@ -173,7 +173,7 @@ class Decoder:
             for length in np.unique(lengths):
                 own = lengths == length
                 content = b"".join(compress(batch.contents, own))
-                messages = np.frombuffer(content, np.uint8).reshape(-1, max(length, 1))
+                messages = np.frombuffer(content, np.uint8).reshape(own.sum(), length)
                 self._take_matrix(channel, messages, places[own])
         except LayoutError as error:
             raise self.budget.error(

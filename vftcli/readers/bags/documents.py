@@ -17,7 +17,7 @@ from vftcli.readers.bags.decode import Decoder
 from vftcli.readers.bags.ros_messages import VECTORS, parts_at
 from vftcli.readers.objects import flat
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.table import Column, Names
+from vftcli.readers.table import Names
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -92,14 +92,11 @@ class Documents:
         raise failures[max(failures)]
 
     def _read(self, channel: Channel, rows: Sequence[Document], times: list[int]) -> RawLog:
-        each = {key: column_of(rows, key) for key in rows[0]}
-        columns = {
-            key: column
-            for key, column in each.items()
-            if column is not None and not key.lower().startswith(("timestamp", "stamp", "header"))
-        }
+        each = {key: column for key in rows[0] if (column := column_of(rows, key)).size}
+        stamped = ("timestamp", "stamp", "header")
+        columns = {key: c for key, c in each.items() if not key.lower().startswith(stamped)}
         stamps = [stamp_of(row) for row in rows]
-        number = next((each[base] for base in STAMPS if each.get(base) is not None), None)
+        number = next((each[base] for base in STAMPS if base in each), None)
         clock = f"stamps in the messages of {channel.topic}"
         if None not in stamps:
             columns["timestamp_ns"] = np.array(stamps, dtype=np.int64)
@@ -115,8 +112,7 @@ class Documents:
 
 def numbers_of(rows: Sequence[Document], paths: Sequence[str]) -> Array:
     """The numbers of each document at the first path that is there. (k, count)"""
-    each = (column_of(rows, name) for name in parts_at(paths, rows[0]))
-    columns = (column.reshape(len(rows), -1) for column in each if column is not None)
+    columns = (column_of(rows, name) for name in parts_at(paths, rows[0]))
     return np.hstack([np.empty((len(rows), 0)), *columns])
 
 
@@ -150,16 +146,15 @@ def names_of(row: Document) -> Names:
     return tuple(names)
 
 
-def column_of(rows: Sequence[Document], path: str) -> Column | None:
-    """The numbers at a path of all documents, None where they are none of one shape."""
-    first = rows[0].get(path, "")
+def column_of(rows: Sequence[Document], path: str) -> Array:
+    """The numbers at a path of all documents, none where they are of several widths. (k, n)"""
+    none, first = np.empty((len(rows), 0)), rows[0].get(path, "")
     if isinstance(first, str | bool) or first == []:
-        return None
+        return none
     try:
-        column = np.array([row.get(path) for row in rows], dtype=np.float64)
+        return np.array([row.get(path) for row in rows], dtype=np.float64).reshape(len(rows), -1)
     except (ValueError, TypeError, OverflowError):
-        return None
-    return column if column.ndim in {1, 2} else None
+        return none
 
 
 def stamp_of(row: Document) -> int | None:
