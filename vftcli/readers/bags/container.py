@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import starmap
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,19 +45,19 @@ MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 def batched(messages: Messages, budget: "ReadBudget") -> Iterator[Batch]:
     """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
-    found: dict[int, Batch] = {}
+    found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0
     for channel, time, content in messages:
         if channel is None:
             raise budget.error("messages of an unknown topic; the file is damaged.")
-        _, times, contents = found.setdefault(id(channel), Batch(channel, [], []))
+        _, times, contents = found.setdefault(id(channel), (channel, [], []))
         times.append(time)
         contents.append(content)
         held += len(content) + MESSAGE_COST
         if held > BATCH_BYTES:
-            yield from found.values()
+            yield from starmap(Batch, found.values())
             found, held = {}, 0
-    yield from found.values()
+    yield from starmap(Batch, found.values())
 
 
 @dataclass

@@ -84,7 +84,7 @@ def _bag_records(
         if counts:
             counts.end = place
         yield kind, header, data, start
-        if kind == CHUNK and counts:
+        if counts and kind == CHUNK:
             size = int.from_bytes(header[b"size"], "little")
             chunk = unpacked(budget, header[b"compression"].decode(), data, size)
             yield from of_chunk(_bag_records(chunk, budget), budget)
@@ -166,7 +166,7 @@ def _mcap_records(
             if kind in DATA and not counts.closed:
                 counts.data_end = place
         yield kind, body
-        if kind == Opcode.CHUNK and counts:
+        if counts and kind == Opcode.CHUNK:
             chunk = Chunk.read(ReadDataStream(BytesIO(body)))
             own = unpacked(budget, chunk.compression, chunk.data, chunk.uncompressed_size)
             # A checksum of zero means that the writer made none.
