@@ -10,7 +10,7 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -99,10 +99,11 @@ class Hdf5Table(ArrayTable):
     are left out; nothing is read before it is asked for.
     """
 
-    def within(self, group: str, also: Sequence[str] = ()) -> "Hdf5Table":
-        """The datasets below a group, by their paths from there on, and others by theirs."""
-        below = {n.removeprefix(group): d for n, d in self.columns.items() if n.startswith(group)}
-        return Hdf5Table(self.path, {name: self.columns[name] for name in also} | below)
+    def within(self, group: str, *, top: bool = False) -> "Hdf5Table":
+        """The datasets below a group, by their paths from there on, and those of no group."""
+        each = self.columns.items()
+        own = {n: d for n, d in each if n.startswith(group) or (top and "/" not in n)}
+        return Hdf5Table(self.path, {n.removeprefix(group): d for n, d in own.items()})
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Read datasets as float64; whole stamps stay whole."""
@@ -221,8 +222,7 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
                 "t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
             )
     # The datasets of the one group that has positions by name, and those at the top.
-    top = [name for name in names if "/" not in name]
-    return from_table(table.within(level_of(table.path, names, "/"), top), request)
+    return from_table(table.within(level_of(table.path, names, "/"), top=True), request)
 
 
 def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
@@ -289,17 +289,17 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
         paths = [path for path in trajectories(file.path) if path is not None]
         if not paths:
             raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
-        places = [str(path.parent.relative_to(file.path)) for path in paths]
-        reads = [partial(read_file, path) for path in paths]
-        yield _placed(dict(enumerate(zip(places, reads, strict=True))))
+        each = {str(path.parent.relative_to(file.path)): partial(read_file, path) for path in paths}
+        yield {k: partial(_placed, len(each) > 1, *one) for k, one in enumerate(each.items())}
         return
     with opened(file) as content:
         table = table_of(file.path, content)
         anchor, groups = layout_of(table)
-        read = LAYOUTS.get(anchor, read_any)
-        yield _placed(
-            {k: (g.rstrip("/"), partial(read, table.within(g))) for k, g in groups.items()}
-        )
+        read, several = LAYOUTS.get(anchor, read_any), len(groups) > 1
+        yield {
+            k: partial(_placed, several, g, partial(read, table.within(g)))
+            for k, g in groups.items()
+        }
 
 
 def read_file(path: Path, request: ReadChoice) -> RawLog:
@@ -308,15 +308,13 @@ def read_file(path: Path, request: ReadChoice) -> RawLog:
     return replace(raw, part="", files=(path,))
 
 
-def _placed(each: Mapping[int, tuple[str, Callable[[ReadChoice], RawLog]]]) -> Episodes:
-    """Episodes, of several each with a remark where it lies."""
-
-    def read(place: str, own: Callable[[ReadChoice], RawLog], request: ReadChoice) -> RawLog:
-        raw = own(request)
-        return replace(raw, remarks=(fact("episode-place", place=place), *raw.remarks))
-
-    several = len(each) > 1
-    return {k: partial(read, place, own) if several else own for k, (place, own) in each.items()}
+def _placed(
+    several: bool, place: str, read: Callable[[ReadChoice], RawLog], request: ReadChoice
+) -> RawLog:
+    """An episode, of several with a remark where it lies."""
+    raw = read(request)
+    said = (fact("episode-place", place=place.rstrip("/")),) if several else ()
+    return replace(raw, remarks=(*said, *raw.remarks))
 
 
 def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:

@@ -273,10 +273,9 @@ def _rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     if not numbers.size:
         return table
     rows = np.flatnonzero(numbers == episode.number)
-    names = table.names
-    differs = episode.length is not None and len(rows) != episode.length
-    if "index" in names and episode.start is not None and not differs:
-        index = names.index("index")
+    differs = episode.length not in {None, len(rows)}
+    if "index" in table.names and episode.start is not None and not differs:
+        index = table.names.index("index")
         usual = episode.start + np.arange(len(rows))
         differs = not np.array_equal(table.load([index], clock=index)[index][rows], usual)
     if differs:

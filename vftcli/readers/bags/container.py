@@ -127,7 +127,7 @@ class ReadBudget:
     def claim(self, size: int) -> None:
         """Count bytes that are about to be unpacked."""
         self.unpacked += size
-        check_unpacked(self.path, self.unpacked if size >= 0 else size, self.size)
+        check_unpacked(self.path, self.unpacked, self.size)
 
     def error(self, text: str) -> LogError:
         """An error that names the file."""
