@@ -221,7 +221,9 @@ def replayed(
             anyway=anyway,
         )
         return Replayed(made)
-    if isinstance(log, Path) and is_scenario(log):
+    # A file of a scenario, or what has no ending and is no file.
+    is_file = isinstance(log, Recording) or log.exists() or log.suffix or len(log.parts) > 1
+    if isinstance(log, Path) and (log.suffix == ".toml" or not is_file):
         return looped(str(log), seed, choice, control, anyway=anyway)
     run = prepared(choice.library.open(log, choice.read), choice)
     recording, arm = run.recording, run.robot
@@ -232,11 +234,6 @@ def replayed(
     force = force_of(run, choice, control.force, named[0] if stored else None)
     made = replay(force.wrench, recording.q, arm, controllers, source=force.source, anyway=anyway)
     return Replayed(made, recording, None, choice.examiner.examinations)
-
-
-def is_scenario(log: Path) -> bool:
-    """Whether a word names a scenario: a file of one, or what has no ending and is no file."""
-    return log.suffix == ".toml" or not (log.exists() or log.suffix or len(log.parts) > 1)
 
 
 def force_of(

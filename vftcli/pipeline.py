@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from vftcli.signals.remarks import Remark
     from vftcli.wrench.choice import WrenchChoice
     from vftcli.wrench.detection import KnownContacts
-    from vftcli.wrench.sensing import Gate
 
 WRITING = 0.7  # share of a log's work that is done before its files are written
 
@@ -330,6 +329,11 @@ def sense(analysis: "Analysis", choice: AnalysisChoice, *, unasked: bool = True)
     from vftcli.wrench import sensing
     from vftcli.wrench.choice import WrenchChoice
 
+    listed, gate = analysis.contacts, None
+    # Outside of the contacts nothing touches, unless the whole log may be one.
+    if listed is not None and listed.tells_untouched and not (asked and asked.looks_back):
+        prior = listed.model.prior and listed.model.prior.looser
+        gate = sensing.Gate([(contact.start, contact.stop) for contact in listed.contacts], prior)
     observers = [o for o in analysis.observers if o.name in names]
     estimates = [e for e in analysis.estimates if e.name in names]
     found = sensing.sense(
@@ -339,21 +343,10 @@ def sense(analysis: "Analysis", choice: AnalysisChoice, *, unasked: bool = True)
         asked or WrenchChoice(),
         analysis.free_log(),
         {name: analysis.free_log(name) for name in names},
-        gate_of(analysis, asked),
+        gate,
     )
     analysis.spare()
     return replace(analysis, virtual_sensor=found)
-
-
-def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None":
-    """The contacts, outside of which nothing touches; None where the whole log may be one."""
-    from vftcli.wrench.sensing import Gate
-
-    found = analysis.contacts
-    if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
-        return None
-    prior = found.model.prior and found.model.prior.looser
-    return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 
 def known_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "KnownContacts":

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vftcli.reproduction.estimates import put_motion
-from vftcli.reproduction.paper import CORRECTED, RunResult
+from vftcli.reproduction.estimates import motion_under_knocks
+from vftcli.reproduction.paper import CORRECTED
 
 
 def test_an_arm_is_back_at_a_tenth_left_where_it_rests_and_moved_by_knocks() -> None:
@@ -25,9 +25,8 @@ def test_an_arm_is_back_at_a_tenth_left_where_it_rests_and_moved_by_knocks() -> 
     found = SimpleNamespace(
         motion=SimpleNamespace(t=t, x=x), controllers=[SimpleNamespace(kind="variable")], rows=rows
     )
-    result = RunResult()
-    put_motion(result, CORRECTED, found, (8.0, 9.4))
-    values = {key: value[CORRECTED] for key, value in result.values.items()}
+    given = motion_under_knocks(CORRECTED, found, (8.0, 9.4))
+    values = {key: value for _, key, value in given}
     assert values["back/variable"] == pytest.approx(4.5, abs=0.011)  # a sample
     assert values["left/variable"] == pytest.approx(3.0)
     assert values["knocked/variable"] == pytest.approx(5.0)

@@ -1,6 +1,6 @@
 """The error table that the paper prints, beside one's own log."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,16 +60,27 @@ class Comparison:
         return np.array(self.published.rmse[name])
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> Iterator[Remark]:
         """Differences of the two, and why a computation need not give these numbers."""
+        if self.names:
+            yield from self.sizes()
+        # FDO and GMO of equal gain are one filter, so they agree where their gains do.
+        if {"fdo", "gmo"} <= {*self.names}:
+            gap = abs(self.ours["fdo"] - self.ours["gmo"])
+            if (alike := gap <= SAME_FILTER * self.ours["fdo"]).any():
+                printed = abs(self.printed("fdo") - self.printed("gmo"))[alike]
+                yield fact("print-one-filter", on_joints(alike), printed_Nm=float(printed.max()))
+        # The noise convention decides the Kalman bandwidth, and the ranking.
+        if "kfo-fe" in self.names and "kfo-fe" in self.tunings:
+            convention = getattr(self.observers.get("kfo-fe"), "noise_convention", "density")
+            code = "print-kalman-discrete" if convention == "discrete" else "print-kalman-density"
+            delay = 1e3 * float(self.tunings["kfo-fe"].delay[0])
+            yield fact(code, convention=convention, delay_ms=delay)
         last = [row[5] for row in self.published.rmse.values()]
         floor = float(self.floor[5])
-        at_floor = fact("print-noise-floor", least_Nm=min(last), most_Nm=max(last), floor_Nm=floor)
-        if not self.names:
-            return (at_floor,)
-        return (*self.sizes(), *self.one_filter(), *self.kalman_delay(), at_floor)
+        yield fact("print-noise-floor", least_Nm=min(last), most_Nm=max(last), floor_Nm=floor)
 
-    def sizes(self) -> tuple[Remark, Remark]:
+    def sizes(self) -> Iterator[Remark]:
         """Joints on which another observer is best than in print, and ours over the print."""
         printed = np.array([self.printed(name) for name in self.names])
         ours = np.array([self.ours[name] for name in self.names])
@@ -82,33 +93,13 @@ class Comparison:
             if theirs != own
         ]
         joints, ratio = len(here), ours / printed
-        winners = fact("print-same-best", joints=joints)
         if other:
             same = joints - len(other)
-            winners = fact("print-other-best", same=same, joints=joints, differing=other)
-        sizes = [float(size(ratio)) for size in (np.nanmedian, np.nanmin, np.nanmax)]
-        return winners, fact("print-sizes", median=sizes[0], least=sizes[1], most=sizes[2])
-
-    def one_filter(self) -> list[Remark]:
-        """FDO and GMO of equal gain are one filter, so they agree where their gains do."""
-        if not {"fdo", "gmo"} <= set(self.names):
-            return []
-        gap = abs(self.ours["fdo"] - self.ours["gmo"])
-        alike = gap <= SAME_FILTER * self.ours["fdo"]
-        if not alike.any():
-            return []
-        printed = abs(self.printed("fdo") - self.printed("gmo"))[alike]
-        return [fact("print-one-filter", on_joints(alike), printed_Nm=float(printed.max()))]
-
-    def kalman_delay(self) -> list[Remark]:
-        """The noise convention decides the Kalman bandwidth, and the ranking."""
-        tuning = self.tunings.get("kfo-fe")
-        if tuning is None or "kfo-fe" not in self.names:
-            return []
-        convention = getattr(self.observers.get("kfo-fe"), "noise_convention", "density")
-        code = "print-kalman-discrete" if convention == "discrete" else "print-kalman-density"
-        delay = 1e3 * float(tuning.delay[0])
-        return [fact(code, convention=convention, delay_ms=delay)]
+            yield fact("print-other-best", same=same, joints=joints, differing=other)
+        else:
+            yield fact("print-same-best", joints=joints)
+        median, least, most = (float(size(ratio)) for size in (np.nanmedian, np.nanmin, np.nanmax))
+        yield fact("print-sizes", median=median, least=least, most=most)
 
 
 def check_published(name: str, reference: str | None) -> None:

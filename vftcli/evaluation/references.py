@@ -133,35 +133,35 @@ def load_of(
     return ReferenceLoad(torque=torque, wrench=wrench)
 
 
-def zero_reference(log: Run) -> ReferenceLoad:
+def zero_reference(motion: FreeMotion, _mounting: Mounting) -> ReferenceLoad:
     """No contact at all: the reference of a free motion, of unknown error, with its contacts."""
+    log = motion.log
     zero, remarks = np.zeros(log.q.shape), (caution("reference-zero"), *touched_remarks(log))
     return ReferenceLoad(torque=ExternalTorque(name="zero", t=log.t, tau=zero, remarks=remarks))
 
 
-def vendor_reference(recording: Recording) -> ReferenceLoad:
+def vendor_reference(motion: FreeMotion, _mounting: Mounting) -> ReferenceLoad:
     """The vendor's estimate in the log, torque on the robot, of unknown error."""
-    tau, remarks = recording.require("tau_ext"), (caution("reference-vendor"),)
-    torque = ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks)
-    return ReferenceLoad(torque=torque)
+    log, remarks = motion.log.recording, (caution("reference-vendor"),)
+    tau = log.require("tau_ext")
+    return ReferenceLoad(torque=ExternalTorque(name="vendor", t=log.t, tau=tau, remarks=remarks))
 
 
-def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting) -> ReferenceLoad:
+def sensor_reference(motion: FreeMotion, mounting: Mounting) -> ReferenceLoad:
     """τ_ext = J_Fᵀ w of the wrench that the log holds."""
-    check_joints(recording, robot)
-    wrench = logged_wrench(recording, robot.chain, mounting)
-    return load_of(wrench, recording, robot, "sensor", caution("reference-sensor"))
+    log, robot = motion.log.recording, motion.log.robot
+    check_joints(log, robot)
+    wrench = logged_wrench(log, robot.chain, mounting)
+    return load_of(wrench, log, robot, "sensor", caution("reference-sensor"))
 
 
 #: One of `NAMES` of a choice → what makes it of a log, its free motion, and where tool
 #: and sensor sit.
 REFERENCES: dict[str, Callable[[FreeMotion, Mounting], ReferenceLoad]] = {
-    "zero": lambda motion, _: zero_reference(motion.log),
-    "vendor": lambda motion, _: vendor_reference(motion.log.recording),
+    "zero": zero_reference,
+    "vendor": vendor_reference,
     "two-cycle": lambda motion, _: ReferenceLoad(torque=two_cycle_reference(motion)),
-    "sensor": lambda motion, mounting: sensor_reference(
-        motion.log.recording, motion.log.robot, mounting
-    ),
+    "sensor": sensor_reference,
 }
 
 

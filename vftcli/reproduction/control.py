@@ -1,6 +1,6 @@
 """Figs. 6, 7, 9, 10, Tables III and IV: the controller in the loop and replayed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from vftcli.admittance.replay import Replay, replay, settling
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance import charts as replay_charts
 from vftcli.outputs.charts import Chart, ChartLine
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, RunResult
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, Given, gathered_results
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
 
@@ -30,31 +30,29 @@ HOLD = 2.5  #: A drag of a contact begins within this time of its force. [s]
 FARTHEST_RELEASE = 0.5
 
 
+@gathered_results
 def closed_loop(
     seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
-) -> RunResult:
+) -> Iterator[Given]:
     """Latencies of a controller in the loop, and its force through controllers of every α."""
-    result = RunResult()
     for variant in CONVENTIONS:
         run, found = looped(scenario, variant, alphas, seed)
         held = latencies(run)[:CONTACTS]
         forces = all(one.axis < 3 for one in held)
         dragged, other = (FORCE, MOMENT) if forces else (MOMENT, FORCE)
-        astray = np.linalg.norm(run.moved[:, other], axis=1)
-        result.put(variant, {"astray": float(astray.max())})
+        yield variant, "astray", np.linalg.norm(run.moved[:, other], axis=1).max()
         for k, one in enumerate(held, start=1):
             for key in ("detection", "motion", "withdrawal", "reaction"):
                 # Motion says nothing of a contact that found the arm moving.
                 shown = one.rested or key in {"detection", "withdrawal"}
-                result.put(variant, {f"{key}/{k}": getattr(one, key) if shown else None})
-            result.put(variant, {f"stop/{k}": one.turn})
-        result.put(variant, return_values(found, held))
+                yield variant, f"{key}/{k}", getattr(one, key) if shown else None
+            yield variant, f"stop/{k}", one.turn
+        yield from return_values(variant, found, held)
         if variant in UNGATED:
-            result.put(UNGATED[variant], return_values(ungated(found), held))
+            yield from return_values(UNGATED[variant], ungated(found), held)
         if variant == CORRECTED:
-            drawn = loop_chart(run, found, dragged), deviation_chart(found, dragged)
-            result.charts.update(zip(figures, drawn, strict=True))
-    return result
+            yield "", figures[0], loop_chart(run, found, dragged)
+            yield "", figures[1], deviation_chart(found, dragged)
 
 
 def looped(
@@ -82,9 +80,8 @@ def ungated(found: Replay) -> Replay:
     return replace(found, motion=replace(motion, x=x, v=v))
 
 
-def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | None]:
+def return_values(variant: str, found: Replay, held: Sequence[Latency]) -> Iterator[Given]:
     """By contact and α: lead of the peak and the turn, and time back."""
-    values: dict[str, float | None] = {}
     for k, one in enumerate(held, start=1):
         rows = [
             row
@@ -98,14 +95,13 @@ def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | N
         before = max(traditional, key=lambda row: abs(row["peak"]))
         same = [row for row in rows if all(row[x] == before[x] for x in ("axis", "drag"))]
         turned = turn_after(found, 0, before)
-        values[f"back/traditional/{k}"] = before["return_10_s"]
+        yield variant, f"back/traditional/{k}", before["return_10_s"]
         for n, controller in enumerate(found.controllers[1:], start=1):
             alpha = controller.alpha[AXES.index(before["axis"])]
             row = next(row for row in same if row["alpha"] == alpha)
-            values[f"peak/{alpha:g}/{k}"] = row["peak_advance_s"]
-            values[f"turn/{alpha:g}/{k}"] = turned - turn_after(found, n, row)
-            values[f"back/{alpha:g}/{k}"] = row["return_10_s"]
-    return values
+            yield variant, f"peak/{alpha:g}/{k}", row["peak_advance_s"]
+            yield variant, f"turn/{alpha:g}/{k}", turned - turn_after(found, n, row)
+            yield variant, f"back/{alpha:g}/{k}", row["return_10_s"]
 
 
 def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
@@ -116,7 +112,8 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
     return float(t[start + np.argmax(outward <= 0.0)] - t[start])
 
 
-def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
+@gathered_results
+def latest_turns(_seed: int, *, alphas: Sequence[float]) -> Iterator[Given]:
     """Latest turn of the UR5 after a release, and the variable law's lead.
 
     The traditional law turns after arccos(ζ)/ω_d at the latest, from x = 0. The advance
@@ -124,7 +121,7 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
     period.
     """
     laws = ControlChoice(alphas=tuple(alphas)).controllers(load_robot("ur5"))
-    parameters, result = laws[0].parameters, RunResult()
+    parameters = laws[0].parameters
     omega = np.sqrt(parameters.stiffness / parameters.mass)
     zeta = parameters.damping / (2.0 * parameters.mass * omega)
     latest = np.arccos(zeta) / (omega * np.sqrt(1.0 - zeta**2))
@@ -137,17 +134,17 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
         turned = motion.t[np.argmax(motion.v[:, :, axis] <= 0.0, axis=0)].reshape(-1, len(laws))
         most = np.max(turned[:, :1] - turned, axis=0)[1:]
         name = AXES[axis]
-        result.put(CORRECTED, {f"latest/{name}": float(latest[axis])})
+        yield CORRECTED, f"latest/{name}", latest[axis]
         for alpha, advance in zip(alphas, most, strict=True):
-            result.put(CORRECTED, {f"most/{name}/{alpha:g}": float(advance)})
-    return result
+            yield CORRECTED, f"most/{name}/{alpha:g}", advance
 
 
+@gathered_results
 def released(
     _seed: int, *, robot: str, deviation: float, alphas: Sequence[float] = ()
-) -> RunResult:
+) -> Iterator[Given]:
     """Parameters of a table; its return from a deviation [m] at rest."""
-    arm, result = load_robot(robot), RunResult()
+    arm = load_robot(robot)
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
     for variant, xi in ((CORRECTED, ()), ("ξ = 1", ("admittance.xi=1",))):
         control = ControlChoice(assignments=xi, alphas=tuple(alphas))
@@ -157,16 +154,15 @@ def released(
         for row in rows_of(laws, motion, drags, np.zeros((len(motion.t) - 1, 6))):
             name = "traditional" if row["alpha"] is None else f"{row['alpha']:g}"
             for key in ("return_10_s", "return_2_s"):
-                result.put(variant, {f"{key}/{name}": row[key]})
-            result.put(variant, {f"overshoot/{name}": 100.0 * (row["overshoot"] or 0.0)})
+                yield variant, f"{key}/{name}", row[key]
+            yield variant, f"overshoot/{name}", 100.0 * (row["overshoot"] or 0.0)
         if not xi:
             parameters = laws[0].parameters
             keys = "mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"
             table = {key: getattr(parameters, key) for key in keys}
             for key, values in {**table, "xi": parameters.damping_ratio}.items():
-                each = zip(AXES, values.tolist(), strict=True)
-                result.put(variant, {f"{key}/{axis}": value for axis, value in each})
-    return result
+                for axis, value in zip(AXES, values, strict=True):
+                    yield variant, f"{key}/{axis}", value
 
 
 def loop_chart(run: ClosedLoop, found: Replay, part: slice) -> Chart:

@@ -1,6 +1,6 @@
 """Table I, Figs. 3, 4, 12: observers and virtual sensor beside the truth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +22,7 @@ from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.reproduction.control import deviation_chart
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, Given, gathered_results
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array, Mask
@@ -54,7 +54,8 @@ REACHED = 0.9  #: Share of a step at which it counts as seen.
 FAST = 5.0
 
 
-def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> RunResult:
+@gathered_results
+def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> Iterator[Given]:
     """RMSE of the virtual sensor against the real one, axis by axis, in flange axes."""
     hard = simulate(load_scenario("ur5-sensor", ()), seed)
     # A soft position loop: joints slide where a stiff one holds them.
@@ -65,7 +66,7 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         "zero removed": (hard, OBSERVERS[CORRECTED], ((start, stop),)),
         "soft servo": (soft, OBSERVERS[CORRECTED], ()),
     }
-    examiner, result = Examiner(), RunResult()
+    examiner = Examiner()
     for variant, (run, observers, spans) in asked.items():
         wrench = WrenchChoice(sensor_pose=sensor_pose, zero=ZeroChoice(spans=spans))
         choice = AnalysisChoice(
@@ -78,34 +79,30 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         made = analyse(run_of(run.recording, load_robot("ur5"), choice), choice)
         for row in error_rows(made, "axis"):
             force, moment = row["rmse_N"], row["rmse_Nm"]
-            result.put(variant, {row["axis"]: moment if force is None else force})
+            yield variant, row["axis"], moment if force is None else force
         assert made.virtual_sensor is not None, "a wrench was asked for"
         real = made.virtual_sensor.reference
         assert real is not None, "the sensor is the reference"
-        q = made.recording.q
-        true, tau = run.truth.wrench[: len(q)], run.truth.tau_ext[: len(q)]
+        q, true, tau = made.recording.q, run.truth.wrench, run.truth.tau_ext
         touched = np.linalg.norm(true[:, :3], axis=1) > UNTOUCHED
-        error = (made.wrenches[0].known - real.known)[: len(true), 1]
+        error = (made.wrenches[0].known - real.known)[:, 1]
         # What the observer makes of the true torque and of nothing else: p is 0, μ is
         # −τ_ext.
-        ideal = DynamicsTerms(t=made.recording.t[: len(true)], p=np.zeros_like(tau), mu=-tau)
+        ideal = DynamicsTerms(t=made.recording.t, p=np.zeros_like(tau), mu=-tau)
         late = made.observers[0].estimate(ideal)
         missed = replace(late, tau=late.tau - tau)
         lag = VirtualSensor().wrench(missed, q, made.robot.chain).known
-        causes = {"fy/untouched": error[~touched], "fy/touched": error[touched]}
-        causes |= {f"{axis}/lag": lag[:, AXES.index(axis)] for axis in ("mx", "my")}
-        result.put(variant, {key: rms(values) for key, values in causes.items()})
+        yield variant, "fy/untouched", rms(error[~touched])
+        yield variant, "fy/touched", rms(error[touched])
+        for axis in ("mx", "my"):
+            yield variant, f"{axis}/lag", rms(lag[:, AXES.index(axis)])
         if variant == CORRECTED:
             # How far the real sensor itself is from the simulation's truth.
-            turn = link_poses(made.robot.chain, q).rotation[: len(true), -1]
-            known = true.reshape(-1, 2, 3)
-            true = np.einsum("tji,tkj->tki", turn, known).reshape(-1, 6)
-            off = (real.known[: len(true)] - true).T
-            result.put(FLOOR, {axis: rms(one) for axis, one in zip(AXES, off, strict=True)})
-            chart = wrench_chart(made)
-            assert chart is not None, "a wrench was asked for"
-            result.charts["fig4"] = chart
-    return result
+            turn = link_poses(made.robot.chain, q).rotation[:, -1]
+            true = np.einsum("tji,tkj->tki", turn, true.reshape(-1, 2, 3)).reshape(-1, 6)
+            for axis, off in zip(AXES, (real.known - true).T, strict=True):
+                yield FLOOR, axis, rms(off)
+            yield "", "fig4", wrench_chart(made)
 
 
 def error_rows(made: Analysis, of: str) -> list[dict[str, Any]]:
@@ -119,6 +116,7 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
 
 
+@gathered_results
 def assembled_bearing(
     seed: int,
     *,
@@ -126,12 +124,11 @@ def assembled_bearing(
     hung: Sequence[float],
     phases: Mapping[str, Sequence[float]],
     sampled: float,
-) -> RunResult:
+) -> Iterator[Given]:
     """Zero drift, the bearing's weight, errors by phase, controllers' results."""
     run = simulate(load_scenario("panda-bearing", ()), seed)
     recording, robot, examiner = run.recording, load_robot("panda"), Examiner()
     vendor = stored_force(recording, robot, WrenchChoice(frame="base"), "libfranka").wrench
-    result = RunResult()
     for variant, observers in OBSERVERS.items():
         asked = WrenchChoice(frame="base")
         choice = AnalysisChoice(
@@ -140,31 +137,29 @@ def assembled_bearing(
         made = analyse(run_of(recording, robot, choice), choice)
         (wrench,) = made.wrenches
         drift = mean_of(wrench, unloaded)
-        put_weights(result, variant, drift, mean_of(wrench, hung))
+        yield from weights(variant, drift, mean_of(wrench, hung))
         zeroed = replace(wrench, values=wrench.values - drift)
         true = run.truth.wrench[: len(wrench.t)]
         for phase, span in phases.items():
             rows = within(wrench, span)
             for name, seen in ((variant, zeroed), (FLOOR, vendor)):
                 squares = np.sum((seen.known - true)[rows, :3] ** 2, axis=1)
-                result.put(name, {f"error/{phase}": float(np.sqrt(np.nanmean(squares)))})
-        agreed = correlation(zeroed.known[:, 2], vendor.known[:, 2])
-        result.put(variant, {"agreement": float(agreed)})
+                yield name, f"error/{phase}", np.sqrt(np.nanmean(squares))
+        yield variant, "agreement", correlation(zeroed.known[:, 2], vendor.known[:, 2])
         controlled = replay_bearing(zeroed, made, as_printed=variant == AS_PRINTED)
-        put_motion(result, variant, controlled, phases["knocked"])
+        yield from motion_under_knocks(variant, controlled, phases["knocked"])
         if variant == CORRECTED:
-            put_weights(result, FLOOR, mean_of(vendor, unloaded), mean_of(vendor, hung))
+            yield from weights(FLOOR, mean_of(vendor, unloaded), mean_of(vendor, hung))
             soon = replay_bearing(zeroed, made, period=sampled)
-            put_motion(result, "control at 1 ms", soon, phases["knocked"])
+            yield from motion_under_knocks("control at 1 ms", soon, phases["knocked"])
             lines = (
                 ChartLine("libfranka", vendor.known, REFERENCE),
                 ChartLine("virtual sensor, drift removed", zeroed.known, "#0b6fb8"),
             )
             units, families = tuple(map(unit_of, AXES)), (1, 1, 1, 2, 2, 2)
             chart = Chart("wrench", "", units, AXES, zeroed.t, lines, families=families)
-            result.charts["fig12"] = chart
-            result.charts["fig13"] = deviation_chart(controlled, slice(6))
-    return result
+            yield "", "fig12", chart
+            yield "", "fig13", deviation_chart(controlled, slice(6))
 
 
 def within(wrench: Wrench, span: Sequence[float]) -> Mask:
@@ -177,12 +172,12 @@ def mean_of(wrench: Wrench, span: Sequence[float]) -> Array:
     return np.asarray(np.nanmean(wrench.known[within(wrench, span)], axis=0))
 
 
-def put_weights(result: RunResult, variant: str, drift: Array, hung: Array) -> None:
+def weights(variant: str, drift: Array, hung: Array) -> Iterator[Given]:
     """Zero drift, and the bearing's weight before and after; down is +."""
     for axis, value in zip(AXES, drift, strict=True):
-        result.put(variant, {f"drift/{axis}": float(value)})
-    weight = -float(hung[2])
-    result.put(variant, {"weight/raw": weight, "weight/zeroed": weight + float(drift[2])})
+        yield variant, f"drift/{axis}", value
+    yield variant, "weight/raw", -hung[2]
+    yield variant, "weight/zeroed", drift[2] - hung[2]
 
 
 def replay_bearing(
@@ -196,7 +191,7 @@ def replay_bearing(
     return replay(wrench, made.recording.q, made.robot, laws, source=source)
 
 
-def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence[float]) -> None:
+def motion_under_knocks(variant: str, found: Replay, knocked: Sequence[float]) -> Iterator[Given]:
     """Return time of a guided arm, its rest, and its motion under knocks."""
     t, (start, stop) = found.motion.t, knocked
     for n, controller in enumerate(found.controllers):
@@ -209,13 +204,10 @@ def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence
         led = Drag(axis=0, number=1, begin=begin, release=begin, end=end)
         before = x[t <= start][-1]
         moved = np.linalg.norm(x[(t > start) & (t < stop)] - before, axis=1)
-        values = {
-            "back": return_time(t, x[:, 0], led, SHARES["return_10_s"]),
-            "left": 1e3 * float(np.linalg.norm(before)),
-            "knocked": 1e3 * float(moved.max()),
-        }
-        kind = controller.kind
-        result.put(variant, {f"{key}/{kind}": value for key, value in values.items()})
+        back = return_time(t, x[:, 0], led, SHARES["return_10_s"])
+        yield variant, f"back/{controller.kind}", back
+        yield variant, f"left/{controller.kind}", 1e3 * float(np.linalg.norm(before))
+        yield variant, f"knocked/{controller.kind}", 1e3 * moved.max()
 
 
 def guideline_numbers(made: Analysis) -> dict[str, dict[str, float]]:
@@ -250,10 +242,11 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
     return np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
 
 
-def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
+@gathered_results
+def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]:
     """Errors joint by joint, lags, free rms, and what the guidelines go by."""
     recording = simulate(load_scenario(scenario, ()), seed).recording
-    robot, examiner, result = load_robot("ur5"), Examiner(), RunResult()
+    robot, examiner = load_robot("ur5"), Examiner()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.
     choice_of_free = FreeChoice(period=period, alignment="period", low_pass=None)
     for variant, chosen in VARIANTS.items():
@@ -268,20 +261,20 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
         rows = error_rows(made, "joint")
         for row in rows:
             key = f"{row['observer']}/{row['joint']}"
-            result.put(variant, {key: row["rmse_Nm"]})
-            result.put(FLOOR, {key: row["reference_floor_Nm"]})
+            yield variant, key, row["rmse_Nm"]
+            yield FLOOR, key, row["reference_floor_Nm"]
         # Free rms and lag are means of joints 1 to 3.
         for estimate in made.estimates:
             free = (estimate.t > 1.0) & (estimate.t < period)
-            result.put(variant, {f"free/{estimate.name}": rms(estimate.tau[free, :3])})
+            yield variant, f"free/{estimate.name}", rms(estimate.tau[free, :3])
             own = (r["lag_s"] for r in rows if r["observer"] == estimate.name and r["joint"] <= 3)
             if lags := [lag for lag in own if lag is not None]:
-                result.put(variant, {f"lag/{estimate.name}": float(np.mean(lags))})
+                yield variant, f"lag/{estimate.name}", np.mean(lags)
         for name, numbers in guideline_numbers(made).items():
-            result.put(variant, {f"{key}/{name}": value for key, value in numbers.items()})
+            for key, value in numbers.items():
+                yield variant, f"{key}/{name}", value
         if variant == CORRECTED:
             chart = torque_chart(made)
             # Four bands would hide one another.
             lines = (line._replace(shown=True, leads=False, half=None) for line in chart.series)
-            result.charts["fig3"] = chart._replace(series=tuple(lines))
-    return result
+            yield "", "fig3", chart._replace(series=tuple(lines))

@@ -5,10 +5,11 @@ shown, is the same for all.
 """
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import wraps
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec
 
 from vftcli.evaluation.published import TABLES
 from vftcli.outputs.charts import Chart
@@ -28,10 +29,28 @@ class RunResult:
     values: Values = field(default_factory=dict)  #: Its numbers.
     charts: dict[str, Chart] = field(default_factory=dict)  #: Name of an item → its traces.
 
-    def put(self, variant: str, found: Mapping[str, float | None]) -> None:
-        """Add one variant's values by the key of their line."""
-        for key, value in found.items():
-            self.values.setdefault(key, {})[variant] = value
+
+#: One thing that an experiment gives: a variant, a line's key and its value, or "", the
+#: name of an item, and its traces.
+Given = tuple[str, str, float | Chart | None]
+P = ParamSpec("P")
+
+
+def gathered_results(run: Callable[P, Iterator[Given]]) -> Callable[P, RunResult]:
+    """An experiment of all that it gives, one thing after the other."""
+
+    @wraps(run)
+    def whole(*args: P.args, **given: P.kwargs) -> RunResult:
+        result = RunResult()
+        for variant, key, value in run(*args, **given):
+            if isinstance(value, Chart):
+                result.charts[key] = value
+            else:
+                number = None if value is None else float(value)
+                result.values.setdefault(key, {})[variant] = number
+        return result
+
+    return whole
 
 
 @dataclass(frozen=True, kw_only=True)

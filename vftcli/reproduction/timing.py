@@ -19,7 +19,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.observers.tuning import tune_to_spectra
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, Given, gathered_results
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
@@ -182,9 +182,10 @@ def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
     tune_to_spectra(name, found).estimate(terms)
 
 
-def computing_time(_seed: int) -> RunResult:
+@gathered_results
+def computing_time(_seed: int) -> Iterator[Given]:
     """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
-    robot, timings, result = load_robot("ur5"), Timings(), RunResult()
+    robot, timings = load_robot("ur5"), Timings()
     log = circle(robot, SAMPLES)
     # The printed way runs over fewer samples and is scaled.
     few = log.between(0.0, float(log.t[SCRIPT_SAMPLES - 1]))
@@ -214,11 +215,10 @@ def computing_time(_seed: int) -> RunResult:
         dynamics = timings.median(f"{variant} dynamics")
         cost = {name: dynamics + timings.median(f"{variant} {name}") for name in PAPER}
         for name, seconds in cost.items():
-            result.put(variant, {f"seconds/{name}": seconds})
-            result.put(variant, {f"cost/{name}": 1e6 * seconds / SAMPLES})
+            yield variant, f"seconds/{name}", seconds
+            yield variant, f"cost/{name}", 1e6 * seconds / SAMPLES
         for name in ("fdo", "kfo-fe"):
-            result.put(variant, {f"zoh/{name}": cost["kfo-zoh"] / cost[name]})
-    return result
+            yield variant, f"zoh/{name}", cost["kfo-zoh"] / cost[name]
 
 
 def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> tuple[Array, Array]:
