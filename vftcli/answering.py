@@ -56,7 +56,7 @@ def errors_of(
 
 
 def free_thresholds(
-    logs: OpenedLogs, choice: AnalysisChoice, rate: float, *, anyway: bool
+    logs: OpenedLogs, choice: AnalysisChoice, rate: float
 ) -> "tuple[list[Run], list[ComparedSignals], Thresholds]":
     """Contact-free logs, their signals, and what motion like theirs exceeds at a rate. [1/h]"""
     from vftcli.contacts.threshold_check import compared_signals
@@ -65,7 +65,7 @@ def free_thresholds(
     opened = list(choice.library.open_each(logs, choice.read))
     refuse_repeated_logs(opened)
     runs = [modelled(log, choice) for log in opened]
-    shown = [remark for run in runs for remark in touched(run, anyway=anyway)]
+    shown = [remark for run in runs for remark in touched(run, choice)]
     signals = [compared_signals(run) for run in runs]
     found = find_thresholds(signals, rate)
     return runs, signals, replace(found, remarks=(*found.remarks, *shown))
@@ -82,11 +82,11 @@ def modelled(recording: Recording, choice: AnalysisChoice) -> Run:
     return run
 
 
-def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
+def touched(run: Run, choice: AnalysisChoice) -> tuple[Remark, ...]:
     """A remark where a log that is to be free shows contact.
 
     Raises:
-        ParameterError: If it shows contact plainly, unless it shall be used `anyway`.
+        ParameterError: If it shows contact plainly, unless it shall be used anyway.
     """
     from vftcli.contacts.thresholds import SETTLING
     from vftcli.evaluation.references import PLAIN, touches
@@ -99,7 +99,7 @@ def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
     where = Where(run.name, (worst.joint + 1,), (worst.start, worst.stop))
     sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
     remark = caution("free-log-touched", where, count=len(found), **sizes)
-    if worst.excess > PLAIN and not anyway:
+    if worst.excess > PLAIN and not choice.examiner.anyway:
         raise ParameterError(
             f"{remark}. Give motion that nobody touches, a part of this log with --interval, or "
             "take it all with --anyway"
@@ -203,7 +203,8 @@ def replayed(
         stored = estimates_columns(log, named[0]) if log.exists() else None
     # A table of estimates may hold those of an observer that is none of ours.
     words = {"observer": named} if stored is None else {"observer": [DRIVER], "columns": stored}
-    choice, anyway = choice_of(asked.but(**words)), bool(asked.words.get("anyway"))
+    choice = choice_of(asked.but(**words))
+    anyway = choice.examiner.anyway
     if asked.words.get("frame") not in {None, "base"}:
         raise ParameterError(
             "the replay is in base axes about the flange point; leave --frame away"

@@ -41,7 +41,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Asked, Choice, settings_as_typed
+from vftcli.signals.option import Anyway, Asked, Choice, settings_as_typed
 from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remarks
@@ -56,7 +56,7 @@ NamedRobot = str | Path | Robot | None
 R = TypeVar("R")
 
 #: The rooms' choices of which calls take the options.
-OF_LOG: tuple[type[Choice], ...] = (ReadChoice, RobotChoice)
+OF_LOG: tuple[type[Choice], ...] = (ReadChoice, RobotChoice, Anyway)
 OF_CONTACTS = (*OF_LOG, FreeChoice)
 OF_ESTIMATE: tuple[type[Choice], ...] = (
     *OF_CONTACTS,
@@ -70,7 +70,7 @@ OF_REPORT = (*OF_ESTIMATE, AlsoWrench, ReferenceChoice)
 def choice_for(asked: Asked, logs: Iterable[Opened], **others: Any) -> AnalysisChoice:  # noqa: ANN401
     """What is asked of some logs, with others of its choices."""
     library = Library(log for log in logs if not isinstance(log, Recording))
-    return choice_of(asked, library, Examiner(anyway=bool(asked.words["anyway"])), **others)
+    return choice_of(asked, library, Examiner(anyway=asked.anyway), **others)
 
 
 def call(
@@ -87,11 +87,11 @@ def call(
 
     def of(function: Callable[..., R]) -> Callable[..., R]:
         first, _, *own = signature(function).parameters.values()
-        placed = [Parameter(word, Parameter.POSITIONAL_OR_KEYWORD, default=None) for word in also]
-        rest = (*(word for word in words if word not in also), "settings", "anyway")
-        named = [Parameter(word, Parameter.KEYWORD_ONLY, default=None) for word in rest]
         robot = first.replace(name="robot", default=None, annotation=NamedRobot)
-        shown = Signature([first, robot, *placed, *own, *named])
+        named = [Parameter(w, Parameter.KEYWORD_ONLY, default=None) for w in (*words, "settings")]
+        placed = [each.replace(kind=first.kind) if each.name in also else each for each in named]
+        every = sorted([first, robot, *own, *placed], key=lambda each: each.kind)
+        shown = Signature(every)
         name = function.__name__
 
         @wraps(function)
@@ -108,12 +108,10 @@ def call(
             said = ", ".join(f"{word}={value!r}" for word, value in values.items())
             log, arm = checked(values.pop(first.name), values.pop("robot", None))
             settings = settings_as_typed(values.pop("settings", None) or {}, kinds)
-            anyway = bool(values.pop("anyway", False))
             typed = {w: options[w].keyword(values.pop(w)) for w in words if w in values}
             if typed.get("columns") is not None and isinstance(log, Recording):
                 raise ParameterError("columns are those of a file; this log is read already")
-            typed |= {"robot": arm, "anyway": anyway}
-            asked = Asked(typed, settings, f"vftcli.{name}({said})")
+            asked = Asked(typed | {"robot": arm}, settings, f"vftcli.{name}({said})")
             return function(log, asked, **values)
 
         vars(called)["__signature__"] = shown
@@ -209,7 +207,7 @@ def compare(logs: Opened | OpenedLogs, asked: Asked) -> "pl.DataFrame":
 def thresholds(free: Opened | OpenedLogs, asked: Asked, rate: float = 1.0) -> "Thresholds":
     """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
     logs = several(free)
-    return free_thresholds(logs, choice_for(asked, logs), rate, anyway=asked.words["anyway"])[2]
+    return free_thresholds(logs, choice_for(asked, logs), rate)[2]
 
 
 @call(*OF_CONTACTS, Task, GoalChoice, RefinementChoice, also=("method",))
@@ -220,7 +218,7 @@ def identify(logs: Opened | OpenedLogs, asked: Asked, *, check: OpenedLogs = ())
         found = gains_of(paths[0], choice_for(asked, paths, observers=TUNED), goal)
         return found.robot.with_gains({line.section: dict(line.gains) for line in found.tuned})
     choice = choice_for(asked, [*paths, *check])
-    examiner = Examiner(anyway=asked.words["anyway"], fitting=task.keeps_links)
+    examiner = Examiner(anyway=asked.anyway, fitting=task.keeps_links)
     return identified(paths, check, replace(choice, examiner=examiner), task).robot
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vftcli.analysis import Analysis
 from vftcli.bias.choice import RefinementChoice
 from vftcli.doctor.examination import Examiner
 from vftcli.free_motion.choice import FreeChoice
@@ -23,14 +24,13 @@ from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.option import Asked, Choice
 from vftcli.signals.progress import stage
 from vftcli.signals.recording import Recording, refuse_repeated_logs
+from vftcli.signals.remarks import Remark, caution
 
 if TYPE_CHECKING:
-    from vftcli.analysis import Analysis
     from vftcli.bias.baseline import Baselines
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.signals.remarks import Remark
     from vftcli.wrench.choice import WrenchChoice
     from vftcli.wrench.detection import KnownContacts
 
@@ -117,7 +117,7 @@ def choice_of(asked: Asked, library: Library, examiner: Examiner, **others: Any)
 
 
 #: What is done with each log of a command.
-Analyser = Callable[[Run, AnalysisChoice], "Analysis"]
+Analyser = Callable[[Run, AnalysisChoice], Analysis]
 Failed = Callable[[Any, VftError], None]  #: Who hears which log could not be analysed, and why.
 
 
@@ -131,7 +131,7 @@ def analyse_logs(
     choice: AnalysisChoice,
     failed: Failed | None = None,
     work: Analyser | None = None,
-) -> Iterator["Analysis"]:
+) -> Iterator[Analysis]:
     """Analyses of the logs of a command one after the other; what they share is made once.
 
     The work on each is `analyse` if not given. A log that cannot be analysed is left out
@@ -157,9 +157,8 @@ def analyse_logs(
             yield made
 
 
-def list_touches(log: Run, choice: AnalysisChoice) -> "Analysis":
+def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
     """What touched the arm along a log, without any observer's estimate."""
-    from vftcli.analysis import Analysis
     from vftcli.contacts.listing import list_contacts
 
     motion = read(log, choice)
@@ -192,12 +191,12 @@ def check_logged(recording: Recording, why: str) -> None:
         )
 
 
-def analyse_log(path: str | Path, choice: AnalysisChoice) -> "Analysis":
+def analyse_log(path: str | Path, choice: AnalysisChoice) -> Analysis:
     """Read a log, choose its robot, and analyse it."""
     return next(analyse_logs([Path(path)], choice))
 
 
-def analyse(log: Run, choice: AnalysisChoice) -> "Analysis":
+def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
     """Estimates of a log and, if a reference is asked for, their errors."""
     name = log.name
     stage(f"{name}: examining", 0.05, 0.15)
@@ -250,11 +249,8 @@ def observe(
     choice: AnalysisChoice,
     *,
     running: bool = True,
-) -> "Analysis":
+) -> Analysis:
     """Run the observers along the log; if not `running`, only build them for it."""
-    from vftcli.analysis import Analysis
-    from vftcli.signals.remarks import caution
-
     log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
     own = choice.observers.gains_of_log
     shown = LogSpectra() if baselines is None else baselines.spectra(gains=own)
@@ -274,9 +270,7 @@ def observe(
     )
 
 
-def refine(
-    analysis: "Analysis", baselines: "Baselines | None", choice: AnalysisChoice
-) -> "Analysis":
+def refine(analysis: Analysis, baselines: "Baselines | None", choice: AnalysisChoice) -> Analysis:
     """Give the estimates what only the complete log allows: their bands."""
     if baselines is None:
         return analysis
@@ -300,7 +294,6 @@ def find_contacts(
     if not choice.lists_contacts:
         return None, ()
     from vftcli.contacts.listing import list_contacts
-    from vftcli.signals.remarks import caution
 
     stage(f"{motion.log.name}: listing contacts", 0.25, 0.4)
     try:
@@ -317,7 +310,7 @@ def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
     return motion if choice.wrench is None else motion.unloaded(choice.wrench.zero.spans)
 
 
-def sense(analysis: "Analysis", choice: AnalysisChoice, *, unasked: bool = True) -> "Analysis":
+def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -> Analysis:
     """The analysis with the wrenches asked for, or `unasked` that of `best` beside its contacts."""
     if analysis.virtual_sensor is not None or (choice.wrench is None and not unasked):
         return analysis
@@ -349,7 +342,7 @@ def sense(analysis: "Analysis", choice: AnalysisChoice, *, unasked: bool = True)
     return replace(analysis, virtual_sensor=found)
 
 
-def known_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "KnownContacts":
+def known_contacts(analysis: Analysis, choice: AnalysisChoice) -> "KnownContacts":
     """What is known of the log's contacts: its list, and where nothing touches the arm."""
     from vftcli.contacts.free_statistics import free_part
     from vftcli.wrench.detection import KnownContacts, read_in_free_runs
@@ -367,7 +360,7 @@ def known_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "KnownContac
     return KnownContacts(untouched=part.own, beside=beside, listed=listed)
 
 
-def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
+def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
     """Compare the estimates with a reference, where one is asked for."""
     if choice.reference is None:
         return analysis

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.bias.choice import RefinementChoice
 from vftcli.cli.console import health_of
-from vftcli.cli.options import Anyway, Talk
+from vftcli.cli.options import Talk
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import OutputChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.option import Asked
+from vftcli.signals.option import Anyway, Asked
 from vftcli.wrench.choice import AlsoWrench, WrenchChoice
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def choice_for(
     """What is asked of a command's logs; their health is said."""
     from vftcli.pipeline import choice_of
 
-    examiner = health_of(library, anyway=bool(asked.words.get("anyway")), on_screen=on_screen)
+    examiner = health_of(library, anyway=asked.anyway, on_screen=on_screen)
     return choice_of(asked, library, examiner, **others)
 
 

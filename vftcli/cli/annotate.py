@@ -11,26 +11,14 @@ from vftcli.cli.console import detail, echo_data, say
 from vftcli.observers.choice import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.option import WRITE, Asked, Option
+from vftcli.signals.option import WRITE, Anyway, Asked, Option
 from vftcli.signals.parsing import check_known
 from vftcli.wrench.choice import WrenchChoice
 
 ADDED = ("wrench", "sd", "contact")  #: What ``--add`` takes.
 
 
-def added_columns(words: list[str] | None) -> list[str]:
-    """The columns that ``--add`` names.
-
-    Raises:
-        ParameterError: If there is no such column.
-    """
-    names = [name.strip() for word in words or () for name in word.split(",")]
-    for name in names:
-        check_known(name, ADDED, f"--add {name}")
-    return names
-
-
-@opt.command(*LOG, ObserverChoice, WrenchChoice, WorkersChoice, opt.Anyway, opt.Talk)
+@opt.command(*LOG, ObserverChoice, WrenchChoice, WorkersChoice, Anyway, opt.Talk)
 def annotate_dataset(
     dataset: Annotated[
         Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")
@@ -62,7 +50,10 @@ def annotate_dataset(
     from vftcli.batch.annotation import USUAL, ForceChoice
     from vftcli.outputs.run_record import to_json
 
-    added, anyway = added_columns(add), asked.words["anyway"]
+    added = [name.strip() for word in add or () for name in word.split(",")]
+    for name in added:
+        check_known(name, ADDED, f"--add {name}")
+    anyway = asked.anyway
     choice = ForceChoice(
         read=asked.of(ReadChoice),
         robot=asked.of(RobotChoice),
@@ -91,13 +82,6 @@ def annotate_dataset(
     say(f"wrote {output}")
 
 
-def meaning(column: Mapping[str, str]) -> str:
-    """What a column's numbers are: unit and axes of a force, else what 1 and 0 say."""
-    if column["units"] == "1":
-        return column["sign"]
-    return f"{column['units']}, {column['frame']}"
-
-
 def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
     """Lines on what was written, and on what a user of it should know."""
     from vftcli.doctor.examination import doubt
@@ -109,8 +93,11 @@ def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
     lines = [
         f"{counted(sum(done.values()), 'episode')} ({count}), {frames} frames, "
         f"{record['robot']['name']}, {observer}, {kind}",
-        *(f"  {name}: {meaning(column)}" for name, column in record["columns"].items()),
     ]
+    for name, column in record["columns"].items():
+        # Unit and axes of a force, else what 1 and 0 say.
+        force = f"{column['units']}, {column['frame']}"
+        lines.append(f"  {name}: {column['sign'] if column['units'] == '1' else force}")
     if delay := record["transient_frames"]:
         lines.append(f"  the first {delay} frames of an episode still show the observer's start")
     clocks = dict.fromkeys(one["clock"] for one in record["episodes"] if "clock" in one)

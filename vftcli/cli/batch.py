@@ -54,7 +54,7 @@ def batch(
     from vftcli.signals.errors import LogError, ParameterError
 
     give_back()
-    choice, anyway = choice_for(asked, Library()), asked.words["anyway"]
+    choice, anyway = choice_for(asked, Library()), asked.anyway
     choice.robot.check()
     if do == "compare" and choice.reference is None:
         raise ParameterError("--do compare needs --reference: two-cycle, sensor, vendor, zero, …")

@@ -12,7 +12,7 @@ from vftcli.cli.batch import SOME_FAILED
 from vftcli.cli.console import echo, echo_data, open_made, say, say_json, show
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import LOG, Asked, Choice, Option, setting
+from vftcli.signals.option import LOG, Anyway, Asked, Choice, Option, setting
 from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class BenchChoice(Choice):
     rounds: Annotated[int, setting("bench.rounds", "N", "Interleaved runs.", least=1)] = 7
 
 
-@opt.command(BenchChoice, opt.TableForm, WorkersChoice, opt.Anyway, opt.Talk)
+@opt.command(BenchChoice, opt.TableForm, WorkersChoice, Anyway, opt.Talk)
 def benchmark(
     what: Annotated[
         str,
@@ -63,7 +63,7 @@ def benchmark(
 
     Example: vftcli benchmark sim
     """
-    engine, form, anyway = asked.of(WorkersChoice), opt.form_of(asked), asked.words["anyway"]
+    engine, form, anyway = asked.of(WorkersChoice), opt.form_of(asked), asked.anyway
     length = asked.states(BenchChoice)
     unfit: dict[str, object] = {"--robot": robot, "--set bench": length}
     if what == SPEED:

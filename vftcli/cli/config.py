@@ -16,7 +16,7 @@ from typing import Any
 import typer
 from typer.core import TyperOption
 
-from vftcli.cli.commands import COMMANDS, now_of
+from vftcli.cli.commands import now_of
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Choice, interval, settings_as_typed, settings_by_name
@@ -33,6 +33,7 @@ OTHERWISE = {
     "convert": {"log.derive"},  # it writes what was logged
 }
 Table = dict[str, Any]  #: A table of TOML.
+Click = Any  #: Of typer, which carries a click of its own without types.
 FILE = "file:"  #: What a reference's file begins with.
 
 
@@ -54,12 +55,12 @@ def config_option() -> TyperOption:
     )
 
 
-def is_configured(command: Any) -> bool:  # noqa: ANN401 - typer carries its own click
+def is_configured(command: Click) -> bool:
     """Whether a command takes options from a file: those that read a log."""
     return any("--columns" in param.opts for param in command.params)
 
 
-def kept_words(ctx: Any, args: Sequence[str]) -> tuple[Path, list[str]] | None:  # noqa: ANN401
+def kept_words(ctx: Click, args: Sequence[str]) -> tuple[Path, list[str]] | None:
     """The file that is read beside these words, and what it gives as words; None for no file.
 
     What is typed is left away, and what cannot be meant for the logs that are.
@@ -78,7 +79,7 @@ def kept_words(ctx: Any, args: Sequence[str]) -> tuple[Path, list[str]] | None: 
     logs = [Path(log) for log in each_log if isinstance(log, str)]
     keys, typed = keys_for(command, path), [param.name for param in params]
     asked = [word.partition("=")[0].strip() for word in opts.get("set") or ()]
-    choices = vars(command.callback).get("choices", ())
+    choices = choices_of(command)
     words = [
         word
         for key, text in keys.items()
@@ -118,7 +119,7 @@ def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401
     return value
 
 
-def keys_for(command: Any, path: Path) -> Table:  # noqa: ANN401
+def keys_for(command: Click, path: Path) -> Table:
     """What a file holds for a command: what is on top, then what is in the command's table.
 
     Settings have their dotted names, and their values are texts.
@@ -191,27 +192,35 @@ def key_now(path: Path, key: str, value: Any) -> tuple[str, Any]:  # noqa: ANN40
 
 def known_options() -> tuple[dict[str, dict[str, Any]], tuple[type[Choice], ...]]:
     """The options that may be kept, by key, of each command that reads them; all choices."""
-    # All are loaded: a key that this command does not have may be another's.
-    group = typer.main.get_command(import_module("vftcli.cli").make_app())
-    commands: Mapping[str, Any] = vars(group)["commands"]
-    reading = [name for name in COMMANDS if is_configured(commands[name])]
-    choices = {kind for n in reading for kind in vars(commands[n].callback)["choices"]}
-    every = tuple(sorted(choices, key=lambda kind: kind.__name__))
-    return {name: options_of(commands[name]) for name in reading}, every
+    # A key that this command does not have may be another's.
+    reading = {name: each for name, each in every_command().items() if is_configured(each)}
+    choices = dict.fromkeys(kind for each in reading.values() for kind in choices_of(each))
+    return {name: options_of(each) for name, each in reading.items()}, (*choices,)
 
 
-def options_of(command: Any) -> dict[str, Any]:  # noqa: ANN401
+def every_command() -> Mapping[str, Click]:
+    """All commands by name, which loads them."""
+    app = import_module("vftcli.cli").make_app()
+    return dict(vars(typer.main.get_command(app))["commands"])
+
+
+def choices_of(command: Click) -> tuple[type[Choice], ...]:
+    """The choices that have a command's settings."""
+    return tuple(vars(command.callback)["choices"])
+
+
+def options_of(command: Click) -> dict[str, Any]:
     """Key → option of a command."""
     options = (p for p in command.params if p.param_type_name == "option")
     return {key: p for p in options if (key := key_of(p)) not in TYPED}
 
 
-def key_of(option: Any) -> str:  # noqa: ANN401
+def key_of(option: Click) -> str:
     """An option's name as it is typed, without its dashes."""
     return str(max(option.opts, key=len)).lstrip("-")
 
 
-def value_of(ctx: Any, option: Any, key: str, value: object, path: Path) -> Any:  # noqa: ANN401
+def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> Any:  # noqa: ANN401
     """A value as typer takes it for an option: words, or True of one that is given or not.
 
     Returns:
@@ -242,7 +251,7 @@ def words_in(value: object) -> Iterator[str]:
         yield str(word)
 
 
-def beside(folder: Path, word: str, option: Any) -> str:  # noqa: ANN401
+def beside(folder: Path, word: str, option: Click) -> str:
     """A word, from the file's folder on where it is the name of a file or folder."""
     prefix = FILE if word.startswith(FILE) else ""
     name = word.removeprefix(FILE)

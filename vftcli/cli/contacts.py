@@ -9,7 +9,7 @@ from vftcli.cli import options as opt
 from vftcli.cli.analysis import LOG, choice_for
 from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
 from vftcli.free_motion.choice import FreeChoice
-from vftcli.signals.option import OUTPUT, Asked, Choice, Option
+from vftcli.signals.option import OUTPUT, Anyway, Asked, Choice, Option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +27,7 @@ class ListForm(Choice):
     all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.")]
 
 
-@opt.command(*LOG, FreeChoice, ListForm, opt.Anyway, opt.Talk)
+@opt.command(*LOG, FreeChoice, ListForm, Anyway, opt.Talk)
 def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     """List what touched the arm. The default command.
 

@@ -7,7 +7,6 @@ import shutil
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
-from importlib import import_module
 from typing import Annotated, Any
 
 import typer
@@ -19,7 +18,10 @@ from vftcli.cli.config import (
     NONE,
     READ,
     WORDS,
+    Click,
+    choices_of,
     config_option,
+    every_command,
     is_configured,
     kept_words,
     say_kept,
@@ -42,7 +44,7 @@ class GroupedCommand(TyperCommand):
         if is_configured(self):
             self.params.append(config_option())
 
-    def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+    def parse_args(self, ctx: Click, args: list[str]) -> Click:
         """Parse the words; of an option that there is not, name the nearest if it is near."""
         try:
             kept = kept_words(ctx, args) if is_configured(self) else None
@@ -62,12 +64,12 @@ class GroupedCommand(TyperCommand):
             say_kept(*kept)
         return rest
 
-    def option(self, param: Any) -> Option:  # noqa: ANN401
+    def option(self, param: Click) -> Option:
         """What a parameter was made of; of those of every command, what is not in their help."""
         own: Option | None = vars(self.callback).get("options", {}).get(param.name)
         return own or Option("", "", "", group=OUTPUT)
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+    def format_help(self, ctx: Click, formatter: Click) -> None:
         """Write how it is called, what it does, its options by group."""
         width = columns()
         lines = [" ".join(["Usage:", ctx.command_path, *self.collect_usage_pieces(ctx)]), ""]
@@ -89,7 +91,7 @@ class GroupedCommand(TyperCommand):
 class JourneyGroup(TyperGroup):
     """The program: its `--help` lists the commands by what one sets out to do."""
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+    def format_help(self, ctx: Click, formatter: Click) -> None:
         """Write the commands by what one sets out to do, then the program's options."""
         width, usage = columns(), "Usage: vftcli [COMMAND] LOG… [OPTIONS]"
         lines = [usage, "", *textwrap.wrap(self.help or "", width)]
@@ -104,7 +106,7 @@ class JourneyGroup(TyperGroup):
         rows = [row for p in shown if (row := row_of(p, ctx)) is not None]
         formatter.write("\n".join([*lines, "", *two_columns(rows)]) + "\n")
 
-    def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+    def parse_args(self, ctx: Click, args: list[str]) -> Click:
         """Parse the words: without a command of the default one, former words by today's."""
         words = with_command(args)
         if not ctx.resilient_parsing and words and (command := self.commands.get(words[0])):
@@ -117,7 +119,7 @@ class JourneyGroup(TyperGroup):
         WORDS.set(words)
         return super().parse_args(ctx, words)
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+    def resolve_command(self, ctx: Click, args: list[str]) -> Click:
         """The command that is asked for; of one that there is not, the nearest if it is near."""
         if args[0] not in self.commands:
             if args[0] in former()["gone"]:
@@ -131,7 +133,7 @@ def columns() -> int:
     return min(max(shutil.get_terminal_size().columns, NARROWEST), WIDEST)
 
 
-def row_of(param: Any, ctx: typer.Context) -> tuple[str, str] | None:  # noqa: ANN401
+def row_of(param: Click, ctx: typer.Context) -> tuple[str, str] | None:
     """How a parameter is typed, and what it means; None for one that is hidden."""
     if param.param_type_name == "argument":
         return (param.metavar or param.name.upper(), param.help) if param.help else None
@@ -255,9 +257,8 @@ def formats(name: str | None) -> Iterator[str]:
 
 def settings() -> Iterator[str]:
     """Every setting of all commands: name, unit, meaning and default."""
-    app = import_module("vftcli.cli").make_app()
-    commands: dict[str, Any] = vars(typer.main.get_command(app))["commands"]
-    every = {kind: None for c in commands.values() for kind in vars(c.callback)["choices"]}
+    commands = every_command().values()
+    every = dict.fromkeys(kind for command in commands for kind in choices_of(command))
     rows = sorted(row for kind in every for row in settings_of(kind))
     yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
     yield from two_columns(rows)

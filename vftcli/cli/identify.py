@@ -23,7 +23,7 @@ from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Asked
+from vftcli.signals.option import Anyway, Asked
 
 
 def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str, object]) -> None:
@@ -61,7 +61,7 @@ def file_for(robot: str) -> Path:
     return Path("my_" + re.sub(r"[^\w.-]", "_", robot) + ".toml")
 
 
-@opt.command(*LOG, Task, GoalChoice, FreeChoice, RefinementChoice, opt.Anyway, opt.Talk)
+@opt.command(*LOG, Task, GoalChoice, FreeChoice, RefinementChoice, Anyway, opt.Talk)
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[
@@ -101,7 +101,7 @@ def identify_robot(
     library = Library([*logs, *(check or ()), *free.logs])
     # That the profile is not the arm's is what this command is there to change; but the
     # friction method keeps the profile's links, and the default begins with it.
-    examiner = health_of(library, anyway=asked.words["anyway"], fitting=task.keeps_links)
+    examiner = health_of(library, anyway=asked.anyway, fitting=task.keeps_links)
     choice = replace(choice_for(asked, library), examiner=examiner)
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
     output = output or file_for(profile.name)

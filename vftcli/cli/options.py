@@ -21,7 +21,6 @@ from vftcli.cli.console import command_line, speaking
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
     ESTIMATE,
-    LOG,
     NUMBERS,
     OUTPUT,
     WRITE,
@@ -98,16 +97,6 @@ def folder_of(output: Path | None, logs: Sequence[Path], asked: Asked) -> Path:
     part = (asked.words["episode"], asked.words["arm"])
     stem = name if logs[0].is_dir() else ENDING.sub("", name, count=1)
     return Path("-".join([stem, *filter(None, part)]) + ".vft")
-
-
-class Anyway(Choice):
-    """Whether to go on where results mean nothing."""
-
-    GROUP = LOG
-
-    anyway: Annotated[
-        bool, Option("--anyway", "", "Continue despite errors; the outputs are marked.")
-    ]
 
 
 class Talk(Choice):

@@ -7,7 +7,7 @@ from vftcli.cli import options as opt
 from vftcli.cli.analysis import LOG, choice_for
 from vftcli.cli.console import echo, say, say_json, say_recording, say_robots
 from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
-from vftcli.signals.option import Asked, Option
+from vftcli.signals.option import Anyway, Asked, Option
 
 if TYPE_CHECKING:
     from vftcli.robots.run import Run
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from vftcli.signals.wrench import Wrench
 
 
-@opt.command(*LOG, ReferenceChoice, opt.Anyway, opt.Talk)
+@opt.command(*LOG, ReferenceChoice, Anyway, opt.Talk)
 def contact_thresholds(
     logs: opt.Logs,
     asked: Asked,
@@ -47,7 +47,7 @@ def contact_thresholds(
     library, reference = choice.library, choice.reference
     if reference is not None and not check:
         raise ParameterError("--reference says where a log was touched: name that with --check LOG")
-    free, signals, thresholds = free_thresholds(logs, choice, rate, anyway=asked.words["anyway"])
+    free, signals, thresholds = free_thresholds(logs, choice, rate)
     counted = left_out(signals, rate)
     checks = []
     for log in check or ():

@@ -163,7 +163,7 @@ class Examiner:
         fitting: bool = True,
         tell: Callable[[Examination], None] | None = None,
     ) -> None:
-        self._anyway, self._fitting, self._tell = anyway, fitting, tell
+        self.anyway, self._fitting, self._tell = anyway, fitting, tell
         self.runs = Runs()  # of the command
         self._made: list[tuple[Recording, Robot, Examination]] = []
         self._robots: dict[tuple[str, RobotChoice, float | None, bool], Robot] = {}
@@ -229,7 +229,7 @@ class Examiner:
             if known is recording and arm is robot:
                 return examination
         examination = examine(recording, robot, in_stretches=in_stretches)
-        if not self._anyway:
+        if not self.anyway:
             refuse(recording.name, examination.refusals(fitting=self._fitting))
         self._made.append((recording, robot, examination))
         if self._tell is not None:

@@ -5,7 +5,7 @@ the joints of a log there is one mean, of those with a reference to be trusted.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -288,17 +288,21 @@ def together(parts: Sequence[Scored]) -> Scored:
     weights = np.isfinite(lag) * share[:, None]
     total = weights.sum(axis=0)
     mean_lag = np.nansum(lag * weights, axis=0) / np.where(total > 0, total, np.nan)
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(p, name) for p in parts])
+        for name in ("estimates", "reference", "moving")
+    }
+    counts: dict[str, Any] = {
+        name: np.sum([getattr(p, name) for p in parts], axis=0)
+        for name in ("missing", "within", "banded")
+    }
     return parts[0]._replace(
-        estimates=np.concatenate([p.estimates for p in parts]),
-        missing=np.sum([p.missing for p in parts], axis=0),
-        reference=np.concatenate([p.reference for p in parts]),
-        moving=np.concatenate([p.moving for p in parts]),
+        **joined,
+        **counts,
         floor=float(np.sqrt(np.sum(share * np.array([p.floor for p in parts]) ** 2))),
         paired=weighed([p.paired for p in parts], share),
         own=tuple(weighed(each, share) for each in zip(*(p.own for p in parts), strict=True)),
         lag=mean_lag,
-        within=np.sum([p.within for p in parts], axis=0),
-        banded=np.sum([p.banded for p in parts], axis=0),
     )
 
 

@@ -129,11 +129,11 @@ def compare_with(
         )
     ours: dict[str, Array] = {}
     floor = np.full(joints, np.nan)
-    known = rows.select("observer", "joint", "rmse_Nm", "reference_floor_Nm")
-    for observer, j, error, own in known.iter_rows():
-        values = ours.setdefault(observer, np.full(joints, np.nan))
-        values[j - 1] = np.nan if error is None else error
-        floor[j - 1] = floor[j - 1] if own is None else own
+    for (observer,), own in rows.group_by("observer", maintain_order=True):
+        at = own["joint"].to_numpy() - 1
+        ours[str(observer)] = np.full(joints, np.nan)
+        ours[str(observer)][at] = own["rmse_Nm"].to_numpy()
+        floor[at] = own["reference_floor_Nm"].to_numpy()
     return Comparison(
         published=published,
         recording=str(rows["recording"][0]),

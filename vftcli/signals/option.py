@@ -13,7 +13,7 @@ from importlib import import_module
 from inspect import get_annotations
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, Self, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import did_you_mean
@@ -196,6 +196,16 @@ class Choice:
         return cls(**values)
 
 
+class Anyway(Choice):
+    """Whether to go on where results mean nothing."""
+
+    GROUP = LOG
+
+    anyway: Annotated[
+        bool, Option("--anyway", "", "Continue despite errors; the outputs are marked.")
+    ]
+
+
 C = TypeVar("C", bound=Choice)
 
 
@@ -205,6 +215,11 @@ class Asked(NamedTuple):
     words: Mapping[str, Any]  #: Word of an option → what was given for it, None for nothing.
     settings: Mapping[str, str]  #: Name → text of the settings.
     line: str  #: The command or call, as `run.json` holds it.
+
+    @property
+    def anyway(self) -> bool:
+        """Whether to continue despite errors."""
+        return bool(self.words.get("anyway"))
 
     def of(self, kind: type[C]) -> C:
         """The choice of a room that they state, checked."""
