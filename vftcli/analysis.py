@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from vftcli.bias.refine import Refinement
-    from vftcli.contacts.contact_list import ContactList
+    from vftcli.contacts.contact_list import Contact, ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.published import Comparison
     from vftcli.free_motion.free_motion import FreeMotion
@@ -97,6 +97,11 @@ class Analysis(Shown):
     def robot(self) -> Robot:
         """The arm as it was used."""
         return self.motion.log.robot
+
+    @property
+    def listed(self) -> "tuple[Contact, ...]":
+        """The contacts of the list, none without one."""
+        return () if self.contacts is None else self.contacts.contacts
 
     @property
     def torques(self) -> tuple[ExternalTorque, ...]:

@@ -8,16 +8,16 @@ import pytest
 import rerun.chunk
 from rerun_rows import rows_of
 
-from vftcli.outputs.charts import Chart, ChartLine, Span
+from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import (
     LogLine,
     Tab,
     blueprint,
     drawable,
+    grid_of,
     recording_id,
     rerun_file,
-    title_of,
 )
 
 POSES = ArmPoses(np.zeros(1), np.ones((1, 2, 3)), np.ones((1, 2, 4)), np.zeros((1, 1)))
@@ -82,9 +82,9 @@ def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
 
 def test_small_plots_say_where_their_axes_end() -> None:
     plots = [plot(f"/a{k}", np.array([[0.0], [10.0 * k]])) for k in range(4)]
-    ends = Span(-1.5, 31.5)
-    assert title_of(Tab("many", plots), plots[3], ends) == "what [N], -1.5 to 31.5"
-    assert title_of(Tab("few", plots[:3]), plots[2], ends) == "what [N]"
+    many, few = grid_of(Tab("many", plots)), grid_of(Tab("few", plots[:3]))
+    assert many.contents[3].name == "what [N], -1.5 to 31.5"
+    assert few.contents[2].name == "what [N]"
 
 
 def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:

@@ -62,7 +62,8 @@ def report(
     give_back()
     library, published, written = Library(logs), asked.of(PrintChoice).table, outputs_of(asked)
     output, details = opt.folder_of(output, logs, asked), asked.words["details"]
-    names = report_files([library.label(log) for log in logs], written.extras, figures)
+    labels = [library.label(log) for log in logs]
+    names = report_files(labels, written.extras, figures, several=len(logs) > 1)
     OutputFolder(output, force, names).check()
     choice = choice_for(asked, library, on_screen=not json)
     if published is not None:

@@ -268,11 +268,11 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
     if rests.any():
         dry, joints = dry_friction(robot.friction, robot.joints), np.flatnonzero(rests).tolist()
         sizes = ", ".join(f"{dry[j]:.2g}" for j in joints)
-        words = f"{joint_words(joints)}: friction hides pushes"
-        if robot.friction:
-            words = f"{joint_words(joints)}: pushes below {sizes} N·m do not show"
+        hides = (
+            f"pushes below {sizes} N·m do not show" if robot.friction else "friction hides pushes"
+        )
         subject = "the arm is still" if rests.all() else "joints at rest"
-        yield Ground("caution", subject, words, of_log=False)
+        yield Ground("caution", subject, f"{joint_words(joints)}: {hides}", of_log=False)
     name = robot_option(analysis)
     if not robot.friction or is_profile(analysis):
         where = "a typical arm's" if robot.friction else "none is modelled"
@@ -311,30 +311,29 @@ def reference_ground(analysis: Analysis) -> Ground:
         doubts = [sentence(r) for r in analysis.reference.remarks if r.level == "warning"]
         words = "; ".join(doubts) or f"{analysis.reference.name}{known}"
         return Ground("caution" if doubts else "good", "reference", words, of_log=False)
-    contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
-    subject = "no reference"
-    standing: Standing = "unknown"
-    words, remedy = "no force sensor in the log: sizes are unchecked", None
-    for kind, name in (("vendor", "the vendor's own estimate"), ("sensor", "the log's own sensor")):
+    contacts = analysis.listed
+    for kind, subject, name in (
+        ("sensor", "force sensor", "the log's own sensor"),
+        ("vendor", "vendor", "the vendor's own estimate"),
+    ):
         forces = [getattr(contact, f"{kind}_force") for contact in contacts]
         own = kind == "vendor" and not contacts and analysis.recording.tau_ext is not None
         if own or any(force is not None for force in forces):
             sizes = ", ".join(DASH if f is None else f"{f:.0f}" for f in forces[:8])
             more = ", …" if len(forces) > 8 else ""
-            words = (
-                f"{name} reads {sizes}{more} N at the peaks"
-                if contacts
-                else f"the log holds {name}"
-            )
-            subject, standing = "vendor", "unknown"
-            if kind == "sensor":
-                missed = missed_words(contacts)
-                subject, standing = "force sensor", "caution" if missed else "good"
-                words += missed
+            reads = f"{name} reads {sizes}{more} N at the peaks"
+            missed = missed_words(contacts) if kind == "sensor" else ""
             options = ("--reference", kind, "--robot", robot_option(analysis))
-            remedy = command("compare", analysis.recording, *options)
-    # A missed reading is found in this log; a log without a sensor is like any other.
-    return Ground(standing, subject, words, remedy, of_log=standing == "caution")
+            return Ground(
+                "unknown" if kind == "vendor" else "caution" if missed else "good",
+                subject,
+                f"{reads}{missed}" if contacts else f"the log holds {name}",
+                command("compare", analysis.recording, *options),
+                # A missed reading is found in this log; a log without a sensor is like any other.
+                of_log=bool(missed),
+            )
+    words = "no force sensor in the log: sizes are unchecked"
+    return Ground("unknown", "no reference", words, of_log=False)
 
 
 def missed_words(contacts: Sequence[Contact]) -> str:

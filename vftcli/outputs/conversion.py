@@ -98,27 +98,22 @@ def joint_topic(
 
 
 def write_mcap(path: Path, analysis: Analysis) -> None:
-    """Write the recording's torques and its estimates; an existing file is replaced."""
-    stamps = stamps_of(analysis.recording)
-    write_topics(path, stamps, estimated_topics(analysis), events(analysis, int(stamps[0])))
-
-
-def estimated_topics(analysis: Analysis) -> Iterator[OutputTopic]:
-    """The log's own signals, every estimate, the reference."""
-    recording = analysis.recording
+    """Write the log's own signals, every estimate, the reference; an existing file is replaced."""
+    recording, stamps = analysis.recording, stamps_of(analysis.recording)
     names = recording.joint_names or analysis.robot.chain.names
     torque = drive_torque(recording, analysis.robot)
-    yield joint_topic("/joint_states", names, recording.q, recording.dq, torque)
+    topics = [joint_topic("/joint_states", names, recording.q, recording.dq, torque)]
     for estimate in analysis.estimates:
         name = f"/vftcli/external/{ros_name(estimate.name)}"
-        yield joint_topic(name, names, effort=estimate.tau)
+        topics.append(joint_topic(name, names, effort=estimate.tau))
     if analysis.reference is not None:
-        yield joint_topic("/vftcli/external/reference", names, effort=analysis.reference.tau)
+        tau = analysis.reference.tau
+        topics.append(joint_topic("/vftcli/external/reference", names, effort=tau))
     for wrench in analysis.wrenches:
-        name = f"/vftcli/wrench/{ros_name(wrench.name)}"
         # Flange, tool or sensor, or base axes there.
         frame = "base@flange" if wrench.frame == "base" else wrench.frame
-        yield wrench_topic(name, frame, wrench.known)
+        topics.append(wrench_topic(f"/vftcli/wrench/{ros_name(wrench.name)}", frame, wrench.known))
+    write_topics(path, stamps, topics, events(analysis, int(stamps[0])))
 
 
 def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
@@ -169,7 +164,7 @@ def stamps_of(recording: Recording) -> Nanoseconds:
 
 
 def write_topics(
-    path: Path, stamps: Nanoseconds, found: Iterable[OutputTopic], events: Sequence[Event] = ()
+    path: Path, stamps: Nanoseconds, found: Sequence[OutputTopic], events: Sequence[Event] = ()
 ) -> None:
     """Write a ros2-profile MCAP with zstd chunks, sample by sample, all topics side by side.
 
@@ -178,7 +173,6 @@ def write_topics(
     """
     from mcap.writer import CompressionType, Writer
 
-    found = tuple(found)
     with path.open("wb") as file:
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="vftcli")

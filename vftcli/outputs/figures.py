@@ -1,6 +1,6 @@
 """The figures of one log, as force, torque, wrench, errors, spectra; gains with theirs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import ContactList
+from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.evaluation.errors import POOLED
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra
@@ -62,7 +62,7 @@ BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
 
 def log_figures(analysis: Analysis) -> dict[str, Drawing]:
     """Every figure that a log has something to show in."""
-    name, numbers = analysis.recording.name, numbers_of(analysis.contacts)
+    name, numbers = analysis.recording.name, numbers_of(analysis.listed)
     found = {}
     if analysis.contacts is not None and analysis.contacts.hardest is not None:
         found["force"] = force_drawing(analysis.contacts, analysis.t)
@@ -131,7 +131,9 @@ def plot(
     elif (draw := PLOTS[what]) is not None and (chart := draw(analysis)) is not None:
         only = [int(j) - 1 for j in numbers] if what == "torques" else []
         plots = plots_of(drawn_lines(analysis, chart, names), only=only or None)
-        drawing = Drawing("", partial(line_figure, plots=plots, numbers=numbers_of(found)))
+        drawing = Drawing(
+            "", partial(line_figure, plots=plots, numbers=numbers_of(analysis.listed))
+        )
     if drawing is None:
         raise ParameterError(f"the analysis holds no {what} to plot")
     return on_paper(drawing)
@@ -148,7 +150,7 @@ def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Draw
     """|F| of every contact with its 95 % band, under its number; over the log's clock. (T,) [s]"""
     courses = [c.course for c in found.contacts if c.course is not None]
     lines = [ChartLine("|F|", c.force[:, None], half=c.band[:, None], x=c.t) for c in courses]
-    spans = contact_spans(found)
+    spans = contact_spans(found.contacts)
     clock = [*t] or [0.0, found.duration, *(at for span in spans for at in span)]
     ends = np.array([min(clock), max(clock)])
     chart = Chart.of_one("force", "|F|", "N", ends, lines)._replace(
@@ -157,7 +159,7 @@ def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Draw
         spans=spans,
         lowest=0.0,
     )
-    draw = partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found))
+    draw = partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found.contacts))
     return Drawing(f"{found.recording}: size of the force on the robot, 95 % band", draw)
 
 
@@ -176,10 +178,9 @@ def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> 
     return chart._replace(series=tuple(series))
 
 
-def numbers_of(contacts: ContactList | None) -> dict[int, float]:
+def numbers_of(contacts: Iterable[Contact]) -> dict[int, float]:
     """Number of every contact → the middle of it. [s]"""
-    found = contacts.contacts if contacts is not None else ()
-    return {c.number: 0.5 * (c.start + c.stop) for c in found if not c.is_load}
+    return {c.number: 0.5 * (c.start + c.stop) for c in contacts if not c.is_load}
 
 
 def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:

@@ -37,19 +37,15 @@ def places_of(labels: Sequence[str]) -> list[str]:
 
 
 def report_files(
-    labels: Sequence[str],
-    extras: Sequence[str] = (),
-    form: str | None = None,
-    *,
-    several: bool | None = None,
+    labels: Sequence[str], extras: Sequence[str], form: str | None, *, several: bool
 ) -> list[str]:
     """Names of all files that a report of logs with these labels may hold, with these extras.
 
-    `several` is whether there is a sub-folder a log, None for where there is more than one.
+    `several` is whether there is a sub-folder a log.
     """
     own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
     own += [CONTACT_TABLE] * (form is not None)
-    if not (len(labels) > 1 if several is None else several):
+    if not several:
         return own
     above = [*SUMMARY_FILES, *figure_files(form, ERROR_FIGURES)]
     return [*above, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
@@ -83,12 +79,10 @@ def write_report(
             for place, analysis in steps(pages)
         ]
         folder.write("index.html", render_index(pages, failed))
-        found = [a.errors for a in analyses if a.errors is not None]
-        together = pl.concat(found, how="diagonal") if found else None
-        put_errors(folder, "", together, analyses)
+        errors = put_errors(folder, "", analyses)
         put_contacts(folder, "", analyses, command)
-        if form is not None and together is not None:
-            write_figures(folder, error_figures(together), form)
+        if form is not None and errors is not None:
+            write_figures(folder, error_figures(errors), form)
         logs = [log_entry(a.recording, {"folder": place}) for place, a in pages]
         left_out = {"left_out": dict(failed)}
         seal(folder, SEAL, envelope(command, logs, found=left_out))
@@ -101,7 +95,7 @@ def fill(
     analysis: Analysis,
     command: str,
     choice: OutputChoice,
-    form: str | None = None,
+    form: str | None,
 ) -> str:
     """Write one log's files; return the text of its `run.json`."""
     from vftcli.outputs.page.pages import render  # templates, which no answer needs
@@ -117,7 +111,7 @@ def fill(
         trim()
         if name == "estimates.parquet":
             write_estimates(path, analysis)
-            put_errors(folder, place, analysis.errors, [analysis])
+            put_errors(folder, place, [analysis])
             put_contacts(folder, place, [analysis], command)
         elif name == "recording.rrd":
             from vftcli.outputs.rerun_recording import write_rrd
@@ -138,8 +132,7 @@ def put_contacts(
     folder: OutputFolder, place: str, analyses: Sequence[Analysis], command: str
 ) -> None:
     """Write the lists of contacts, if there are any: as `vftcli contacts` prints them."""
-    lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
-    if lists:
+    if lists := [each.contacts for each in analyses if each.contacts is not None]:
         folder.write(f"{place}contacts.json", to_json(contacts_envelope(analyses, command)))
         folder.write(f"{place}contacts.csv", contacts_csv(lists))
 
@@ -154,14 +147,14 @@ def contacts_envelope(
 
 
 def put_errors(
-    folder: OutputFolder,
-    place: str,
-    errors: pl.DataFrame | None,
-    analyses: Sequence[Analysis],
-) -> None:
-    """Write the error tables, if there are errors."""
-    if errors is None:
-        return
-    errors = tables.marked(errors, analyses)
+    folder: OutputFolder, place: str, analyses: Sequence[Analysis]
+) -> pl.DataFrame | None:
+    """Write the error tables of all logs, if there are errors; return their rows."""
+    found = [a.errors for a in analyses if a.errors is not None]
+    if not found:
+        return None
+    errors = pl.concat(found, how="diagonal")
+    marked = tables.marked(errors, analyses)
     for name, text_of in zip(ERROR_TABLES, tables.FORMS.values(), strict=True):
-        folder.write(f"{place}{name}", text_of(errors, analyses))
+        folder.write(f"{place}{name}", text_of(marked, analyses))
+    return errors

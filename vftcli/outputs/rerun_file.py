@@ -183,11 +183,13 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     ends_of, views = {family: tab.ends(plot) for family, plot in families.items()}, []
     for k, plot in enumerate(tab.plots):
         ends = ends_of[plot.families or plot.key]
+        # In small plots few ticks are labelled.
+        span = f", {ends.low:.3g} to {ends.high:.3g}" if len(tab.plots) > 3 else ""
         # It would cover a corner; of a plot with points the title says it all.
         named = k == 0 and len(lines_of(plot)) == len(plot.series)
         view = rrb.TimeSeriesView(
             origin=plot.key,
-            name=drawable(title_of(tab, plot, ends)),
+            name=drawable(f"{plot.title} [{plot.units[0]}]{span}"),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=named),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
             axis_y=rrb.ScalarAxis(range=ends),
@@ -202,12 +204,6 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     paths = dict.fromkeys(line.path for line in tab.log)
     log = rrb.TextLogView(origin="/", contents=[*paths], name="Log", columns=columns)
     return rrb.Vertical(plots, log, row_shares=[2, 1], name=tab.name)
-
-
-def title_of(tab: Tab, plot: Chart, ends: Span) -> str:
-    """A plot's title; in small plots, where few ticks are labelled, with the axis' ends."""
-    span = f", {ends.low:.3g} to {ends.high:.3g}" if len(tab.plots) > 3 else ""
-    return f"{plot.title} [{plot.units[0]}]{span}"
 
 
 def send_plot(stream: Stream, plot: Chart) -> None:

@@ -89,8 +89,7 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
 
 def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
     """All plots; of a long log what `STRETCHES` show, every sample where contacts begin."""
-    found = analysis.contacts.contacts if analysis.contacts is not None else ()
-    hardest = sorted(found, key=lambda c: -(c.peak_force or 0.0))
+    hardest = sorted(analysis.listed, key=lambda c: -(c.peak_force or 0.0))
     strongest, tabs = hardest[: int(0.5 * WHOLE_TIME / AROUND)], []
     whole = [(c.start - AROUND, c.start + AROUND) for c in strongest]
     for name, group in steps(list(plot_groups(analysis).items())):

@@ -7,8 +7,7 @@ from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.outputs.page.details import contact_details, joint_values, model_pairs
-from vftcli.outputs.page.pages import render
+from vftcli.outputs.page.pages import contact_details, joint_values, model_pairs, render
 from vftcli.outputs.page.shell import part
 
 

@@ -1,11 +1,11 @@
 """The charts of one log: torques, wrenches, what the pose tells, responses, spectra and tuning."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import ContactList
+from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import Curve
@@ -59,7 +59,7 @@ def torque_chart(analysis: Analysis) -> Chart:
         families_of(analysis.robot.limits.tau_max),
         None if reference is None else reference.floor,
         "± floor of the reference",
-        contact_spans(analysis.contacts),
+        contact_spans(analysis.listed),
     )
 
 
@@ -68,9 +68,8 @@ def observer_styles(analysis: Analysis) -> dict[str, LineStyle]:
     return lines_of_names([estimate.name for estimate in analysis.estimates])
 
 
-def contact_spans(found: ContactList | None) -> tuple[tuple[float, float], ...]:
+def contact_spans(contacts: Iterable[Contact]) -> tuple[tuple[float, float], ...]:
     """When something touched the arm. [s]"""
-    contacts = found.contacts if found is not None else ()
     return tuple((contact.start, contact.stop) for contact in contacts if not contact.is_load)
 
 
@@ -166,7 +165,7 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
         analysis.t,
         (*below, *lines),
         families=(1, 1, 1, 2, 2, 2),
-        spans=contact_spans(analysis.contacts),
+        spans=contact_spans(analysis.listed),
     )
 
 
@@ -188,7 +187,7 @@ def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
         size = np.linalg.norm(own[:, :3], axis=1)[:, None]
         lines.insert(0, ChartLine("the log's own wrench", size, REFERENCE))
     chart = Chart.of_one("force", "Force on the robot", "N", t, lines)
-    spans = contact_spans(found)
+    spans = contact_spans(found.contacts)
     return chart._replace(spans=spans, lowest=0.0, highest=highest(found, lines[:-1]))
 
 

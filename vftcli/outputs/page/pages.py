@@ -1,18 +1,25 @@
-"""The pages of one log, of several logs and of a batch: what each of them is filled with."""
+"""The pages of one log with its details, of several logs and of a batch: what fills them."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from itertools import groupby, repeat
 from operator import itemgetter
 from types import MappingProxyType
+from typing import Any
 
+import numpy as np
 import polars as pl
 
 from vftcli.analysis import Analysis
+from vftcli.bias.refine import Budget
+from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.errors import JointMeans, joint_means
+from vftcli.evaluation.published import Comparison
+from vftcli.observers.table import OBSERVERS
 from vftcli.outputs import Record
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
-from vftcli.outputs.contacts import by_force, hardest_words, otherwise
+from vftcli.outputs.contacts import by_force, hardest_rows, hardest_words, otherwise
 from vftcli.outputs.error_tables import (
     axis_grids,
     blocks,
@@ -20,14 +27,23 @@ from vftcli.outputs.error_tables import (
     rmse_grid,
 )
 from vftcli.outputs.examination import rate_of
-from vftcli.outputs.grid import Grid, GridCell, words
+from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, words
 from vftcli.outputs.grids import contact_grids, drift_grid
-from vftcli.outputs.page import details, log_charts
+from vftcli.outputs.page import log_charts
 from vftcli.outputs.page.shell import Box, page, part, scales_of
 from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, still_arm, view_of
-from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
-from vftcli.outputs.run_record import run_record
+from vftcli.outputs.quantity import (
+    DASH,
+    at_least_shown,
+    banded,
+    counted,
+    ranged,
+    significant,
+    vector,
+)
+from vftcli.outputs.run_record import observer_record, run_record
 from vftcli.outputs.shapes import link_surfaces
+from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.frames import FRAMES
@@ -42,6 +58,16 @@ FILES = {
     "errors.csv": "errors by joint",
     "run.json": "settings, versions, remarks",
 }
+MOST = 40  #: Contacts in numbers at most.
+#: Keys of what has three numbers in a contact's record.
+VECTORS = ("force_N", "force_sd_N", "moment_Nm", "moment_sd_Nm", "mean_force_N", "impulse_Ns")
+#: Columns of the table of contacts.
+WRENCHES = (
+    *map(Column, ("#", "from – to [s]", "range [N]")),
+    *words("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]"),
+    *map(Column, ("log-likelihood ratio [nats]", "margin of the place [nats]")),
+    *map(Column, ("vendor |F| [N]", "sensor |F| [N]")),
+)
 #: Heads of the overview.
 HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean RMSE", "Health")
 
@@ -64,17 +90,17 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         view |= {
             "most": max(ranges, default=1.0),
             "free": free_spans(analysis),
-            "contact_grids": details.contact_details(found),
-            "model": details.model_pairs(found),
+            "contact_grids": contact_details(found),
+            "model": model_pairs(found),
         }
     if (sensed := analysis.virtual_sensor) is not None:
         grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
         grids += contact_grids(analysis.errors) if analysis.errors is not None else ()
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
     if (refined := analysis.refinement) is not None and refined.budgets:
-        view["budget"] = details.budget_grid(refined.budgets[:1])
+        view["budget"] = budget_grid(refined.budgets[:1])
     if analysis.published is not None:
-        view["printed"] = details.beside_print(analysis.published)
+        view["printed"] = beside_print(analysis.published)
     answer, (surfaces, lacking) = headline(analysis), link_surfaces(analysis.robot)
     if lacking:
         view["drawing"] = fact("meshes-not-found", count=len(lacking), first=lacking[0])
@@ -96,7 +122,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         torque=torque,
         wrench=wrench,
         errors=errors_view(analysis),
-        observers=details.observers_view(analysis),
+        observers=observers_view(analysis),
         files=[(name, what, sizes[name]) for name, what in FILES.items() if name in sizes],
         remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["remarks"]],
         **view,
@@ -153,6 +179,103 @@ def errors_view(analysis: Analysis) -> Record:
 def least_error(means: JointMeans) -> str:
     """The least mean RMSE and its observer."""
     return DASH if means.least is None else f"{significant(means.least[1])} N·m ({means.least[0]})"
+
+
+def contact_details(found: ContactList) -> tuple[Grid, ...]:
+    """Moments, impulses, evidence and joint torques of the contacts, `MOST` at most."""
+    if not found.contacts:
+        return ()
+    contacts = hardest_rows(found.contacts, MOST)
+    title = "Wrench at the peak, base axes, the moment about the flange point"
+    if len(contacts) < len(found.contacts):
+        title += f"; the {MOST} hardest, contacts.csv has all"
+    wrenches: Rows = []
+    torques: Rows = []
+    for c in contacts:
+        record = c.record()
+        vectors = (None if record[key] is None else vector(record[key]) for key in VECTORS)
+        rest = (c.evidence, c.lead, c.vendor_force, c.sensor_force)
+        ends = DASH if c.anywhere is None else ranged(*c.anywhere, unit="")
+        wrenches.append((str(c.number), f"{c.start:.2f} – {c.stop:.2f}", ends, *vectors, *rest))
+        each = map(banded, c.joint_torque, c.joint_torque_sd, repeat(".2f"), repeat(""))
+        torques.append((str(c.number), *each, c.at_rest))
+    columns = Column("#"), *joint_columns(len(contacts[0].joint_torque)), Column("at rest")
+    below = "Joint torque at the peak in N·m, ± its standard deviation"
+    return Grid(WRENCHES, wrenches, title), Grid(columns, torques, below)
+
+
+def model_pairs(found: ContactList) -> dict[str, str]:
+    """What the list rests on."""
+    model, prior = found.model, found.model.prior
+
+    def each(values: Array) -> str:
+        """One number a joint."""
+        return ", ".join(map(significant, values.tolist()))
+
+    pairs = {
+        "basis": found.basis,
+        "free motion": f"{found.free_seconds:.1f} s",
+        "false contacts in it": DASH if found.false_on_free is None else str(found.false_on_free),
+        "evidence asked": DASH if found.threshold is None else f"{found.threshold:.1f} nats",
+        "block": f"{model.block:.3g} s",
+        "noise, joint by joint": f"{each(model.noise_sd)} N·m",
+        "model error": f"{each(model.error_sd)} N·m",
+        "its correlation time": f"{each(model.error_time)} s",
+    }
+    if prior is not None:
+        sizes = f"{prior.force:.3g} N and {prior.moment:.3g} N·m"
+        pairs["contacts' force and moment"] = f"{sizes}, which keep for {prior.time:.3g} s"
+    return pairs
+
+
+def observers_view(analysis: Analysis) -> Record:
+    """What each observer's parameters are and mean."""
+    rows: Rows = []
+    for name in (observer.name for observer in analysis.observers):
+        what, meant = OBSERVERS[name].title if name in OBSERVERS else "", list[Any]([None] * 5)
+        if (tuning := analysis.tunings.get(name)) is not None:
+            columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
+            meant = [GridCell("", html=joint_values(column)) for column in columns]
+            meant.append(tuning.parameter_count)
+        rows.append((name, what, *meant))
+    heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
+    title = "What the parameters mean at this log's sample time; one value a joint where they "
+    title += "differ"
+    # Parameters as JSON can hold them, also those of a wrapped observer.
+    used = {o.name: observer_record(o, None)["parameters"] for o in analysis.observers}
+    grid = Grid((*words("observer", "What"), *map(Column, heads)), rows, title, swatches=True)
+    return {"grid": grid, "names": ", ".join(used), "parameters": used}
+
+
+def joint_values(values: Array) -> str:
+    """One number where all joints agree to three digits, else one line a run of equal joints."""
+    # Compared as printed: values that look equal are one.
+    texts = enumerate(map(significant, values.tolist()), 1)
+    runs = [(text, [j for j, _ in run]) for text, run in groupby(texts, itemgetter(1))]
+    return part("parts/joint_values", runs)
+
+
+def beside_print(comparison: Comparison) -> Grid:
+    """Printed and computed errors side by side."""
+    columns = list(words("observer"))
+    for j in range(1, len(comparison.floor) + 1):
+        columns += (Column(f"J{j} print", form=".2f"), Column("here"))
+    rows: Rows = []
+    for name in comparison.names:
+        both = np.column_stack([comparison.printed(name), comparison.ours[name]])
+        rows.append((name, *both.ravel().tolist()))
+    return Grid(columns, rows, f"RMSE in N·m: {comparison.published.title}", swatches=True)
+
+
+def budget_grid(budgets: Sequence[Budget]) -> Grid:
+    """Where every observer's error comes from, cause by cause. [N·m]"""
+    rows: Rows = [
+        (budget.name, cause, *map(float, values))
+        for budget in budgets
+        # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
+        for cause, values in (*budget.parts.items(), ("all but stiction at rest", budget.total))
+    ]
+    return Grid((*words("observer", "cause"), *joint_columns(len(budgets[0].total))), rows)
 
 
 def render_index(

@@ -5,14 +5,14 @@ the side to which it reaches in this log, a little turned; the page's script has
 projection.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.contacts.contact_list import Contact
 from vftcli.outputs import Record
 from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
 from vftcli.outputs.page.packing import PageClock
@@ -81,8 +81,7 @@ def view_of(analysis: Analysis) -> View:
     swept = link_poses(analysis.robot.chain, np.ascontiguousarray(every)).translation
     flange, points = swept[:, -1], [np.zeros((1, 3)), swept.reshape(-1, 3)]
     reach = float(np.linalg.norm(flange, axis=1).max()) or 1.0
-    listed = analysis.contacts.contacts if analysis.contacts is not None else ()
-    sized = (contact for contact in listed if contact.wrench is not None and contact.size_known)
+    sized = (c for c in analysis.listed if c.wrench is not None and c.size_known)
     points += (arrow_of(analysis, contact, reach)[:1] for contact in sized)
     mean = flange.mean(axis=0)
     yaw = float(np.arctan2(mean[1], mean[0])) - ASIDE if np.hypot(*mean[:2]) > 0.05 else -ASIDE
@@ -105,7 +104,7 @@ def pose_at(analysis: Analysis, t: float) -> Pose:
 def arrow_of(analysis: Analysis, contact: Contact, reach: float) -> Array:
     """Tail and tip of a contact's force at its peak; the tip is where it acts. (2, 3) [m]"""
     (tip,) = touched_point(contact, pose_at(analysis, contact.peak).translation)
-    share = min((contact.peak_force or 0.0) / most_force(analysis.contacts), 1.0)
+    share = min((contact.peak_force or 0.0) / most_force(analysis.listed), 1.0)
     return np.vstack([tip - reach * (SHARES[0] + SHARES[1] * share) * along(contact), tip])
 
 
@@ -115,10 +114,9 @@ def along(contact: Contact) -> Array:
     return np.asarray(force / max(float(np.linalg.norm(force)), 1e-12))
 
 
-def most_force(found: ContactList | None) -> float:
-    """The largest force of a list, at least 1. [N]"""
-    rows = found.contacts if found is not None else ()
-    return max((c.peak_force or 0.0 for c in rows if c.size_known), default=1.0)
+def most_force(contacts: Sequence[Contact]) -> float:
+    """The largest force of known size, 1 without one. [N]"""
+    return max((c.peak_force or 0.0 for c in contacts if c.size_known), default=1.0)
 
 
 def cone_of(contact: Contact) -> float:
@@ -179,8 +177,7 @@ def stage_data(
     # Axes that the script knows; in others the direction is that of the peak.
     turns = sensed is not None and sensed.sensor.frame in {"base", "flange"}
     # A load lasts: what touches the arm meanwhile comes before it.
-    rows = found.contacts if found is not None else ()
-    ordered = sorted(rows, key=lambda contact: contact.is_load)
+    ordered = sorted(analysis.listed, key=lambda contact: contact.is_load)
     turned = np.concatenate([chain.rotation, chain.flange_rotation[None]]).reshape(-1, 9)
     moved = np.vstack([chain.translation, chain.flange_translation])
     return {
@@ -203,7 +200,7 @@ def stage_data(
         "view": view._replace(centre=view.centre.tolist(), span=view.span.tolist())._asdict(),
         "contacts": [contact_data(c, chain.joints, analysis.t, clock) for c in ordered],
         "first": 0 if hardest is None else peak_index(hardest, analysis.t, clock),
-        "most": most_force(found),
+        "most": most_force(analysis.listed),
         "floor": least,
         # Number, band and words of a moment without one.
         "none": (
