@@ -75,8 +75,8 @@ def test_the_touched_links_are_painted(touched: Analysis) -> None:
     assert touched.contacts is not None
     found = painted_links(touched.contacts, 6)
     assert sorted(found) == [3, 5, 6]
-    assert found[6] == [(1.0, 1.5, PLACES["wrist"])]
-    assert found[3] == [(2.2, 2.6, PLACES["forearm"])]
+    assert found[6] == {1.0: PLACES["wrist"], 1.5: ""}
+    assert found[3] == {2.2: PLACES["forearm"], 2.6: ""}
 
 
 @pytest.mark.parametrize(("places", "point"), [((0, 6), 6.0), ((2, 3), 2.5), ((), 6.0)])

@@ -120,9 +120,11 @@ def bench_grid(result: Record) -> Grid:
     return keyed_grid(columns, [dynamics, *result["observers"], *result["complete_log"]])
 
 
-def contact_grids(errors: "pl.DataFrame") -> Iterator[Grid]:
+def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
     """How each observer tells contacts, one row a recording and observer; none if not asked."""
-    if "contacts" in errors.columns and len(rows := errors.drop_nulls("contacts")):
+    if errors is None or "contacts" not in errors.columns:
+        return
+    if len(rows := errors.drop_nulls("contacts")):
         columns = dict(zip(CONTACTS, words(*CONTACTS.values()), strict=True))
         yield keyed_grid(columns, rows.iter_rows(named=True), "contacts against the reference")
 

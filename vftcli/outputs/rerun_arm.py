@@ -23,7 +23,8 @@ from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
 Stream = rr.RecordingStream  #: A recording that is being made.
 Packed = NDArray[np.uint32]  #: Colours as Rerun takes them.
-Painted = tuple[float, float, str]  #: Start and stop [s] of a link's other colour ``#rrggbb``.
+#: When a link's colour changes [s] → that colour ``#rrggbb``, "" for its own.
+Changes = Mapping[float, str]
 
 ROBOT, CONTACTS = "/robot", "/contacts"  #: Roots of the arm and of the contacts, by number.
 RATE = 50.0  #: Poses a second that are drawn. [Hz]
@@ -70,15 +71,14 @@ def arrow_scale(hardest: float) -> float:
     return next((scale for scale in SCALES if hardest <= LONGEST * scale), SCALES[-1])
 
 
-def send_arm(
-    stream: Stream, robot: Robot, poses: ArmPoses, painted: Mapping[int, Sequence[Painted]]
-) -> None:
+def send_arm(stream: Stream, robot: Robot, poses: ArmPoses, painted: Mapping[int, Changes]) -> None:
     """Send the arm's shape once, its poses over time, and when links have another colour."""
-    time, start = rr.TimeColumn("t", duration=poses.t), float(poses.t[0])
+    time = rr.TimeColumn("t", duration=poses.t)
     for j, shapes in enumerate(capsules(robot.chain)):
         link = f"{ROBOT}/link_{j}" if j else f"{ROBOT}/base"
         meshes = [mesh for mesh in robot.meshes if mesh.link == j]
-        if not send_meshes(stream, link, meshes, start, painted.get(j, ())) and shapes:
+        changes = {float(poses.t[0]): "", **painted[j]} if j in painted else {}
+        if not send_meshes(stream, link, meshes, changes) and shapes:
             # Rerun's own capsules are along z from one end.
             turns = np.array([rotation_onto(shape.direction) for shape in shapes])
             batch = rr.Capsules3D(
@@ -90,7 +90,7 @@ def send_arm(
             )
             stream.log(link, batch, static=True)
             own = rgba(*(JOINT if shape.kind == "joint" else LINK for shape in shapes))
-            send_colours(stream, link, own, start, painted.get(j, ()))
+            send_colours(stream, link, own, changes)
         if j:
             columns = rr.Transform3D.columns(
                 translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
@@ -98,9 +98,7 @@ def send_arm(
             stream.send_columns(link, [time], columns)
 
 
-def send_meshes(
-    stream: Stream, link: str, meshes: Sequence[Mesh], start: float, painted: Sequence[Painted]
-) -> bool:
+def send_meshes(stream: Stream, link: str, meshes: Sequence[Mesh], changes: Changes) -> bool:
     """Send the meshes of a link once; whether it has any and none is missing."""
     found = [(mesh, mesh.file) for mesh in meshes if mesh.file is not None]
     try:
@@ -114,43 +112,33 @@ def send_meshes(
         place = rr.Transform3D(translation=mesh.pose.translation, mat3x3=shape)
         stream.log(path, asset, place, static=True)
         own = rgba(*() if ending in COLOURED else (LINK,))
-        send_colours(stream, path, own, start, painted, mesh=True)
+        send_colours(stream, path, own, changes, mesh=True)
     return 0 < len(found) == len(meshes)
 
 
 def send_colours(
-    stream: Stream,
-    path: str,
-    own: Packed,
-    start: float,
-    painted: Sequence[Painted],
-    *,
-    mesh: bool = False,
+    stream: Stream, path: str, own: Packed, changes: Changes, *, mesh: bool = False
 ) -> None:
-    """Send the colours of shapes from the first pose on: their own, others in the spans."""
+    """Send the colours of shapes: their own, and when they have others."""
     kind, field = (rr.Asset3D, "albedo_factor") if mesh else (rr.Capsules3D, "colors")
     given: dict[str, Any] = {field: own}
-    if not painted:
+    if not changes:
         if len(own):  # else those in a mesh's file show
             stream.log(path, kind.from_fields(**given), static=True)
         return
-    changes: dict[float, Packed] = {start: own}
-    for begin, stop, colour in painted:
-        changes[max(begin, start)] = rgba(*[colour] * max(len(own), 1))
-        changes[stop] = own
-    colours = [changes[t] for t in sorted(changes)]
-    given = {field: np.concatenate(colours)}
+    count, times = max(len(own), 1), sorted(changes)
+    colours = [rgba(*[changes[t]] * count) if changes[t] else own for t in times]
+    given[field] = np.concatenate(colours)
     columns = kind.columns(**given).partition([*map(len, colours)])
-    stream.send_columns(path, [rr.TimeColumn("t", duration=sorted(changes))], columns)
+    stream.send_columns(path, [rr.TimeColumn("t", duration=times)], columns)
 
 
-def painted_links(found: ContactList, joints: int) -> dict[int, list[Painted]]:
+def painted_links(found: ContactList, joints: int) -> dict[int, dict[float, str]]:
     """Number of a link → when it is one of those that were touched, in the colour of the part."""
-    spans: dict[int, list[Painted]] = {}
-    for contact in found.contacts:
-        for link in sorted({place or joints for place in contact.places}):
-            painted = (contact.start, contact.stop, PLACES[contact.where])
-            spans.setdefault(link, []).append(painted)
+    spans: dict[int, dict[float, str]] = {}
+    for c in found.contacts:
+        for link in {place or joints for place in c.places}:
+            spans.setdefault(link, {}).update({c.start: PLACES[c.where], c.stop: ""})
     return spans
 
 

@@ -119,9 +119,8 @@ def log_screen(
     tail, text = doubt_lines(analysis), ""
     for block in blocks(analysis.errors)[:1]:
         tail += canvas.wrapped(against(block, analysis), 2)
-    if analysis.errors is not None:
-        for grid in contact_grids(analysis.errors):
-            tail += terminal(grid).splitlines()
+    for grid in contact_grids(analysis.errors):
+        tail += terminal(grid).splitlines()
     if (printed := analysis.published) is not None:
         why = next((f": {sentence(each)}" for each in printed.remarks), "")
         tail += canvas.wrapped(f"Beside {printed.published.title}{why} → --details", 2)

@@ -65,7 +65,7 @@ class PageClock:
 
     def __init__(self, blob: Blob, t: Array, spans: Sequence[tuple[float, float]] = ()) -> None:
         gaps, first, half = gaps_of(t, GAP_STEPS) + 1, np.arange(len(t)), np.array(0)
-        self.blob, self.whole = blob, len(t) <= WHOLE
+        self.blob, self.t, self.whole = blob, t, len(t) <= WHOLE
         if not self.whole:
             # Half of the stretches are near the spans; none reaches over a gap.
             near = np.zeros(len(t), dtype=bool)
@@ -86,8 +86,9 @@ class PageClock:
         self.rows = [blob.add(low * TICK, TICK), blob.add(high * (WIDE * TICK), WIDE * TICK)]
         self.gaps = np.searchsorted(first, gaps).tolist()
 
-    def index(self, sample: int) -> int:
-        """Place of a sample of the log on this clock."""
+    def index(self, time: float) -> int:
+        """Place of the sample nearest to a time on this clock. [s]"""
+        sample = np.argmin(np.abs(self.t - time))
         return int(np.searchsorted(self.starts, sample, side="right")) - 1
 
     def pose(self, values: Array) -> int:

@@ -86,16 +86,15 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         if (force := log_charts.force_chart(analysis, found)) is not None:
             charts.insert(0, force)
             view |= {"force": force, "scales": next(scales_of(force, FORCE_BOX))}
-        ranges = [contact.anywhere[1] for contact in found.contacts if contact.anywhere is not None]
         view |= {
-            "most": max(ranges, default=1.0),
+            "most": max((c.anywhere[1] for c in found.contacts if c.anywhere), default=1.0),
             "free": free_spans(analysis),
             "contact_grids": contact_details(found),
             "model": model_pairs(found),
         }
     if (sensed := analysis.virtual_sensor) is not None:
         grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
-        grids += contact_grids(analysis.errors) if analysis.errors is not None else ()
+        grids += contact_grids(analysis.errors)
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
     if (refined := analysis.refinement) is not None and refined.budgets:
         view["budget"] = budget_grid(refined.budgets[:1])

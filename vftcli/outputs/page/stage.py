@@ -132,10 +132,9 @@ def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillA
     """The arm at a contact's peak, else at the log's start."""
     pose = pose_at(analysis, float(analysis.t[0]) if contact is None else contact.peak)
     rotation = np.concatenate([np.eye(3)[None], pose.rotation[0]])
-    origin = np.concatenate([np.zeros((1, 3)), pose.translation[0]])
-    last = analysis.robot.joints
-    touched = {place or last for place in contact.places} if contact is not None else set()
-    parts = []
+    origin = np.vstack([np.zeros(3), pose.translation[0]])
+    places, parts = contact.places if contact is not None else (), []
+    touched = {place or analysis.robot.joints for place in places}
     for frame, shapes in enumerate(capsules(analysis.robot.chain)):
         for shape in shapes:
             ends = np.vstack([shape.start, shape.start + shape.direction])
@@ -174,8 +173,7 @@ def stage_data(
     least = found.detectable_force if found is not None else None
     hardest = found.hardest if found is not None else None
     sure = found is not None and found.tells_untouched
-    # Axes that the script knows; in others the direction is that of the peak.
-    turns = sensed is not None and sensed.sensor.frame in {"base", "flange"}
+    frame = sensed.sensor.frame if sensed is not None else ""
     # A load lasts: what touches the arm meanwhile comes before it.
     ordered = sorted(analysis.listed, key=lambda contact: contact.is_load)
     turned = np.concatenate([chain.rotation, chain.flange_rotation[None]]).reshape(-1, 9)
@@ -184,8 +182,8 @@ def stage_data(
         "chain": [*zip(np.round(turned, 9).tolist(), np.round(moved, 9).tolist(), strict=True)],
         "q": [clock.pose(column) for column in analysis.recording.q.T],
         "shapes": [
-            (frame, *np.round([s.start, s.start + s.direction], 4).tolist(), s.radius, s.kind)
-            for frame, shapes in enumerate(capsules(chain))
+            (link, *np.round([s.start, s.start + s.direction], 4).tolist(), s.radius, s.kind)
+            for link, shapes in enumerate(capsules(chain))
             for s in shapes
         ],
         # Per link the rows of x, y and z of corners, and of the three corners of
@@ -196,10 +194,11 @@ def stage_data(
             + [clock.blob.add(k, 1.0) for k in surface.faces.T]
             for link in range(chain.joints + 1)
         ],
-        "wrench": {"flange": sensed.sensor.frame == "flange"} if turns and sensed else None,
+        # Axes that the script knows; in others the direction is that of the peak.
+        "wrench": {"flange": frame == "flange"} if frame in {"base", "flange"} else None,
         "view": view._replace(centre=view.centre.tolist(), span=view.span.tolist())._asdict(),
-        "contacts": [contact_data(c, chain.joints, analysis.t, clock) for c in ordered],
-        "first": 0 if hardest is None else peak_index(hardest, analysis.t, clock),
+        "contacts": [contact_data(c, chain.joints, clock) for c in ordered],
+        "first": 0 if hardest is None else clock.index(hardest.peak),
         "most": most_force(analysis.listed),
         "floor": least,
         # Number, band and words of a moment without one.
@@ -213,11 +212,6 @@ def stage_data(
     }
 
 
-def peak_index(contact: Contact, t: Array, clock: PageClock) -> int:
-    """Place of a contact's peak on the page's clock."""
-    return clock.index(int(np.argmin(np.abs(t - contact.peak))))
-
-
 def contact_words(contact: Contact) -> str:
     """A contact's name, place and direction, and how unsure the last is where no cone is drawn."""
     said = [contact_name(contact), place_words(contact)]
@@ -228,19 +222,18 @@ def contact_words(contact: Contact) -> str:
     return " · ".join(said)
 
 
-def contact_data(contact: Contact, joints: int, t: Array, clock: PageClock) -> Record:
+def contact_data(contact: Contact, joints: int, clock: PageClock) -> Record:
     """A contact for the script: its moment, its words, its place."""
-    sized = contact.peak_force is not None and not contact.place_unknown
     cone = cone_of(contact)
     size, _, band = force_size(contact).partition(" ") if contact.wrench is not None else ("",) * 3
     return {
         "number": contact.number,
         "name": contact_name(contact),
         **{key: round(getattr(contact, key), 4) for key in ("start", "stop", "peak")},
-        "i": peak_index(contact, t, clock),
+        "i": clock.index(contact.peak),
         "size": contact.peak_force and round(contact.peak_force, 2),
         "half": contact.peak_band and round(contact.peak_band, 2),
-        "sized": sized,
+        "sized": contact.peak_force is not None and not contact.place_unknown,
         "force": size,
         "band": band,
         "words": contact_words(contact),
