@@ -40,6 +40,7 @@ from vftcli.outputs.run_record import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import sentence
+from vftcli.signals.shown import frame_of, per_joint
 from vftcli.signals.wrench import AXES as FORCES
 
 if TYPE_CHECKING:
@@ -106,12 +107,11 @@ def motion_table(replay: Replay) -> pl.DataFrame:
         for k, axis in enumerate(AXES):
             columns[f"x/{label}/{axis}"] = motion.x[:, n, k]
             columns[f"v/{label}/{axis}"] = motion.v[:, n, k]
-        for j in range(replay.robot.joints):
-            columns[f"q/{label}/{j + 1}"] = replay.path.q[:, n, j]
+        columns |= per_joint(f"q/{label}", replay.path.q[:, n])
         columns[f"reached/{label}"] = replay.path.reached[:, n].astype(np.float64)
     if replay.logged is not None:
         columns |= {f"logged/{a}": padded(replay.logged[:, k]) for k, a in enumerate(AXES)}
-    return pl.DataFrame({k: np.ascontiguousarray(v) for k, v in columns.items()}).fill_nan(None)
+    return frame_of(columns.items())
 
 
 def admittance_record(made: Replayed, command: str) -> Record:

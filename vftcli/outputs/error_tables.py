@@ -123,8 +123,7 @@ def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
 def block(rows: pl.DataFrame) -> Block:
     """The rows of one recording as a matrix."""
     joints = rows["joint"].unique().sort()
-    observers = rows["observer"].unique(maintain_order=True)
-    values = {(o, j): value for o, j, value in rows.select("observer", "joint", "rmse_Nm").rows()}
+    wide = rows.pivot("joint", index="observer", values="rmse_Nm")
     floors = dict(rows.select("joint", "reference_floor_Nm").rows())
     # Joints may differ in how many samples have a reference.
     counts = rows["samples"].drop_nulls().to_list() or [0]
@@ -134,9 +133,9 @@ def block(rows: pl.DataFrame) -> Block:
         recording=str(rows["recording"][0]),
         reference=str(rows["reference"][0]),
         joints=tuple(joints),
-        observers=tuple(observers),
+        observers=tuple(wide["observer"]),
         # Null is what polars has for unknown.
-        rmse=np.array([[values.get((o, j)) for j in joints] for o in observers], dtype=float),
+        rmse=wide.select(*map(str, joints)).cast(pl.Float64).to_numpy(),
         floor=np.array([floors[j] for j in joints], dtype=float),
         samples=(min(counts), max(counts)),
         means=joint_means(rows),
@@ -255,10 +254,8 @@ def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Ite
         # A force axis has its number in newtons, a moment axis in newton-metres; never
         # both.
         values = group.select("observer", "axis", rmse=pl.coalesce("rmse_N", "rmse_Nm"))
-        found: dict[str, dict[str, float | None]] = {}
-        for name, axis, value in values.iter_rows():
-            found.setdefault(name, {})[axis] = value
-        rows: Rows = [(name, *map(own.get, AXES)) for name, own in found.items()]
+        wide = values.pivot("axis", index="observer", values="rmse")
+        rows: Rows = list(wide.select("observer", *AXES).rows())
         # The paper compares with a sensor; beside a simulated truth its bounds mean
         # nothing.
         if reference == "sensor" and (limits := published.get(recording)):
