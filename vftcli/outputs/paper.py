@@ -4,7 +4,7 @@ Nothing here loads matplotlib before a figure is drawn; it is an extra (``vftcli
 """
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -74,7 +74,9 @@ PLOTTED = 0.75  #: About which share of a plot's room its axes take.
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}  #: Unit of a horizontal axis → what it is called.
 
 Look = dict[str, Any]  #: What matplotlib draws with.
-BAND_LOOK: Look = {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
+BAND_LOOK: Look = {
+    "color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0)), "zorder": 1.9,
+}  # fmt: skip
 #: Where the number of a contact is, above a plot.
 ABOVE: Look = {
     "xycoords": ("data", "axes fraction"), "xytext": (0, 1), "textcoords": "offset points",
@@ -86,7 +88,7 @@ BELOW: Look = {
     "ha": "center", "va": "top",
 }  # fmt: skip
 WHISKER_LOOK: Look = {"elinewidth": 0.6, "capsize": 1.4, "capthick": 0.6}
-CONTACT_LOOK: Look = {"facecolor": "0.9", "linewidth": 0.0}
+CONTACT_LOOK: Look = {"facecolor": "0.9", "linewidth": 0.0, "zorder": 0.9}
 #: Colours of the page that follow its theme → theirs on white paper.
 PAINTS = {INK: "black", REFERENCE: "0.65"}
 #: Dashes of the page → those on paper, where they are too much like others.
@@ -138,24 +140,24 @@ def paper_style() -> Iterator[None]:
         yield
 
 
-def sheet(
-    width: float, cells: int, columns: int, height: float, handles: "Mapping[str, Artist]"
-) -> "tuple[Figure, NDArray[Any]]":
-    """A figure with room for so many plots, row by row, and one legend above all of them.
-
-    Width, and height of a row, are in inches; the legend has a handle a name, if any.
-    """
+def sheet(width: float, cells: int, columns: int, height: float) -> "tuple[Figure, NDArray[Any]]":
+    """A figure with room for so many plots, row by row; width and a row's height in inches."""
     from matplotlib.figure import Figure
 
-    rows, widest = -(-cells // columns), SAMPLE + LETTER * max(map(len, handles), default=0)
-    lines = -(-len(handles) // max(int(width / widest), 1))
-    above = LINE * lines + 0.05 * bool(lines)
-    figure = Figure(figsize=(width, rows * height + above + 0.22), layout="constrained")
-    if handles:
-        # As many columns as rows of about one length need.
-        wide = -(-len(handles) // lines)
-        figure.legend([*handles.values()], [*handles], loc="outside upper center", ncols=wide)
+    rows = -(-cells // columns)
+    figure = Figure(figsize=(width, rows * height + 0.22), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
+
+
+def add_legend(figure: "Figure", handles: "Mapping[str, Artist]") -> None:
+    """Add one legend above all plots, a handle a name: the figure grows by its lines."""
+    width, height = figure.get_size_inches()
+    widest = SAMPLE + LETTER * max(map(len, handles))
+    lines = -(-len(handles) // max(int(width / widest), 1))
+    figure.set_figheight(height + LINE * lines + 0.05)
+    # As many columns as rows of about one length need.
+    columns = -(-len(handles) // lines)
+    figure.legend([*handles.values()], [*handles], loc="outside upper center", ncols=columns)
 
 
 def shortened(name: str) -> str:
@@ -197,7 +199,7 @@ def line_figure(
     """
     wide = width > NARROW
     columns = min(len(plots), columns or (2 if not wide else 4 if len(plots) > 6 else 3))
-    figure, grid = sheet(width, len(plots), columns, HIGH[wide], legend_handles(plots, marks or ()))
+    figure, grid = sheet(width, len(plots), columns, HIGH[wide])
     if numbers:
         figure.set_figheight(figure.get_figheight() + 0.12)
     for k, (axes, plot) in enumerate(zip(grid, plots, strict=False)):
@@ -216,8 +218,8 @@ def line_figure(
             if at - half >= end:
                 axes.annotate(str(number), (at, 1.0), **ABOVE)
                 end = at + half + BETWEEN * inch
-        for n, (x, y) in enumerate((marks or {}).values()):
-            axes.plot(x[plot.panel], y[plot.panel], **dot_look(n))
+        for n, (name, (x, y)) in enumerate((marks or {}).items()):
+            axes.plot(x[plot.panel], y[plot.panel], label=f"{name}, chosen", **dot_look(n))
     # A place without a plot has the numbers and the label of the axis above it.
     for axes, plot in zip(grid[len(plots) :], plots[len(plots) - columns :], strict=False):
         set_scale(axes, plot.chart)
@@ -229,6 +231,10 @@ def line_figure(
         axes.tick_params(labeltop=True, pad=-10.0)
         axes.annotate(below or AXES[plot.chart.unit], (0.5, 1.0), **BELOW)
     figure.align_ylabels(list(grid[: len(plots)]))
+    each = (zip(*axes.get_legend_handles_labels(), strict=True) for axes in figure.axes)
+    named = {name: artist for artists in each for artist, name in artists}
+    if len(named) > 1:
+        add_legend(figure, named)
     return figure
 
 
@@ -237,17 +243,18 @@ def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
     from matplotlib.ticker import MaxNLocator
 
     chart, j = plot.chart, plot.panel
-    for start, stop in chart.spans:
-        axes.axvspan(start, stop, **CONTACT_LOOK)
+    # The legend names lines, then ribbons, band and contacts.
+    shown = [(s, *drawn_line(chart, s, j, STRETCHES)) for s in chart.series if s.shown]
+    for series, t, y, _ in shown:
+        axes.plot(t, y, label=shortened(series.name), **look(series))
+    for series, t, y, halves in shown:
+        for half, style in zip(halves, ribbon_looks(series), strict=False):
+            axes.fill_between(t, y - half, y + half, **style)
     if chart.band is not None and np.isfinite(chart.band[j]):
         for sign in (1.0, -1.0):
-            axes.axhline(sign * chart.band[j], **BAND_LOOK)
-    for series in chart.series:
-        if series.shown:
-            t, y, halves = drawn_line(chart, series, j, STRETCHES)
-            for half, style in zip(halves, ribbon_looks(series), strict=False):
-                axes.fill_between(t, y - half, y + half, **style)
-            axes.plot(t, y, **look(series))
+            axes.axhline(sign * chart.band[j], label=chart.band_label, **BAND_LOOK)
+    for start, stop in chart.spans:
+        axes.axvspan(start, stop, label="contact", **CONTACT_LOOK)
     set_scale(axes, chart)
     axes.set_ylim(*chart.ends(j))
     axes.yaxis.set_major_locator(MaxNLocator(4))
@@ -277,10 +284,11 @@ def dot_look(k: int, paint: str = "black", edge: float = 0.7, fill: str = "white
     return {"color": paint, "linestyle": "none", "markeredgewidth": edge, **shape}
 
 
-def ribbon_looks(series: ChartLine) -> tuple[Look, Look]:
-    """Looks of the band about a line: itself, and where no contact is listed."""
+def ribbon_looks(series: ChartLine) -> list[Look]:
+    """Looks of the band about a line: itself, and where no contact is listed, if anywhere."""
     own = {"facecolor": look(series)["color"], "alpha": 0.25, "linewidth": 0.0}
-    return own, own | {"facecolor": "0.4"}
+    grey = own | {"facecolor": "0.4", "label": QUIET}
+    return [own | {"label": "95 % band"}, *[grey] * (series.quiet is not None)]
 
 
 def look(series: ChartLine) -> Look:
@@ -292,30 +300,6 @@ def look(series: ChartLine) -> Look:
         "linewidth": 1.8 if series.colour == REFERENCE else 0.9,
         "solid_capstyle": "butt",
     }
-
-
-def legend_handles(plots: Sequence[Plot], marks: Iterable[str]) -> dict[str, Any]:
-    """Everything that the legend names: lines, their ribbon, bands, contacts; alone, no line."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    found: dict[str, Any] = {}
-    charts = {id(c): c for plot in plots for c in (plot.chart, plot.over) if c is not None}
-    for chart in charts.values():
-        shown = [series for series in chart.series if series.shown]
-        found |= {shortened(series.name): Line2D([], [], **look(series)) for series in shown}
-        for series in (series for series in shown if series.half is not None):
-            own, grey = ribbon_looks(series)
-            found["95 % band"] = Patch(**own)
-            if series.quiet is not None:
-                found[QUIET] = Patch(**grey)
-        if chart.band is not None:
-            found[chart.band_label] = Line2D([], [], **BAND_LOOK)
-        if chart.spans:
-            found["contact"] = Patch(**CONTACT_LOOK)
-    for k, name in enumerate(marks):
-        found[f"{name}, chosen"] = Line2D([], [], **dot_look(k))
-    return found if len(found) > 1 else {}
 
 
 class DotPlot(NamedTuple):
@@ -346,7 +330,8 @@ def dot_figure(
     handles: dict[str, Any] = {shortened(n): Line2D([], [], **how) for n, how in looks.items()}
     if any(np.isfinite(plot.floor).any() for plot in plots):
         handles["floor of the reference"] = Line2D([], [], color="black", linewidth=1.2)
-    figure, grid = sheet(width, len(plots), columns, 1.7 if len(plots) == 1 else 1.45, handles)
+    figure, grid = sheet(width, len(plots), columns, 1.7 if len(plots) == 1 else 1.45)
+    add_legend(figure, handles)
     for axes, plot in zip(grid, plots, strict=False):
         draw_dots(axes, plot, looks)
         axes.set_ylabel(label)
