@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from seed_logs import ROWS, headerless_csv, matrix_npy, motion, parquet, table_csv
 
@@ -191,6 +192,17 @@ def test_a_headed_table_that_is_described_wrongly(
 ) -> None:
     with pytest.raises(LogError, match=reported):
         read(table_csv(tmp_path / "x"), columns=columns)
+
+
+def test_columns_of_lists_hold_the_clock_or_are_no_numbered_columns(tmp_path: Path) -> None:
+    """A pair of seconds and nanoseconds may be one list; q_{i} finds no lists."""
+    path = tmp_path / "x.parquet"
+    rows = {"stamp": [[k, 5 * 10**8] for k in range(9)], "q_0": [[0.1 * k, 0.2] for k in range(9)]}
+    pl.DataFrame(rows).write_parquet(path)
+    for clock in ("stamp", "stamp[0]|stamp[1]"):
+        assert read(path, columns=f"t={clock},q=q_0").source.t0_ns == 5 * 10**8
+    with pytest.raises(LogError, match=r"no column 'q_\{i\}'"):
+        read(path, columns="t=stamp,q=q_{i}")
 
 
 def test_every_row_is_kept(tmp_path: Path) -> None:

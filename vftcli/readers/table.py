@@ -123,7 +123,7 @@ def named_cells(table: Table, item: Item) -> Cells:
     )
     found: dict[int, Cell] = {}
     for column, name in enumerate(table.names):
-        if match := template.fullmatch(name):
+        if column not in table.lists and (match := template.fullmatch(name)):
             found.setdefault(int(match[1]), Cell(column))  # of two of one name the first
     if not found:
         raise missing_column(table, item.signal, pattern)

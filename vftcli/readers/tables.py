@@ -255,17 +255,20 @@ def load_signals(
 
 def _stacked(pick: Item, loaded: Block) -> Array:
     """One signal's cells side by side, scaled. (T, n)"""
-    rows = len(loaded[pick.cells[0].column])
-    out = np.empty((rows, len(pick.cells)))
+    out = np.empty((len(loaded[pick.cells[0].column]), len(pick.cells)))
     for j, cell in enumerate(pick.cells):
-        column = loaded[cell.column]
-        out[:, j] = column if cell.element is None else column[:, cell.element]
+        out[:, j] = _numbers(loaded, cell)
         if cell.turned:
             out[:, j] = 0.0 - out[:, j]
     if pick.factor != 1.0:
         out *= pick.factor
         out += 0.0  # a turned zero is plain zero
     return out
+
+
+def _numbers(loaded: Block, cell: Cell) -> Column:
+    column = loaded[cell.column]
+    return column if cell.element is None else column[:, cell.element]
 
 
 def _stamps(
@@ -285,12 +288,11 @@ def _stamps(
             f"{table.path}: --columns turns the sign of the clock; time cannot run back."
         )
     cell, *rest = clock.cells
-    column = loaded[cell.column]
-    stamps: Column = column if cell.element is None else column[:, cell.element]
+    stamps = _numbers(loaded, cell)
     name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
     words = clock_name or f"column {name}" if table.names else name
     if rest:
-        parts = stamps, loaded[rest[0].column]
+        parts = stamps, _numbers(loaded, rest[0])
         whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in parts)
         if not whole or not np.all((parts[1] >= 0) & (parts[1] < 1e9) & (np.abs(stamps) < 9e9)):
             raise LogError(
