@@ -23,21 +23,21 @@ def write(tmp_path):
 
 def test_torques_are_found_by_the_end_of_their_name(write):
     found = read_reference(write("t", "true_tau_ext_1", "true_tau_ext_2", "note"))
-    np.testing.assert_allclose(found.t, [0.0, 0.1, 0.2, 0.3])
-    np.testing.assert_allclose(found.tau[:, 1], found.t + 2)
-    assert found.wrench is None
+    np.testing.assert_allclose(found.stamps, [0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(found.signals["tau_ext"][:, 1], found.stamps + 2)
+    assert "wrench" not in found.signals
 
 
 def test_a_wrench_alone_is_a_reference_too(write):
     found = read_reference(write("t", "fx", "fy", "fz", "mx", "my", "mz"))
-    np.testing.assert_allclose(found.wrench[:, 5], found.t + 6)
-    assert found.tau is None
+    np.testing.assert_allclose(found.signals["wrench"][:, 5], found.stamps + 6)
+    assert "tau_ext" not in found.signals
 
 
 def test_columns_are_scaled_as_described(write):
     found = read_reference(write("ms", "a", "b"), "t[ms]=ms,-tau_ext[mNm]=a|b")
-    np.testing.assert_allclose(found.t, [0.0, 1e-4, 2e-4, 3e-4])
-    np.testing.assert_allclose(found.tau[0], [-1e-3, -2e-3])
+    np.testing.assert_allclose(found.stamps, [0.0, 1e-4, 2e-4, 3e-4])
+    np.testing.assert_allclose(found.signals["tau_ext"][0], [-1e-3, -2e-3])
 
 
 @pytest.mark.parametrize(

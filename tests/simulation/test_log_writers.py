@@ -108,9 +108,8 @@ def test_truth_is_on_the_clock_of_the_log(ur5: Simulation, tmp_path: Path) -> No
     path = tmp_path / "log.csv"
     save({path: ur5})
     truth, log = read_reference(companions(path)[0], None), read(path)
-    assert truth.t[0] == pytest.approx(log.source.t0, abs=1e-12)
-    assert truth.tau is not None
-    np.testing.assert_array_equal(truth.tau, ur5.truth.tau_ext)
+    assert truth.stamps[0] == pytest.approx(log.source.t0, abs=1e-12)
+    np.testing.assert_array_equal(truth.signals["tau_ext"], ur5.truth.tau_ext)
     table = pl.read_parquet(companions(path)[0])
     axes = [f"wrench/{a}" for a in ("fx", "fy", "fz", "mx", "my", "mz")]
     assert table.columns == ["t", *(f"tau_ext/{j}" for j in range(1, 7)), *axes]

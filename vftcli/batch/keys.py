@@ -37,7 +37,7 @@ def content_digest(files: Iterable[Path]) -> str:
 def options_digest(options: Any) -> str:  # noqa: ANN401 - choices of every room
     """The sha256 of options, of the files they name, and of the program's version."""
     named = with_files(options, lambda path: Path(digest_of(path)))
-    return sha256(json.dumps([VERSION, plain(named)], sort_keys=True))
+    return sha256(json.dumps([VERSION, named], sort_keys=True, default=plain))
 
 
 def key_of(content: str, options: str, part: object = None) -> str:
@@ -74,19 +74,13 @@ def with_files(value: Any, change: Callable[[Path], Path]) -> Any:  # noqa: ANN4
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401
-    """Options as JSON, equal in every process: sets in order, classes by name."""
+    """What JSON has no form for, equal in every process: sets in order, classes by name."""
     match value:
-        case None | bool() | int() | float() | str():
-            return value
         case frozenset() | set():
             return sorted(map(str, value))
         case Mapping():
-            return {str(key): plain(item) for key, item in value.items()}
-        case tuple() | list():
-            return [plain(item) for item in value]
+            return dict(value)
         case _ if is_dataclass(value) and not isinstance(value, type):
-            own = {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.compare}
+            own = {f.name: getattr(value, f.name) for f in fields(value) if f.compare}
             return {type(value).__name__: own}
-        case _ if hasattr(value, "tolist"):
-            return plain(value.tolist())
-    return str(value)
+    return value.tolist() if hasattr(value, "tolist") else str(value)

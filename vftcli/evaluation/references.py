@@ -16,7 +16,8 @@ from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.free_motion.two_cycle import two_cycle_reference
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
-from vftcli.readers.references import ReferenceTable, read_reference
+from vftcli.readers.reader import RawLog
+from vftcli.readers.references import read_reference
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
@@ -190,32 +191,32 @@ def file_reference(
     """
     table = read_reference(path, columns)
     # The recording counts from its first sample, a reference file from the log's zero.
-    table = table._replace(t=table.t - recording.source.t0)
+    table = replace(table, stamps=table.stamps - recording.source.t0)
     return table_reference(table, path, recording, robot, mounting)
 
 
 def table_reference(
-    table: ReferenceTable, path: Path, recording: Recording, robot: Robot, mounting: Mounting
+    table: RawLog, path: Path, recording: Recording, robot: Robot, mounting: Mounting
 ) -> ReferenceLoad:
     """What a file's table gives at the log's times, its own counted from the first sample."""
-    t, name = table.t, f"file:{path.name}"
+    t, name = table.stamps, f"file:{path.name}"
     wrench = None
-    if table.wrench is not None:
-        values = on_the_logs_clock(t, table.wrench, recording, path)
+    if (values := table.signals.get("wrench")) is not None:
+        values = on_the_logs_clock(t, values, recording, path)
         frame = table.wrench_frame or WrenchFrame("base", "flange")
         given = replace(recording, wrench=values, wrench_frame=frame)
         # Zero throughout is an answer here: a truth of a log that nobody touched.
         wrench = in_base_axes(given, robot.chain, mounting)
-    if table.tau is None:
+    if (tau := table.signals.get("tau_ext")) is None:
         if wrench is None:
             raise ReferenceTorqueError(f"{path}: it holds neither a torque nor a wrench")
         remark = caution("reference-wrench-file", file=path.name)
         return load_of(wrench, recording, robot, name, remark)
-    if table.tau.shape[1] != recording.joints:
+    if tau.shape[1] != recording.joints:
         raise ReferenceTorqueError(
-            f"{path}: {table.tau.shape[1]} torque columns for a log of {recording.joints} joints"
+            f"{path}: {tau.shape[1]} torque columns for a log of {recording.joints} joints"
         )
-    tau = on_the_logs_clock(t, table.tau, recording, path)
+    tau = on_the_logs_clock(t, tau, recording, path)
     covered = int(np.count_nonzero(np.isfinite(tau[:, 0])))
     remark = caution("reference-file", file=path.name, covered=covered, samples=recording.samples)
     torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=(remark,))

@@ -252,11 +252,8 @@ SINGLE = ("tau", "current", "tau+g")
 
 
 def _is_clock(stamps: Array) -> bool:
-    steps = np.diff(stamps)
-    if not np.all(steps >= 0):
-        return False
-    usual = median_step(stamps)
-    return bool(usual > 0 and np.quantile(steps, 0.95) < EVEN * usual)
+    steps, usual = np.diff(stamps), median_step(stamps)
+    return bool(np.all(steps >= 0) and np.quantile(steps, 0.95) < EVEN * usual)
 
 
 def _blocks(table: Array, joints: int) -> list[Array]:

@@ -30,10 +30,10 @@ def is_comment(line: str) -> bool:
     return line.removeprefix("\ufeff").lstrip().startswith("#")
 
 
-def is_number(text: str, *, decimal_comma: bool = False) -> bool:
+def is_number(text: str) -> bool:
     """Whether a cell holds a number."""
     try:
-        float(text.replace(",", ".") if decimal_comma else text)
+        float(text)
     except ValueError:
         return False
     return "_" not in text
@@ -95,7 +95,7 @@ class TextTable(Table):
 
     def is_number(self, cell: str) -> bool:
         """Whether a cell holds a number as this table writes them."""
-        return is_number(cell, decimal_comma=self.decimal_comma)
+        return is_number(cell.replace(",", ".") if self.decimal_comma else cell)
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Parse some columns; a clock of long whole numbers or dates comes back as integers."""

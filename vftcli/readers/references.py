@@ -4,6 +4,7 @@ They are tables with a clock and one external torque a joint, but no positions.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import count, takewhile
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.readers.aliases import NamedColumns
-from vftcli.readers.cleaning import measured, seconds, without_repeats
+from vftcli.readers.cleaning import kept, measured, seconds, without_repeats
 from vftcli.readers.columns import Cell, Item, parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.opening import open_log, sha256_of
@@ -31,19 +32,9 @@ from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.option import interval_text
-from vftcli.signals.wrench import AXES, WrenchFrame
+from vftcli.signals.wrench import AXES
 
 TORQUE = "tau_ext"
-
-
-class ReferenceTable(NamedTuple):
-    """What a reference file holds."""
-
-    t: Array  #: Its stamps, on the clock of the log it belongs to. (T,) [s]
-    tau: Array | None  #: External torque on the robot, or None. (T, n) [N·m]
-    wrench: Array | None  #: Force then moment on the robot, or None. (T, 6) [N, N·m]
-    #: Frame of the wrench as the columns' description gave it, or None.
-    wrench_frame: WrenchFrame | None
 
 
 def table_at(path: Path) -> Table:
@@ -59,22 +50,21 @@ def program_clock(raw: RawLog, path: Path) -> Array:
     return t
 
 
-def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
-    """Read a reference file: text, compressed text or Parquet."""
+def read_reference(path: Path, columns: str | None = None) -> RawLog:
+    """Read a reference file: text, compressed text or Parquet.
+
+    Its stamps [s] are on the clock of the log it belongs to; its signals are `tau_ext`
+    (T, n) [N·m], `wrench` (T, 6) [N, N·m], or both, on the robot.
+    """
     table = table_at(path)
     picks = _stated(table, columns) if columns else _found(table)
     raw = load_signals(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
-    t = program_clock(raw, path)
+    raw = replace(raw, stamps=program_clock(raw, path), tick=1.0)
     for name, values in raw.signals.items():
         if not np.all(np.isfinite(values)):
             row, column = np.argwhere(~np.isfinite(values))[0]
             raise LogError(f"{path}: {name} {column + 1} is not a number in row {row + 1}.")
-    return ReferenceTable(
-        t=t,
-        tau=raw.signals.get(TORQUE),
-        wrench=raw.signals.get("wrench"),
-        wrench_frame=raw.wrench_frame,
-    )
+    return raw
 
 
 def _stated(table: Table, columns: str) -> Picks:
@@ -231,16 +221,15 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     inside = (t >= start) & (t <= stop)
     if np.count_nonzero(inside) < 2:
         raise ClockError(f"{path}: fewer than two samples in {interval_text(start, stop)} [s]")
-    jacobian = velocity_first(raw.signals["jacobian"].reshape(-1, 6, n), path)
-    wrench = raw.signals.get("wrench")
+    signals = kept(raw, inside).signals
     return JacobianLog(
         name=name,
         path=path,
         sha256=sha256_of(path),
         t=t[inside],
-        tau_ext=raw.signals["tau_ext"][inside],
-        jacobian=jacobian[inside],
-        wrench=None if wrench is None else wrench[inside],
+        tau_ext=signals[TORQUE],
+        jacobian=velocity_first(signals["jacobian"].reshape(-1, 6, n), path),
+        wrench=signals.get("wrench"),
         remarks=raw.remarks,
     )
 

@@ -116,7 +116,7 @@ def truth_of(task: ScoreTask, recording: Recording, robot: Robot) -> KnownTruth:
             return KnownTruth(np.zeros(recording.q.shape), None, [])
         return KnownTruth(None, None, listed)
     table = read_reference(task.truth, log.truth_columns or None)
-    table = table._replace(t=since_start(table.t, recording))
+    table = replace(table, stamps=since_start(table.stamps, recording))
     load = table_reference(table, task.truth, recording, robot, NOTHING)
     tau, wrench = load.torque.tau, None if load.wrench is None else load.wrench.values
     if listed is None and wrench is not None:
@@ -181,8 +181,8 @@ def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator
     yield Answer(ExternalTorque(name="zero", t=t, tau=np.zeros(recording.q.shape)), nothing)
     if task.log.vendor:
         table = read_reference(task.file, task.log.vendor)
-        assert table.tau is not None, "the vendor's columns are torques"
-        tau = on_the_logs_clock(since_start(table.t, recording), table.tau, recording, task.file)
+        t_file, tau = since_start(table.stamps, recording), table.signals["tau_ext"]
+        tau = on_the_logs_clock(t_file, tau, recording, task.file)
         yield Answer(ExternalTorque(name="vendor", t=t, tau=tau))
     lists: dict[str, Sequence[ListedRow]] = {}
     if made.contacts is not None:
