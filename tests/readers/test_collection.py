@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.readers.library import LogCollection, LogEntry
-from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reader import ALL, ReadChoice
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 CIRCLE = FIXTURES / "ur5_circle.csv"
@@ -99,3 +99,8 @@ def test_an_episode_of_a_data_set_is_a_log(
 def test_one_episode_may_be_chosen(samples: Path) -> None:
     entries = found(samples / "lerobot_v3_effort", choice=ReadChoice(episode=1))
     assert [entry.episode for entry in entries] == [1]
+
+
+def test_all_episodes_are_each_a_log_beside_what_describes_them(folder: Path) -> None:
+    (folder / "about.json").write_text('{"who": "me"}')
+    assert names(found(folder, choice=ReadChoice(episode=ALL))) == ["b.csv", "b.csv", "empty.csv"]

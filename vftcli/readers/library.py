@@ -118,8 +118,8 @@ class LogCollection:
     """
 
     def __init__(self, choice: ReadChoice, leave: Path | None = None) -> None:
-        self._choice = choice
-        self._episode = None if choice.episode == ALL else choice.episode
+        # Each episode is a log of its own unless one is chosen.
+        self._choice = replace(choice, episode=None) if choice.episode == ALL else choice
         self._leave = leave and absolute(leave)
         self._searched: set[Path] = set()
         self.passed: list[Path] = []
@@ -137,11 +137,11 @@ class LogCollection:
         try:
             yield from self._episodes(path, reading.recognise(path, self._choice))
         except (LogError, OSError):
-            yield LogEntry(path, self._episode, (path,))
+            yield LogEntry(path, self._choice.episode, (path,))
 
     def _episodes(self, path: Path, reader: LogFormat) -> Iterator[LogEntry]:
         """An entry an episode; one alone where there is one, or one is chosen."""
-        chosen, files = self._episode, tuple(files_of(path))
+        chosen, files = self._choice.episode, tuple(files_of(path))
         if reader.name == "lerobot":
             from vftcli.readers import lerobot
 
