@@ -10,7 +10,7 @@ from sphinx.application import Sphinx
 
 from vftcli.cli import help as topics
 from vftcli.doctor.examination import REFUSING
-from vftcli.readers import FORMATS
+from vftcli.readers.reading import FORMATS
 from vftcli.signals.version import VERSION
 
 DOCS = Path(__file__).parent

@@ -207,7 +207,7 @@ def test_every_observer_and_robot_is_documented() -> None:
 def test_the_site_has_a_row_of_every_finding_and_format() -> None:
     """Its tables are made of the catalogues; docs/formats.md names every format."""
     pytest.importorskip("sphinx", reason="no site is built: the extra docs is not installed")
-    from vftcli.readers import FORMATS
+    from vftcli.readers.reading import FORMATS
 
     site = runpy.run_path(str(ROOT / "docs" / "conf.py"))
     findings, formats = site["findings"](), site["formats"]()

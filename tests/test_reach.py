@@ -14,9 +14,9 @@ import pytest
 
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
-from vftcli.readers import read
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms

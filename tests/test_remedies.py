@@ -34,7 +34,7 @@ from planted_faults import (
 )
 from planted_spans import picked_up
 
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import PROFILES
 from vftcli.signals.remarks import WORDS
 from vftcli.signals.remarks import words as words_of

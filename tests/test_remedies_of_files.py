@@ -52,7 +52,7 @@ from seed_logs import ur_binary
 from test_remedies import Command, dropped, free_log, printed, typed
 
 import vftcli
-from vftcli.readers import FORMATS
+from vftcli.readers.reading import FORMATS
 
 PACKAGE = Path(vftcli.__file__).parent
 ROOMS = ("cli", "readers", "robots", "signals", "batch", "doctor")

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
         thresholds,
     )
     from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
-    from vftcli.readers import read
-    from vftcli.readers.reading import assemble
+    from vftcli.readers.reading import assemble, read
     from vftcli.robots import Payload, Robot, load_robot
     from vftcli.robots.chain import flange_jacobian, link_poses
     from vftcli.robots.run import Run
@@ -53,7 +52,6 @@ else:
         "signals.recording",
         "signals.external_torque",
         "robots",
-        "readers",
         "readers.reading",
         "robots.run",
         "robots.chain",

@@ -19,8 +19,8 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import Outcome
 from vftcli.batch.datasets.copying import partial_of
 from vftcli.observers.choice import ObserverChoice
-from vftcli.readers import recognise
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import recognise
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError, VftError
 from vftcli.signals.progress import heard_by

@@ -93,7 +93,7 @@ def test_a_row_that_repeats_a_sample_has_its_value_and_one_that_is_none_has_none
 
 def test_the_samples_of_rows_come_from_the_reader(tmp_path: Path) -> None:
     """Rows 2 and 5 of 8 hold no number, row 7 repeats the stamp of row 6 (from 0)."""
-    from vftcli.readers import read, read_chosen
+    from vftcli.readers.reading import read, read_chosen
 
     q = np.linspace(0, 0.1, 8)
     t = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.6]

@@ -29,7 +29,7 @@ from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.observers.tuning import tune_to_spectra
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.reproduction.timing import (
     FREE_SECONDS,
     SAMPLES,

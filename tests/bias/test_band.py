@@ -13,7 +13,7 @@ from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers import MomentumObserver
 from vftcli.observers.tuning import tune_to_spectra
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 

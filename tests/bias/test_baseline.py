@@ -10,7 +10,7 @@ from vftcli.bias.baseline import Baseline, baseline_of, free_reading
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.observers import MomentumObserver
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording

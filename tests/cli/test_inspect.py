@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import app
-from vftcli.readers import FORMATS
+from vftcli.readers.reading import FORMATS
 from vftcli.signals.errors import VftError
 
 KEYS = {"format", "joints", "samples", "duration_s", "rate_hz", "max_gap_s", "duplicates",

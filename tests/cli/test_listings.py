@@ -9,7 +9,7 @@ import typer
 from vftcli.cli import COMMANDS, make_app
 from vftcli.cli.help import topics
 from vftcli.observers.table import OBSERVERS
-from vftcli.readers import FORMATS
+from vftcli.readers.reading import FORMATS
 from vftcli.robots import PROFILES
 
 Run = Callable[..., tuple[int, str, str]]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vftcli.cli import main
-from vftcli.readers import read
+from vftcli.readers.reading import read
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 SAID = "ur5.arrow episode 0: episode 0 of 2: --episode K|all"

@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from vftcli.cli.convert import simulate_log
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.signals.errors import VftError
 
 app = typer.Typer()

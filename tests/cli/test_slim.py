@@ -55,7 +55,7 @@ def test_a_report_holds_all_but_the_recording(folder: Path) -> None:
 
 
 def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> None:
-    from vftcli.readers import read
+    from vftcli.readers.reading import read
 
     made, logged = read(folder / "log.parquet"), read(FIXTURE)
     for name in logged.signals:

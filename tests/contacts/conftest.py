@@ -7,7 +7,7 @@ from contact_logs import FIXTURES, motion
 
 from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.listing import list_contacts
-from vftcli.readers import read
+from vftcli.readers.reading import read
 
 Lister = Callable[..., ContactList]
 

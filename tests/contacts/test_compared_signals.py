@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.contacts.threshold_check import compared_signals
 from vftcli.observers.paper import MomentumObserver
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import RobotError

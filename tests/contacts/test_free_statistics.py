@@ -23,7 +23,7 @@ from vftcli.contacts.free_statistics import (
 )
 from vftcli.contacts.windows import START
 from vftcli.free_motion.free_motion import FreeLoad
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run, RunSamples

@@ -14,7 +14,7 @@ from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.listing import adjoining, list_contacts
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run

@@ -18,7 +18,7 @@ from vftcli.contacts.rows import (
     vendor_force,
 )
 from vftcli.contacts.windows import PointFit
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run

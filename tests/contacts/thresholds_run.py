@@ -20,7 +20,7 @@ import numpy as np
 
 from vftcli.contacts.threshold_check import CountedAlarms, compared_signals, counted_alarms
 from vftcli.contacts.thresholds import BLOCK, SETTLING, ComparedSignals, find_thresholds
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording

@@ -32,7 +32,7 @@ from planted_faults import (
 )
 
 from vftcli.doctor import examine
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.signals.errors import VftError
 from vftcli.signals.remarks import Remark, fact
 

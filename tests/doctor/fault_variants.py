@@ -24,7 +24,7 @@ from planted_faults import READER, Fault, Table, fits_log, simulated
 from sound_logs import LOGS, SoundLog, recording_of
 
 from vftcli.observers import MomentumObserver
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import VftError

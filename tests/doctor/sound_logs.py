@@ -21,7 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor import Examiner, examine
-from vftcli.readers import ReadChoice, read_first_recording
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read_first_recording
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import paired
 from vftcli.signals.arrays import Array

@@ -12,7 +12,8 @@ from sound_logs import LOGS, recording_of, robot_of
 from vftcli.doctor import Examiner, examine
 from vftcli.doctor.fit import profiles
 from vftcli.notebook import contacts
-from vftcli.readers import ReadChoice, read
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import Examination, FindingWords, examine, finding_record, in_words
-from vftcli.readers import ReadChoice, read, read_first_recording
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read, read_first_recording
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array

@@ -19,7 +19,7 @@ from planted_faults import FAULTS, HARMLESS, READER, Table, robot_named
 
 from vftcli.doctor import examine, in_words
 from vftcli.doctor.examination import NO_FIT, REFUSING
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.signals.remarks import Remark
 
 LOGS = ("ur10e", "ur5", "panda")

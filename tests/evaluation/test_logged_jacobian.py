@@ -7,8 +7,8 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation.wrenches import JacobianJudgement, judge_jacobian
-from vftcli.readers import read
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read
 from vftcli.readers.references import JacobianLog, jacobian_log
 from vftcli.readers.table import JacobianError
 from vftcli.robots import load_robot

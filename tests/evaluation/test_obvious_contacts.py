@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli import readers
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.references import make_reference, touched_remarks, touches
 from vftcli.free_motion.free_motion import FreeMotion
+from vftcli.readers import reading
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.remarks import sentence
 
 ROOT = Path(__file__).parent.parent.parent
-FIXTURE = readers.read(ROOT / "fixtures" / "ur5_circle.csv")
+FIXTURE = reading.read(ROOT / "fixtures" / "ur5_circle.csv")
 UR5 = load_robot("ur5")
 REAL = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
@@ -66,7 +66,7 @@ def test_two_planted_torques_are_where_they_were_planted() -> None:
 def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -> None:
     """That nobody touched this UR10 is its authors' word; 7 N·m of J6's friction are open."""
     path = logs / "salerno_ur10" / "ur10_exciting.db3"
-    recording = readers.read(path, columns="tau=effort")
+    recording = reading.read(path, columns="tau=effort")
     log = Run(recording=recording, robot=load_robot("ur10"))
     made = make_reference(FreeMotion(log=log), ReferenceChoice(name="zero"))
     assert not made.torque.tau.any()
@@ -99,7 +99,7 @@ def test_a_log_without_a_quiet_level_is_not_judged() -> None:
 def test_hands_are_found_in_real_logs_and_in_those_alone(
     name: str, columns: str, touched: bool, logs: Path
 ) -> None:
-    recording = readers.read(logs / name, columns=columns)
+    recording = reading.read(logs / name, columns=columns)
     found = touches(Run(recording=recording, robot=load_robot("ur10e")))
     assert bool(found) == touched
     assert np.all([touch.torque > touch.quiet for touch in found])

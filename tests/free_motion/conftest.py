@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import SERIES, Run
 from vftcli.signals.arrays import Array

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.free_motion.alignment import align, uniform
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 

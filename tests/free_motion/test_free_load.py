@@ -10,7 +10,7 @@ from vftcli.bias.baseline import Baseline, baseline_of, free_reading
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, columns, free_load, weigh
 from vftcli.observers.tuning import tune_to_spectra
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.kernels import load_regressor

@@ -10,7 +10,7 @@ import pytest
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.free_motion.two_cycle import partners_in_log, partners_in_logs
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError

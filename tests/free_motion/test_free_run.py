@@ -9,7 +9,7 @@ import pytest
 
 from vftcli.free_motion import free_motion as room
 from vftcli.free_motion.free_motion import FreeRun
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError

@@ -11,7 +11,7 @@ import pytest
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.difference import RUNGS
 from vftcli.free_motion.two_cycle import friction_change, two_cycle_difference
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array

@@ -37,7 +37,7 @@ def long_seeds(folder: Path) -> Iterator[Seed]:
     """A log of a UR5 and of a Panda, and a dataset of three episodes."""
     from fault_variants import table_from, thinned
 
-    from vftcli.readers import read
+    from vftcli.readers.reading import read
 
     for robot, name in LOGS.items():
         table = thinned(table_from(read(FIXTURES / name), robot), RATE).between(0.0, SECONDS)

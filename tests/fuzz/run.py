@@ -147,7 +147,7 @@ def keep_what_is_parsed(seeds: list[Seed]) -> None:
 
     One robot of each number of joints stays: inspect fits all there are, most of an input's time.
     """
-    from vftcli.readers import read
+    from vftcli.readers.reading import read
     from vftcli.robots import PROFILES, profile
     from vftcli.signals import remarks
 

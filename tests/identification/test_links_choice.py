@@ -10,7 +10,7 @@ from vftcli.identification import Task, identify
 from vftcli.identification.methods import chosen_method
 from vftcli.identification.training import prepare_training
 from vftcli.observers import MomentumObserver
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.robots.terms import dynamics_terms

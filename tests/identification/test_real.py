@@ -11,7 +11,7 @@ from vftcli.identification import Task, identify
 from vftcli.identification.fitting import REPEATED, repeated_share
 from vftcli.identification.training import prepare
 from vftcli.observers import MomentumObserver
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording

@@ -9,7 +9,7 @@ import pytest
 from vftcli.observers import FilteredDynamicsObserver, MomentumObserver
 from vftcli.observers.observer import Observer
 from vftcli.observers.table import Setup, build_observers
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.errors import ParameterError

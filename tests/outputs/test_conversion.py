@@ -14,7 +14,7 @@ from vftcli.outputs import conversion
 from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.conversion import WRITERS, convert, ros_name, stamps_of, write_mcap
 from vftcli.outputs.run_record import jsonable
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording, Source

@@ -16,7 +16,7 @@ from vftcli.outputs.believability import (
     subject_of,
 )
 from vftcli.outputs.examination import command
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.signals.remarks import warning, words
 
 

@@ -44,7 +44,7 @@ def read_apart(paths: Iterable[Path]) -> dict[str, Reading]:
 
 def outcome(path: str) -> tuple[int, str, list[str]]:
     """Samples, words and codes of the remarks of a file that is read or refused in this process."""
-    from vftcli.readers import read
+    from vftcli.readers.reading import read
     from vftcli.signals.errors import VftError
 
     try:

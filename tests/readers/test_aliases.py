@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers import read
 from vftcli.readers.aliases import UR_NAMES
+from vftcli.readers.reading import read
 from vftcli.signals.errors import ClockError, LogError
 
 ROWS = 30

@@ -20,8 +20,8 @@ from seed_logs import (
     rosbag2,
 )
 
-from vftcli.readers import read
 from vftcli.readers.bags.container import ReadBudget, unpacked
+from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import Recording
 

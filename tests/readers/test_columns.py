@@ -7,8 +7,8 @@ import polars as pl
 import pytest
 from seed_logs import ROWS, headerless_csv, matrix_npy, motion, parquet, table_csv
 
-from vftcli.readers import read, read_first_recording
 from vftcli.readers.columns import parse_columns
+from vftcli.readers.reading import read, read_first_recording
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.wrench import WrenchFrame
 

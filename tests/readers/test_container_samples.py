@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import examine
-from vftcli.readers import ReadChoice, read, read_first_recording
 from vftcli.readers.library import Library
-from vftcli.readers.reader import ALL
+from vftcli.readers.reader import ALL, ReadChoice
+from vftcli.readers.reading import read, read_first_recording
 from vftcli.robots import load_robot
 
 

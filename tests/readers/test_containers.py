@@ -14,12 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from seed_logs import ROWS, motion
 
-from vftcli.readers import ReadChoice, read, read_first_recording, recognise
 from vftcli.readers.hdf5 import numbers_of
 from vftcli.readers.opening import natural, open_log
 from vftcli.readers.parquet import ArrowTable, claims
-from vftcli.readers.reader import ALL
-from vftcli.readers.reading import episode_numbers
+from vftcli.readers.reader import ALL, ReadChoice
+from vftcli.readers.reading import episode_numbers, read, read_first_recording, recognise
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 
 FORMATS = {

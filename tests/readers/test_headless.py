@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers import read
 from vftcli.readers.columns import Guess, guess_columns
+from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError
 
 T31 = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"

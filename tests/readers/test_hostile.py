@@ -34,8 +34,8 @@ from hostile_logs import (
 from reading_child import read_apart
 from seed_logs import ROWS, bare_db3, bare_mcap, motion, rosbag1, ur_csv
 
-from vftcli.readers import read
 from vftcli.readers.bags import container
+from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError, VftError
 
 

@@ -12,8 +12,8 @@ import polars as pl
 import pytest
 from seed_logs import bare_db3, bare_mcap
 
-from vftcli.readers import read_chosen
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read_chosen
 from vftcli.signals.errors import ClockError, LogError, VftError
 from vftcli.signals.recording import Recording
 

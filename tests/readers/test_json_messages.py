@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.readers import read
 from vftcli.readers.aliases import UR_NAMES
+from vftcli.readers.reading import read
 
 ROWS, START = 25, 1_750_000_000_000_000_001
 ALPHABETICAL = sorted(UR_NAMES)

@@ -6,8 +6,9 @@ import hashlib
 import pytest
 import zstandard
 
-from vftcli.readers import FORMATS, opening, read
+from vftcli.readers import opening
 from vftcli.readers.opening import HEAD_BYTES, open_log, sha256_of
+from vftcli.readers.reading import FORMATS, read
 from vftcli.signals.errors import LogError
 
 CONTENT = bytes(range(256)) * 1000

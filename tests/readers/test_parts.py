@@ -7,8 +7,8 @@ import seed_logs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.readers import read
 from vftcli.readers.reader import ALL, ReadChoice, arm_of, episode_of
+from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError, ParameterError
 
 PATH = Path("log")

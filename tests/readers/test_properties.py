@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vftcli.readers import read
 from vftcli.readers.columns import parse_columns
+from vftcli.readers.reading import read
 from vftcli.signals.errors import VftError
 from vftcli.signals.parsing import HIDDEN, printable
 

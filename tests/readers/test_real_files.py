@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.signals.errors import VftError
 
 TABLE_31 = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"

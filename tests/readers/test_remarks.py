@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import vftcli.readers
-from vftcli.readers import read
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.reader import RawLog
+from vftcli.readers.reading import read
 from vftcli.signals.remarks import WORDS
 
 MADE = re.compile(r"(?:fact|caution|warning)\(\s*\"([a-z-]+)\"")

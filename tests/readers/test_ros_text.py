@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers import read, recognise
 from vftcli.readers.aliases import UR_NAMES
+from vftcli.readers.reading import read, recognise
 from vftcli.signals.errors import LogError
 
 START = 1_750_000_000_123_456_789

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from seed_logs import ROWS, motion, table_csv, ur_csv
 
-from vftcli.readers import FORMATS, read, recognise
+from vftcli.readers.reading import FORMATS, read, recognise
 from vftcli.signals.errors import ClockError, LogError, UnknownFormatError
 
 
@@ -325,7 +325,7 @@ def test_every_format_is_described() -> None:
 
 def test_a_text_loads_no_reader_of_another_container(tmp_path: Path) -> None:
     script = (
-        "import sys; from vftcli.readers import read; read(sys.argv[1]); "
+        "import sys; from vftcli.readers.reading import read; read(sys.argv[1]); "
         "heavy = 'h5py', 'mcap', 'pyarrow', 'rosbags', 'scipy'; "
         "ours = (f'vftcli.readers.{name}' for name in "
         "('arrays', 'bags', 'hdf5', 'lerobot', 'objects', 'parquet')); "

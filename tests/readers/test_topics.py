@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError
 from vftcli.signals.wrench import WrenchFrame
 

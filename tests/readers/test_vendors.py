@@ -25,7 +25,7 @@ from seed_logs import (
     ur_csv,
 )
 
-from vftcli.readers import FORMATS, LogFormat, read
+from vftcli.readers.reading import FORMATS, LogFormat, read
 from vftcli.signals.errors import LogError
 from vftcli.signals.wrench import WrenchFrame
 

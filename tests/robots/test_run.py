@@ -8,9 +8,9 @@ import pytest
 from made_urdfs import arm, link, robot, written
 
 from vftcli.doctor.examination import Examiner
-from vftcli.readers import read
 from vftcli.readers.aliases import UR_NAMES, UR_WORDS
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import SERIES, Run, Runs, paired, places, unwound
 from vftcli.signals.errors import RobotError

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers import ReadChoice
+from vftcli.readers.reader import ReadChoice
 from vftcli.signals.recording import Recording
 from vftcli.signals.repairs import is_fast, with_velocity, without_isolated
 

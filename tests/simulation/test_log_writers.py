@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from vftcli.outputs.conversion import companions, save
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.readers.references import read_reference
 from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError, ParameterError

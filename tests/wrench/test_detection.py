@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.observers import MomentumObserver
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.errors import ParameterError

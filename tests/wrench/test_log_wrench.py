@@ -11,7 +11,7 @@ from rosbags.highlevel import AnyReader
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.references import make_reference
 from vftcli.free_motion.free_motion import FreeMotion
-from vftcli.readers import read
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.run import Run

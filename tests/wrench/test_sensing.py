@@ -9,8 +9,8 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
-from vftcli.readers import read
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice

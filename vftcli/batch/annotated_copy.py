@@ -35,8 +35,8 @@ from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of
 from vftcli.outputs.files import digest, put_text
 from vftcli.outputs.run_record import envelope, to_json
-from vftcli.readers import FORMATS
 from vftcli.readers.opening import open_log
+from vftcli.readers.reading import FORMATS
 from vftcli.signals.errors import LogError
 from vftcli.signals.progress import stage
 

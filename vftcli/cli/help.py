@@ -240,7 +240,7 @@ def observers() -> Iterator[str]:
 
 def formats(name: str | None) -> Iterator[str]:
     """The log formats, or how to record one."""
-    from vftcli.readers import FORMATS
+    from vftcli.readers.reading import FORMATS
 
     if name is None:
         yield from two_columns([(form.name, form.title) for form in FORMATS.values()])

@@ -42,7 +42,7 @@ def inspect_log(
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.outputs.files import check_file
     from vftcli.outputs.run_record import log_entry
-    from vftcli.readers import read_first_recording
+    from vftcli.readers.reading import read_first_recording
 
     if output is not None:
         check_file(output, force)
