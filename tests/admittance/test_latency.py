@@ -1,6 +1,5 @@
 """Latencies of a loop whose times are made up, so that they are known."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ def loop(**changed: Any) -> ClosedLoop:
         zero=np.zeros(6),
         simulation=None,
     )
-    return replace(run, **changed)
+    return run._replace(**changed)
 
 
 def test_a_push_is_seen_followed_and_withdrawn() -> None:

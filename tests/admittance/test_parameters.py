@@ -39,7 +39,7 @@ def test_table_iii_and_iv() -> None:
 
 
 def test_assignments_reach_their_axes() -> None:
-    p = read("ur5", "position.K=9", "z.threshold=15", "xi=1", "rotation.m=0.1,0.2,0.3")
+    p = read("ur5", "position.stiffness=9", "z.threshold=15", "xi=1", "rotation.mass=0.1,0.2,0.3")
     np.testing.assert_array_equal(p.stiffness, [9, 9, 9, 0.5, 0.5, 0.5])
     np.testing.assert_array_equal(p.threshold, [20, 20, 15, 6, 6, 6])
     np.testing.assert_array_equal(p.mass, [3, 3, 3, 0.1, 0.2, 0.3])

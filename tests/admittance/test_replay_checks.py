@@ -8,7 +8,7 @@ import pytest
 from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import Admittance, controllers, from_table
 from vftcli.admittance.motion import AxisMotion, Drag, Phases
-from vftcli.admittance.replay import Lyapunov, Replay, drag_remarks, replay, trouble
+from vftcli.admittance.replay import Replay, drag_remarks, replay, trouble
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import Wrench
@@ -31,20 +31,15 @@ def path(reached: np.ndarray | None = None, speed: float = 0.5) -> JointPath:
     return JointPath(q=np.zeros((ROWS, 2, 6)), reached=good, speed=np.array([speed, np.nan]))
 
 
-NONE = np.zeros(2, dtype=np.int64)
-
-
 def replayed(
     made: AxisMotion | None = None,
     way: JointPath | None = None,
     *,
-    rises: np.ndarray = NONE,
     parameters: Admittance = PARAMETERS,
     **others: np.ndarray,
 ) -> Replay:
     """A replay without trouble, but for what is given."""
     zero = np.zeros((ROWS - 1, 6))
-    energies = np.zeros((ROWS, 2, 6))
     given = {"start": zero[0], "wrench": zero, "drags": (), **others}
     found = Replay(
         robot=load_robot("ur5"),
@@ -53,8 +48,7 @@ def replayed(
         motion=made or motion(),
         **given,
     )
-    lyapunov = Lyapunov(corrected=energies, printed=energies, rises=rises)
-    vars(found).update(path=way or path(), lyapunov=lyapunov)
+    vars(found).update(path=way or path())
     return found
 
 
@@ -72,8 +66,7 @@ def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
     x[20:, 1, 0] = np.inf
     clipped[3:6, 0, 2] = clipped[5, 0, 3] = True
     reached[30:40, 1] = False
-    rises = np.array([0, 7])
-    found = [*trouble(replayed(motion(x, clipped), path(reached, 1.5), rises=rises))]
+    found = [*trouble(replayed(motion(x, clipped), path(reached, 1.5)))]
     assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
     reported = {(r.code, r.where.about): dict(r.values) for r in found}
     first, second = (controller.name for controller in TWO)
@@ -83,7 +76,6 @@ def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
         ("joint-too-fast", first): {"share": 1.5},
         ("motion-escaped", second): {"time_s": pytest.approx(2.0)},
         ("poses-out-of-reach", second): {"lost": 10, "poses": ROWS, "first_s": pytest.approx(3.0)},
-        ("energy-rises", second): {"steps": 7},
     }
 
 

@@ -118,7 +118,7 @@ def ranked(monkeypatch: pytest.MonkeyPatch, **fits: RobotMatch) -> list[tuple[st
     """The ranking of profiles whose fits are as given."""
 
     def given(_log: Recording, robot: Robot) -> RobotMatch:
-        return replace(fits[robot.name], robot=robot.name)
+        return fits[robot.name]._replace(robot=robot.name)
 
     monkeypatch.setattr(doctor_fit, "match_of", given)
     found = ranking(held(), [replace(PANDA, name=name) for name in fits])
@@ -156,9 +156,9 @@ def test_how_much_better_another_profile_is_where_a_log_is_its_own(
 ) -> None:
     healed = SimpleNamespace(misfit=0.2)
     diagnosis = SimpleNamespace(cause=cause and SimpleNamespace(code=cause), healed=healed)
-    own, other = replace(fake(0.3), load=more), fake(0.2 * share)
+    own, other = fake(0.3)._replace(load=more), fake(0.2 * share)
     assert doctor_fit.is_rather(other, own, diagnosis) is rather  # type: ignore[arg-type]
-    misfit = replace(other, fits=False)
+    misfit = other._replace(fits=False)
     assert not doctor_fit.is_rather(misfit, own, diagnosis)  # type: ignore[arg-type]
 
 

@@ -152,14 +152,14 @@ def test_the_worst_explained_heavy_joint_is_named(data):
     tau = log.tau
     most = 0.8 * np.var(tau[:, 1]) / np.mean(tau[:, 1] ** 2)
     residuals = [0.9, most, 0.01, 0.9, 0.9, 0.9]
-    fits = [
-        SimpleNamespace(fit=SimpleNamespace(residual=np.sqrt(share) * tau[:, j]))
+    fits = {
+        j: SimpleNamespace(fit=SimpleNamespace(residual=np.sqrt(share) * tau[:, j]))
         for j, share in enumerate(residuals)
-    ]
+    }
     (remark,) = model_doubts(data, fits)
     assert (remark.code, remark.where.joints) == ("unexplained-torque", (2,))
     assert remark.values["share_percent"] == pytest.approx(20.0, rel=1e-9)
-    assert not list(model_doubts(replace(data, moves=np.zeros(6, dtype=bool)), fits))
+    assert not list(model_doubts(data._replace(moves=np.zeros(6, dtype=bool)), fits))
 
 
 def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
@@ -170,7 +170,7 @@ def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
         extra = torque_regressor(UR5.chain, q, dq, ddq) @ (heavier - chain_parameters(UR5.chain))
         log = replace(recording, current=recording.current + extra / UR5.torque_constant)
         data = prepare_training([log], UR5)
-        remarks = list(model_doubts(data, [None] * 6))
+        remarks = list(model_doubts(data, {}))
         assert [r.code for r in remarks] == ["unknown-load"] * doubted
         if doubted:
             assert remarks[0].values["mass_kg"] == pytest.approx(mass, rel=0.02)

@@ -1,6 +1,5 @@
 """Where the numbers of an identified robot come from, as its file says."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +104,7 @@ def test_residuals_are_one_table_a_log_even_of_one_name(prepared):
     t, left = np.arange(0, 1, 0.01), np.tile([1.123456, 1.246912], (100, 1))
     roles = enumerate(("train", "held-out"))
     traces = [Trace(prepared(t, tau=left), role, left + k, 0 * left, left[0]) for k, role in roles]
-    scored = replace(found(), traces=tuple(traces))
+    scored = found()._replace(traces=tuple(traces))
     robot = with_provenance(scored, "", [log("a.csv")], [log("a.csv")], None)
     assert robot.document["identification"]["residuals"] == [
         {"log": "recording", "role": "train", "rms_Nm": [1.1235, 1.2469]},

@@ -17,7 +17,6 @@ from vftcli.identification.targets import (
     constant_in_motion,
     controller_friction,
     controller_models,
-    gravity_remarks,
     refuse_guided,
     resolution,
     rotor_inertia,
@@ -55,27 +54,15 @@ def test_the_drive_constant_comes_from_currents_that_follow_moments(targets):
 
 
 def test_rotor_and_gravity_come_from_moments_beyond_the_rigid_body(targets):
-    rotor, gravity = rotor_inertia(0, targets)
+    rotor = rotor_inertia(0, targets)
     assert rotor.value == pytest.approx(J, rel=1e-6)
-    assert gravity.value == pytest.approx(GRAVITY, abs=1e-6)
     assert rotor.known
-    assert gravity.known
-
-
-def test_gravity_that_hardly_changes_tells_no_scale(targets):
-    """20 µN·m beside 1.5 N·m that stay, as at a wrist that keeps level; noise of 10 mN·m."""
-    level = -1.5 + 1e-6 * targets.gravity
-    noise = 0.01 * np.random.default_rng(5).standard_normal(level.shape)
-    _, gravity = rotor_inertia(0, targets._replace(gravity=level, moment=targets.moment + noise))
-    assert not gravity.known
 
 
 def test_a_shift_in_time_is_no_inertia(targets):
     late = targets._replace(moment=targets.moment + 0.002 * targets.lead)
-    rotor, gravity = rotor_inertia(0, late)
     # the derivative's column takes it up to second order, numerical differences to 1e-3
-    assert rotor.value == pytest.approx(J, rel=2e-3)
-    assert gravity.value == pytest.approx(GRAVITY, abs=2e-4)
+    assert rotor_inertia(0, late).value == pytest.approx(J, rel=2e-3)
 
 
 def test_friction_is_read_as_the_points_of_the_controllers_line(targets):
@@ -129,7 +116,7 @@ def slowed(targets, fastest):
 
 def test_a_joint_that_does_not_accelerate_tells_no_rotor(targets):
     still = targets._replace(ddq=0.0 * targets.ddq)
-    assert [e.known for e in rotor_inertia(0, still)] == [False, False]
+    assert not rotor_inertia(0, still).known
 
 
 def resting(prepared, moments, step=1e-3, wobble=0.0):
@@ -170,10 +157,10 @@ def test_a_robot_without_constants_has_no_targets():
         list(controller_models([], load_robot("panda")))
 
 
-def model(constant=KNOWN, rotor=KNOWN, friction=True, gravity=UNKNOWN):
+def model(constant=KNOWN, rotor=KNOWN, friction=True):
     """What a controller believes of a joint."""
     found = (WRITTEN[0], np.array([1.0, 2.0]), np.full(2, 0.1)) if friction else None
-    return ControllerModel(constant, rotor, found, gravity)
+    return ControllerModel(constant, rotor, found)
 
 
 @pytest.mark.parametrize(
@@ -209,13 +196,3 @@ def test_numbers_stand_beside_the_profiles(rubbing_data, monkeypatch):
     np.testing.assert_array_equal(found.robot.chain.rotor_inertia, KNOWN.value)
     assert found.robot.friction[2] == arm.friction[2]
     assert found.robot.friction[1].model == "coulomb-logarithmic"
-
-
-def test_gravity_is_averaged_by_its_spread_and_said_where_it_differs():
-    models = [model(gravity=Estimate(1.002, 1e-4, True)), model(gravity=Estimate(1.0, 2e-4, True))]
-    (remark,) = gravity_remarks([*models, model()])
-    assert remark.values["ratio"] == pytest.approx((4 * 1.002 + 1 * 1.0) / 5)
-    assert not list(gravity_remarks([model(gravity=Estimate(1.0002, 1e-4, True))]))
-    assert not list(gravity_remarks([model()]))
-    # 0.9995 ± .0007: no difference
-    assert not list(gravity_remarks([model(gravity=Estimate(0.9995, 7e-4, True))]))

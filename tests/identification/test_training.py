@@ -83,13 +83,13 @@ def test_the_equation_of_a_joint_is_torque_less_rigid_body(data):
     asked = data_of_joint(data, 1, constant=True)
     np.testing.assert_array_equal(asked.y, log.tau[:, 1])
     np.testing.assert_array_equal(asked.fixed[:, 1], log.rigid[:, 1])
-    behind_gear = replace(data, robot=replace(UR5, torque_source="link_torque"))
+    behind_gear = data._replace(robot=replace(UR5, torque_source="link_torque"))
     assert data_of_joint(behind_gear, 1, constant=False).fixed.shape[1] == 0
 
 
 def test_friction_and_rotor_of_every_joint_are_found(data):
     fits = fit_frictions(data)
-    for j, found in enumerate(fits):
+    for j, found in fits.items():
         values = dict(zip(found.shape.terms, found.fit.values, strict=False))
         # noise .1 through the 8 Hz filter on 570 samples; offset and Coulomb share reversals
         assert values["coulomb"] == pytest.approx(4.0, abs=0.15)
@@ -142,7 +142,7 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_reported(dat
 def test_joints_that_are_held_are_reported(data):
     moves = np.array([True, False, True, True, True, True])
     reverses = np.array([True, False, False, True, True, True])
-    held = replace(data, moves=moves, reverses=reverses, rubs=False)
+    held = data._replace(moves=moves, reverses=reverses, rubs=False)
     remarks = friction_method(held, CleanFit(held, fit_frictions(held), [])).remarks
     reported = [(r.code, r.where.joints) for r in remarks if r.code.endswith("-joint")]
     assert reported == [("static-joint", (2,)), ("one-way-joint", (3,))]
@@ -195,7 +195,7 @@ def test_the_whole_arm_starts_from_the_profile_and_the_fits(data):
     np.testing.assert_array_equal(start[:60], chain_parameters(UR5.loaded_chain))
     assert start[60 + 1] == fits[1].fit.values[len(fits[1].shape.terms)]
     np.testing.assert_array_equal(start[layout.frictions[2]], fits[2].fit.values[:-1])
-    held = [None, *fits[1:]]
+    held = {j: fit for j, fit in fits.items() if j}
     layout, start = initial_columns(data, held)
     assert layout.shapes[0].terms == ("coulomb", "viscous", "offset")
     np.testing.assert_array_equal(start[layout.frictions[0]], [4.0, 6.0, 0.5])
@@ -243,8 +243,8 @@ def test_too_short_logs_are_refused(data):
 def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, monkeypatch):
     """The log's own arm is its profile: what is fitted predicts as well as the truth, not worse."""
     fits = fit_frictions(data)
-    assert all(fit.errors[1] == pytest.approx(fit.errors[0], rel=0.1) for fit in fits)
-    assert not any(fit.is_kept for fit in fits)
+    assert all(fit.errors[1] == pytest.approx(fit.errors[0], rel=0.1) for fit in fits.values())
+    assert not any(fit.is_kept for fit in fits.values())
     assert fits[0]._replace(errors=(1.0, 0.84)).is_kept
     assert not fits[0]._replace(errors=(1.0, np.nan)).is_kept
     monkeypatch.setattr(friction_fit, "KEPT", 2.0)

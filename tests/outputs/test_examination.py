@@ -56,7 +56,7 @@ def test_how_arms_miss_an_effort_that_is_misread_is_not_said_before_what_it_is()
     slow, wrong = map(examination_text, found)
     assert "fit       ur10e 62.4 % (effort): does not fit" in slow
     assert "does not fit" not in wrong
-    held = examination_text(replace(found[1], robots=(replace(miss, fits=True),)))
+    held = examination_text(replace(found[1], robots=(miss._replace(fits=True),)))
     assert "fit       ur10e 62.4 % (effort)" in held
 
 

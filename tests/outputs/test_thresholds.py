@@ -214,5 +214,5 @@ def test_the_line_on_a_check_counts_and_sizes() -> None:
     assert "hardest missed 12.0 N" in line
     assert "2 false in 0.500 h" in line
     assert check_line(check(None)) == "pushed.csv: 3 alarms, the weakest at 20.0 N"
-    on = replace(check(), contacts=(check().contacts[0]._replace(already_above=True),))
+    on = check()._replace(contacts=(check().contacts[0]._replace(already_above=True),))
     assert ", 1 while an alarm was on already, 2 false" in check_line(on)

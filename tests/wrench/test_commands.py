@@ -82,7 +82,7 @@ def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:
         (("--zero", "500:600"), "is outside the log"),
         (
             ("--frame", "sensor", "--set", "virtual-sensor.sensor=0,0,0,2,0,0,0,1,0,0,0,1"),
-            "not a rotation",
+            "three or six",
         ),
     ],
 )

@@ -1,7 +1,5 @@
 """The model error that a contact has to exceed."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from drawn_blocks import B, blocks, drawn, noise
@@ -45,9 +43,8 @@ def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
     np.testing.assert_allclose(alone.variance, 0.26, rtol=0.2)
     assert alone.time[0] == LEAST_TIME
     for variance, time, found in ((9.0, 0.1, 0.1), (1e-4, 0.1, LEAST_TIME), (1e-4, 2.0, 2.0)):
-        learned = replace(
-            noise(), white=np.array([4.0]), variance=np.array([variance]), time=np.array([time])
-        )
+        fitted = {"white": [4.0], "variance": [variance], "time": [time]}
+        learned = noise()._replace(**{name: np.array(x) for name, x in fitted.items()})
         both = infer_noise(log, dry, learned)
         assert both is not None
         assert (both.white[0], both.time[0], both.free_seconds) == (4.0, found, 4.0)

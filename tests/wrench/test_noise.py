@@ -149,7 +149,7 @@ def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
     assumed = torque_noise(log, [], UR5, SECONDS)
     assert assumed.near == NEAR_REST
     for near, expected in ((2.5 * SECONDS, range(18, 27)), (0.0, range(20, 25))):
-        variance = replace(assumed, near=near).stationary(log)[0][:, 2]
+        variance = assumed._replace(near=near).stationary(log)[0][:, 2]
         assert np.flatnonzero(variance > variance[0]).tolist() == list(expected)
 
 

@@ -23,7 +23,7 @@ def reading(*removed: bool) -> SensorReading:
     """One observer, 80 ms late; a drift of its unloaded span for each flag."""
     wrench = Wrench(name="gmo", t=T, values=force(0.08), frame="base", masked=T > 19.0)
     drifts: tuple[Drift, ...] = tuple(
-        replace(zero_drift(wrench, SPAN), removed=flag) for flag in removed
+        zero_drift(wrench, SPAN)._replace(removed=flag) for flag in removed
     )
     return SensorReading(
         sensor=VirtualSensor(frame="base"),

@@ -6,7 +6,7 @@ force, and as Figs 6 and 9 time them: from detection to motion, and from the est
 fall to the turn.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,8 +44,7 @@ STILL = (0.005, 0.05)
 REST = 1.0  #: A contact begins where the force had been below the threshold for this long. [s]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ClosedLoop:
+class ClosedLoop(NamedTuple):
     """A finished run."""
 
     controller: Controller  #: The controller in the loop.
@@ -82,12 +81,7 @@ class OnlineKalman:
     """
 
     def __init__(
-        self,
-        observer: KalmanObserver,
-        robot: Robot,
-        step: float,
-        *,
-        averaged: bool,
+        self, observer: KalmanObserver, robot: Robot, step: float, *, averaged: bool
     ) -> None:
         """Prepare for samples every `step` [s]; `averaged`: torque is its mean over the step."""
         import pinocchio as pin
@@ -109,13 +103,13 @@ class OnlineKalman:
         mu = C.T @ dq - gravity
         if self.robot.friction:  # presliding friction goes on from the sample before
             mu -= self.friction.torque(q[None], dq[None], gravity[None])[0]
-        if not self.averaged:
-            mu += torque
+        mean = torque if self.averaged else 0.0
+        mu += torque - mean
         if self.p is None:
             self.p, self.mu = p, mu
             return self.tau
-        gained = 0.5 * (mu + self.mu) + (torque if self.averaged else 0.0)
-        ahead = self.p + self.system.a12 * self.tau + self.step * gained
+        ahead = self.p + self.system.a12 * self.tau
+        ahead += self.step * (0.5 * (mu + self.mu) + mean)
         innovation = p - ahead
         self.p, self.mu = ahead + self.gains.l1 * innovation, mu
         self.tau = self.system.a22 * self.tau + self.gains.l2 * innovation
@@ -126,11 +120,10 @@ class OnlineKalman:
 
         A controller that knows no force must not move by it.
         """
-        pin, model, data = self.pin, self.model, self.data
-        frame = model.getFrameId("flange")
-        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
-        found = wrench_of(self.tau[None], J[None])
-        return found.values[0] if found.known[0] else np.zeros(6)
+        pin, frame = self.pin, self.model.getFrameId("flange")
+        J = pin.computeFrameJacobian(self.model, self.data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+        (wrench,), (known,) = wrench_of(self.tau[None], J[None])
+        return wrench if known else np.zeros(6)
 
 
 class Loop:
@@ -143,9 +136,9 @@ class Loop:
         nominal, self.interval = arm.true.nominal, 1.0 / log_rate(arm.scenario.sensing, arm.robot)
         self.span = self.interval if averaged else arm.scenario.step
         self.rng = np.random.default_rng(arm.seeds["sensing"])
-        q_noise, dq_noise, effort_noise = noise_sizes(arm)
+        *sizes, effort = noise_sizes(arm)
         K = drive_constants(arm.robot)
-        self.noise = q_noise, dq_noise, effort_noise if K is None else effort_noise * K
+        self.noise = *sizes, effort if K is None else effort * K
         self.sensor = OnlineKalman(observer, nominal, self.interval, averaged=averaged)
         self.solver = FlangeSolver(nominal)
         self.start = self.solver.check_start(arm.q.copy())
@@ -153,11 +146,8 @@ class Loop:
         self.law = Recursion([controller])
         self.dragged = np.zeros(6, bool)
         self.q_measured = self.q_command = self.q_before = self.start
-        speed = np.fmin(arm.robot.limits.qd_max, np.inf)
-        self.reach_step = speed * controller.parameters.period
-        self.reached = True
-        self.zeros: list[Array] = []
-        self.zero = np.zeros(6)
+        self.reach_step = np.fmin(arm.robot.limits.qd_max, np.inf) * controller.parameters.period
+        self.reached, self.zeros, self.zero = True, list[Array](), np.zeros(6)
 
     def sample(self) -> None:
         """Read positions, velocities and drive torques, noise and all, and run the observer."""
@@ -189,11 +179,11 @@ class Loop:
 
     def control(self, wrench: Array) -> None:
         """One control period of Algorithm 1 under a wrench. (6,) [N, N·m]"""
-        split = phases(wrench[None], self.controller.parameters, self.dragged)
-        (self.dragged,), (force,) = split
-        x, v, turn = self.law.x, self.law.v, self.law.turn
-        self.law.step(force, self.dragged)
-        self.reached, last, wanted = False, self.q_command, self.law.x[0]
+        (self.dragged,), (force,) = phases(wrench[None], self.controller.parameters, self.dragged)
+        law, last = self.law, self.q_command
+        x, v, turn = law.x, law.v, law.turn
+        law.step(force, self.dragged)
+        self.reached, wanted = False, law.x[0]
         if np.isfinite(wanted).all():
             goal, point = exp_matrix(wanted[3:]) @ self.rotation, self.translation + wanted[:3]
             q, good = self.solver.reach(goal, point, 2.0 * last - self.q_before)
@@ -202,7 +192,7 @@ class Loop:
         if self.reached:
             self.q_command = q
         else:  # out of reach or too fast for a joint: wait at rest, as at a wall
-            self.law.x, self.law.v, self.law.turn = x, 0.0 * v, turn
+            law.x, law.v, law.turn = x, 0.0 * v, turn
 
     @property
     def reference(self) -> Reference:
@@ -256,8 +246,9 @@ def run_closed_loop(
     arm = still_arm(scenario, period, seed)
     loop = Loop(arm, controller, observer, averaged=torque == "average")
     log = list[dict[str, Any]]()
-    every_sample = steps_in(loop.interval, arm.scenario.step, "sampling interval")
-    every_control = steps_in(period, arm.scenario.step, "control period")
+    step = arm.scenario.step
+    every_sample = steps_in(loop.interval, step, "sampling interval")
+    every_control = steps_in(period, step, "control period")
     stage("simulating")
     for k in steps(range(arm.steps)):
         if k % every_sample == 0:
@@ -266,9 +257,9 @@ def run_closed_loop(
             log.append(loop.act(zero))
             reference = loop.reference
             forward = arm.servo.feed_forward(reference)[0]
-            x, fastest = loop.law.x[0], abs(arm.v).max()
+            x = loop.law.x[0]
             near = np.isfinite(x).all() and np.linalg.norm(x[:3]) <= FARTHEST
-            if not near or fastest > 50.0:  # the arm has run away
+            if not near or abs(arm.v).max() > 50.0:  # the arm has run away
                 break
         arm.command(reference.q[0], reference.dq[0], reference.ddq[0], forward)
     columns = {name: np.array([row[name] for row in log]) for name in log[0]}
@@ -291,9 +282,9 @@ def run_closed_loop(
 def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
     """The scenario's arm at rest at its start, with an inner step that divides the period."""
     robot = load_robot(scenario.robot)
-    divided = abs(period / scenario.step - round(period / scenario.step)) < 1e-9
-    inner = scenario.step if divided else period / np.ceil(period / scenario.step + 2)
-    scenario = replace(scenario, step=float(inner))
+    count = period / scenario.step
+    if abs(count - round(count)) >= 1e-9:
+        scenario = replace(scenario, step=float(period / np.ceil(count + 2)))
     duration = scenario.duration or scenario.trajectory.motion(robot).duration
     q = plan(scenario.trajectory, robot, np.array([0.0])).q
     still = Reference(q, 0.0 * q, 0.0 * q)
@@ -320,8 +311,7 @@ class Replayed(NamedTuple):
     examinations: tuple[Examination, ...] = ()  #: What is wrong with the log.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Latency:
+class Latency(NamedTuple):
     """One application of a force, all in seconds; None where it did not happen."""
 
     axis: int  #: Index of the axis on which the true force passes its threshold first.
@@ -363,22 +353,21 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     def until(flags: Mask, row: int | None) -> float | None:
         """Time from a row to the first from there on that is set, None without any. [s]"""
         found = first_true(flags, row)
-        return None if row is None or found is None else float(t[found] - t[row])
+        return None if row is None or found is None else (t[found] - t[row])
 
     before = max(k - 3, 0)
     speed = np.linalg.norm(moved[k] - moved[before]) / max(t[k] - t[before], 1e-9)
     seen, ends = first_true(felt, k), first_true(~there, k)
-    lost = first_true(~felt, ends)
     turned = np.append(np.diff(np.linalg.norm(moved, axis=1)) <= 0.0, False)
     return Latency(
         axis=axis,
-        force=float(t[k]),
+        force=t[k],
         detection=until(felt, k),
         motion=until(far(k), k),
         withdrawal=until(~felt, ends),
         reaction=None if seen is None else until(far(seen), seen),
-        turn=until(turned, lost),
-        rested=bool(speed < STILL[rotates]),
+        turn=until(turned, first_true(~felt, ends)),
+        rested=speed < STILL[rotates],
     )
 
 

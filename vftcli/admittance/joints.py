@@ -1,7 +1,6 @@
 """From flange poses to joint positions: damped least squares, each sample started from the last."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -88,8 +87,7 @@ class FlangeSolver:
         return q, False
 
 
-@dataclass(frozen=True, kw_only=True)
-class JointPath:
+class JointPath(NamedTuple):
     """Joint positions along the motions of N controllers."""
 
     #: Positions; where a pose is out of reach the arm waits at the last it reached.
@@ -121,7 +119,7 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
                 last, before = found, last if good else found
                 shown = found if good else shown
             q[k, i], reached[k, i] = shown, good
-    return JointPath(q=q, reached=reached, speed=largest_speed(solver.robot, q, reached, period))
+    return JointPath(q, reached, largest_speed(solver.robot, q, reached, period))
 
 
 def try_pose(

@@ -33,22 +33,13 @@ GROUPS: dict[str, tuple[int, ...]] = {
     **{axis: (k,) for k, axis in enumerate(AXES)},
 }
 THRESHOLD_MODES = ("hard", "soft", "literal")
-#: Parameter with one number an axis → the paper's letters, accepted beside the words.
-PER_AXIS = {
-    "mass": ("m", "m_d"),
-    "damping": ("b", "b_d"),
-    "stiffness": ("k", "k_d"),
-    "alpha": (),
-    "threshold": ("f_tsd",),
-    "xi": (),
-    "hysteresis": (),
-    "speed_limit": ("v_tsd",),
-    "speed_scale": ("v0",),
-}
+#: Parameters with one number an axis.
+PER_AXIS = (
+    "mass", "damping", "stiffness", "alpha", "threshold", "xi", "hysteresis", "speed_limit",
+    "speed_scale",
+)  # fmt: skip
 #: Every number of every group of axes, as ``--set`` names it.
 NUMBERS = tuple(f"{group}.{name}" for group in GROUPS for name in PER_AXIS)
-LETTERS = {letter: name for name, letters in PER_AXIS.items() for letter in letters}
-LETTERS["ts"] = "period"
 MAY_BE_ZERO = ("damping", "threshold", "hysteresis")
 MAY_BE_ENDLESS = ("threshold", "speed_limit")
 #: Keys of ``[admittance]`` that are not one number an axis.
@@ -102,12 +93,12 @@ class Admittance:
                     f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be "
                     f"{'zero or ' * zero}positive"
                 )
-        if np.any(self.hysteresis >= 1.0):
+        if (most := np.max(self.hysteresis)) >= 1.0:
             raise ParameterError(
                 "admittance.hysteresis is a share of the threshold and must be below 1; "
-                f"it is {np.max(self.hysteresis):g}"
+                f"it is {most:g}"
             )
-        if not (np.isfinite(self.period) and self.period > 0.0):
+        if not 0.0 < self.period < np.inf:
             raise ParameterError(
                 f"admittance.period is {self.period:g} s; the control period must be positive"
             )
@@ -123,7 +114,7 @@ class Admittance:
     @property
     def release_threshold(self) -> Array:
         """Force from which down an axis that is dragged recovers. (6,) [N, N·m]"""
-        return self.threshold * (1.0 - np.asarray(self.hysteresis))
+        return self.threshold * (1.0 - self.hysteresis)
 
     @property
     def damping_ratio(self) -> Array:
@@ -173,31 +164,29 @@ def from_table(
         )
     NUMBER.check("admittance.period", plain["period"])
     words = {name: plain[name] for name in ("threshold_mode", "source") if name in plain}
-    xi = values.pop("xi")
-    own = None if np.isnan(xi).all() else xi
-    return Admittance(**values, xi=own, period=float(plain["period"]), **words)
+    if np.isnan(values["xi"]).all():
+        values["xi"] = None
+    return Admittance(**values, period=float(plain["period"]), **words)
 
 
 def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Read ``SECTION.PARAMETER=VALUE`` assignments of the admittance; see `GROUPS`.
 
-    ``xi=1`` without a section is ``admittance.xi=1``; the paper's letters are understood.
+    ``xi=1`` without a section is ``admittance.xi=1``.
     """
     settings: dict[str, dict[str, Any]] = {}
     for text in assignments:
         left, value = assignment(text, "--set", "SECTION.PARAMETER=VALUE, as position.stiffness=12")
         section, _, name = (left if "." in left else f"admittance.{left}").rpartition(".")
-        name = LETTERS.get(name.lower(), name)
         whole = ("period", "threshold_mode", "source") if section == "admittance" else ()
         if section not in GROUPS or name not in (*PER_AXIS, *whole):
             raise ParameterError(
                 f"--set {text!r}: no such admittance parameter. Sections: {', '.join(GROUPS)}; "
                 f"parameters: {', '.join((*PER_AXIS, 'period'))}"
             )
-        given: Any = value
-        if name not in {"threshold_mode", "source"}:
-            endless = name == "speed_limit" and value.lower() == "none"
-            given = set_value("inf" if endless else value, text)
+        endless = name == "speed_limit" and value.lower() == "none"
+        is_word = name in {"threshold_mode", "source"}
+        given = value if is_word else set_value("inf" if endless else value, text)
         settings.setdefault(section, {})[name] = given
     return settings
 
@@ -238,7 +227,7 @@ class Controller:
     @cached_property
     def recovery(self) -> Array:
         """2TsB/M + Ts²K/M of the recovery at the speed limit; infinite without one. (6,)"""
-        p, limit = self.parameters, np.asarray(self.parameters.speed_limit)
+        p, limit = self.parameters, self.parameters.speed_limit
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             swell = self.alpha * np.exp(np.where(self.rate > 0, limit * self.rate, 0))
         return discrete_number(p.mass / swell, self.damping, p.stiffness * swell, p.period)
@@ -268,8 +257,8 @@ class Controller:
                 yield warning(code, where, axis=AXES[k], number=number[k])
         risky = ~limited & np.isfinite(self.escape) & (size > self.escape)
         for k in np.flatnonzero(risky):
-            bound, unit = self.escape[k], UNITS[k]
-            yield warning("law-escapes", where, axis=AXES[k], bound=bound, unit=unit)
+            bound = self.escape[k]
+            yield warning("law-escapes", where, axis=AXES[k], bound=bound, unit=UNITS[k])
 
 
 def traditional(parameters: Admittance) -> Controller:

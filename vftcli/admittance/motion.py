@@ -4,7 +4,6 @@ A motion is judged by axis and drag: peak, its time, overshoot, return, idle tim
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,8 +40,7 @@ def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -
     size = abs(wrench)
     on, off = size > parameters.threshold, size <= parameters.release_threshold
     # The last row at which anything was switched tells the state: no loop over samples.
-    rows = np.arange(len(on))[:, None]
-    last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)
+    last = np.maximum.accumulate(np.where(on | off, np.arange(len(on))[:, None], -1), axis=0)
     dragged = np.where(last < 0, before, np.take_along_axis(on, np.maximum(last, 0), axis=0))
     if parameters.threshold_mode == "literal":
         return Phases(dragged, wrench)
@@ -50,8 +48,7 @@ def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -
     return Phases(dragged, np.where(dragged, np.sign(wrench) * np.maximum(over, 0.0), 0.0))
 
 
-@dataclass(frozen=True, kw_only=True)
-class AxisMotion:
+class AxisMotion(NamedTuple):
     """Motion of the flange: one row a control period, one column a controller.
 
     Row k + 1 follows from row k and the force of row k. All components are in base axes;
@@ -82,30 +79,28 @@ class Recursion:
         """Start at deviations `x` with velocities `v`, (N, 6) or (6,), zero if not given."""
         if not controllers:
             raise ParameterError("no controller to run; choose traditional, variable, or both")
-        periods = {controller.parameters.period for controller in controllers}
-        if len(periods) > 1:
+        all_parameters, shape = [c.parameters for c in controllers], (len(controllers), 6)
+        self.period, *others = {parameters.period for parameters in all_parameters}
+        if others:
             raise ParameterError("controllers that run side by side need the same control period")
-        self.period = periods.pop()
-        shape = (len(controllers), 6)
         self.mass, self.damping, self.stiffness, self.limit = (
-            np.array([getattr(c.parameters, name) for c in controllers])
+            np.array([getattr(p, name) for p in all_parameters])
             for name in ("mass", "damping", "stiffness", "speed_limit")
         )
         self.alpha, self.rate, self.recovery = (
             np.array([getattr(c, name) for c in controllers])
             for name in ("alpha", "rate", "damping")
         )
-        self.x = np.array(np.broadcast_to(np.zeros(6) if x is None else x, shape))
-        self.v = np.array(np.broadcast_to(np.zeros(6) if v is None else v, shape))
+        start = (np.zeros(6) if given is None else given for given in (x, v))
+        self.x, self.v = (np.array(np.broadcast_to(given, shape)) for given in start)
         self.clipped = np.zeros(shape, bool)
         self.turn = exp_quaternion(self.x[:, 3:])
-        self.turns = bool(self.x[:, 3:].any() or self.v[:, 3:].any())
+        self.turns = self.x[:, 3:].any() or self.v[:, 3:].any()
 
     def step(self, force: Array, dragged: Mask) -> None:
         """Move on under the force that enters (6,) [N, N·m]; axes are `dragged` (6,) or not."""
         x, v, period = self.x, self.v, self.period
-        swell = np.exp(abs(v) * self.rate)
-        swell *= self.alpha
+        swell = np.exp(abs(v) * self.rate) * self.alpha
         swell[:, dragged] = 1.0
         damping = np.where(dragged, self.damping, self.recovery)
         acceleration = swell / self.mass * (force - damping * v - self.stiffness * swell * x)
@@ -114,7 +109,7 @@ class Recursion:
         self.clipped = self.v != wanted
         self.x = x.copy()
         self.x[:, :3] += self.v[:, :3] * period
-        self.turns = self.turns or bool(self.v[:, 3:].any())
+        self.turns = self.turns or self.v[:, 3:].any()
         if self.turns:
             turn = quaternion_product(exp_quaternion(self.v[:, 3:] * period), self.turn)
             self.turn = turn / np.sqrt(np.sum(turn**2, axis=1, keepdims=True))
@@ -171,9 +166,8 @@ def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
         # From the last dragged sample of one to the first of the next; stamps are
         # rounded.
         spans = intervals(t, dragged, gap=PAUSE + period - 1e-9)
-        ends = [*(begin + 1 for begin, _ in spans[1:]), len(t) + 1]
-        numbered = enumerate(zip(spans, ends, strict=False), start=1)
-        found += [Drag(axis, number, a, b, end) for number, ((a, b), end) in numbered]
+        ends = [*(begin + 1 for begin, _ in spans), len(t) + 1]
+        found += [Drag(axis, k, *span, ends[k]) for k, span in enumerate(spans, start=1)]
     return tuple(found)
 
 
@@ -192,17 +186,14 @@ def rows_of(
     the drag phase. What does not happen before the record ends or the next drag begins is
     None.
     """
-    numbered = list(enumerate(controllers))
-    rows = [row_of(one, motion, n, drag, wrench) for n, one in numbered for drag in drags]
-    peaks = {
-        (row["axis"], row["drag"]): row["time_to_peak_s"]
-        for row in rows
-        if row["controller"] == "traditional"
-    }
-    for row in rows:
-        other = peaks.get((row["axis"], row["drag"]))
-        ahead = other is not None and row["controller"] != "traditional"
-        row["peak_advance_s"] = other - row["time_to_peak_s"] if ahead else None
+    rows, peaks = list[dict[str, Any]](), dict[Drag, float]()
+    for n, controller in enumerate(controllers):
+        for drag in drags:
+            row = row_of(controller, motion, n, drag, wrench)
+            peak, first = row["time_to_peak_s"], peaks.get(drag)
+            if controller.kind == "traditional":
+                peaks[drag], first = peak, None
+            rows.append({**row, "peak_advance_s": None if first is None else first - peak})
     return rows
 
 
@@ -212,24 +203,23 @@ def row_of(
     """One controller's figures for one drag of one axis."""
     axis, t = drag.axis, motion.t
     x, v = motion.x[:, n, axis], motion.v[:, n, axis]
-    sizes = np.nan_to_num(abs(x[drag.begin : drag.end]), nan=np.inf)
-    top = drag.begin + sizes.argmax()
+    top = drag.begin + np.nan_to_num(abs(x[drag.begin : drag.end]), nan=np.inf).argmax()
     returns = {name: return_time(t, x, drag, share) for name, share in SHARES.items()}
-    back, start, released = returns["return_2_s"], float(t[drag.begin]), float(t[drag.release])
+    back, start, released = returns["return_2_s"], t[drag.begin], t[drag.release]
     # Row k + 1 is what the force of row k made of row k.
     span = slice(drag.begin, drag.release)
     work = np.nansum(wrench[span, axis] * v[1:][span]) * (t[1] - t[0])
     return {
         "controller": controller.kind,
-        "alpha": None if controller.kind == "traditional" else float(controller.alpha[axis]),
-        "xi": float(controller.xi[axis]),
+        "alpha": None if controller.kind == "traditional" else controller.alpha[axis],
+        "xi": controller.xi[axis],
         "axis": AXES[axis],
         "unit": "m" if axis < 3 else "rad",
         "drag": drag.number,
         "start_s": start,
         "release_s": released,
         "peak": finite(x[top]),
-        "time_to_peak_s": float(t[top]) - start,
+        "time_to_peak_s": t[top] - start,
         "at_release": finite(x[drag.release]),
         "overshoot": overshoot(x, drag),
         **returns,
@@ -247,7 +237,7 @@ def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
     if not len(after):
         return None
     outside = np.flatnonzero(after > share * after[0])
-    last = int(outside[-1]) if outside.size else 0
+    last = outside[-1] if outside.size else 0
     if last == len(after) - 1:
         return None
     return float(t[drag.release + last] - t[drag.release])
@@ -256,7 +246,7 @@ def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
 def overshoot(x: Array, drag: Drag) -> float | None:
     """Largest deviation to the other side after the release, as a share of that at the release."""
     after = recovery_of(x, drag)
-    return max(float(np.max(-after / after[0])), 0.0) if len(after) else None
+    return max(np.max(-after / after[0]), 0.0) if len(after) else None
 
 
 def recovery_of(x: Array, drag: Drag) -> Array:
@@ -267,4 +257,4 @@ def recovery_of(x: Array, drag: Drag) -> Array:
 
 def finite(value: float) -> float | None:
     """A finite number, or None."""
-    return float(value) if np.isfinite(value) else None
+    return value if np.isfinite(value) else None

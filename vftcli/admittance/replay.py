@@ -33,7 +33,7 @@ from vftcli.admittance.motion import (
 )
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import refuse_mostly_gap
@@ -48,8 +48,6 @@ from vftcli.wrench.frames import logged_wrench
 from vftcli.wrench.sensor_reading import SensorReading, without_zero
 from vftcli.wrench.solvers import VirtualSensor
 
-#: Rise of W in a step that gets a remark, as a share of W at the start of the phase.
-RISE = 1e-12
 LONGEST = 600.0  #: Longest release that is computed. [s]
 #: A drag in which the log's arm stays within this distance for so long has a remark.
 #: [s, m]
@@ -59,16 +57,11 @@ RESTING = (2.0, 0.01)
 STILL = 0.01
 
 
-@dataclass(frozen=True, kw_only=True)
-class Lyapunov:
+class Lyapunov(NamedTuple):
     """Energies of the recovery phases along a run. All (T+1, N, 6), NaN in a drag phase."""
 
     corrected: Array  #: W, which must not rise in a recovery phase into which no force enters. [J]
     printed: Array  #: V of (52). [J]
-    #: Steps in which W rises by more than `RISE` of its value at the phase's start, for
-    #: each controller; the three axes of a rotation that recover together count together.
-    #: (N,)
-    rises: Indices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,26 +100,16 @@ class Replay:
 
     @cached_property
     def lyapunov(self) -> Lyapunov:
-        """Energies along the run, and where the corrected one rises while no force enters."""
-        split, motion, each = self.phases, self.motion, list(enumerate(self.controllers))
+        """Energies along the run."""
+        dragged, motion, each = self.phases.dragged, self.motion, list(enumerate(self.controllers))
         # Row k + 1 is in the phase of the force before it, row 0 in that of the first.
-        before = np.concatenate([split.dragged[:1], split.dragged])
-        dragged = before[: len(motion.t), None] if len(before) else np.zeros((1, 1, 6), bool)
+        hidden = np.concatenate([dragged[:1], dragged])[:, None] if len(dragged) else False
         with np.errstate(over="ignore", invalid="ignore"):
-            corrected, printed = (
+            energies = (
                 np.stack([of(one, motion.x[:, n], motion.v[:, n]) for n, one in each], 1)
                 for of in (energy, printed_energy)
             )
-        # The three axes of a rotation turn together, and so they count together.
-        alone = ~split.dragged & (split.force == 0.0)
-        alone = np.column_stack([alone[:, :3], alone[:, 3:].all(axis=1)])[:, None]
-        W = np.concatenate([corrected[..., :3], corrected[..., 3:].sum(axis=2, keepdims=True)], 2)
-        begins = alone & ~np.concatenate([np.zeros((1, 1, 4), bool), alone[:-1]])
-        start = np.where(begins, np.arange(len(alone))[:, None, None], 0)
-        before = np.take_along_axis(W[:-1], np.maximum.accumulate(start, axis=0), axis=0)
-        rises = np.sum(alone & (np.diff(W, axis=0) > RISE * before), axis=(0, 2))
-        corrected, printed = (np.where(dragged, np.nan, W) for W in (corrected, printed))
-        return Lyapunov(corrected=corrected, printed=printed, rises=rises)
+            return Lyapunov(*(np.where(hidden, np.nan, W) for W in energies))
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -165,7 +148,7 @@ def replay(
         start=start,
         wrench=force,
         phases=split,
-        motion=replace(motion, t=motion.t + clock[0]),
+        motion=motion._replace(t=motion.t + clock[0]),
         drags=drags_of(split, parameters.period),
         logged=deviation_of(solver, start, q),
         force_remarks=(*wrench.remarks, *missing, *complaints),
@@ -223,20 +206,17 @@ def release_deviation(assignments: Sequence[str]) -> Array:
 
 def settling(controllers: Sequence[Controller], x: Array) -> float:
     """A time after which every controller is back to less than 1 % of a release. [s]"""
-    slowest = np.inf
+    rates = []
     for controller in controllers:
-        p = controller.parameters
+        p, xi = controller.parameters, np.maximum(controller.xi, 1e-3)
         omega = controller.alpha * np.sqrt(p.stiffness / p.mass)
-        xi = np.maximum(controller.xi, 1e-3)
-        rate = omega * np.where(xi > 1.0, xi - np.sqrt(np.maximum(xi**2 - 1.0, 0.0)), xi)
-        slowest = min(slowest, rate[x != 0.0].min())
-    return float(min(max(6.0 / slowest, 1.0), LONGEST))
+        rates.append(omega * (xi - np.sqrt(np.maximum(xi**2 - 1.0, 0.0))))
+    return float(np.clip(6.0 / np.min(rates, axis=0)[x != 0.0].min(), 1.0, LONGEST))
 
 
 def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[Array, list[Array]]:
     """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
-    count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
-    clock = t[0] + np.arange(count) * period
+    clock = t[0] + np.arange(np.floor((t[-1] - t[0]) / period + 1e-6) + 1) * period
     # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay
     # in step.
     newest = np.clip(t.searchsorted(clock + 5e-7 + 1e-3 * period, side="right") - 1, 0, None)
@@ -256,13 +236,12 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
     if (logged := found.logged) is None:
         return
     if not found.drags and len(found.wrench):
-        largest = abs(np.nan_to_num(found.wrench)).max(axis=0)
         threshold = found.parameters.threshold
-        share = largest / np.maximum(threshold, 1e-12)
+        share = abs(np.nan_to_num(found.wrench)).max(axis=0) / np.maximum(threshold, 1e-12)
         k = share.argmax()
         yield caution("no-drag", axis=AXES[k], share=share[k], threshold=threshold[k])
-    longest: dict[str, int] = {}
-    long, near = round(RESTING[0] / found.parameters.period), RESTING[1]
+    longest, period, (seconds, near) = dict[str, int](), found.parameters.period, RESTING
+    long = round(seconds / period)
     for drag in found.drags:
         part = logged[drag.begin : drag.release, :3]
         if len(part) <= long:
@@ -275,7 +254,7 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
             axis = AXES[drag.axis]
             longest[axis] = max(longest.get(axis, 0), len(part))
     for axis, count in longest.items():
-        yield caution("drag-at-rest", axis=axis, duration_s=count * found.parameters.period)
+        yield caution("drag-at-rest", axis=axis, duration_s=count * period)
 
 
 def trouble(found: Replay) -> Iterator[Remark]:
@@ -291,16 +270,14 @@ def trouble(found: Replay) -> Iterator[Remark]:
             yield warning("motion-escaped", where, time_s=motion.t[k])
         if acted := np.count_nonzero(motion.clipped[:, n].any(axis=1)):
             yield fact("speed-limit-acted", where, periods=acted)
-        if lost := np.count_nonzero(~path.reached[:, n]):
-            first = motion.t[path.reached[:, n].argmin()]
-            rows = {"lost": lost, "poses": len(motion.t)}
-            yield caution("poses-out-of-reach", where, **rows, first_s=first)
+        reached = path.reached[:, n]
+        if lost := np.count_nonzero(~reached):
+            rows = {"lost": lost, "poses": len(reached), "first_s": motion.t[reached.argmin()]}
+            yield caution("poses-out-of-reach", where, **rows)
             way = np.linalg.norm(motion.x[:, n, :3], axis=1)
             travel.append(np.nan_to_num(way, nan=np.inf).max())
         if path.speed[n] > 1.0:
             yield caution("joint-too-fast", where, share=path.speed[n])
-        if rises := found.lyapunov.rises[n]:
-            yield warning("energy-rises", where, steps=rises)
     if travel:
         hard = "-hard" if found.parameters.threshold_mode == "hard" else ""
         yield caution(f"travel-implausible{hard}", travel_m=max(travel))
@@ -333,15 +310,15 @@ def stored_force(
             "virtual-sensor.solver=smoother needs the log itself, not a file of estimates; "
             "give the log, or leave the setting away"
         )
-    tau = recording.require("tau_ext")
-    estimate = ExternalTorque(name=observer, t=recording.t, tau=tau)
+    estimate = ExternalTorque(name=observer, t=recording.t, tau=recording.require("tau_ext"))
     sensor = VirtualSensor(
         solver=choice.by_pose, frame=choice.frame, mounting=choice.mounting(robot)
     )
     # Nobody kept the covariance of this torque: its band says nothing of the replay.
     seen = replace(sensor.wrench(estimate, recording.q, robot.chain), remarks=())
-    source = fact("force-of-observer", observer=observer)
-    return DrivingForce(without_zero(seen, choice.zero), source)
+    return DrivingForce(
+        without_zero(seen, choice.zero), fact("force-of-observer", observer=observer)
+    )
 
 
 def sensor_force(recording: Recording, robot: Robot, choice: WrenchChoice) -> DrivingForce:

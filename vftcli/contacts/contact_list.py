@@ -140,7 +140,7 @@ class Contact(Shown):
         for key, value in self.record().items():
             if isinstance(value, np.ndarray):
                 axes = "xyz" if len(value) == 3 else range(1, len(value) + 1)
-                row |= {f"{key}_{axis}": float(v) for axis, v in zip(axes, value, strict=True)}
+                row |= {f"{key}_{axis}": v for axis, v in zip(axes, value, strict=True)}
             elif key == "anywhere_N":
                 low, high = value or (None, None)
                 row |= {"anywhere_least_N": low, "anywhere_most_N": high}
@@ -153,9 +153,8 @@ class Contact(Shown):
     @property
     def size_known(self) -> bool:
         """Whether its force is larger than its band, and does not hang on an unknown place."""
-        if self.peak_force is None or self.peak_band is None or self.place_unknown:
-            return False
-        return self.peak_force > self.peak_band
+        size, band = self.peak_force, self.peak_band
+        return size is not None and band is not None and not self.place_unknown and size > band
 
     @property
     def place_unknown(self) -> bool:
@@ -171,14 +170,14 @@ class Contact(Shown):
     @property
     def trust(self) -> Trust:
         """How far the size of the row may be believed: by its evidence, band and remarks."""
-        if self.remarks or self.is_load or self.evidence is None or self.evidence < SURE_NATS:
+        force, narrow, wide = self.peak_force, self.place_band, self.peak_band
+        doubted = self.remarks or self.is_load or (self.evidence or 0.0) < SURE_NATS
+        if doubted or force is None or narrow is None or wide is None:
             return "weak"
-        if self.peak_force is None or self.place_band is None or self.peak_band is None:
+        size = max(force, 1e-9)
+        if narrow > WIDE * size:
             return "weak"
-        size = max(self.peak_force, 1e-9)
-        if self.place_band > WIDE * size:
-            return "weak"
-        is_sure = self.peak_band <= TIGHT * size and not self.inferred
+        is_sure = wide <= TIGHT * size and not self.inferred
         return "good" if is_sure and not self.goes_with_place else "fair"
 
 
@@ -206,7 +205,7 @@ class CarriedLoad(NamedTuple):
         apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
         name = min(apart, key=lambda key: apart[key], default=None)
         alike = name is not None and apart[name] <= max(2.0 * load.sd, SAME_MASS * load.mass)
-        span = float(ends[0]), float(ends[-1])
+        span = ends[0], ends[-1]
         return cls(load.mass, load.sd, run.robot.name, name if alike else None, span)
 
     def record(self) -> dict[str, Any]:
@@ -228,8 +227,7 @@ class Unexplained(NamedTuple):
     at: float  #: When. [s]
 
 
-@record
-class ContactModel(Shown):
+class ContactModel(NamedTuple):
     """Noise model behind a list, for `run.json`."""
 
     #: How the wrench of the contacts moves, None where it was not learned.
@@ -238,9 +236,6 @@ class ContactModel(Shown):
     error_sd: Array  #: Standard deviation of the model error. (n,) [N·m]
     error_time: Array  #: Its correlation time. (n,) [s]
     block: float  #: Length of a block. [s]
-
-    def __post_init__(self) -> None:
-        seal(self, "noise_sd", "error_sd", "error_time")
 
 
 @record
@@ -326,10 +321,8 @@ class ContactList(Shown):
     def without_forces(self) -> "ContactList":
         """The list of an arm with too few joints for a wrench: times and joint torques."""
         nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
-        rows, weak = (
-            tuple(replace(row, **nothing) for row in part)
-            for part in (self.contacts, self.candidates)
-        )
+        both = (self.contacts, self.candidates)
+        rows, weak = (tuple(replace(row, **nothing) for row in part) for part in both)
         remarks = (*self.remarks, caution("no-wrench-of-few-joints"))
         return replace(self, contacts=rows, candidates=weak, smallest_force=None, remarks=remarks)
 

@@ -1,7 +1,6 @@
 """Motion that nobody touched, named or inferred: its noise, its level, the smallest force."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -51,11 +50,9 @@ LEAST_CYCLES = 2
 PSEUDO, MOST_PSEUDO = 0.6, 48
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FreeStatistics:
+class FreeStatistics(NamedTuple):
     """Noise and level of motion that nobody touched, as a list of contacts needs them."""
 
-    basis: Basis = "free motion"  #: What tells a contact from an error of the model.
     noise: TorqueNoise  #: Noise and model error.
     level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
     own: Mask  #: Samples of the log itself that are known to be free. (T,)
@@ -68,19 +65,20 @@ class FreeStatistics:
     #: A load that the arm carries in this log and its model lacks, None where none shows.
     load: FreeLoad | None
     remarks: tuple[Remark, ...]  #: What it is and how it was found, and a load that it carries.
+    basis: Basis = "free motion"  #: What tells a contact from an error of the model.
 
     def in_blocks(self, seconds: float) -> "FreeStatistics | None":
         """The statistics by blocks of another length [s]; None if no stretch holds enough."""
         found = noise_of(self.log, self.free, seconds, known=self.basis == "free motion")
-        return None if found is None else replace(self, noise=found[0], pieces=found[1])
+        return None if found is None else self._replace(noise=found[0], pieces=found[1])
 
 
 def block_length(t: Array) -> float:
     """Length of a block for a clock. [s]"""
     if len(t) < 3:
         return BLOCK
-    usual, steps = median_step(t), np.diff(t)
-    uneven = float(np.quantile(abs(steps - usual), 0.9)) > UNEVEN * usual
+    usual = median_step(t)
+    uneven = np.quantile(abs(np.diff(t) - usual), 0.9) > UNEVEN * usual
     return max(BLOCK, SAMPLES * usual) if uneven else BLOCK
 
 
@@ -220,21 +218,18 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
     uses = [(run, inside & (run.t >= run.t[0] + SETTLED)) for run, inside in pieces]
     torque = abs(np.concatenate([observed(run)[use] for run, use in uses]))
     moving = np.concatenate([faster(run.dq[use], REST) for run, use in uses])
-    found = np.empty(torque.shape[1])
-    for j, column in enumerate(torque.T):
-        some = column[moving[:, j]]
-        chosen = some if len(some) >= LEAST_MOVING else column
-        found[j] = np.quantile(chosen, 0.95) / 1.96 if len(chosen) else 0.0
-    return found
+    if not len(torque):
+        return np.zeros(torque.shape[1])
+    moving |= moving.sum(axis=0) < LEAST_MOVING
+    pairs = zip(torque.T, moving.T, strict=True)
+    return np.array([np.quantile(column[some], 0.95) / 1.96 for column, some in pairs])
 
 
 def expected_torque(run: Run, level: Array | None) -> Array:
     """Standard deviation of the observer's torque where nothing touches. (T, n) [N·m]"""
-    dry, recording = dry_torques(run.robot), run.recording
-    least = np.full(len(dry), LEAST_ERROR) if level is None else level
-    sd = np.tile(np.maximum(least, DRY_SHARE * dry), (recording.samples, 1))
-    count = max(round(NEAR_REST / median_step(recording.t)), 1)
-    close = near(slower(recording.require("dq")), count)
+    dry = dry_torques(run.robot)
+    sd = np.maximum(LEAST_ERROR if level is None else level, DRY_SHARE * dry)
+    close = near(slower(run.dq), max(round(NEAR_REST / median_step(run.t)), 1))
     return np.where(close, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
 
 
@@ -251,9 +246,9 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
     shares, forces = [], []
     each = max(MOST_PSEUDO // max(len(free.pieces), 1), 4)
     for blocks in free.pieces:
-        made_up, count = pseudo_contacts(blocks, each), len(blocks.t)
-        if not made_up:
+        if not (made_up := pseudo_contacts(blocks, each)):
             continue
+        count = len(blocks.t)
         log = BlockLog(blocks, error_process(free.noise, blocks, covered(made_up, count, 1)))
         J, nowhere = flange_jacobian(free.log.robot.loaded_chain, blocks.q), np.zeros(count, bool)
         lanes = [
@@ -268,12 +263,12 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
     if not forces:
         return PseudoContactTest(np.ones(6), float("nan"))
     widening = np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / 1.96, 1.0)
-    return PseudoContactTest(widening, float(np.quantile(np.concatenate(forces), 0.95)))
+    return PseudoContactTest(widening, np.quantile(np.concatenate(forces), 0.95))
 
 
 def pseudo_contacts(blocks: Blocks, most: int) -> list[tuple[int, int]]:
     """Runs of known blocks of `PSEUDO` seconds, half as much on either side, `most` at most."""
-    count = max(round(PSEUDO / float(np.median(blocks.length))), 1)
+    count = max(round(PSEUDO / np.median(blocks.length)), 1)
     half = (count + 1) // 2
     runs = [
         (k, k + count)

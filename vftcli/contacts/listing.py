@@ -37,7 +37,7 @@ from vftcli.contacts.rows import (
     shows_force,
 )
 from vftcli.contacts.search import Candidates, search
-from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places
+from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places, times_of
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
@@ -118,12 +118,12 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
     run, named = free.log, free.basis == "free motion"
     found = search(run, free.noise, free.level, seconds)
     t = found.log.blocks.t
-    middle = [float(np.mean(t[slice(*span)])) for span in found.runs]
+    middle = [np.mean(t[slice(*span)]) for span in found.runs]
     own = found.best[free.own[np.searchsorted(run.t, middle)]]
-    least = max(LEAST_EVIDENCE, FALSE_MARGIN * float(own.max(initial=-np.inf)))
-    ends = t[0] + AT_ENDS, t[-1] - AT_ENDS
+    least = max(LEAST_EVIDENCE, FALSE_MARGIN * own.max(initial=-np.inf))
+    first, last = t[0] + AT_ENDS, t[-1] - AT_ENDS
     found = found.kept(
-        [k for k, (a, b) in enumerate(found.runs) if t[b - 1] >= ends[0] and t[a] <= ends[1]]
+        [k for k, (a, b) in enumerate(found.runs) if t[b - 1] >= first and t[a] <= last]
     )
     at_rest = np.array([rests_around(run, found, span) for span in found.runs], bool)
     passed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
@@ -131,7 +131,7 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
         passed |= at_rest & np.array(found.beyond, bool)
     seen = np.flatnonzero(passed | (found.best > LEAST_EVIDENCE)).tolist()
     halted = [k for k in seen if is_stop(run, found, k, seconds)]
-    stops = tuple(float(t[found.runs[k][0]]) for k in halted if passed[k])
+    stops = tuple(t[found.runs[k][0]] for k in halted if passed[k])
     kept, others = (
         [k for k in seen if passed[k] == wanted and k not in halted] for wanted in (True, False)
     )
@@ -180,10 +180,9 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
     groups: list[list[int]] = []
     sized = [(row.peak_force or 0.0) > (row.place_band or 0.0) for row in rows]
     for i, (start, _) in enumerate(runs):
-        if i and start - runs[i - 1][1] <= 1 and not (sized[i] and sized[i - 1]):
-            groups[-1].append(i)
-        else:
-            groups.append([i])
+        if not i or start - runs[i - 1][1] > 1 or (sized[i] and sized[i - 1]):
+            groups.append([])
+        groups[-1].append(i)
     return groups
 
 
@@ -215,9 +214,8 @@ def fine_rows(
     if fine is None:
         return []
     blocks = disturbance_blocks(fine.log.terms, fine.log.q, seconds)
-    edges = found.log.blocks.t - 0.5 * found.log.blocks.length
-    edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
-    spans = [(int(a), int(b)) for a, b in blocks.t.searchsorted(edges[np.array(found.runs)])]
+    ends = [times_of(found.log.blocks, run) for run in found.runs]
+    spans = [(a, b) for a, b in blocks.t.searchsorted(ends).tolist()]
     others = [span for k, span in enumerate(spans) if k not in brief]
     process = error_process(fine.noise, blocks).hiding(covered(others, len(blocks.t), 1))
     some = found.kept(brief)._replace(
@@ -232,21 +230,18 @@ def fine_rows(
 
 def is_stop(run: Run, found: Candidates, number: int, seconds: float) -> bool:
     """Whether a candidate follows an abrupt stop of the arm."""
-    first, last = found.runs[number]
-    t, half = found.log.blocks.t, 0.5 * found.log.blocks.length
-    return follows_stop(
-        run.recording, t[first] - half[first], t[last - 1] + half[last - 1], seconds
-    )
+    start, stop = times_of(found.log.blocks, found.runs[number])
+    return follows_stop(run.recording, start, stop, seconds)
 
 
 def false_rows(free: FreeStatistics, seconds: float) -> int:
     """Rows that the same search lists in free runs of other logs."""
-    count = 0
-    for run in free.runs:
-        found = search(run, free.noise, free.level, seconds)
-        strong = np.flatnonzero(found.best > LEAST_EVIDENCE).tolist()
-        count += sum(not is_stop(run, found, k, seconds) for k in strong)
-    return count
+    each = [(run, search(run, free.noise, free.level, seconds)) for run in free.runs]
+    return sum(
+        not is_stop(run, found, k, seconds)
+        for run, found in each
+        for k in np.flatnonzero(found.best > LEAST_EVIDENCE).tolist()
+    )
 
 
 def limits(
@@ -274,8 +269,7 @@ def felt_by(run: Run, torque: Array) -> float:
     """
     some = slice(None, None, -(-len(run.q) // POSES))
     J = abs(flange_jacobian(run.robot.loaded_chain, run.q[some])[:, :3])
-    each = np.min(NORMAL * torque / np.maximum(J, 1e-9), axis=2)
-    return float(np.median(each.min(axis=1)))
+    return float(np.median(np.min(NORMAL * torque / np.maximum(J, 1e-9), axis=2).min(axis=1)))
 
 
 def without_list(run: Run) -> ContactList:
@@ -284,16 +278,13 @@ def without_list(run: Run) -> ContactList:
     torque = abs(observed(run))
     torque[run.t < run.t[0] + SETTLED] = 0.0
     k, j = np.unravel_index(torque.argmax(), torque.shape)
-    model = ContactModel(
-        prior=None, noise_sd=unknown, error_sd=unknown, error_time=unknown, block=np.nan
-    )
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
         contacts=(),
         basis="none",
         unexplained=Unexplained(float(torque[k, j]), int(j) + 1, float(run.t[k])),
-        model=model,
+        model=ContactModel(None, unknown, unknown, unknown, np.nan),
     )
 
 
@@ -324,18 +315,16 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
         return False
     moving = np.any(faster(recording.require("dq"), REST), axis=1)
     t = recording.t
-    first = float(t[np.argmax(moving)]) if moving.any() else float(t[0])
+    first = t[np.argmax(moving)] if moving.any() else t[0]
     lasts = np.array([contact.stop - contact.start for contact in contacts])
-    if lasts.sum() <= SHARE * (float(t[-1]) - first):
+    if lasts.sum() <= SHARE * (t[-1] - first):
         return False
     for edge in (contacts[0].start, contacts[-1].stop):
-        near = abs(t - edge) < EDGE
-        if t[0] + EDGE < edge < t[-1] - EDGE and not moving[near].any():
+        if t[0] + EDGE < edge < t[-1] - EDGE and not moving[abs(t - edge) < EDGE].any():
             return False
     forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
     sizes = np.linalg.norm(forces, axis=1).sum()
-    together = float(np.linalg.norm(forces.sum(axis=0)))
-    return len(contacts) == 1 or together > ONE_SIDE * float(sizes)
+    return len(contacts) == 1 or bool(np.linalg.norm(forces.sum(axis=0)) > ONE_SIDE * sizes)
 
 
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
@@ -364,14 +353,14 @@ def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
         start=start,
         stop=stop,
         is_load=True,
-        peak_force=float(size),
-        peak_band=float(band),
-        place_band=float(band),
+        peak_force=size,
+        peak_band=band,
+        place_band=band,
         wrench=mean,
         wrench_sd=sd,
         mean_force=mean[:3],
         impulse=mean[:3] * (stop - start),
-        anywhere=(max(float(size - band), 0.0), float(size + band)),
+        anywhere=(max(size - band, 0.0), size + band),
         course=force_course(t, forces, covariance),
         where="wrist" if "wrist" in {contact.where for contact in contacts} else "cannot tell",
     )

@@ -23,6 +23,7 @@ from vftcli.contacts.windows import (
     point_fits,
     points_on,
     smooth_lanes,
+    times_of,
 )
 from vftcli.robots.chain import link_poses
 from vftcli.robots.run import Run
@@ -100,11 +101,11 @@ class ContactLocation(NamedTuple):
         """Smallest and largest |F| over the places that fit, bands included. [N]"""
         fits = self.fits if self.is_force else []
         spans = [(size, band), *((fit.size, fit.band) for fit in fits)]
-        low, high = min(s - b for s, b in spans), max(s + b for s, b in spans)
-        return max(low, 0.0), high
+        high = max(s + b for s, b in spans)
+        return max(min(s - b for s, b in spans), 0.0), high
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ContactMeasurement:
     """Measures the contacts of one log."""
 
@@ -131,21 +132,16 @@ class ContactMeasurement:
         gate = covered(found.runs, len(blocks.t), 1)
         process = error_process(free.noise, blocks, gate)._replace(white=found.log.process.white)
         log, quiet = BlockLog(blocks, process), quiet_error(blocks.d, process, gate)
-        if like is not None:
-            prior, test = like.prior, like.test
-        else:
+        if like is None:
             prior = learn_prior(log, J, found.runs, found.prior, rounds=2 if found.runs else 0)
-            test = self_test(free, prior)
-        return cls(
-            run=free.log, found=found, log=log, prior=prior, test=test, quiet=quiet, bent=bent
-        )
+            return cls(free.log, found, log, prior, self_test(free, prior), quiet, bent)
+        return cls(free.log, found, log, like.prior, like.test, quiet, bent)
 
     @cached_property
     def priors(self) -> list[WrenchPrior]:
         """How the wrench of every contact may move: one that is short moves faster."""
         own = self.prior.looser
-        lasts = (OWN_TIME * seconds for seconds in self.found.lasts)
-        return [own._replace(time=min(own.time, seconds)) for seconds in lasts]
+        return [own._replace(time=min(own.time, OWN_TIME * s)) for s in self.found.lasts]
 
     @cached_property
     def wrenches(self) -> list[WindowWrench]:
@@ -160,11 +156,8 @@ class ContactMeasurement:
 
     def rows(self, locations: Sequence[ContactLocation] | None = None) -> list[Contact]:
         """The contacts, in the order of time, numbered; their places may be known better."""
-        runs, J = self.found.runs, self.found.places[0].jacobian
-        wrenches, poses = (
-            [*self.wrenches],
-            link_poses(self.run.robot.loaded_chain, self.log.blocks.q),
-        )
+        runs, J, wrenches = self.found.runs, self.found.places[0].jacobian, [*self.wrenches]
+        poses = link_poses(self.run.robot.loaded_chain, self.log.blocks.q)
         locations = self.locations if locations is None else locations
         moved = {
             i: link_jacobian(poses, where.fits[0].link, where.fits[0].share)
@@ -178,16 +171,17 @@ class ContactMeasurement:
             for i, wrench in zip(moved, smooth_lanes(self.log, lanes), strict=True):
                 wrenches[i] = wrench
         each = enumerate(zip(wrenches, locations, strict=True))
-        return [self.row(i, *pair, moved.get(i, J), on_link=i in moved) for i, pair in each]
+        return [self.row(i, *pair, moved.get(i, J)) for i, pair in each]
 
     def location(self, number: int) -> ContactLocation:
         """Where a contact is."""
         run, blocks = self.found.runs[number], self.log.blocks
         size = self.wrenches[number].within(run).size
-        peak = run[0] + int(size.argmax())
+        peak = run[0] + size.argmax()
         core = np.arange(*run)[size >= CORE * size.max()]
         core = core[abs(blocks.t[core] - blocks.t[peak]) <= CORE_TIME]
-        core = core[blocks.known[core]] if blocks.known[core].any() else core
+        known = core[blocks.known[core]]
+        core = known if known.size else core
         mean, variance = (series[core] for series in self.quiet)
         torque = (blocks.d[core] - mean).mean(axis=0)
         white = self.log.process.white[core].mean(axis=0) / len(core)
@@ -197,48 +191,37 @@ class ContactMeasurement:
         return ContactLocation(fits, chain.joints, tuple(likely))
 
     def row(
-        self,
-        number: int,
-        course: WindowWrench,
-        location: ContactLocation,
-        jacobian: Array,
-        *,
-        on_link: bool,
+        self, number: int, course: WindowWrench, location: ContactLocation, jacobian: Array
     ) -> Contact:
         """One row of the list."""
         run, blocks = self.found.runs[number], self.log.blocks
-        inside = course.within(run)
-        k = int(inside.size.argmax())
-        peak = run[0] + k
-        values, factor = inside.values[k], WIDENED * self.test.widening
+        span, inside, factor = slice(*run), course.within(run), WIDENED * self.test.widening
         # What the drives' constants and the blocks' length may hide, as in the wrench of
         # `best`.
-        hidden = hidden_by_blocks(course.values, self.bent)
-        hidden = hidden[run[0] - course.first : run[1] - course.first]
-        covariances = inside.covariance * np.outer(factor, factor) + hidden
-        covariance = covariances[k]
-        size, length = float(inside.size[k]), blocks.length[slice(*run)]
-        u = values[:3] / max(size, 1e-12)
+        hidden = hidden_by_blocks(course.values, self.bent)[run[0] - course.first :]
+        covariances = inside.covariance * np.outer(factor, factor) + hidden[: len(inside.values)]
+        force, length = inside.values[:, :3], blocks.length[span]
+        forces = force_course(blocks.t[span], force, covariances[:, :3, :3])
+        k = forces.force.argmax()
+        peak, size, band, covariance = run[0] + k, forces.force[k], forces.band[k], covariances[k]
         where, named, lead = self.part(number, location)
-        band = NORMAL * float(np.sqrt(u @ covariance[:3, :3] @ u))
         anywhere = location.sizes(size, band)
         spread = 0.0 if named == "wrist" and lead >= SURE_NATS else location.spread(size)
-        remarks: tuple[Remark, ...] = ()
+        remarks = list[Remark]()
         if len(location.parts) > 1 and NORMAL * spread > WIDE * size:
             # Where another part may have been touched, another force touched it.
-            why = caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1])
-            remarks = (why,)
+            least, most = anywhere
+            remarks.append(caution("size-goes-with-place", least_N=least, most_N=most))
         rate = 1.0 / self.run.step
         if length.sum() < SHORT and rate < SLOW:
-            remarks = (*remarks, caution("peak-cut-by-rate", rate_hz=rate))
-        start = float(blocks.t[run[0]] - 0.5 * blocks.length[run[0]])
-        stop = float(blocks.t[run[1] - 1] + 0.5 * blocks.length[run[1] - 1])
+            remarks.append(caution("peak-cut-by-rate", rate_hz=rate))
+        start, stop = times_of(blocks, run)
         cuts = self.run.recording.source.cuts
         for cut in [c for c in cuts if c.start <= stop + BESIDE and c.stop >= start - BESIDE][:1]:
-            remarks = (*remarks, caution("samples-cut-inside", at_s=cut.start))
-        J, at = jacobian[peak], float(blocks.t[peak])
-        wrench, force = values.copy(), inside.values[:, :3]
-        if on_link:
+            remarks.append(caution("samples-cut-inside", at_s=cut.start))
+        J, at, values = jacobian[peak], blocks.t[peak], inside.values[k]
+        wrench = values.copy()
+        if not location.on_wrist:
             poses, fit = link_poses(self.run.robot.loaded_chain, blocks.q[[peak]]), location.fits[0]
             lever = points_on(poses, fit.link, fit.share) - poses.translation[:, -1]
             wrench[3:] += np.cross(lever[0], values[:3])
@@ -248,7 +231,7 @@ class ContactMeasurement:
             stop=stop,
             peak=at,
             peak_force=size,
-            peak_band=float(np.hypot(band, NORMAL * spread)),
+            peak_band=np.hypot(band, NORMAL * spread),
             place_band=band,
             wrench=wrench,
             wrench_sd=np.sqrt(np.diag(covariance)),
@@ -258,27 +241,26 @@ class ContactMeasurement:
             where=where,
             lead=lead,
             places=location.links,
-            evidence=float(self.found.best[number]),
+            evidence=self.found.best[number],
             joint_torque=J.T @ values,
             joint_torque_sd=np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J)),
             at_rest=bool(blocks.rests[peak].all()),
             vendor_force=vendor_force(self.run, self.found.places[0].jacobian[peak], at),
             sensor_force=sensor_force(self.run, at),
-            course=force_course(blocks.t[slice(*run)], force, covariances[:, :3, :3]),
-            remarks=remarks,
+            course=forces,
+            remarks=tuple(remarks),
         )
 
     def part(self, number: int, location: ContactLocation) -> tuple[ArmPart, ArmPart, float]:
         """The part of the arm that alone fits, the one that leads, and by how much evidence."""
-        names = arm_parts(self.run.robot.joints)
-        best: dict[ArmPart, float] = {}
+        names, best = arm_parts(self.run.robot.joints), dict[ArmPart, float]()
         for place, nats in zip(self.found.places, self.found.evidence[number], strict=True):
             part = names[place.link]
-            best[part] = max(best.get(part, -np.inf), float(nats))
+            best[part] = max(best.get(part, nats), nats)
         fitting = location.parts
         where = fitting[0] if len(fitting) == 1 else "cannot tell"
         named = where if where in best else max(best, key=lambda part: best[part])
-        return where, named, best[named] - max(v for part, v in best.items() if part != named)
+        return where, named, best.pop(named) - max(best.values())
 
 
 def shows_force(row: Contact, smallest: float) -> bool:
@@ -297,8 +279,7 @@ def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
     """|F| over a contact with its band along the force (K, 3) [N], of covariance (K, 3, 3)."""
     size = np.linalg.norm(force, axis=1)
     u = force / np.maximum(size, 1e-12)[:, None]
-    variance = np.einsum("ki,kij,kj->k", u, covariance, u)
-    return ForceCourse(t, size, NORMAL * np.sqrt(variance))
+    return ForceCourse(t, size, NORMAL * np.sqrt(np.einsum("ki,kij,kj->k", u, covariance, u)))
 
 
 def vendor_force(run: Run, J: Array, at: float) -> float | None:

@@ -89,7 +89,7 @@ class Candidates(NamedTuple):
     @property
     def lasts(self) -> list[float]:
         """Length of each candidate. (C,) [s]"""
-        return [float(self.log.blocks.length[slice(*run)].sum()) for run in self.runs]
+        return [self.log.blocks.length[slice(*run)].sum() for run in self.runs]
 
     def kept(self, chosen: Sequence[int]) -> "Candidates":
         """Some of the candidates."""
@@ -114,16 +114,13 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)
     J = options[0].jacobian
-    ahead, back = error_process(noise, blocks), error_process(noise, turned_round(blocks))
-    inside = filtered_contacts(blocks, (ahead, back), J)
-    beyond = []
-    for start, stop in runs_of(beyond_threshold(run, level)):
-        # The observer lags by 1/gain.
-        span = np.array([run.t[start], run.t[stop - 1]]) - 1.0 / GAIN
-        first, last = (int(k) for k in blocks.t.searchsorted(span))
-        last = min(max(last, first + 1), len(blocks.t))
-        if first < last:
-            beyond.append((first, last))
+    ahead = error_process(noise, blocks)
+    inside = filtered_contacts(blocks, (ahead, error_process(noise, turned_round(blocks))), J)
+    spans = np.reshape(runs_of(beyond_threshold(run, level)), (-1, 2)).astype(int)
+    # The observer lags by 1/gain.
+    first, last = blocks.t.searchsorted(run.t[spans - [0, 1]] - 1.0 / GAIN).T
+    last = np.minimum(np.maximum(last, first + 1), len(blocks.t))
+    beyond = [(a, b) for a, b in np.stack([first, last], axis=1).tolist() if a < b]
     struck = inside.copy()
     # The filter takes a load that hangs on for many seconds for an error of the model,
     # and sees only what strikes it in the meantime: before, between and behind that the
@@ -141,11 +138,10 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     log = BlockLog(blocks, ahead._replace(white=white))
     if not runs:
         return Candidates(log, options, [], np.zeros((0, len(options))), [], START)
-    prior = learn_prior(log, J, runs, START, rounds=1)
-    count = len(runs)
+    prior, count = learn_prior(log, J, runs, START, rounds=1), len(runs)
     wrenches = smooth_lanes(log, contact_lanes(log, [J] * count, runs, [prior] * count))
     pairs = zip(wrenches, runs, strict=True)
-    pieces = [piece for wrench, run in pairs for piece in split_run(blocks.t, wrench, run, J)]
+    pieces = [piece for pair in pairs for piece in split_run(blocks.t, *pair, J)]
     passed = [any(a < stop and b > start for a, b in beyond) for start, stop in pieces]
     return Candidates(log, options, pieces, evidence(log, options, pieces, prior), passed, prior)
 
@@ -168,8 +164,8 @@ def filtered_contacts(
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
     inside = np.zeros(len(blocks.t), bool)
     for forward, backward in two_state_odds(blocks, processes, size):
-        high, low = np.maximum(forward, backward), np.minimum(forward, backward)
-        seed = (high > sure) & (low > likely)
+        low = np.minimum(forward, backward)
+        seed = (np.maximum(forward, backward) > sure) & (low > likely)
         runs = intervals(blocks.t, 0.5 * (forward + backward) > 0.0, gap=GAP)
         inside |= covered([run for run in runs if seed[slice(*run)].any()], len(seed))
     return inside
@@ -183,7 +179,7 @@ def two_state_odds(
     A long log is searched in stretches side by side, each after `WARM_UP` seconds of the
     log before it, in which the filter forgets that it has just begun.
     """
-    step, usual, many = steps(blocks), float(np.median(blocks.length)), len(SEARCHES)
+    step, usual, many = steps(blocks), np.median(blocks.length), len(SEARCHES)
     step[0] = usual
     back = np.concatenate([step[:1], step[:0:-1]])
     ahead = (blocks.d, *processes[0], size**2, step[:, None])
@@ -191,10 +187,8 @@ def two_state_odds(
     begins, warm, length = stretches_of(len(step), usual)
     # The last block is repeated beyond the end.
     at = np.minimum(np.add.outer(begins, np.arange(length)), len(step) - 1)
-    inputs = []
-    for pair in zip(ahead, turned, strict=True):
-        each = np.stack([series[at] for series in pair]).repeat(many, axis=1)
-        inputs.append(each.reshape(-1, *each.shape[2:]).swapaxes(0, 1))
+    pairs = (np.concatenate([x[at], y[at]]) for x, y in zip(ahead, turned, strict=True))
+    inputs = (pair.repeat(many, axis=0).swapaxes(0, 1) for pair in pairs)
     table = filtered_odds(*inputs).reshape(length, 2, len(begins), many)
     joined = np.concatenate([table[(warm if k else 0) :, :, i] for i, k in enumerate(begins)])
     odds = joined[: len(step)]
@@ -277,23 +271,25 @@ def imm_predict(
 
 def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Array]) -> ImmState:
     """The states with a block's disturbance in them; a joint that spikes tells a 40th."""
-    S0 = state.bb[0] + white
-    b1, cross, own = state.bb[1], state.bb[1] + state.bx, state.bx + state.xx
-    S1 = cross + own + white
-    S = np.stack([S0, S1])
-    nu = np.stack([d - state.b[0], d - state.b[1] - state.x])
+    own = state.bx + state.xx
+    # Covariance of b, as each mode has it, with d. (2, S, n)
+    cross = np.stack([state.bb[0], state.bb[1] + state.bx])
+    S = cross + white
+    S[1] += own
+    nu = d - state.b
+    nu[1] -= state.x
     square = nu * nu / S
     usual = often[1] - 0.5 * square
     spiked = often[0] - 0.5 * square / SPIKE
     likely = np.logaddexp(usual, spiked) - 0.5 * np.log(S)
     odds = state.odds + (likely[1] - likely[0]).sum(axis=1)
     S = np.where(spiked > usual, SPIKE * S, S)
-    K0, K1, Kx = state.bb[0] / S[0], cross / S[1], own / S[1]
+    K, Kx = cross / S, own / S[1]
     return ImmState(
-        np.stack([state.b[0] + K0 * nu[0], state.b[1] + K1 * nu[1]]),
+        state.b + K * nu,
         state.x + Kx * nu[1],
-        np.stack([state.bb[0] * (1.0 - K0), b1 - K1 * cross]),
-        state.bx - K1 * own,
+        state.bb - K * cross,
+        state.bx - K[1] * own,
         state.xx - Kx * own,
         odds.clip(-MOST_ODDS, MOST_ODDS),
     )
@@ -305,19 +301,14 @@ def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -
     size = inside.size
     torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
     sd = np.sqrt(np.trace(inside.covariance[:, :3, :3], axis1=1, axis2=2))
-    low, at = size < RELEASED * sd, t[run[0] : run[1]]
+    low, at, force = size < RELEASED * sd, t[slice(*run)], inside.values[:, :3]
     pieces, begin = [], 0
     for k, end in quiet_pauses(low, at):
         if is_valley((size[begin:], torque[begin:]), k - begin, end - begin, RELEASE_SHARE):
-            pieces.append((run[0] + begin, run[0] + k))
+            pieces += split_at_turns(at, force, torque, (begin, k))
             begin = end
-    pieces.append((run[0] + begin, run[1]))
-    force = inside.values[:, :3]
-    return [
-        (first + run[0], last + run[0])
-        for piece in pieces
-        for first, last in split_at_turns(at, force, torque, (piece[0] - run[0], piece[1] - run[0]))
-    ]
+    pieces += split_at_turns(at, force, torque, (begin, len(at)))
+    return [(first + run[0], last + run[0]) for first, last in pieces]
 
 
 def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> list[BlockSpan]:
@@ -329,10 +320,11 @@ def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> l
     for k in inner[size[inner].argsort()].tolist():
         if not is_valley((size, load), k, k + 1, HALF):
             continue
-        i, j = int(size[:k].argmax()), k + int(size[k:].argmax())
+        i, j = size[:k].argmax(), k + size[k:].argmax()
         if there[i] @ there[j] < TURNED * size[i] * size[j]:
-            ends = (piece[0], piece[0] + k), (piece[0] + k, piece[1])
-            return [part for end in ends for part in split_at_turns(t, force, torque, end)]
+            start, stop = piece
+            before = split_at_turns(t, force, torque, (start, start + k))
+            return before + split_at_turns(t, force, torque, (start + k, stop))
     return [piece]
 
 
@@ -343,7 +335,7 @@ def is_valley(series: Sequence[Array], start: int, stop: int, share: float) -> b
 
 def quiet_pauses(low: Mask, t: Array) -> list[tuple[int, int]]:
     """Runs of low blocks within a contact that last at least `RELEASE_TIME`."""
-    usual = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    usual = np.median(np.diff(t)) if len(t) > 1 else 0.0
     return [
         (start, stop)
         for start, stop in runs_of(low)

@@ -6,7 +6,6 @@ a robot needs it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -47,27 +46,25 @@ def compared_signals(run: Run) -> ComparedSignals:
     least squares in base axes about the flange point.
     """
     # The robot's own estimate asks for no model, which else would check.
-    check_joints(run.recording, run.robot)
-    recording, vendor = run.recording, run.recording.tau_ext
-    of_vendor = vendor is not None and bool(vendor.any())
-    if vendor is not None and of_vendor:
-        torque = ExternalTorque(name="tau_ext", t=recording.t, tau=vendor)
+    log = run.recording
+    check_joints(log, run.robot)
+    vendor, stated, own = log.tau_ext, log.wrench_frame, log.wrench
+    if vendor is not None and vendor.any():
+        torque = ExternalTorque(name="tau_ext", t=log.t, tau=vendor)
     else:
         torque = MomentumObserver(gain=GAIN).estimate(run.terms)
-    stated, own = recording.wrench_frame, recording.wrench
-    logged = own is not None and bool(own.any()) and stated is not None
-    if own is not None and stated is not None and logged and stated.axes != "sensor":
-        wrench, frame = own, f"{stated.axes} axes at {POINTS.get(stated.point, stated.point)}"
-    elif recording.joints >= 6:
-        solved = VirtualSensor(frame="base").wrench(torque, recording.q, run.robot.chain)
-        wrench, frame, logged = solved.known, "base axes at the flange point", False
-    else:
-        wrench, frame, logged = np.zeros((recording.samples, 0)), "", False
+    wrench, frame, logged = np.zeros((log.samples, 0)), "", False
+    if own is not None and own.any() and stated is not None and stated.axes != "sensor":
+        frame, logged = f"{stated.axes} axes at {POINTS.get(stated.point, stated.point)}", True
+        wrench = own
+    elif log.joints >= 6:
+        solved = VirtualSensor(frame="base").wrench(torque, log.q, run.robot.chain)
+        wrench, frame = solved.known, "base axes at the flange point"
     return ComparedSignals(
-        recording=recording,
+        recording=log,
         torque=torque.tau,
         wrench=wrench,
-        of_vendor=of_vendor,
+        of_vendor=torque.name == "tau_ext",
         logged_wrench=logged,
         frame=frame,
     )
@@ -85,19 +82,18 @@ class CheckedContact(NamedTuple):
     already_above: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
-class ThresholdDetection:
+class ThresholdDetection(NamedTuple):
     """What thresholds would have done along a log with contacts."""
 
     log: str  #: The log.
+    contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
+    remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
     #: What says where the contacts are, None where nothing does: then the alarms
     #: themselves are listed as contacts.
     reference: str | None = None
-    contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
     #: Alarms that touch no contact, None where nothing says where they are.
     false_alarms: int | None = None
-    untouched_h: float = float("nan")  #: Time without contact, NaN if not known. [h]
-    remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
+    untouched_h: float = np.nan  #: Time without contact, NaN if not known. [h]
 
     @property
     def detected(self) -> tuple[CheckedContact, ...]:
@@ -107,12 +103,12 @@ class ThresholdDetection:
     @property
     def median_delay(self) -> float:
         """Of those detected, NaN if none is. [s]"""
-        return float(np.median([c.delay for c in self.detected])) if self.detected else float("nan")
+        return float(np.median([c.delay for c in self.detected] or np.nan))
 
     @property
     def longest_delay(self) -> float:
         """Of those detected, NaN if none is. [s]"""
-        return max((c.delay for c in self.detected), default=float("nan"))
+        return max((c.delay for c in self.detected), default=np.nan)
 
     @property
     def smallest_detected(self) -> float:
@@ -145,17 +141,15 @@ def check_contacts(
     own = [(n, one) for n, x in zip(names, level.T, strict=False) for one in events(t, x)]
     own.sort(key=lambda alarm: alarm[1].start)
     if reference is None:
-        listed = [checked(alarm, t, signals.force, own) for alarm in alarms]
-        return ThresholdDetection(
-            log=signals.recording.name,
-            contacts=tuple(contact._replace(delay=float("nan")) for contact in listed),
-            remarks=(caution("check-without-truth"),),
-        )
+        listed = (checked(alarm, t, signals.force, own) for alarm in alarms)
+        contacts = tuple(contact._replace(delay=np.nan) for contact in listed)
+        remarks = (caution("check-without-truth"),)
+        return ThresholdDetection(signals.recording.name, contacts, remarks)
     floor = 0.0 if reference.floor is None else np.nan_to_num(reference.floor)
     limits = np.maximum(TRUE_TORQUE, 5.0 * floor)
     true = [c for c in true_intervals(t, reference.tau, limits) if c.stop >= t[0] + SETTLING]
     size = np.zeros((len(t), 0)) if wrench is None else np.linalg.norm(wrench.force, axis=1)
-    touched = sum(c.stop - max(c.start, float(t[0]) + SETTLING) for c in true)
+    touched = sum(c.stop - max(c.start, t[0] + SETTLING) for c in true)
     return ThresholdDetection(
         log=signals.recording.name,
         reference=reference.name,
@@ -215,9 +209,9 @@ def left_out(free: Sequence[ComparedSignals], rate: float) -> tuple[CountedAlarm
 
     None where there is one log alone, or the others are all too short.
     """
-    found = []
-    for k, signals in enumerate(free):
-        others = [*free[:k], *free[k + 1 :]]
-        if any(one.recording.duration >= LONG_ENOUGH for one in others):
-            found.append(counted_alarms(signals, find_thresholds(others, rate)))
-    return tuple(found)
+    others = ([*free[:k], *free[k + 1 :]] for k in range(len(free)))
+    return tuple(
+        counted_alarms(signals, find_thresholds(rest, rate))
+        for signals, rest in zip(free, others, strict=True)
+        if any(one.recording.duration >= LONG_ENOUGH for one in rest)
+    )

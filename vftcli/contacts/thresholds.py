@@ -7,7 +7,7 @@ came out too low.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -90,9 +90,8 @@ class Tail(NamedTuple):
         largest maximum, of m its 95 %, m ± 1.96 √m.
         """
         if rate <= self.rate:
-            step = self.excess * float(np.log(self.rate / rate))
-            spread = float(NORMAL / np.sqrt(self.size) * step)
-            value = self.start + step
+            step = self.excess * np.log(self.rate / rate)
+            value, spread = self.start + step, NORMAL / np.sqrt(self.size) * step
             return value, (max(value - spread, self.start), value + spread)
         due = rate * self.hours
         if due > 0.5 * len(self.maxima):
@@ -103,7 +102,7 @@ class Tail(NamedTuple):
             )
         ranks = due + np.array([0.0, 1.0, -1.0]) * NORMAL * np.sqrt(due)
         places = np.rint(ranks).astype(int).clip(1, len(self.maxima)) - 1
-        value, low, high = (float(x) for x in self.maxima[places])
+        value, low, high = self.maxima[places].tolist()
         return value, (low, high)
 
 
@@ -111,9 +110,7 @@ def tail_of(maxima: Array) -> Tail | None:
     """The tail of block maxima (B,), None where there are fewer than five of them."""
     hours = len(maxima) * BLOCK / 3600.0
     count = min(max(LEAST_READINGS, round(AN_HOUR * hours)), len(maxima) // SHARE)
-    if count < 1:
-        return None
-    return Tail(np.sort(maxima)[::-1], count)
+    return Tail(np.sort(maxima)[::-1], count) if count else None
 
 
 #: A log that holds this many false alarms, at their rate, shows it; a shorter one
@@ -155,10 +152,10 @@ class ComparedSignals:
 
 def check_alike(signals: Sequence[ComparedSignals]) -> None:
     """Raise unless all logs hold the same estimates of the same arm."""
-    first = signals[0]
-    for other in signals[1:]:
-        kinds = ((one.of_vendor, one.logged_wrench, one.frame) for one in (first, other))
-        if len(set(kinds)) > 1:
+    first, *others = signals
+    for other in others:
+        kinds = {(one.of_vendor, one.logged_wrench, one.frame) for one in (first, other)}
+        if len(kinds) > 1:
             raise ParameterError(
                 f"{other.recording.name} and {first.recording.name} do not hold the same "
                 "estimates of the robot's own, and one set of thresholds serves one of them; "
@@ -256,13 +253,12 @@ class Thresholds(Shown):
     def level(self, name: str, signals: ComparedSignals) -> Array:
         """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)"""
         values = [one.value if name == "joints" else one.level for one in getattr(self, name)]
-        if not values:
-            return np.zeros((len(signals.t), 0))
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
         # A signal that never moved has the threshold zero: whatever it reads then is an
         # alarm.
-        return np.asarray(abs(getattr(signals, SETS[name])) / np.maximum(limits, LEAST))
+        sizes = abs(getattr(signals, SETS[name])[:, : len(values)])
+        return np.asarray(sizes / np.maximum(limits, LEAST))
 
 
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
@@ -284,51 +280,48 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
             f"the longest free log has {longest:.3g} s: too short to count how often a level is "
             f"passed; record at least {LONG_ENOUGH:g} s, better an hour"
         )
-    made = Thresholds(
+    remarks = remarks_on(free, len(joints), rate)
+    if free[0].wrench.shape[1] and not axes:
+        remarks.append(caution("axes-untold"))
+    named = (*zip(AXES, axes, strict=False), *(("|F|", one) for one in force))
+    if wide := {name: one for name, one in named if one.is_wide}:
+        lengths = {signals.recording.name: signals.recording.duration for signals in free}
+        more = max(one.more_share * lengths[one.log] / 60.0 for one in wide.values())
+        remarks.append(caution("axes-too-wide", axes=", ".join(wide), more_min=more))
+    return Thresholds(
         rate=rate,
         joints=joints,
         axes=axes,
         force=force,
         of_vendor=free[0].of_vendor,
         logged_wrench=free[0].logged_wrench,
+        remarks=tuple(remarks),
     )
-    remarks = remarks_on(free, len(made.joints), rate)
-    if free[0].wrench.shape[1] and not made.axes:
-        remarks.append(caution("axes-untold"))
-    wide = {name: one for name, *_, one in made.named[len(made.joints) :] if one.is_wide}
-    if wide:
-        lengths = {signals.recording.name: signals.recording.duration for signals in free}
-        more = max(one.more_share * lengths[one.log] / 60.0 for one in wide.values())
-        remarks.append(caution("axes-too-wide", axes=", ".join(wide), more_min=more))
-    return replace(made, remarks=tuple(remarks))
 
 
 def thresholds_of_set(
     free: Sequence[ComparedSignals], field: str, rate: float
 ) -> tuple[SignalThreshold, ...]:
     """The threshold of every signal of a set, none if no log tells one; see `find_thresholds`."""
-    maxima = {
-        log.recording.name: [block_maxima(log.t, x) for x in abs(getattr(log, field)).T]
-        for log in free
-    }
+    signals = {log.recording.name: (log.t, abs(getattr(log, field)).T) for log in free}
     count = getattr(free[0], field).shape[1]
-    found = []
+    share, found = rate / max(count, 1), []
     for k in range(count):
-        each = {name: own[k] for name, own in maxima.items() if len(own[k])}
-        tails = {name: tail for name, own in each.items() if (tail := tail_of(own)) is not None}
+        maxima = {name: block_maxima(t, x[k]) for name, (t, x) in signals.items()}
+        tails = {name: tail for name, own in maxima.items() if (tail := tail_of(own)) is not None}
         if not tails:
             return ()
         # Of few readings a tail is a guess, and a guess may not outdo what others know.
         sure = {name: tail for name, tail in tails.items() if tail.size >= ENOUGH} or tails
         levels = [
-            SignalThreshold(*tail.threshold(rate / count), rate / count, name, tail)
+            SignalThreshold(*tail.threshold(share), share, name, tail)
             for name, tail in sure.items()
         ]
-        for name in each.keys() - sure.keys():
-            largest = float(each[name].max())
-            levels.append(
-                SignalThreshold(largest, (largest, float("nan")), rate / count, name, None)
-            )
+        levels += [
+            SignalThreshold(own.max(), (own.max(), np.nan), share, name, None)
+            for name, own in maxima.items()
+            if len(own) and name not in sure
+        ]
         found.append(max(levels, key=lambda one: one.value))
     return tuple(found)
 
@@ -336,15 +329,14 @@ def thresholds_of_set(
 def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> list[Remark]:
     """What the logs can bear: who made the estimate, how far it is extrapolated, what lacks."""
     first = free[0]
-    remarks = [
-        fact("thresholds-of-vendor") if first.of_vendor else caution("thresholds-of-observer")
-    ]
+    vendor = fact("thresholds-of-vendor")
+    remarks = [vendor if first.of_vendor else caution("thresholds-of-observer")]
     if first.frame:
         code = "thresholds-of-logged-wrench" if first.logged_wrench else "thresholds-of-torques"
         remarks.append(fact(code, frame=first.frame))
     # How many readings there are is the same for every joint.
-    tails = [tail_of(block_maxima(signals.t, signals.torque[:, 0])) for signals in free]
-    longest = max((tail for tail in tails if tail is not None), key=lambda tail: tail.hours)
+    tails = (tail_of(block_maxima(signals.t, signals.torque[:, 0])) for signals in free)
+    longest = max(filter(None, tails), key=lambda tail: tail.hours)
     if longest.hours < (need := DUE / rate):
         remarks.append(
             caution(
@@ -365,7 +357,7 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> lis
             remarks.append(caution("free-log-too-short", where, duration_s=duration))
         if not signals.frame:
             continue
-        if (share := float(np.isfinite(signals.wrench[:, 0]).mean())) < SELDOM:
+        if (share := np.isfinite(signals.wrench[:, 0]).mean()) < SELDOM:
             remarks.append(caution("wrench-seldom-known", where, share=share))
     return remarks
 

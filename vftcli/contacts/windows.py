@@ -20,6 +20,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vftcli.robots.chain import Chain, link_poses
+from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.linear_model import SPIKE, LinearModel, log_likelihood, smoothed
 from vftcli.signals.pose import Pose
@@ -119,8 +120,8 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     links = np.arange(FIRST_LINK, n + 1).repeat(POINTS)
     along = np.tile(np.arange(1, POINTS + 1) / POINTS, n + 1 - FIRST_LINK)
     points = points_on(poses, links, along[:, None])[0]
-    axes, origins = poses.rotation[0, :-1, :, 2], poses.translation[0, :-1]
-    rows = np.cross(axes[None], points[:, None] - origins[None])
+    origins = poses.translation[0, :-1]
+    rows = np.cross(poses.rotation[0, :-1, :, 2][None], points[:, None] - origins[None])
     rows[np.arange(n)[None] >= links[:, None]] = 0.0
     A, y = rows / sd[:, None], torque / sd
     precision = A.swapaxes(1, 2) @ A + np.eye(3) / FORCE_PRIOR**2
@@ -128,10 +129,9 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     forces = (covariance @ (A.swapaxes(1, 2) @ y)[..., None])[..., 0]
     misfit = np.sum((y - (A @ forces[..., None])[..., 0]) ** 2, axis=1)
     score = misfit + np.sum(forces**2, axis=1) / FORCE_PRIOR**2
-    sizes = np.maximum(np.linalg.norm(forces, axis=1), 1e-12)
-    u = forces / sizes[:, None]
+    u = forces / np.maximum(np.linalg.norm(forces, axis=1), 1e-12)[:, None]
     bands = 1.96 * np.sqrt(np.einsum("pi,pij,pj->p", u, covariance, u))
-    least = float(score.min()) + ALIKE
+    least = score.min() + ALIKE
     order = score.argsort(kind="stable")[: np.count_nonzero(score <= least)]
     columns = (x[order].tolist() for x in (links, along, misfit, score))
     return [PointFit(*each) for each in zip(*columns, forces[order], bands[order], strict=True)]
@@ -180,9 +180,14 @@ class WindowWrench(NamedTuple):
 
 def window_of(t: Array, run: BlockSpan, margin: float = MARGIN) -> BlockSpan:
     """The blocks within `margin` of a run of them."""
-    first = int(t.searchsorted(t[run[0]] - margin))
-    last = int(t.searchsorted(t[run[1] - 1] + margin, side="right"))
-    return first, last
+    first = t.searchsorted(t[run[0]] - margin)
+    return first, t.searchsorted(t[run[1] - 1] + margin, side="right")
+
+
+def times_of(blocks: Blocks, run: BlockSpan) -> Array:
+    """When a run of blocks begins and ends. (2,) [s]"""
+    ends = [run[0], run[1] - 1]
+    return blocks.t[ends] + blocks.length[ends] * [-0.5, 0.5]
 
 
 def contact_lanes(
@@ -193,32 +198,28 @@ def contact_lanes(
     margin: float = MARGIN,
 ) -> list[Lane]:
     """A lane for every run of blocks, the others' hidden, with J (K, 6, n) and prior of each."""
-    count = len(log.blocks.t)
-    every, own = covered(runs, count, 1), {}
-    for run in runs:
-        if run not in own:
-            gate = covered([run], count, 1)
-            own[run] = window_of(log.blocks.t, run, margin), gate, every & ~gate
+    t, own = log.blocks.t, {}
+    every = covered(runs, len(t), 1)
+    for run in set(runs):
+        gate = covered([run], len(t), 1)
+        own[run] = window_of(t, run, margin), gate, every & ~gate
     lanes = zip(runs, jacobians, priors, strict=True)
     return [Lane(*own[run], jacobian, prior) for run, jacobian, prior in lanes]
 
 
 def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
     """Numbers of lanes that are about equally long, so that little is padded."""
-    length = [stop - start for start, stop in (lane.window for lane in lanes)]
-    batch: list[int] = []
-    for number in sorted(range(len(lanes)), key=length.__getitem__):
-        if batch and (len(batch) == MOST_LANES or length[number] > 1.5 * length[batch[0]] + 20):
-            yield batch
-            batch = []
-        batch.append(number)
-    if batch:
-        yield batch
+    length = np.array([stop - start for start, stop in (lane.window for lane in lanes)])
+    left = length.argsort(kind="stable")
+    while left.size:
+        alike = length[left[:MOST_LANES]] <= 1.5 * length[left[0]] + 20
+        batch, left = np.split(left, [np.count_nonzero(alike)])
+        yield batch.tolist()
 
 
 def smooth_lanes(log: BlockLog, lanes: Sequence[Lane]) -> list[WindowWrench]:
     """The smoothed wrench of every lane along its window."""
-    found: dict[int, WindowWrench] = {}
+    found = dict[int, WindowWrench]()
     for batch in batches(lanes):
         mean, covariance = smoothed(assembled(log, [lanes[i] for i in batch]))
         for place, i in enumerate(batch):
@@ -269,14 +270,14 @@ def learn_prior(
         priors = [prior._replace(time=time) for time in TIMES for _ in runs]
         each = [jacobian] * len(priors)
         lanes = contact_lanes(log, each, [*runs] * len(TIMES), priors, NEAR)
-        best = int(likelihoods(log, lanes).reshape(len(TIMES), -1).sum(axis=1).argmax())
+        best = likelihoods(log, lanes).reshape(len(TIMES), -1).sum(axis=1).argmax()
         wrenches = smooth_lanes(log, lanes[best * len(runs) : (best + 1) * len(runs)])
         inside = [wrench.within(run) for wrench, run in zip(wrenches, runs, strict=True)]
         values = np.concatenate([wrench.values for wrench in inside])
         covariance = np.concatenate([wrench.covariance for wrench in inside])
         power = (values**2 + np.diagonal(covariance, axis1=1, axis2=2)).mean(axis=0)
-        force, moment = np.sqrt(power[:3].mean()), np.sqrt(power[3:].mean())
-        sds = float(np.clip(force, *FORCES)), float(np.clip(moment, *MOMENTS))
+        moment = np.sqrt(power[3:].mean())
+        sds = np.clip(np.sqrt(power[:3].mean()), *FORCES), np.clip(moment, *MOMENTS)
         prior = WrenchPrior(TIMES[best], *sds)
     return prior
 

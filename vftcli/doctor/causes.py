@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.signals import TRAVEL
 from vftcli.doctor.windows import Case, Terms, Windows, solve, spread, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
@@ -146,11 +145,10 @@ def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
     case, found = may_be[0].case, list[Cause]()
     tells = case.gravity_range >= RANGE
     if tells:
-        best, *rest = sorted(may_be[1:], key=lambda cause: cause.misfit)
-        second = min(cause.misfit for cause in (may_be[0], *rest))
+        best, second, *_ = sorted(may_be, key=lambda cause: cause.misfit)
         # Gravity counted twice may look like a load: none is subtracted.
         right = case.bare.size < READ_RIGHT * case.size
-        if second > (OVERWHELMING if right else CLEAR) * best.misfit:
+        if best.code and second.misfit > (OVERWHELMING if right else CLEAR) * best.misfit:
             found.append(best)
     for trial in TRIALS if tells else (turned_or_swapped,):
         found += trial(case)
@@ -179,15 +177,14 @@ def readings(windows: Windows) -> Iterator[Cause]:
         return
     mean = windows.mean(value)
     mean[:, idle] = 0.0
-    if not mean.any() or not np.isfinite(mean).all():
+    if not (mean.any() and np.isfinite(mean).all()):
         return
     gravity, unit = windows.gravity[:, :, 2], np.ones(mean.shape[1])
     # The rest is relative to the whole torque, mostly gravity.
     whole = root_mean_square(mean + gravity) if name == "torque_without_gravity" else 0.0
     for code in MAY_BE[name]:
         # Nothing corrects currents without gravity.
-        none = Reading("current_without_gravity" if code else "")
-        reading = CORRECTIONS.get(code, none)
+        reading = CORRECTIONS.get(code, Reading("current_without_gravity" if code else ""))
         kind = reading.kind or name
         drives = constant if kind.startswith("current") else unit
         if drives is None:
@@ -223,15 +220,16 @@ def tilted(case: Case) -> Iterator[Cause]:
 
 def turned_or_swapped(case: Case) -> Iterator[Cause]:
     """Single joints with a reversed effort, pairs with exchanged efforts."""
-    moving = np.ptp(case.windows.q, axis=(0, 1)) > TRAVEL
+    moving = case.windows.moves
     suspects = np.flatnonzero((case.by_joint > SUSPECT) & moving).tolist()
     if not suspects:
         return
     straight = [rest_of(case, j, j) for j in range(len(moving))]
     wrong = [j for j in suspects if rest_of(case, j, j, -1.0) < TURNED * straight[j]]
     for joints in {tuple(wrong), *((j,) for j in wrong)} - {()}:
-        sign = np.where(np.isin(np.arange(len(moving)), joints), -1.0, 1.0)
-        yield Cause("joint-sign", replace(case, given=case.given * sign), joints)
+        turned = case.given.copy()
+        turned[:, joints] *= -1.0
+        yield Cause("joint-sign", replace(case, given=turned), joints)
     for i, j in combinations(np.flatnonzero(moving).tolist(), 2):
         if {i, j}.isdisjoint(suspects):
             continue
@@ -287,17 +285,16 @@ def scaled(case: Case) -> Iterator[Cause]:
     (wrong,) = np.nonzero((off > ALONE + SURE * sds) & (sds < KNOWN))
     others = np.delete(off < np.maximum(OTHERS, SURE * sds), wrong)
     if wrong.size == 1 and others.all() and LEAST < factors[wrong] < MOST:
-        (j,) = wrong.tolist()
-        healed = replace(case, given=case.given / np.where(np.arange(n) == j, factors, 1.0))
-        yield Cause("drive-scale", healed, (j,), {"factor": factors[j], "sd": sds[j]})
+        (j,), given = wrong.tolist(), case.given.copy()
+        given[:, j] /= factors[j]
+        values = {"factor": factors[j], "sd": sds[j]}
+        yield Cause("drive-scale", replace(case, given=given), (j,), values)
 
 
 def swapped(case: Case) -> Iterator[Cause]:
     """Two joints with all signals exchanged: each pair evaluates the model."""
-    moving = np.ptp(case.windows.q, axis=(0, 1)) > TRAVEL
-    far = (case.by_joint > SUSPECT) & moving
-    gravity = root_mean_squares(case.gravity)
-    if not np.any(far & (gravity > CARRIES * case.effort_sizes)):
+    far = (case.by_joint > SUSPECT) & case.windows.moves
+    if not np.any(far & (root_mean_squares(case.gravity) > CARRIES * case.effort_sizes)):
         return  # gravity loads none of the joints with a large misfit
     few = spread(len(case.given), FEW)
     for i, j in combinations(np.flatnonzero(far).tolist(), 2):
@@ -359,15 +356,13 @@ def is_modelled(case: Case) -> bool:
     if len(friction) != n:
         return False
     typical = root_mean_squares(case.windows.motion[:, 1])
-    pairs = zip(friction, typical[:, None], strict=True)
-    stated = abs(np.concatenate([steady_torque(joint, speed) for joint, speed in pairs]))
+    stated = abs(np.concatenate([*map(steady_torque, friction, typical[:, None])]))
     moving = (case.windows.ways.min(axis=0) >= FORTH_AND_BACK) & (stated > 0)
     if moving.sum() < WITHOUT:
         return False
     # A joint without information has the model's torque as its effort.
     tells = abs(case.given - case.needed).max(axis=0) > 1e-9 * case.size
-    static = solve((case.given - case.gravity) * tells, case.windows.friction)
-    for fit in (case.bare, static):
+    for fit in (case.bare, solve((case.given - case.gravity) * tells, case.windows.friction)):
         rubs = fit.values[:n] + fit.values[n:] * typical + SURE * fit.sd[:n]
         if fit.size < MODELLED * case.size and np.all(rubs[moving] < RUBS * stated[moving]):
             return True

@@ -148,8 +148,7 @@ def blows(dq: Array, rows: Mask) -> Mask:
     for start, stop in runs_of(rows):
         before, behind = max(start - 1, 0), min(stop, len(dq) - 1)
         trend = dq[before] - dq[max(before - 2, 0)] + dq[min(behind + 2, len(dq) - 1)] - dq[behind]
-        bend = abs(dq[behind] - dq[before] - 0.5 * trend)
-        found[start:stop] = bend.max() > BLOW
+        found[start:stop] = abs(dq[behind] - dq[before] - 0.5 * trend).max() > BLOW
     return found
 
 
@@ -266,5 +265,4 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
         return
     # The drives release and grip again somewhere in the windows beside.
     spans = [(start, start + length) for start in first[free]]
-    off = covered(spans, recording.samples, length)
-    yield Bad("brakes", off[:, None], None, MOST)
+    yield Bad("brakes", covered(spans, recording.samples, length)[:, None], None, MOST)

@@ -9,7 +9,7 @@ from vftcli.doctor.cuts import cut_findings, without_bad_samples
 from vftcli.doctor.fit import RobotMatch, arm_findings, guess_robot, profiles
 from vftcli.doctor.lateness import LAGLESS, effort_lag
 from vftcli.doctor.load import controller_findings, temperature_findings
-from vftcli.doctor.signals import signal_findings, stuck_findings, unusable_findings
+from vftcli.doctor.signals import efforts_of, signal_findings, stuck_findings, unusable_findings
 from vftcli.doctor.velocity import clock_findings, velocity_findings, velocity_fit
 from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
@@ -18,7 +18,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Runs, paired, unwound
 from vftcli.robots.terms import effort_name
 from vftcli.signals.errors import ExaminationError, UnsettledRobotError
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks, as_record, fact, filled, sentence, words
 from vftcli.signals.shown import Shown
 
@@ -60,10 +60,9 @@ class Examination(Shown):
         """
         codes = REFUSING if fitting else REFUSING - NO_FIT
         # At least half of the joints' effort was not measured, if all efforts agree.
-        joints, efforts = self.recording.joints, set(EFFORTS) & set(self.recording.signals)
-        zero = [f for f in self.warnings if f.code == "zero-effort"]
-        half = [f for f in zero if 2 * len(f.where.joints) >= joints]
-        unmeasured = half if len(half) == len(efforts) else []
+        zero, log = [f for f in self.warnings if f.code == "zero-effort"], self.recording
+        half = [f for f in zero if 2 * len(f.where.joints) >= log.joints]
+        unmeasured = half if len(half) == len(efforts_of(log)) else []
         return tuple(f for f in self.warnings if f.code in codes or f in unmeasured)
 
     @property
@@ -84,10 +83,8 @@ class Examination(Shown):
     @property
     def load(self) -> tuple[float, float] | None:
         """Mass and standard deviation of a load that the model lacks, or None. [kg]"""
-        for remark in self.findings:
-            if "load_kg" in remark.values:
-                return remark.values["load_kg"], remark.values["sd_kg"]
-        return None
+        loads = (r.values for r in self.findings if "load_kg" in r.values)
+        return next(((load["load_kg"], load["sd_kg"]) for load in loads), None)
 
 
 #: Samples at most that are examined of a log in stretches, and samples of such a stretch.
@@ -118,18 +115,18 @@ def examine(
     if unusable := tuple(unusable_findings(part)):
         return Examination(recording=recording, findings=unusable, robots=())
     velocities = velocity_fit(part)
-    by_signal = (
+    by_signal = [
         *clock_findings(recording, velocities, part),
         *signal_findings(part),
         *velocity_findings(part, velocities),
         *stuck_findings(part),
-    )
+    ]
     by_arm, fits = arm_findings(part, robot, by_signal)
     best = robot
     if best is None and fits and fits[0].fits:
         best = profiles()[fits[0].robot]
     if any(finding.code in SIZED for finding in by_arm):
-        by_signal = tuple(f for f in by_signal if f.code != "milliamperes")
+        by_signal = [f for f in by_signal if f.code != "milliamperes"]
     findings = [*cut_findings(recording), *by_signal, *controller_findings(part, best), *by_arm]
     if best is not None:
         if not (LAGLESS | REFUSING) & {finding.code for finding in findings}:
@@ -263,12 +260,10 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
 
 def refuse(name: str, findings: Iterable[Remark]) -> None:
     """Raise an error on the first of some findings with its remedy, if any."""
-    found = [in_words(finding) for finding in findings]
-    if not found:
-        return
-    others = list(dict.fromkeys(other.name for other in found[1:]))
-    more = f" Also: {', '.join(others)}." if others else ""
-    raise ExaminationError(f"{name}: {found[0]}{more} With --anyway it goes on all the same.")
+    if found := [in_words(finding) for finding in findings]:
+        others = ", ".join(dict.fromkeys(other.name for other in found[1:]))
+        more = f" Also: {others}." if others else ""
+        raise ExaminationError(f"{name}: {found[0]}{more} With --anyway it goes on all the same.")
 
 
 class FindingWords(NamedTuple):

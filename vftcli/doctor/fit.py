@@ -8,7 +8,7 @@ most; friction leaves several per cent of a measured effort open.
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +58,7 @@ FELT = 0.02  #: Size of the vendor's torque, relative to the effort, from which 
 EFFORT = frozenset({"stuck-effort", "zero-effort", "saturation", "stuck-position"})
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobotMatch:
+class RobotMatch(NamedTuple):
     """Fit of a profile to a log."""
 
     robot: str  #: The profile's name.
@@ -103,8 +102,8 @@ def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMat
     fits = ranking(recording, profiles().values())
     if not fits or not fits[0].by_maker or fits[0].misfit > GUESSED:
         return None, fits
-    apart = len(fits) < 2 or fits[1].misfit >= APART * fits[0].misfit
-    return fits[0] if apart else None, fits
+    close = any(fit.misfit < APART * fits[0].misfit for fit in fits[1:2])
+    return None if close else fits[0], fits
 
 
 def ranking(recording: Recording, robots: Iterable[Robot]) -> tuple[RobotMatch, ...]:
@@ -115,7 +114,7 @@ def ranking(recording: Recording, robots: Iterable[Robot]) -> tuple[RobotMatch, 
             fits.append(match_of(paired(recording, robot), robot))
     found = sorted(filter(None, fits), key=by_fit)
     return tuple(
-        replace(fit, fits=fit.fits and fit.misfit <= CLOSE * found[0].misfit) for fit in found
+        fit._replace(fits=fit.fits and fit.misfit <= CLOSE * found[0].misfit) for fit in found
     )
 
 
@@ -130,7 +129,7 @@ def is_judgeable(recording: Recording) -> bool:
         return False
     sizes = [abs(x).max() for _, x in efforts_of(recording)]
     motion = max(abs(recording.q).max(), abs(recording.dq).max())
-    return bool(motion < 1e4 and all(1e-9 < size < 1e9 for size in sizes))
+    return motion < 1e4 and all(1e-9 < size < 1e9 for size in sizes)
 
 
 def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> RobotMatch | None:
@@ -188,13 +187,11 @@ def arm_findings(
     if robot is None:
         return of_unknown_arm(recording, ignored)
     own = match_of(recording, robot, ignored)
-    diagnosis = None if own is None else diagnose(recording, robot, ignored)
-    if diagnosis is None or own is None:
+    if own is None or (diagnosis := diagnose(recording, robot, ignored)) is None:
         return ArmFindings()
-    case, cause = diagnosis.case, diagnosis.cause
+    case, cause, others = diagnosis.case, diagnosis.cause, list[RobotMatch]()
     heavy = case.carries_load and case.loaded.values[0] > GENERATION
     refuted = cause is not None and cause.code != "effort-offset"
-    others = list[RobotMatch]()
     if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
         arms = (other for other in profiles().values() if other.path != robot.path)
         others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
@@ -202,14 +199,13 @@ def arm_findings(
         if others and others[0].robot != robot.name and is_rather(others[0], own, diagnosis):
             best, *more = others
             # A user's own file may be nearer to the arm than its maker's model.
-            arm = load_robot(best.robot)
-            driven = case_of(windows_of(recording, arm))
+            driven = case_of(windows_of(recording, load_robot(best.robot)))
             if robot.path in PROFILES.values() or (
                 driven is not None and driven.misfit < ANOTHER * diagnosis.healed.misfit
             ):
                 remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
-                return ArmFindings((remark,), (best, replace(own, fits=False), *more))
-    others = [replace(other, fits=False) for other in others if other.robot != robot.name]
+                return ArmFindings((remark,), (best, own._replace(fits=False), *more))
+    others = [other._replace(fits=False) for other in others if other.robot != robot.name]
     robots = (own, *others)
     return ArmFindings(tuple(explained(diagnosis, robots)), robots)
 
@@ -261,19 +257,18 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
             return ArmFindings()
         return ArmFindings((warning("no-profile", joint_count=recording.joints, counts=counts),))
     # A maker's own model that fits no profile is of another arm.
-    tried = fits[:1] if fits[0].fits else [fit for fit in fits if not fit.by_maker]
-    found = []
-    for fit in tried:
-        diagnosis = diagnose(recording, robots[fit.robot], ignored)
-        if diagnosis is None:
-            continue
-        mistaken = diagnosis.cause is not None and diagnosis.healed.misfit < MISTAKEN
-        if fits[0].fits or mistaken:
-            found.append(diagnosis)
+    is_known = fits[0].fits
+    tried = fits[:1] if is_known else [fit for fit in fits if not fit.by_maker]
+    each = (diagnose(recording, robots[fit.robot], ignored) for fit in tried)
+    found = [
+        one
+        for one in filter(None, each)
+        if is_known or (one.cause is not None and one.healed.misfit < MISTAKEN)
+    ]
     if found:
         best = min(found, key=lambda one: one.healed.misfit)
         return ArmFindings(tuple(explained(best, fits)), fits)
-    if fits[0].fits:
+    if is_known:
         return ArmFindings(robots=fits)
     still = np.ptp(recording.q, axis=0).max() < 0.05
     code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
@@ -288,14 +283,16 @@ def cause_remark(diagnosis: Diagnosis, cause: Cause) -> Remark:
     if cause.code == "milliamperes":
         currents = abs(recording.require("current"))
         return warning(cause.code, typical_A=np.percentile(currents, 99))
-    joints = [f"J{j + 1}" for j in rival.joints] if rival is not None else []
+    second = "nothing else"
+    if rival is not None:
+        second = " ".join([rival.code, *(f"J{j + 1}" for j in rival.joints)])
     by_current = recording.current is not None and np.any(cause.case.constant != 1)
     return warning(
         cause.code,
         on_joints(cause.joints),
         misfit_percent=100 * diagnosis.case.misfit,
         healed_percent=100 * cause.misfit,
-        rival=" ".join([rival.code, *joints]) if rival is not None else "nothing else",
+        rival=second,
         signal="current" if by_current else "torque",
         column="current" if by_current else "tau",
         width=recording.joints,

@@ -64,22 +64,20 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
     known = np.flatnonzero(np.isfinite(rest[:, 0]) & (rest.min(axis=1) > 0))
     if known.size < max(ENOUGH, 0.5 * recording.joints):
         return
-    rest = rest[known]
-    together = np.log(rest).mean(axis=0)
     part: Lateness | None = late
     if recording.duration > LONG:
         part = lateness_of(recording.between(recording.t[0], recording.t[0] + LONG), robot)
     if part is not None and (found := part.drift(known)) is not None:
         yield found
         return
-    best = together.argmin()
-    lag = lags[best]
-    better = np.exp(together[abs(lags).argmin()] - together[best])
+    rest = rest[known]
+    together = np.log(rest).mean(axis=0)
+    lag = lags[together.argmin()]
+    better = np.exp(together[abs(lags).argmin()] - together.min())
     alike = agreed(lags[rest.argmin(axis=1)], lag, STEP)
     if abs(lag) > LATE and better > BETTER and alike.any():
-        order = "later" if lag > 0 else "earlier"
-        values = {"lag_ms": 1e3 * abs(lag), "order": order, "ratio": better}
-        yield warning("effort-lag", on_joints(known[alike]), **values)
+        values = {"lag_ms": 1e3 * abs(lag), "order": "later" if lag > 0 else "earlier"}
+        yield warning("effort-lag", on_joints(known[alike]), **values, ratio=better)
 
 
 def agreed(own: Array, best: float, step: float) -> Mask:
@@ -129,13 +127,14 @@ class Lateness(NamedTuple):
         if min(steadily / STEADY, better / BETTER) < 1 or not alike.any():
             return None
         first = self.lags[left[best].argmin()]
-        values = {"first_ms": 1e3 * first, "last_ms": 1e3 * (first + grown), "span_s": span}
         return warning(
             "effort-drift",
             on_joints(known[alike]),
             drift_percent=100 * abs(grown) / span,
             pace="slow" if grown > 0 else "fast",
-            **values,
+            first_ms=1e3 * first,
+            last_ms=1e3 * (first + grown),
+            span_s=span,
             ratio=better,
         )
 

@@ -51,16 +51,14 @@ def drive_constants(recording: Recording) -> Array:
     constants = np.full(recording.joints, np.nan)
     if current is None or torque is None:
         return constants
-    rest = resting(recording)
-    for j in range(recording.joints):
-        use = rest & (abs(current[:, j]) > 0.02)
-        if use.sum() >= 10:
-            i, tau = current[use, j], torque[use, j]
-            # Through the origin: no current, no torque.
-            slope = i @ tau / (i @ i)
-            # A joint that carries nothing has a target of zero and shows no constant.
-            if np.std(tau - slope * i) < 0.05 * max(tau.std(), abs(tau).mean()):
-                constants[j] = slope
+    used = resting(recording)[:, None] & (abs(current) > 0.02)
+    for j in np.flatnonzero(used.sum(axis=0) >= 10):
+        i, tau = current[used[:, j], j], torque[used[:, j], j]
+        # Through the origin: no current, no torque.
+        slope = i @ tau / (i @ i)
+        # A joint that carries nothing has a target of zero and shows no constant.
+        if np.std(tau - slope * i) < 0.05 * max(tau.std(), abs(tau).mean()):
+            constants[j] = slope
     return constants
 
 
@@ -232,8 +230,8 @@ def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> I
         used = (speeds[:, j] > MOVES) & ~np.isnan(temperature[:, j])
         if joint.model == "none" or not used.any():
             continue
-        reference = joint.reference_temperature
-        code, (low, high), least = "far-temperature", (reference, reference), FAR
+        reference = low = high = joint.reference_temperature
+        code, least = "far-temperature", FAR
         if joint.temperature:
             code, (low, high), least = "temperature-beyond-law", HOLDS, 0.0
         elif joint.temperature_at is None:

@@ -50,6 +50,8 @@ STUCK = {
     "current": "stuck-effort",
     "torque": "stuck-effort",
 }
+#: Signals that may be zero throughout, and what that is.
+LEVELS = {"tau_ext": warning, "wrench": warning, "target_torque": fact, "dq": fact}
 
 
 def unusable_findings(recording: Recording) -> Iterator[Remark]:
@@ -108,7 +110,7 @@ def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
     bent = abs(np.diff(slope, axis=0)) > BEND * (abs(slope[1:]) + abs(slope[:-1]))
     moves = (slope[1:] != 0) & (slope[:-1] != 0)
     enough = moves.sum() > MOVED * moves.size
-    return float(np.mean(~bent[moves])) if enough else 0.0, (bent & moves).any(axis=1)
+    return np.mean(~bent[moves]) if enough else 0.0, (bent & moves).any(axis=1)
 
 
 def work_shares(recording: Recording, effort: Array) -> Array:
@@ -133,7 +135,8 @@ def work_shares(recording: Recording, effort: Array) -> Array:
 def effort_of(recording: Recording) -> tuple[str, Array] | None:
     """Name and values of the log's effort: torque before current."""
     efforts = dict(efforts_of(recording))
-    return next(((name, efforts[name]) for name in ("torque", "current") if name in efforts), None)
+    name = "torque" if "torque" in efforts else "current"
+    return (name, efforts[name]) if name in efforts else None
 
 
 def inverted_effort(recording: Recording) -> Iterator[Remark]:
@@ -151,15 +154,16 @@ def inverted_effort(recording: Recording) -> Iterator[Remark]:
         return
     first = turned.argmax()
     forward = value[recording.dq[:, first] > NONZERO, first]
+    unit, column = ("A", "current") if name == "current" else ("N·m", "tau")
     yield warning(
         "effort-sign-by-work" if most else "effort-sign-of-some",
         on_joints(turned),
         signal=name,
         shares_percent=100 * shares[turned],
         mean=forward.mean() if forward.size else np.nan,
-        unit="A" if name == "current" else "N·m",
+        unit=unit,
         first=first + 1,
-        column="current" if name == "current" else "tau",
+        column=column,
         width=recording.joints,
     )
 
@@ -173,16 +177,15 @@ def stuck_findings(recording: Recording) -> Iterator[Remark]:
     elif still.any():
         yield fact("still-joints" if still.sum() > 1 else "still-joint", on_joints(still))
     for name, code in STUCK.items():
-        if stretches := list(stuck_stretches(recording, name)):
-            _, first, last = max(stretches, key=lambda found: t[found[2]] - t[found[1]])
-            where = on_joints(sorted({joint for joint, _, _ in stretches}))
-            longest, begun = t[last] - t[first], t[first]
+        if stretches := [(t[b] - t[a], t[a], j) for j, a, b in stuck_stretches(recording, name)]:
+            longest, begun, _ = max(stretches, key=lambda found: found[0])
+            where = on_joints(sorted({j for *_, j in stretches}))
             yield warning(code, where, signal=name, longest_s=longest, at_s=begun)
     yield from zero_signals(recording)
     least = max(10, round(CLIPPED / recording.median_step))
     for name, value in efforts_of(recording):
-        columns = zip(value.T, recording.q.T, strict=True)
-        clipped = {j for j, (x, q) in enumerate(columns) if is_clipped(x, q, least)}
+        joints, q = range(recording.joints), recording.q
+        clipped = {j for j in joints if is_clipped(value[:, j], q[:, j], least)}
         if clipped and (clipped := clipped.difference(stuck_joints(recording, name))):
             yield warning("saturation", on_joints(sorted(clipped)), signal=name)
     yield from coarse_positions(recording)
@@ -253,7 +256,7 @@ def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, in
     same = value[1:] == value[:-1]
     signals = (getattr(recording, n) for n in ("q", "dq", *EFFORTS) if n != name)
     others = [x for x in signals if x is not None]
-    for j in range(value.shape[1]):
+    for j in range(recording.joints):
         # A run of steps that change nothing ends with the sample behind its last step.
         first, last = edges_of(same[:, j])
         lengths = last - first
@@ -283,7 +286,7 @@ def is_extreme(value: Array, rows: slice) -> bool:
     at = stretch[0]
     if len(stretch) > ONCE * len(value) + 1 and np.count_nonzero(value == at) == len(stretch):
         return False
-    return bool(low < high and at in (low, high) and abs(at) >= 0.5 * (high - low))
+    return low < high and at in (low, high) and abs(at) >= 0.5 * (high - low)
 
 
 def zero_signals(recording: Recording) -> Iterator[Remark]:
@@ -292,8 +295,9 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
     for name in recording.signals:
         value = getattr(recording, name)
         # Nearly every column has another number among its first samples.
-        zero = ~value[:FEW].any(axis=0)
-        zeros[name] = zero & ~value.any(axis=0) if zero.any() else zero
+        zeros[name] = zero = ~value[:FEW].any(axis=0)
+        if zero.any():
+            zero &= ~value.any(axis=0)
     for name, value in efforts_of(recording):
         zero = zeros[name]
         # Without noise a joint that never moves may need no torque at all: most columns
@@ -305,12 +309,10 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
         odd = zero if measured else zero & (travel_of(recording) >= TRAVEL)
         if odd.any():
             yield warning("zero-effort", on_joints(odd), signal=name)
-    for name in ("tau_ext", "wrench", "target_torque", "dq"):
+    for name, level in LEVELS.items():
         if name in zeros and zeros[name].all():
-            level = fact if name in {"target_torque", "dq"} else warning
-            others = "tau_ext" in zeros and not zeros["tau_ext"].all()
-            beside = "-beside-tau-ext" if name == "wrench" and others else ""
-            yield level(f"zero-{name.replace('_', '-')}{beside}")
+            others = name == "wrench" and not zeros.get("tau_ext", np.True_).all()
+            yield level(f"zero-{name.replace('_', '-')}{'-beside-tau-ext' * others}")
 
 
 def is_clipped(value: Array, position: Array, least: int) -> bool:

@@ -95,8 +95,8 @@ def velocity_fit(recording: Recording) -> VelocityFit | None:
     for j in np.flatnonzero(moved):
         alone[:, j] = joint_fit(*means[:, :, j])
     product = logged.T @ positions
-    size, whole = np.sum(positions**2, axis=0), np.sum(logged**2, axis=0)[:, None]
-    factor = product / np.maximum(size, TINY)
+    whole = np.sum(logged**2, axis=0)[:, None]
+    factor = product / np.maximum(np.sum(positions**2, axis=0), TINY)
     explained = factor * product / np.maximum(whole, TINY)
     return VelocityFit._make([*alone, factor, np.maximum(1 - explained, 0.0)])
 
@@ -327,8 +327,7 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
     if missed > 0.001 * len(steps):
         yield fact("missing-samples", missed=missed, steps=len(steps))
     # A gap is no jitter: it has its own finding.
-    even = steps[steps < GAP_STEPS * usual]
-    low, high = np.percentile(even, [5, 95], overwrite_input=True)
+    low, high = np.percentile(steps[steps < GAP_STEPS * usual], [5, 95], overwrite_input=True)
     if (width := (high - low) / usual) > JITTER:
         values = {"spread_percent": 100 * width, "low_ms": 1e3 * low, "high_ms": 1e3 * high}
         yield fact("jitter", **values, clock=source.clock)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.doctor.signals import TRAVEL
 from vftcli.robots import Robot
 from vftcli.robots.chain import Chain, link_poses
 from vftcli.robots.kernels import LINK, load_regressor, momentum_terms, torque_regressor
@@ -76,7 +77,7 @@ def solve(target: Array, *by: Terms) -> RobustFit:
     columns = np.concatenate([part.columns for part in by], axis=2)
     counts = [part.columns.shape[2] for part in by]
     positive = np.repeat([part.positive for part in by], counts)
-    sizes = [np.full(count, part.prior) for part, count in zip(by, counts, strict=True)]
+    sizes = [np.full(part.columns.shape[2], part.prior) for part in by]
     across = columns.swapaxes(1, 2)
     gram, moment = across @ columns, (across @ target[:, :, None])[:, :, 0]
     used = abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
@@ -117,11 +118,16 @@ class Windows:
 
     def exchanged(self, i: int, j: int, few: Indices) -> "Windows":
         """Some of the windows, all signals of two joints in them exchanged."""
-        times = {name: getattr(self, name)[few] for name in ("first", "last", "t")}
-        signals = {name: getattr(self, name)[few] for name in ("q", "dq", "motion")}
-        for values in signals.values():
+        names = ("first", "last", "t", "q", "dq", "motion")
+        some = {name: getattr(self, name)[few] for name in names}
+        for values in (some["q"], some["dq"], some["motion"]):
             values[:, :, [i, j]] = values[:, :, [j, i]]
-        return replace(self, **times, **signals)
+        return replace(self, **some)
+
+    @property
+    def moves(self) -> Mask:
+        """Joints that travel. (n,)"""
+        return np.asarray(np.ptp(self.q, axis=(0, 1)) > TRAVEL)
 
     @property
     def ways(self) -> Indices:
@@ -214,8 +220,7 @@ def trapezoids(t: Array) -> Array:
 
 def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
     """Mean of a signal from some samples to others, by trapezoids. (W, n)"""
-    steps = np.diff(t)[:, None]
-    rise = (value[1:] + value[:-1]) / 2 * steps
+    rise = (value[1:] + value[:-1]) / 2 * np.diff(t)[:, None]
     area = np.vstack([np.zeros(value.shape[1]), rise.cumsum(axis=0)])
     return np.asarray((area[last] - area[first]) / (t[last] - t[first])[:, None])
 
@@ -304,7 +309,7 @@ class Case:
         if self.gravity_range < VARIED * self.size:
             return False  # in one pose any residual passes for a load
         plausible = 0.05 < mass < MAX_MASS and np.linalg.norm(moment) < MAX_ARM * mass + 0.3
-        return bool(plausible and self.loaded.size < TELLING * self.bare.size)
+        return plausible and self.loaded.size < TELLING * self.bare.size
 
     @property
     def best(self) -> RobustFit:
@@ -319,8 +324,7 @@ class Case:
     @cached_property
     def effort_sizes(self) -> Array:
         """Root mean square of each joint's effort, contact set aside. (n,) [N·m]"""
-        sizes = root_mean_squares(self.given[self.bare.kept])
-        return np.maximum(sizes, 1e-9 * self.size)
+        return np.maximum(root_mean_squares(self.given[self.bare.kept]), 1e-9 * self.size)
 
     @cached_property
     def by_joint(self) -> Array:

@@ -1,6 +1,6 @@
 """Friction fitted on free motion: contacts left out, another robot doubted."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,14 +10,13 @@ from vftcli.identification.friction_fit import LIGHT, JointFit, all_residuals, f
 from vftcli.identification.links import residuals
 from vftcli.identification.shapes import Shape
 from vftcli.identification.training import ParameterColumns, PreparedLog, Training, apparent_load
-from vftcli.robots.friction import SMOOTHING, dry_friction, dry_torque
-from vftcli.robots.robot import JointFriction
+from vftcli.robots.friction import SMOOTHING, dry_torque
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import NormalEquations, folds, normal_equations, robust_sd
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints, warning
 from vftcli.signals.rest import SLIDES, slower
-from vftcli.signals.series import intervals, median_step, near
+from vftcli.signals.series import covered, intervals, median_step, near
 
 TOUCH = 7.0  #: Residual of a contact, in robust standard deviations.
 TOUCH_TIME = 0.15  #: Time it must last. [s]
@@ -42,7 +41,7 @@ class CleanFit(NamedTuple):
     """Friction fits of free motion."""
 
     data: Training  #: Training data, contacts at weight 0.
-    fits: list[JointFit | None]  #: One a joint, None at rest.
+    fits: dict[int, JointFit]  #: Joint, from 0 → its fit; none at rest.
     remarks: list[Remark]  #: Contacts, drift and doubts.
 
 
@@ -54,12 +53,12 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     fits, remarks = fit_frictions(data), list[Remark]()
     logs = list(data.logs)
     for k, (log, residual) in enumerate(zip(data.logs, all_residuals(data, fits), strict=True)):
-        t, name = log.t, log.recording.name
         if contacts := find_contacts(log, residual, fitted_dry_friction(log, fits)):
-            touched = [(t > c.start - TOUCH_MARGIN) & (t < c.stop + TOUCH_MARGIN) for c in contacts]
-            free = ~np.any(touched, axis=0)
-            logs[k] = replace(log, weights=log.weights * free[:, None])
             starts, stops, joints, sizes = map(np.array, zip(*contacts, strict=True))
+            t = log.t[:, None]
+            touched = (t > starts - TOUCH_MARGIN) & (t < stops + TOUCH_MARGIN)
+            free = ~touched.any(axis=1, keepdims=True)
+            logs[k] = replace(log, weights=log.weights * free)
             values = {
                 "count": len(contacts),
                 "total_s": np.sum(stops - starts),
@@ -68,9 +67,9 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
                 "worst_joints": joints,
                 "residuals_Nm": sizes,
             }
-            remarks.append(caution("suspected-contacts", Where(name), **values))
+            remarks.append(caution("suspected-contacts", Where(log.recording.name), **values))
     if remarks:
-        data = replace(data, logs=tuple(logs))
+        data = data._replace(logs=tuple(logs))
         fits = fit_frictions(data)
     remarks += warm_up_remarks(data, fits)
     doubts = list(model_doubts(data, fits))
@@ -105,46 +104,41 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
 
     Near a reversal a joint may stick: only torque above dry friction (M, n) counts.
     """
-    usable = motion.weights > 0
+    t, usable = motion.t, motion.weights > 0
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
     # The filter spreads an event at standstill over a period of its cutoff.
-    reach = max(1, round(1.0 / (motion.cutoff * median_step(motion.t))))
-    sticks = near(slower(motion.dq, SLIDES), reach)
-    excess = abs(residual) - abs(dry) * sticks
+    reach = max(1, round(1.0 / (motion.cutoff * median_step(t))))
+    excess = abs(residual) - abs(dry) * near(slower(motion.dq, SLIDES), reach)
     z = excess * usable / np.maximum(sd, 1e-9)
+    touched = covered(intervals(t, z.max(axis=1) > TOUCH, least=TOUCH_TIME), len(t))
+    z *= touched[:, None]
     found = list[ContactSpan]()
-    for start, stop in intervals(motion.t, z.max(axis=1) > TOUCH, least=TOUCH_TIME):
-        k, j = np.unravel_index(z[start:stop].argmax(), (stop - start, z.shape[1]))
-        begin, end = motion.t[start], motion.t[stop - 1]
-        contact = ContactSpan(begin, end, int(j) + 1, residual[start + k, j])
-        if found and begin - found[-1].stop < 2 * TOUCH_MARGIN:
-            before = found.pop()
-            larger = max(before, contact, key=lambda c: abs(c.size))
-            contact = larger._replace(start=before.start, stop=end)
-        found.append(contact)
+    for start, stop in intervals(t, touched, gap=2 * TOUCH_MARGIN):
+        k, j = np.unravel_index(z[start:stop].argmax(), z[start:stop].shape)
+        found.append(ContactSpan(t[start], t[stop - 1], int(j) + 1, residual[start + k, j]))
     return found
 
 
-def fitted_dry_friction(log: PreparedLog, fits: Sequence[JointFit | None]) -> Array:
+def fitted_dry_friction(log: PreparedLog, fits: Mapping[int, JointFit]) -> Array:
     """Dry friction of each joint by its fit, with load. (M, n) [N·m]"""
     load = log.load[log.kept]
     out = np.zeros(load.shape)
-    for j, fit in enumerate(fits):
-        if fit is not None:
-            out[:, j] = dry_torque(fit.friction, load[:, j])
+    for j, fit in fits.items():
+        out[:, j] = dry_torque(fit.friction, load[:, j])
     return out
 
 
-def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
+def links_explain(data: Training, fits: Mapping[int, JointFit]) -> Array:
     """Rest of the profile's links over free ones', heavy joints. (h,) [1]
 
     All inertial parameters are free, physical or not; the friction's structure is fixed.
     No links explain the rest: it is this log's noise.
     """
-    shapes = tuple(Shape(()) if fit is None else fit.shape for fit in fits)
+    joints = range(data.robot.joints)
+    shapes = tuple(fits[j].shape if j in fits else Shape(()) for j in joints)
     layout = ParameterColumns(data.robot.chain, data.rotor, shapes)
     logs = [replace(log, weights=log.weights * data.moves) for log in data.logs]
-    data = replace(data, logs=tuple(logs))
+    data = data._replace(logs=tuple(logs))
     before = weighted_rms(data, all_residuals(data, fits))
     parts = []
     for log in logs:
@@ -173,7 +167,7 @@ def heavy_joints(data: Training) -> Mask:
     return heavy
 
 
-def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> Iterator[Remark]:
+def model_doubts(data: Training, fits: Mapping[int, JointFit]) -> Iterator[Remark]:
     """Remarks on torque that profile links and friction leave."""
     heavy, robot = np.flatnonzero(heavy_joints(data)), data.robot
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
@@ -192,19 +186,15 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> Iterator[Re
             yield warning("unexplained-torque", where, robot=robot.name, share_percent=share)
 
 
-def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> Iterator[Remark]:
+def warm_up_remarks(data: Training, fits: Mapping[int, JointFit]) -> Iterator[Remark]:
     """Remarks on logs in which dry friction falls from third to third."""
-    models = [JointFriction() if fit is None else fit.friction for fit in fits]
-    dry = dry_friction(models, data.robot.joints)
+    dry = np.zeros(data.robot.joints)
+    dry[[*fits]] = [dry_torque(fit.friction) for fit in fits.values()]
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
-        sign = np.tanh(log.dq / SMOOTHING) * log.weights
-        more = np.array(
-            [
-                np.sum(sign[part] * residual[part], axis=0)
-                / np.maximum(abs(sign[part]).sum(axis=0), 1e-9)
-                for part in folds(log.samples, THIRDS)
-            ]
-        )
+        sign, parts = np.tanh(log.dq / SMOOTHING) * log.weights, folds(log.samples, THIRDS)
+        both = (sign * residual, abs(sign))
+        pushes, sizes = (np.array([x[part].sum(axis=0) for part in parts]) for x in both)
+        more = pushes / np.maximum(sizes, 1e-9)
         fall = more[0] - more[-1]
         falls = np.all(np.diff(more, axis=0) < 0.0, axis=0) & data.moves
         joints = np.flatnonzero(falls & (fall > np.maximum(DRIFT * dry, LEAST)))

@@ -4,7 +4,7 @@ A log is scored filtered and in motion, from its first to its last sample that m
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
@@ -80,6 +80,11 @@ class Trace(NamedTuple):
     before: Array  #: RMS of what the profile does not explain. (n,) [N·m]
 
     @property
+    def where(self) -> Where:
+        """The log as what a remark is about."""
+        return Where(self.motion.recording.name)
+
+    @property
     def residual(self) -> Array:
         """Measured less predicted. (M, n) [N·m]"""
         return self.measured - self.predicted
@@ -93,14 +98,13 @@ class Trace(NamedTuple):
         """Rows of `RESIDUALS`, this log being the one of this index."""
         name, samples = self.motion.recording.name, self.motion.samples
         return [
-            (name, index, self.role, model, j, float(value), samples)
+            (name, index, self.role, model, j, value, samples)
             for model, values in (("identified", self.rms), ("profile", self.before))
             for j, value in enumerate(values, start=1)
         ]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Identification:
+class Identification(NamedTuple):
     """A robot made from logs, with the account of how."""
 
     robot: Robot  #: The identified robot; its document carries the sources.
@@ -113,7 +117,7 @@ class Identification:
     base: pl.DataFrame | None  #: Base parameters (`BASE`), None for methods that have none.
     traces: tuple[Trace, ...]  #: Measured and predicted torque of every log.
     #: Filters, differentiation, decimation and band, by name.
-    processing: Mapping[str, Any] = field(default_factory=dict)
+    processing: Mapping[str, Any] = {}
     remarks: tuple[Remark, ...] = ()  #: What the reader should know.
 
 
@@ -132,19 +136,16 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
 
 def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
     """Remarks on worse or repeated logs, and on joints much worse elsewhere."""
-    train = [trace for trace in traces if trace.role == "train"]
-    held_out = [trace for trace in traces if trace.role == "held-out"]
+    train, held_out = ([t for t in traces if t.role == role] for role in ("train", "held-out"))
     for trace in traces:
         left, before = trace.rms.mean(), trace.before.mean()
         if left > BEHIND * before > 0.0:
-            where = Where(trace.motion.recording.name)
-            yield caution("worse-than-profile", where, identified_Nm=left, profile_Nm=before)
+            yield caution("worse-than-profile", trace.where, identified_Nm=left, profile_Nm=before)
     for test in held_out:
-        where = Where(test.motion.recording.name)
         for other in (trace.motion for trace in train):
             if (share := repeated_share(other, test.motion)) >= REPEATED:
                 values = {"training_log": other.recording.name, "share_percent": 100.0 * share}
-                yield caution("repeated-trajectory", where, **values)
+                yield caution("repeated-trajectory", test.where, **values)
     if train:
         level = np.mean([trace.rms for trace in train], axis=0)
         for test in held_out:
@@ -157,20 +158,19 @@ def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
 
     A load on the flange, which explains all joints at once, is looked for first.
     """
-    motion, name = trace.motion, trace.motion.recording.name
-    worse = np.flatnonzero(trace.rms > WORSE * trained).tolist()
-    if not worse:
+    motion, worse = trace.motion, trace.rms > WORSE * trained
+    if not worse.any():
         return
     mass, explained = apparent_load(motion, trace.residual)
     if explained > EXPLAINS and abs(mass) > HEAVY:
         share = 100.0 * explained
-        yield caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)
+        yield caution("apparent-load", trace.where, mass_kg=mass, share_percent=share)
         return
-    moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0)
-    resting = [j for j in worse if moving[j] < ENOUGH]
-    yield from (joint_remark(trace, j, trained[j]) for j in worse if j not in resting)
-    if resting:
-        yield fact("resting-joints", on_joints(resting, name))
+    moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0) >= ENOUGH
+    for j in np.flatnonzero(worse & moving).tolist():
+        yield joint_remark(trace, j, trained[j])
+    if (resting := worse & ~moving).any():
+        yield fact("resting-joints", on_joints(resting, motion.recording.name))
 
 
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
@@ -238,12 +238,12 @@ def identify(
     sources = logs if free is None else [*logs, free]
     refuse_repeated_logs(sources)
     refuse_repeated_logs(held_out, "--check")
-    load = find_load(logs, robot, free) if task.method == "payload" else None
-    train = logs if free is None or load is None else [free]
-    train = [log for log in train if load is None or not load.carried_by(log)]
-    result = MethodResult("payload", robot)
-    if load is None:
-        data = prepare_training(train, robot, task.cutoff, task.constants, task.friction)
+    load, train = None, logs
+    if task.method == "payload":
+        load, result = find_load(logs, robot, free), MethodResult("payload", robot)
+        train = [log for log in (logs if free is None else [free]) if not load.carried_by(log)]
+    else:
+        data = prepare_training(logs, robot, task.cutoff, task.constants, task.friction)
         result = FITS[task.method](data)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     traces = tuple(
@@ -261,19 +261,24 @@ def identify(
             numbers.append(number(last, f"com_{axis}", value, sd, np.nan, sd < 0.05))
         remarks.append(load.origin)
     rows = [row for k, trace in enumerate(traces, start=1) for row in trace.rows(k)]
+    choices = [
+        (j + 1, shape.words, error, shape == fit.shape)
+        for j, fit in result.fits.items()
+        for shape, error in fit.scores.items()
+    ]
     found = Identification(
         robot=new,
         profile=robot,
         method=result.method,
         residuals=pl.DataFrame(rows, schema=RESIDUALS, orient="row"),
         parameters=pl.DataFrame(numbers, schema=PARAMETERS, orient="row"),
-        shape_choices=pl.DataFrame(result.shape_choices, schema=SHAPE_CHOICES, orient="row"),
+        shape_choices=pl.DataFrame(choices, schema=SHAPE_CHOICES, orient="row"),
         base=result.base,
         traces=traces,
         processing=settings_record(task.cutoff, logs[0].median_step),
         remarks=tuple(remarks),
     )
-    return replace(found, robot=with_provenance(found, task.name, sources, train, load))
+    return found._replace(robot=with_provenance(found, task.name, sources, train, load))
 
 
 def with_provenance(
@@ -297,9 +302,8 @@ def with_provenance(
     document.pop("published", None)
     new = f"identified ({found.method}) from {names_of(trained)}"
     old = f"profile {profile.name}"
-    sure = found.parameters.filter("determined")
-    determined = set(zip(sure["joint"], sure["parameter"], strict=True))
-    links = found.method == "base"
+    sure = found.parameters.filter("determined").select("joint", "parameter")
+    determined, links = set(sure.rows()), found.method == "base"
     for j, table in enumerate(document["joints"], start=1):
         table["inertial_source"] = new if links else old
         for key in ("rotor_inertia", "torque_constant"):
@@ -314,12 +318,8 @@ def with_provenance(
         "sha256": digests,
         "processing": dict(found.processing),
         "residuals": [
-            {
-                "log": trace.motion.recording.name,
-                "role": trace.role,
-                "rms_Nm": [round(v, 4) for v in trace.rms.tolist()],
-            }
-            for trace in found.traces
+            {"log": x.where.about, "role": x.role, "rms_Nm": x.rms.round(4).tolist()}
+            for x in found.traces
         ],
     }
     if load is not None:

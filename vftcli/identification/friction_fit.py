@@ -1,6 +1,6 @@
 """Friction, rotor inertia and drive constant per joint, links fixed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -98,8 +98,8 @@ class JointData(NamedTuple):
     @property
     def parts(self) -> list[Array]:
         """The rows that cross-validation leaves out in turn."""
-        lengths = [log.samples for log in self.logs]
-        return left_out(lengths, [speed > MOVES for speed in self.speeds])
+        moves = [speed > MOVES for speed in self.speeds]
+        return left_out([log.samples for log in self.logs], moves)
 
     def slow(self, signals: Array) -> Array:
         """Signals in an observer's band, each log by itself. (M, k)"""
@@ -151,13 +151,11 @@ class JointFit(NamedTuple):
         return self.errors[1] < KEPT * self.errors[0]
 
 
-def fit_frictions(data: Training) -> list[JointFit | None]:
-    """Fits of all moving joints, links from the profile; None at rest."""
-    moving = [j for j in range(data.robot.joints) if data.moves[j]]
-    presliding = choose_presliding(
-        [data_of_joint(data, j, data.fit_constants) for j in moving if data.rubs]
-    )
-    fits: list[JointFit | None] = [None] * data.robot.joints
+def fit_frictions(data: Training) -> dict[int, JointFit]:
+    """Joint, from 0 → its fit, links from the profile; none at rest."""
+    moving = np.flatnonzero(data.moves).tolist()
+    joints = [data_of_joint(data, j, data.fit_constants) for j in moving if data.rubs]
+    presliding, fits = choose_presliding(joints), dict[int, JointFit]()
     for j in moving:
         fit = fit_joint(data, j, presliding, data.fit_constants)
         # A light joint cannot separate its constant, the last value, from friction.
@@ -188,11 +186,10 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     """
     names = ("tau", "rigid", "ddq", "weights", "load", "predicted")
     torque, rigid, ddq, weights, load, predicted = (data.joined(name)[:, j] for name in names)
-    fixed = [ddq] * data.rotor + [rigid] * constant
     return JointData(
         joint=j,
         y=torque if constant else torque - rigid,
-        fixed=np.reshape(fixed, (-1, len(torque))).T,
+        fixed=np.reshape([ddq] * data.rotor + [rigid] * constant, (-1, len(torque))).T,
         weights=weights,
         logs=data.logs,
         load_spread=load.std(),
@@ -203,13 +200,12 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     )
 
 
-def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array]:
+def all_residuals(data: Training, fits: Mapping[int, JointFit]) -> list[Array]:
     """Residuals of the friction fits, log by log; zero for held joints. (M, n) each"""
     ends = np.cumsum([log.samples for log in data.logs])
     whole = np.zeros((ends[-1], data.robot.joints))
-    for j, fit in enumerate(fits):
-        if fit is not None:
-            whole[:, j] = fit.fit.residual
+    for j, fit in fits.items():
+        whole[:, j] = fit.fit.residual
     return np.split(whole, ends[:-1])
 
 
@@ -233,17 +229,13 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
         weights = fit_column(plain, y, data.weights).weights
         # A smoother sign that explains as much beats presliding; an even smoother one is
         # presliding in disguise.
-        rivals = [Shape(terms, smoothing) for smoothing in (SLIDING, SMOOTHING)]
-        sliding = [
-            Shape((*terms, "presliding"), SLIDING, presliding_length=length)
-            for length in PRESLIDING_LENGTHS
-        ]
-        errors = [
-            cross_validated(data.slow(data.columns(shape)), y, weights, parts)
-            for shape in (*rivals, *sliding)
-        ]
-        none = min(errors[: len(rivals)])
-        ratios[i] = np.array([none, *errors[len(rivals) :]]) / max(none, 1e-300)
+        shapes = [Shape(terms, SLIDING), Shape(terms, SMOOTHING)]
+        play = Shape((*terms, "presliding"), SLIDING)
+        shapes += [play._replace(presliding_length=length) for length in PRESLIDING_LENGTHS]
+        columns = (data.slow(data.columns(shape)) for shape in shapes)
+        first, *errors = [cross_validated(A, y, weights, parts) for A in columns]
+        errors[0] = none = min(first, errors[0])
+        ratios[i] = np.array(errors) / max(none, 1e-300)
     whole = root_mean_squares(ratios)
     near = np.flatnonzero(whole <= LENGTH_MARGIN * whole.min())
     return PreslidingScore(lengths[near[0]], dict(zip(lengths, whole, strict=True)))
@@ -260,7 +252,7 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
     bounded, is_turned = bounded_shape(plain, data)
     if is_turned:
         return plain, {}  # positions may still rub correctly
-    if not bounded.terms or bounded.terms == ("offset",):
+    if bounded.terms in {(), ("offset",)}:
         return bounded, {}
     # Outliers' weights are fixed: candidates answer for one set of samples.
     weights, parts = data.fit(Shape(rich)).weights, data.parts
@@ -291,11 +283,11 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[S
 
     Smoothing, bend and presliding length are those of `best`.
     """
-    shapes: list[Shape] = []
-    line = bent(speed)
-    for terms in (*CANDIDATES, *((*line.terms, *more) for more in BESIDE_POINTS if line)):
+    shapes, line = list[Shape](), bent(speed)
+    points = [(*line.terms, *more) for more in BESIDE_POINTS] if line else []
+    for terms in (*CANDIDATES, *points):
         shape = best._replace(terms=tellable_terms(terms, data))
-        if line and terms[0] in line.terms:
+        if line and terms in points:
             shape = shape._replace(speeds=line.speeds)
         if "stribeck" in terms:
             # In slower ones the sign's rounding hides the fading.
@@ -323,20 +315,22 @@ def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
 def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
     """A shape less its terms at zero; whether velocities seem reversed."""
     powers: dict[Shape, float] = {}
-    for without in ((), *((term,) for term in BOUNDED), BOUNDED):
+    for without in ((), BOUNDED[:1], BOUNDED[1:], BOUNDED):
         one = shape._replace(terms=tuple(t for t in shape.terms if t not in without))
         fit = data.fit(one)
-        power = float(np.sum(data.weights * fit.residual**2))
+        power = np.sum(data.weights * fit.residual**2)
         own = [k for k, term in enumerate(one.terms) if term in BOUNDED]
+        values = fit.values[own]
         if not without:
-            push = root_mean_square(data.columns(one)[:, own] @ fit.values[own])
-            both, free = bool(np.all(fit.values[own] < 0.0)), power
-        if np.all(fit.values[own] >= 0.0):
+            push = root_mean_square(data.columns(one)[:, own] @ values)
+            both, free = (values < 0.0).all(), power
+        if (values >= 0.0).all():
             powers[one] = power
         if shape in powers:
             return shape, False
     best = min(powers, key=lambda one: powers[one])
-    return best, both and powers[best] > TURNED * free and push > PUSH * data.torque_limit
+    turned = both and powers[best] > TURNED * free and push > PUSH * data.torque_limit
+    return best, bool(turned)
 
 
 def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
@@ -355,4 +349,4 @@ def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
 def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
     """Whether friction never pushes and rises up to a speed. [rad/s]"""
     friction = shape.friction(values[: len(shape.terms)])
-    return not pushing_terms(shape, values) and bool(np.isnan(falling_speed(friction, speed_limit)))
+    return not pushing_terms(shape, values) and np.isnan(falling_speed(friction, speed_limit))

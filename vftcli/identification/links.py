@@ -68,7 +68,7 @@ class Triangles(NamedTuple):
     def misfit(self, part: int, x: Array) -> float:
         """Weighted sum of squares left by x in one stretch."""
         R = self.parts[part]
-        return float(np.sum((R[:, -1] - R[:, :-1] @ x) ** 2))
+        return np.sum((R[:, -1] - R[:, :-1] @ x) ** 2)
 
 
 def triangle(rows: Array) -> Array:
@@ -95,8 +95,7 @@ def stack(layout: ParameterColumns, logs: Sequence[PreparedLog], start: Array) -
         )
     x = start
     for _ in range(REWEIGHTINGS):
-        left = [residuals(layout, log, x) for log in logs]
-        triangles = triangulate(layout, logs, left)
+        triangles = triangulate(layout, logs, [residuals(layout, log, x) for log in logs])
         x = least_change(triangles, start)
     return triangles
 
@@ -111,21 +110,19 @@ def triangulate(
     weights = np.concatenate([log.weights for log in logs])
     pairs = zip(np.concatenate(left).T, weights.T, strict=True)
     sigma = np.array([max(robust_sd(r[w > 0]), 1e-9) for r, w in pairs])
-    parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
-    correlation = []
+    parts, correlation = [np.zeros((0, layout.size + 1))] * FOLDS, []
     for log, residual in zip(logs, left, strict=True):
+        used = log.weights > 0
         scale = np.sqrt(log.weights * huber(residual / sigma)) / sigma
-        for r, w in zip(residual.T, log.weights.T, strict=True):
-            if np.count_nonzero(w) > 10:
-                correlation.append(correlation_time(r[w > 0]))
+        each = (r[u] for r, u in zip(residual.T, used.T, strict=True))
+        correlation += [correlation_time(r) for r in each if len(r) > 10]
         # Contiguous stretches: neighbours share noise.
         for k, fold in enumerate(folds(log.samples)):
             for start in range(fold.start, fold.stop, ROWS):
                 span = slice(start, min(start + ROWS, fold.stop))
                 A = np.concatenate([layout.rows(log, span), log.tau[span, :, None]], axis=2)
                 rows = (A * scale[span, :, None]).reshape(-1, A.shape[2])
-                weighs = scale[span].ravel() > 0
-                parts[k] = triangle(np.vstack([parts[k], rows[weighs]]))
+                parts[k] = triangle(np.vstack([parts[k], rows[scale[span].ravel() > 0]]))
     return Triangles(layout, tuple(parts), float(np.mean(correlation)) if correlation else 1.0)
 
 
@@ -206,10 +203,8 @@ def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     deviation.
     """
     layout = triangles.layout
-    grouping = group_parameters(layout)
-    R, z = triangles.joined()
-    R = R[:, list(grouping.independent)]
-    before = grouping.values(start)
+    grouping, (R, z) = group_parameters(layout), triangles.joined()
+    R, before = R[:, grouping.independent], grouping.values(start)
     step, spread, lost = truncated_step(R, z - R @ before)
     values = before + step
     sd = np.where(lost > DOUBTFUL, np.inf, spread * np.sqrt(triangles.correlation))
@@ -342,9 +337,10 @@ def pulled_links(
     # Correlated rows repeat each other; dividing them makes the misfit a log-likelihood
     # that can be weighed against the distance.
     shrink = 1.0 / np.sqrt(triangles.correlation)
+    problem = Problem(R * shrink, z * shrink, start, triangles.layout, np.inf)
     for weight in WEIGHTS[::-1]:
         # Each optimum is a good start for the next, weaker pull.
-        x = solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
+        x = solve(problem._replace(weight=weight), x)
         yield weight, x
 
 

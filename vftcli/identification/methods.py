@@ -3,7 +3,7 @@
 What method "targets" says of a joint's friction is made here too.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -79,8 +79,8 @@ def number(
     j: int, parameter: str, value: float, sd: float, profile: float, determined: bool
 ) -> Number:
     """An identified number of joint j (from 0), with its parameter's unit."""
-    unit, known = UNITS[parameter], bool(determined)
-    return Number(j + 1, parameter, float(value), float(sd), unit, float(profile), known)
+    unit = UNITS[parameter]
+    return Number(j + 1, parameter, value, sd, unit, profile, bool(determined))
 
 
 class MethodResult(NamedTuple):
@@ -90,19 +90,9 @@ class MethodResult(NamedTuple):
     robot: Robot  #: The identified robot.
     numbers: Sequence[Number] = ()  #: Its identified numbers.
     remarks: Sequence[Remark] = ()  #: What the reader of the numbers should know.
-    fits: Sequence[JointFit | None] = ()  #: Its fits of friction, one a joint.
+    fits: Mapping[int, JointFit] = {}  #: Joint, from 0 → its fit of friction.
     base: pl.DataFrame | None = None  #: Base parameters (`BASE`), if the method has them.
     is_narrow: bool = False  #: Whether the motion tells the links too little.
-
-    @property
-    def shape_choices(self) -> list[tuple[int, str, float, bool]]:
-        """Rows of `SHAPE_CHOICES`, one a joint and candidate."""
-        known = ((j, fit) for j, fit in enumerate(self.fits, start=1) if fit is not None)
-        return [
-            (j, shape.words, error, shape == fit.shape)
-            for j, fit in known
-            for shape, error in fit.scores.items()
-        ]
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
@@ -117,14 +107,11 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = None if robot.torque_constant is None else robot.torque_constant.copy()
     numbers = list[Number]()
-    for j, fit in enumerate(fits):
-        if fit is None:
-            continue
+    for j, fit in fits.items():
         count, where = len(fit.shape.terms), on_joints([j])
         if fit.is_kept:
-            found_rms, profile_rms = fit.errors
-            missed = {"found_Nm": found_rms, "profile_Nm": profile_rms}
-            remarks.append(caution("profile-kept", where, **missed))
+            own, theirs = fit.errors
+            remarks.append(caution("profile-kept", where, found_Nm=own, profile_Nm=theirs))
             continue
         values, sd = fit.fit.values, fit.fit.sd
         if data.fit_constants and not fit.constant:
@@ -166,7 +153,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
             f"(slope {scale:.2g}); wrong robot, sign or joint order, or the joint carries no load: "
             "leave out --set identify.constants=yes"
         )
-    before = profile_constant(data.robot, j)
+    before = np.array(data.robot.torque_constant, float)[j]
     K, K_sd = before / scale, before * scale_sd / scale**2
     return values / scale, sd / scale, number(j, "torque_constant", K, K_sd, before, True)
 
@@ -182,8 +169,8 @@ def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number
     J = number(j, "rotor_inertia", value, sd, before, refuted or known)
     if known:
         return J, []
-    values = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
     code = "refuted-rotor-inertia" if refuted else "undetermined-rotor-inertia"
+    values = {"found_kgm2": J.value, "sd_kgm2": sd, "profile_kgm2": before}
     return J, [caution(code, on_joints([j]), **values)]
 
 
@@ -235,13 +222,12 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> Iterator[
         yield warning("falling-friction", where, speeds_rad_s=[falls], limits_rad_s=[limit])
 
 
-def fit_remarks(data: Training, fits: Sequence[JointFit | None]) -> Iterator[Remark]:
+def fit_remarks(data: Training, fits: Mapping[int, JointFit]) -> Iterator[Remark]:
     """Remarks on fits of friction, and on the motion that they are made from."""
-    known = [(j, fit) for j, fit in enumerate(fits) if fit is not None]
-    for j, fit in known:
+    for j, fit in fits.items():
         if fit.at_bound:
             yield caution("friction-at-bound", on_joints([j]), terms=" and ".join(fit.at_bound))
-    presliding = known[0][1].presliding
+    presliding = fit.presliding  # the same of all joints
     if len(presliding.errors) > 1:
         yield fact(
             "presliding-length",
@@ -261,18 +247,13 @@ def temperature_remarks(data: Training) -> Iterator[Remark]:
     """Remarks on the factors of friction by the joints' temperatures."""
     for log in data.logs:
         if (warmth := log.warmth) is not None:
-            factors, where = [warmth.min(), warmth.max()], Where(log.recording.name)
-            yield fact("friction-by-temperature", where, factors=factors)
+            where = Where(log.recording.name)
+            yield fact("friction-by-temperature", where, factors=[warmth.min(), warmth.max()])
 
 
 def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
     """The profile's friction, one a joint even where it has none."""
-    return robot.friction or tuple(JointFriction() for _ in range(robot.joints))
-
-
-def profile_constant(robot: Robot, j: int) -> float:
-    """The profile's drive constant of joint j (from 0), nan if it has none. [N·m/A]"""
-    return float(robot.torque_constant[j]) if robot.torque_constant is not None else np.nan
+    return robot.friction or (JointFriction(),) * robot.joints
 
 
 #: Share of undetermined base parameters from which a motion is narrow.
@@ -293,15 +274,15 @@ def whole_arm(data: Training) -> MethodResult:
     layout, start = initial_columns(data, fits)
     x = nearest_physical_links(stack(layout, data.logs, start), start)
     refined = with_vector(data.robot, layout, x, data.robot.friction)
-    data = replace(data, logs=tuple(log.with_robot(refined) for log in data.logs))
+    data = data._replace(logs=tuple(log.with_robot(refined) for log in data.logs))
     fits = fit_frictions(data)
     layout, start = initial_columns(data, fits)
     triangles = stack(layout, data.logs, start)
     base = base_parameters(triangles, start)
     behind = len(base) - layout.size  # of a coefficient's row to its column
     count = layout.rotor_places.stop + behind
-    undetermined = int((~base["determined"][:count]).sum())
-    share = undetermined / max(count, 1)
+    undetermined = (~base["determined"][:count]).sum()
+    share = undetermined / count
     narrow = share > NARROW or (share > MOST and predicts_best_unpulled(triangles, start))
     x = nearest_physical_links(triangles, start, TABLE if narrow else WEIGHTS[0])
     level = caution if narrow else fact
@@ -310,39 +291,36 @@ def whole_arm(data: Training) -> MethodResult:
     if data.robot.payload is not None:
         remarks.append(fact("payload-in-link"))
     numbers, frictions = list[Number](), list(profile_friction(data.robot))
-    for j, (fit, place) in enumerate(zip(fits, layout.frictions, strict=True)):
-        if fit is not None and data.rubs:
-            values = x[place]
-            # Beside errors of the links a rise may fall; the joint's own fit does not.
-            if not is_dissipative(fit.shape, values, data.top_speed(j)):
-                values = fit.fit.values[: len(fit.shape.terms)]
-            sd = base["sd"].to_numpy()[place.start + behind : place.stop + behind]
-            frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "base")
-            numbers += more
-            remarks += check_friction(j, frictions[j], data)
+    for j, fit in fits.items() if data.rubs else ():
+        place = layout.frictions[j]
+        values, sd = x[place], base["sd"].to_numpy()[place.start + behind : place.stop + behind]
+        # Beside errors of the links a rise may fall; the joint's own fit does not.
+        if not is_dissipative(fit.shape, values, data.top_speed(j)):
+            values = fit.fit.values[: len(fit.shape.terms)]
+        frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "base")
+        numbers += more
+        remarks += check_friction(j, frictions[j], data)
     robot = with_vector(data.robot, layout, x, tuple(frictions) if data.rubs else ())
     remarks += fit_remarks(data, fits)
     return MethodResult("base", robot, numbers, remarks, fits, base, narrow)
 
 
-def initial_columns(
-    data: Training, fits: Sequence[JointFit | None]
-) -> tuple[ParameterColumns, Array]:
+def initial_columns(data: Training, fits: Mapping[int, JointFit]) -> tuple[ParameterColumns, Array]:
     """The unknowns of the whole arm, and the profile with its fitted friction. (size,)"""
     chain = data.robot.loaded_chain
     shapes, values, rotor = list[Shape](), list[float](), chain.rotor_inertia.copy()
-    for j, fit in enumerate(fits):
-        if fit is None:
-            known = profile_friction(data.robot)[j].parameters
-            smoothing = float(known.get("smoothing", SMOOTHING))
-            shapes.append(Shape(PLAIN if data.rubs else (), smoothing))
-            values += [float(known.get(term, 0.0)) for term in shapes[j].terms]
-        else:
-            shapes.append(fit.shape)
-            own, others = np.split(fit.fit.values, [len(fit.shape.terms)])
+    for j, joint in enumerate(profile_friction(data.robot)):
+        if j in fits:
+            shape = fits[j].shape
+            own, others = np.split(fits[j].fit.values, [len(shape.terms)])
             values += own.tolist()
             if data.rotor and others[0] > 0:
                 rotor[j] = others[0]
+        else:
+            known = joint.parameters
+            shape = Shape(PLAIN if data.rubs else (), known.get("smoothing", SMOOTHING))
+            values += [known.get(term, 0.0) for term in shape.terms]
+        shapes.append(shape)
     start = np.concatenate([chain_parameters(chain), rotor if data.rotor else [], values])
     return ParameterColumns(data.robot.chain, data.rotor, tuple(shapes)), start
 
@@ -368,8 +346,7 @@ def chosen_method(data: Training) -> MethodResult:
     free, fits = fitted.data, fitted.fits
     spread = free.joined("tau").std(axis=0)
     much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * spread
-    ratios = links_explain(free, fits)[much[heavy_joints(free)]]
-    ratio = ratios.max(initial=0.0)
+    ratio = links_explain(free, fits)[much[heavy_joints(free)]].max(initial=0.0)
     doubted = any(remark.level == "warning" for remark in fitted.remarks)
     if ratio <= OTHER_LINKS or doubted or data.fit_constants:
         return kept

@@ -151,14 +151,14 @@ class JointsFit(NamedTuple):
 
 def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
     """Least squares of columns A (N, n, k) to y (N, n), weights `usable` (N, n)."""
-    scale = y.std(axis=0)
-    for _ in range(PASSES):
-        w = np.sqrt(usable) / np.maximum(scale, 1e-9)
-        x = solve((A * w[:, :, None]).reshape(-1, A.shape[2]), (y * w).ravel())
-        left = y - np.einsum("knp,p->kn", A, x)
-        scale = root_mean_squares(left)
-    w = np.sqrt(usable) / np.maximum(scale, 1e-9)
-    return JointsFit(x, left, w, A * w[:, :, None])
+    left = y - y.mean(axis=0)
+    for passes in range(PASSES + 1):
+        w = np.sqrt(usable) / np.maximum(root_mean_squares(left), 1e-9)
+        weighted = A * w[:, :, None]
+        if passes < PASSES:
+            x = solve(weighted.reshape(-1, A.shape[2]), (y * w).ravel())
+            left = y - np.einsum("knp,p->kn", A, x)
+    return JointsFit(x, left, w, weighted)
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
@@ -167,15 +167,16 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
     At equal phase the torque differs by the load and by friction that grows with it.
     """
     for loaded, free in ((second, first), (first, second)):
-        motion = prepare(loaded, robot)
+        motion, t = prepare(loaded, robot), free.t
         shift, distance = find_time_shift(motion, free)
-        torque = zero_phase(free.t, drive_torque(free, robot), motion.cutoff)
+        torque = zero_phase(t, drive_torque(free, robot), motion.cutoff)
         at = motion.t + shift
-        inside = (at >= free.t[0]) & (at <= free.t[-1])
-        extra = (motion.tau - resample_columns(at, free.t, torque))[inside]
-        sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))[inside]
-        q, usable = motion.q[inside], motion.weights[inside]
-        Y = load_columns(robot, q, motion.dq[inside], motion.ddq[inside])
+        inside = (at >= t[0]) & (at <= t[-1])
+        extra = motion.tau - resample_columns(at, t, torque)
+        sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))
+        signals = (motion.q, motion.dq, motion.ddq, motion.weights, extra, sign)
+        q, dq, ddq, usable, extra, sign = (x[inside] for x in signals)
+        Y = load_columns(robot, q, dq, ddq)
         fit = fit_all_joints(Y, extra, usable)
         # Friction grows with the load we seek: a few rounds settle it.
         for _ in range(4):
@@ -186,8 +187,8 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
     sd = np.sqrt(np.diag(fit.motion_covariance(extra, gain_sd(loaded, robot))))[:STATIC]
     values = {"loaded": loaded.name, "free": free.name, "distance_mrad": 1e3 * distance}
     origin = Remark("load-from-pair", values={**values, "shift_s": round(-shift, 3) + 0.0})
-    x, left = fit.x[:STATIC], root_mean_squares(fit.left)
-    return load_at_flange(x, sd, left, robot, (loaded,), origin)
+    x = fit.x[:STATIC]
+    return load_at_flange(x, sd, root_mean_squares(fit.left), robot, (loaded,), origin)
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
@@ -218,18 +219,18 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
         there = resample_columns(at[inside], other.t, other.q)
         return root_mean_square(there - motion.q[inside])
 
-    low, high = other.t[0] - motion.t[-1], other.t[-1] - motion.t[0]
+    high = other.t[-1] - motion.t[0]
     # The distance has many minima: try the whole range, then refine.
-    best = min(np.arange(low, high, COARSE), key=distance)
+    best = min(np.arange(other.t[0] - motion.t[-1], high, COARSE), key=distance)
     for step in (COARSE / 5, COARSE / 25, FINE):
         best = min(best + step * np.arange(-6, 7), key=distance)
-    left = distance(float(best))
+    left = distance(best)
     if left > SAME_MOTION:
         raise NotSameMotionError(
             f"{motion.recording.name} and {other.name} are not the same motion: positions differ "
             f"by {1e3 * left:.3g} mrad rms at best; a pair must repeat one trajectory"
         )
-    return float(best), left
+    return best, left
 
 
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
@@ -267,20 +268,19 @@ def different_poses(q: Array) -> int:
     """Number of poses (P, n) at least `APART` apart."""
     found: list[Array] = []
     for pose in q:
-        if not found or abs(np.array(found) - pose).max(axis=1).min() > APART:
+        if all(abs(other - pose).max() > APART for other in found):
             found.append(pose)
     return len(found)
 
 
 def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
     """Mean position and torque of every rest. (P, n) [rad], (P, n) [N·m]"""
-    effort, still = drive_torque(recording, robot), held(recording.q, recording.median_step)
-    rests = intervals(recording.t, still, least=DWELL)
+    effort = drive_torque(recording, robot)
+    rests = intervals(recording.t, held(recording.q, recording.median_step), least=DWELL)
     # In the outer fifths the arm still settles or leaves.
     spans = [slice(a + (b - a) // 5, b - (b - a) // 5) for a, b in rests]
     means = [[x[span].mean(axis=0) for span in spans] for x in (recording.q, effort)]
-    q, torque = np.reshape(means, (2, -1, robot.joints))
-    return q, torque
+    return tuple(np.reshape(means, (2, -1, robot.joints)))
 
 
 def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
@@ -365,8 +365,7 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
     """The load, from a pair if there is one, else from poses, else from motion."""
     bare = robot.with_payload(None)
     if free is not None:
-        fit = payload_from_pair(logs[0], free, bare)
-        if fit.carried_by(free):
+        if (fit := payload_from_pair(logs[0], free, bare)).carried_by(free):
             raise IdentificationError(
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )

@@ -19,7 +19,6 @@ from vftcli.identification.methods import (
     Number,
     identified_friction,
     number,
-    profile_constant,
     profile_friction,
     temperature_remarks,
 )
@@ -33,7 +32,7 @@ from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.least_squares import fit_column, solve
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, caution, fact, on_joints
+from vftcli.signals.remarks import Remark, caution, on_joints
 from vftcli.signals.rest import NONZERO, SLIDES, faster
 from vftcli.signals.series import runs_of
 
@@ -58,9 +57,6 @@ GUIDED = 0.4
 SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of samples, which must agree too. [rad/s]
 SETTLE = 0.1  #: Cut at both ends of a rest. [s]
 STEADY = 5e-3  #: Largest relative change of the target current in a rest.
-#: Largest relative difference of gravity without a remark: a third of that of 9.82 to
-#: 9.81 m/s².
-SAME_GRAVITY = 3e-4
 
 
 class Estimate(NamedTuple):
@@ -82,7 +78,6 @@ class ControllerModel(NamedTuple):
     constant: Estimate  #: Drive constant K. [N·m/A]
     rotor: Estimate  #: Reflected rotor inertia. [kg·m²]
     friction: FrictionLaw | None  #: Its feed-forward law, None at rest.
-    gravity: Estimate  #: Its gravity torque over the profile's.
 
 
 def targets_method(data: Training) -> MethodResult:
@@ -104,7 +99,7 @@ def targets_method(data: Training) -> MethodResult:
         if model.friction is not None:
             frictions[j], more = identified_friction(data, j, *model.friction, "targets")
             numbers += more
-    remarks += [*gravity_remarks(models), *temperature_remarks(data)]
+    remarks += temperature_remarks(data)
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
     return MethodResult("targets", new, numbers, remarks)
@@ -114,29 +109,16 @@ def target_remarks(j: int, model: ControllerModel, robot: Robot) -> Iterator[Rem
     """Remarks on joint j's (from 0) open numbers: the profile's stay."""
     where = on_joints([j])
     if not model.constant.known:
-        values = {"profile_NmA": profile_constant(robot, j)}
-        if np.isfinite(model.constant.sd):
-            values |= {"found_NmA": model.constant.value, "sd_NmA": model.constant.sd}
-            yield caution("undetermined-drive-constant", where, **values)
-        else:
-            yield caution("unexcited-drive-constant", where, **values)
+        found, sd, _ = model.constant
+        values = {"profile_NmA": np.array(robot.torque_constant, float)[j]}
+        if np.isfinite(sd):
+            values |= {"found_NmA": found, "sd_NmA": sd}
+        code = "undetermined" if np.isfinite(sd) else "unexcited"
+        yield caution(f"{code}-drive-constant", where, **values)
     if not model.rotor.known:
         yield caution("unaccelerated-joint", where, profile_kgm2=robot.chain.rotor_inertia[j])
     if model.friction is None:
         yield caution("unexcited-friction", where)
-
-
-def gravity_remarks(models: Sequence[ControllerModel]) -> Iterator[Remark]:
-    """A remark if the controller's gravity differs from the profile's."""
-    scales = [m.gravity for m in models if m.gravity.known]
-    if not scales:
-        return
-    # All joints feel one gravity: weights are inverse variances.
-    weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
-    ratio = weights @ [s.value for s in scales] / weights.sum()
-    least = max(SAME_GRAVITY, 2.0 / np.sqrt(weights.sum()))
-    if abs(ratio - 1.0) >= least:
-        yield fact("controller-gravity", ratio=ratio)
 
 
 class ControllerTargets(NamedTuple):
@@ -163,87 +145,86 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> Iterator
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
             "read a model off; use --method friction or base"
         )
-    logs = []
-    for recording in recordings:
-        current, moment = recording.require("target_current"), recording.require("target_torque")
-        motion = prepare(recording, robot, CUTOFF)
-        smooth = zero_phase(recording.t, moment, CUTOFF)
-        log = ControllerTargets(
-            logs=(motion,),
-            dq=motion.dq,
-            ddq=motion.ddq,
-            current=motion.filtered(current),
-            moment=smooth[motion.kept],
-            lead=derivative(recording.t, smooth)[motion.kept],
-            rigid=motion.rigid,
-            gravity=gravity_torque(robot, motion.q),
-        )
+    each = [targets_of(recording, robot) for recording in recordings]
+    for recording, log in zip(recordings, each, strict=True):
         refuse_guided(recording, log, robot)
-        logs.append(log)
-    motions, signals = tuple(log.logs[0] for log in logs), (log[1:] for log in logs)
-    every = ControllerTargets(motions, *map(np.concatenate, zip(*signals, strict=True)))
+    motions, *signals = zip(*each, strict=True)
+    every = ControllerTargets(sum(motions, ()), *map(np.concatenate, signals))
     for j, before in enumerate(robot.torque_constant):
         # Of two ways to K, the surer one wins; friction needs it.
         ways = constant_at_rest(j, every), constant_in_motion(j, every)
         K = min(ways, key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
         friction = controller_friction(j, every, K.value if K.known else before)
-        rotor, gravity = rotor_inertia(j, every)
-        yield ControllerModel(K, rotor, friction, gravity)
+        yield ControllerModel(K, rotor_inertia(j, every), friction)
+
+
+def targets_of(recording: Recording, robot: Robot) -> ControllerTargets:
+    """Targets beside the motion of one log."""
+    current, moment = recording.require("target_current"), recording.require("target_torque")
+    motion = prepare(recording, robot, CUTOFF)
+    smooth = zero_phase(recording.t, moment, CUTOFF)
+    return ControllerTargets(
+        logs=(motion,),
+        dq=motion.dq,
+        ddq=motion.ddq,
+        current=motion.filtered(current),
+        moment=smooth[motion.kept],
+        lead=derivative(recording.t, smooth)[motion.kept],
+        rigid=motion.rigid,
+        gravity=gravity_torque(robot, motion.q),
+    )
 
 
 def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
     """K from the ratio at rest, without friction; sd from the current's digits."""
     points = []
     for recording in (motion.recording for motion in log.logs):
-        t = recording.t
-        current, moment = recording.require("target_current"), recording.require("target_torque")
-        step = resolution(current[:, j])
+        names, t = ("target_current", "target_torque"), recording.t
+        current, moment = (recording.require(name)[:, j] for name in names)
+        step = resolution(current)
         for start, stop in runs_of(~np.any(faster(recording.require("dq"), NONZERO), axis=1)):
-            inside = (t[start:stop] > t[start] + SETTLE) & (t[start:stop] < t[stop - 1] - SETTLE)
-            if np.count_nonzero(inside) > 3:
-                held = current[start:stop, j][inside]
-                i, m = np.median(held), np.median(moment[start:stop, j][inside])
+            first, last = t[start] + SETTLE, t[stop - 1] - SETTLE
+            inside = slice(t.searchsorted(first, side="right"), t.searchsorted(last))
+            held = current[inside]
+            if len(held) > 3:
+                i, m = np.median(held), np.median(moment[inside])
                 if np.ptp(held) <= max(4 * step, STEADY * abs(i)) and abs(i) > 20 * step:
                     points.append((i, m, step))
     if not points:
         return UNKNOWN
     i, m, steps = np.array(points).T
     value = i @ m / (i @ i)
-    scatter = np.std(m - value * i) if len(i) > 1 else 0.0
     rounding = abs(value) * steps.max() / np.sqrt(12.0)
-    sd = np.hypot(rounding, scatter) / np.sqrt(i @ i)
+    sd = np.hypot(rounding, np.std(m - value * i)) / np.sqrt(i @ i)
     return Estimate(value, sd, value > 0 and sd <= CONSTANT_KNOWN * value)
 
 
 def resolution(values: Array) -> float:
     """Smallest step between two values of a signal: its digits."""
     steps = np.diff(np.unique(values.round(9)))
-    return float(steps.min()) if steps.size else 0.0
+    return steps.min() if steps.size else 0.0
 
 
 def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:
     """K from current against moment; sd from the friction's shapes."""
     moment, speed = log.moment[:, j], abs(log.dq[:, j])
-    constants, spread = [], []
+    slopes = []
     for shape in SHAPES:
         A = np.column_stack([moment, log.columns(j, shape)])
-        for low in SPEEDS:
-            used = (speed >= low).astype(float)
-            if np.count_nonzero(used) < 50 or np.ptp(moment[used > 0]) == 0.0:
-                continue
-            fit = fit_column(A, log.current[:, j], used)
-            if fit.values[0] > 0:
-                constants.append(1.0 / fit.values[0])
-                spread.append(fit.sd[0] / fit.values[0] ** 2)
-    if len(constants) < len(SPEEDS):
+        for used in (speed >= low for low in SPEEDS):
+            if np.count_nonzero(used) >= 50 and np.ptp(moment[used]):
+                fit = fit_column(A, log.current[:, j], used.astype(float))
+                slopes.append((fit.values[0], fit.sd[0]))
+    slope, spread = np.array([one for one in slopes if one[0] > 0]).reshape(-1, 2).T
+    if len(slope) < len(SPEEDS):
         return UNKNOWN
-    value = np.median(constants)
-    sd = np.hypot(np.median(spread), 0.5 * np.ptp(constants))
+    value = np.median(1.0 / slope)
+    sd = np.hypot(np.median(spread / slope**2), 0.5 * np.ptp(1.0 / slope))
     return Estimate(value, sd, sd <= CONSTANT_KNOWN * value)
 
 
-def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
-    """J from the moment beyond the rigid body, and the controller's gravity.
+def rotor_inertia(j: int, log: ControllerTargets) -> Estimate:
+    """J from the moment beyond the rigid body.
 
     y = J q̈ + s g + c + δ·dy/dt: s separates 9.82 from 9.81 m/s², δ shifts time.
     """
@@ -252,15 +233,11 @@ def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
     )
     A = np.column_stack([ddq, gravity, np.ones(len(y)), lead])
     if ddq.std() < 1e-2:
-        return UNKNOWN, UNKNOWN
+        return UNKNOWN
     # Half of robustness's change joins the spread, for the model's error.
-    fit, plain = fit_column(A, y, np.ones(len(y))), solve(A, y)
-    value, sd = plain[0], np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0]))
-    rotor = Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)
-    # With nearly constant gravity only constant and scale together show.
-    scale = 1.0 + plain[1]
-    scale_sd = np.hypot(fit.sd[1], 0.5 * (fit.values[1] - plain[1]))
-    return rotor, Estimate(scale, scale_sd, scale_sd < 1e-3)
+    fit, value = fit_column(A, y, np.ones(len(y))), solve(A, y)[0]
+    sd = np.hypot(fit.sd[0], 0.5 * (fit.values[0] - value))
+    return Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)
 
 
 def controller_friction(j: int, log: ControllerTargets, constant: float) -> FrictionLaw | None:
@@ -274,22 +251,17 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
     if fast < SLIDES:
         return None
     y = constant * log.current[:, j] - log.moment[:, j]
-    load = np.concatenate([motion.load[motion.kept, j] for motion in log.logs])
     line = bent(speed.max())
     shapes = WRITTEN if line is None else (line,)
-    if load.std() >= LIGHT:
+    if np.std(abs(log.gravity[:, j])) >= LIGHT:
         shapes = (*shapes, *(s._replace(terms=(*s.terms, "load_coulomb")) for s in shapes))
-    fits = {}
-    for shape in shapes:
-        fit = fit_column(log.columns(j, shape), y, np.ones(len(y)))
-        if is_dissipative(shape, fit.values, fast):
-            fits[shape] = fit
-
-    def misfit(shape: Shape) -> float:
-        return float(fits[shape].weights @ fits[shape].residual ** 2)
-
-    best = min(fits, key=misfit, default=None)
-    return None if best is None else (best, fits[best].values, fits[best].sd)
+    fits = [(shape, fit_column(log.columns(j, shape), y, np.ones(len(y)))) for shape in shapes]
+    laws = [
+        (fit.weights @ fit.residual**2, (shape, fit.values, fit.sd))
+        for shape, fit in fits
+        if is_dissipative(shape, fit.values, fast)
+    ]
+    return min(laws, key=lambda law: law[0])[1] if laws else None
 
 
 def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) -> None:
@@ -299,19 +271,19 @@ def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) ->
     fed forward is a fraction of the law, .1 to 1.1 by joint: one joint far below the law
     shows the hand.
     """
-    moves = faster(recording.require("dq"), SLIDES)
-    guided: bool | np.bool = False
+    share, least = 1.0, UNASKED
     if recording.target_dq is not None:
-        asked = np.any(recording.target_dq != 0.0, axis=1)
-        guided = moves.any() and asked[moves.any(axis=1)].mean() < UNASKED
+        moves = faster(recording.require("dq"), SLIDES).any(axis=1)
+        asked = np.any(recording.target_dq[moves] != 0.0, axis=1)
+        share = asked.mean() if asked.size else 1.0
     elif robot.torque_constant is not None and robot.friction:
         law = friction_torque(robot.friction, log.dq)
         fed = robot.torque_constant * log.current - log.moment
         used = np.where(faster(log.dq, SLIDES), law, 0.0)
         size = np.sum(used**2, axis=0)
         shares = np.sum(used * fed, axis=0)[size > 0] / size[size > 0]
-        guided = shares.min(initial=1.0) < GUIDED
-    if guided:
+        share, least = shares.min(initial=1.0), GUIDED
+    if share < least:
         raise IdentificationError(
             f"{recording.name}: a hand led the arm, and the controller feeds less friction forward "
             "then; read its model off a log in which a program moves the arm"

@@ -168,15 +168,11 @@ def prepare(recording: Recording, robot: Robot, cutoff: float = CUTOFF) -> Prepa
     moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, each) if moving.size else np.arange(0)
 
-    def smooth(signal: Array) -> Array:
-        return zero_phase(t, signal[:, None], cutoff)
-
-    joints = []
-    for position, speed, effort in zip(recording.q.T, dq.T, torque.T, strict=True):
-        velocity = smooth(speed)
-        signals = smooth(position), velocity, derivative(t, velocity), smooth(effort)
-        joints.append([signal[kept] for signal in signals])
-    q, velocities, ddq, tau = (np.concatenate(x, axis=1) for x in zip(*joints, strict=True))
+    signals = np.empty((4, len(kept), recording.joints))
+    for j in range(recording.joints):
+        q, v, tau = (zero_phase(t, x[:, [j]], cutoff) for x in (recording.q, dq, torque))
+        signals[:, :, [j]] = [x[kept] for x in (q, v, derivative(t, v), tau)]
+    q, velocities, ddq, tau = signals
     return PreparedLog(
         recording=recording,
         robot=robot,
@@ -256,8 +252,8 @@ class ParameterColumns(NamedTuple):
 
     def rows(self, log: PreparedLog, span: slice) -> Array:
         """Regressor A of a span: A x is every joint's drive torque. (N, n, size)"""
-        n, q, dq, ddq = self.chain.joints, log.q[span], log.dq[span], log.ddq[span]
-        A = np.zeros((len(q), n, self.size))
+        q, dq, ddq = log.q[span], log.dq[span], log.ddq[span]
+        A = np.zeros((len(q), self.chain.joints, self.size))
         A[:, :, : self.inertial] = torque_regressor(self.chain, q, dq, ddq)
         for j, (shape, place) in enumerate(zip(self.shapes, self.frictions, strict=True)):
             if self.rotor:
@@ -266,8 +262,7 @@ class ParameterColumns(NamedTuple):
         return A
 
 
-@dataclass(frozen=True, kw_only=True)
-class Training:
+class Training(NamedTuple):
     """The training logs, prepared."""
 
     robot: Robot  #: The profile.

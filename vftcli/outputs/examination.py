@@ -30,7 +30,7 @@ def examination_record(examination: Examination) -> Record:
         "robot": recording.robot_hint,
         "wrench_frame": recording.wrench_frame and str(recording.wrench_frame),
         "payload_kg": recording.payload_mass,
-        "robots": examination.robots,
+        "robots": [fit._asdict() for fit in examination.robots],
         "findings": [finding_record(finding) for finding in (*read, *examination.findings)],
     }
 

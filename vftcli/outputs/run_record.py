@@ -79,7 +79,7 @@ def run_record(analysis: Analysis, command: str) -> Record:
             "masked_share": sensed.masked_share,
             "tool": sensed.sensor.mounting.tool,
             "sensor": sensed.sensor.mounting.sensor,
-            "zero_drift": sensed.drifts,
+            "zero_drift": [drift._asdict() for drift in sensed.drifts],
             "warnings": [r for r in sensed.remarks if r.level == "warning"],
         },
         "contacts": analysis.contacts and contacts_record(analysis.contacts),

@@ -77,7 +77,7 @@ def ungated(found: Replay) -> Replay:
     alone = follow_force(found.controllers[:1], force, found.phases.dragged)
     x, v = motion.x.copy(), motion.v.copy()
     x[:, :1], v[:, :1] = alone.x, alone.v
-    return replace(found, motion=replace(motion, x=x, v=v))
+    return replace(found, motion=motion._replace(x=x, v=v))
 
 
 def return_values(variant: str, found: Replay, held: Sequence[Latency]) -> Iterator[Given]:

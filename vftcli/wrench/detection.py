@@ -4,7 +4,6 @@ A contact is where a wrench or a joint torque leaves its free band, what is read
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -49,7 +48,7 @@ def contact_intervals(
 ) -> tuple[ContactInterval, ...]:
     """Stretches of a mask as `vftcli.signals.series.intervals` has them, in time."""
     runs = intervals(t, mask, least, gap)
-    return tuple(ContactInterval(float(t[start]), float(t[stop - 1])) for start, stop in runs)
+    return tuple(ContactInterval(t[start], t[stop - 1]) for start, stop in runs)
 
 
 def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInterval, ...]:
@@ -97,8 +96,7 @@ class Interval(Protocol):
         """When it ends. [s]"""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Detection:
+class Detection(NamedTuple):
     """How well found contacts agree with the true ones, one to one."""
 
     contacts: int  #: True contacts.
@@ -143,16 +141,15 @@ def assignment(found: Sequence[Interval], true: Sequence[Interval]) -> list[int 
     found, and of the ways to do so to that which overlaps most.
     """
     given: list[int | None] = [None] * len(true)
-    if not found or not true:
-        return given
-    from scipy.optimize import linear_sum_assignment
+    if found and true:
+        from scipy.optimize import linear_sum_assignment
 
-    shared = overlaps(found, true)
-    # One more pair is worth more than all that may overlap.
-    worth = np.where(shared > 0.0, 1.0 + float(shared.sum()), 0.0) + shared
-    for i, j in zip(*linear_sum_assignment(worth, maximize=True), strict=True):
-        if shared[i, j] > 0.0:
-            given[int(j)] = int(i)
+        shared = overlaps(found, true)
+        # One more pair is worth more than all that may overlap.
+        worth = np.where(shared > 0.0, 1.0 + shared.sum(), 0.0) + shared
+        for i, j in np.transpose(linear_sum_assignment(worth, maximize=True)).tolist():
+            if shared[i, j] > 0.0:
+                given[j] = i
     return given
 
 
@@ -166,11 +163,8 @@ def match_contacts(
     """
     given, shared = assignment(found, true), overlaps(found, true) > 0.0
     missed = [j for j, i in enumerate(given) if i is None]
-    false = {
-        i
-        for i, f in enumerate(found)
-        if not any(c.start - EARLY <= f.start <= c.stop + LATE for c in true)
-    }
+    meant = [(c.start - EARLY, c.stop + LATE) for c in true]
+    false = {i for i, f in enumerate(found) if not any(a <= f.start <= b for a, b in meant)}
     free = duration - sum(c.stop - c.start for c in true)
     return Detection(
         contacts=len(true),
@@ -195,15 +189,14 @@ class ContactScore(NamedTuple):
     detection: Detection  #: Counts and delays, of the free band itself or of the list.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class KnownContacts:
+class KnownContacts(NamedTuple):
     """What is known of a log's contacts before they are judged."""
 
     untouched: Mask  #: Samples of the log that are known to be free; none where nothing is. (T,)
     #: What each observer reads in free runs of other logs, by name. (S, k) each
-    beside: Mapping[str, Array] = field(default_factory=dict)
+    beside: Mapping[str, Array] = {}
     #: Contacts of a list, by the observer that gave the wrench.
-    listed: Mapping[str, Sequence[Interval]] = field(default_factory=dict)
+    listed: Mapping[str, Sequence[Interval]] = {}
 
 
 def read_in_free_runs(
@@ -226,7 +219,7 @@ def read_in_free_runs(
 
 def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
     """Samples from `SETTLING` after the start to the first true contact. (T,)"""
-    first = true[0].start if true else float(t[-1])
+    first = true[0].start if true else t[-1]
     free: Mask = (t >= t[0] + SETTLING) & (t < first)
     if np.count_nonzero(free) < 10:
         raise ParameterError(
@@ -241,12 +234,13 @@ def floor_in_motion(reference: ExternalTorque) -> Array:
 
     Stiction at rest would deafen the reference to contacts in motion.
     """
-    if reference.floor is None or reference.sd is None or reference.moving is None:
-        return np.zeros(reference.joints) if reference.floor is None else reference.floor
-    known = reference.moving & np.isfinite(reference.sd)
-    square = np.sum(np.where(known, reference.sd, 0.0) ** 2, axis=0)
+    floor, sd, moving = reference.floor, reference.sd, reference.moving
+    if floor is None or sd is None or moving is None:
+        return np.zeros(reference.joints) if floor is None else floor
+    known = moving & np.isfinite(sd)
+    square = np.sum(np.where(known, sd, 0.0) ** 2, axis=0)
     count = np.count_nonzero(known, axis=0)
-    return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), reference.floor)
+    return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), floor)
 
 
 def judge_contacts(
@@ -278,17 +272,14 @@ def judge_contacts(
         quiet = measured.free
     scores = []
     for name, values in signals.items():
-        found: Sequence[Interval]
-        if (listed := known.listed.get(name)) is not None:
-            kind_of_it, found = "list", listed
-        else:
-            free = values[quiet] if quiet.any() else known.beside.get(name, ())
+        found, of = known.listed.get(name), "list"
+        if found is None:
+            free = values[quiet] if quiet.any() else known.beside.get(name, values[:0])
             if not len(free):
                 free = values[learned_free(t, true)]
             # Observers rise from zero: what they read before they have settled touches
             # nothing.
-            score = np.where(settled, departure(values, np.asarray(free), least), 0.0)
-            kind_of_it, found = kind, find_contacts(t, score)
-        counts = match_contacts(found, true, float(t[-1] - t[0]))
-        scores.append(ContactScore(name, kind_of_it, counts))
+            score = np.where(settled, departure(values, free, least), 0.0)
+            found, of = find_contacts(t, score), kind
+        scores.append(ContactScore(name, of, match_contacts(found, true, t[-1] - t[0])))
     return tuple(scores)

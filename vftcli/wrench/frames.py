@@ -12,7 +12,6 @@ A log may state its wrench's axes, the point of its moment and its sign (`Wrench
 what it leaves open is assumed, and the assumption is a remark.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -28,8 +27,6 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.wrench import Wrench, WrenchFrame
 
-#: How far RᵀR may lie from the identity: nine printed digits of a rotation leave 1e-9.
-ROTATION_TOLERANCE = 1e-6
 #: Name at the command line → axes and reference point.
 FRAMES: dict[str, str] = {
     "flange": "flange axes, moment about the flange point",
@@ -94,36 +91,15 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     return adjoint(inverse(frame_pose(frame, mounting))) @ X
 
 
-def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
-    """A pose with rotation one."""
-    R, p = np.asarray(rotation, float), np.asarray(translation, float)
-    if R.shape != (3, 3) or p.shape != (3,) or not (np.isfinite(R).all() and np.isfinite(p).all()):
-        raise ParameterError(f"{what}: a pose has a finite 3×3 rotation and three finite lengths")
-    error = float(abs(R.T @ R - np.eye(3)).max())
-    if error > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
-        why = f"RᵀR differs from the identity by {error:.3g}"
-        if error <= ROTATION_TOLERANCE:
-            why = "its determinant is −1 (left-handed axes)"
-        raise ParameterError(f"{what}: the matrix is not a rotation: {why}")
-    return Pose(R, p)
-
-
-def pose_of_numbers(values: Sequence[float], what: str) -> Pose:
-    """A pose from x, y, z [m] with roll, pitch, yaw [rad] or nine entries of R by rows."""
-    if (count := len(values)) not in {3, 6, 12}:
-        raise ParameterError(
-            f"{what}: {count} numbers; a pose is x,y,z or x,y,z,roll,pitch,yaw or x,y,z and "
-            "nine entries of a rotation matrix, row by row [m, rad]"
-        )
-    turn = values[3:] or np.eye(3)
-    R = rpy_matrix(values[3:]) if count == 6 else np.reshape(turn, (3, 3))
-    return checked_pose(R, np.asarray(values[:3]), what)
-
-
 def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
     """A pose from the command line: numbers, or NAME of ``[section.NAME]`` in the robot file."""
     if (values := numbers(text)) is not None:
-        return pose_of_numbers(values, option)
+        if len(values) not in {3, 6} or not np.isfinite(values).all():
+            raise ParameterError(
+                f"{option}: {len(values)} numbers; a pose is three or six finite ones, "
+                "x,y,z or x,y,z,roll,pitch,yaw [m, rad]"
+            )
+        return Pose(rpy_matrix(values[3:] or (0.0, 0.0, 0.0)), np.array(values[:3]))
     poses = {"tool": robot.tools, "sensor": robot.sensors}[section]
     if not text or text not in poses:
         there = ", ".join(filter(None, poses)) or "none"
@@ -160,7 +136,7 @@ def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wren
     frame = stated or UNSTATED
     remarks = [warning("wrench-frame-unstated")] if stated is None else []
     if frame.point == "controller":
-        tool = None if mounting.tool is None else np.asarray(mounting.tool.translation)
+        tool = None if mounting.tool is None else mounting.tool.translation
         point, why = controller_point(recording, chain, tool)
         frame, remarks = replace(frame, point=point), [*why]
     # The flange replaces a tool or sensor of unknown pose; base axes need none.
@@ -224,9 +200,9 @@ def controller_point(
         point: unexplained(beyond, np.einsum("tij,ti->tj", J, np.hstack([force, turned])))
         for point, turned in about.items()
     }
-    values = {point: float(np.sqrt(share.mean())) for point, share in left.items()}
+    values = {point: np.sqrt(share.mean()) for point, share in left.items()}
     pieces = recording.duration / PIECE
-    evidence = 0.5 * pieces * float(np.log(left["flange"] / left["tool"]).sum())
+    evidence = 0.5 * pieces * np.log(left["flange"] / left["tool"]).sum()
     if abs(evidence) <= SURE:
         return "flange", (caution("controller-point-open", **values),)
     point = "tool" if evidence > 0.0 else "flange"

@@ -18,7 +18,6 @@ References:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +67,7 @@ DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
 QUIET, QUIET_SD = 0.6, 0.8416
 #: The block in which a joint comes to rest draws b anew: this share is left of what it
 #: was.
-STOP_DECAY = float(np.exp(-5.0))
+STOP_DECAY = np.exp(-5.0)
 #: What a joint has just done: it stops if it moved for more than half of this time
 #: before, and for this time after a start b changes within `START_TIME`. [s]
 RECENT = 0.1
@@ -79,8 +78,7 @@ SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
 UNKNOWN = 1e9  #: Variance of the white noise of a block that says nothing. [(N·m)²]
 
 
-@dataclass(frozen=True, kw_only=True)
-class TorqueNoise:
+class TorqueNoise(NamedTuple):
     """White noise and model error of every joint, by blocks of one length."""
 
     white: Array  #: R, variance of the white noise. (n,) [(N·m)²]
@@ -107,13 +105,13 @@ class TorqueNoise:
     def stationary(self, blocks: Blocks, touched: Mask | None = None) -> tuple[Array, Array]:
         """Variance and time of b in blocks; `touched` ones may re-settle. (K, n) each"""
         rests = np.column_stack([grown(blocks.t, rest, self.near) for rest in blocks.rests.T])
+        held = blocks.rests & (False if touched is None else touched[:, None])
         variance = np.where(rests, self.variance + self.at_rest, self.moving)
         time = np.where(rests, np.maximum(self.time, REST_TIME), self.moving_time)
-        if touched is not None:
-            held = blocks.rests & touched[:, None]
-            variance = np.where(held, self.variance + self.pushed, variance)
-            time = np.where(held, PUSHED_TIME, time)
-        return variance, time
+        return (
+            np.where(held, self.variance + self.pushed, variance),
+            np.where(held, PUSHED_TIME, time),
+        )
 
 
 def steps(blocks: Blocks) -> Array:
@@ -134,24 +132,21 @@ def torque_noise(
     differ.
     """
     dry, pieces = dry_torques(robot), []
-    for piece in free:
-        blocks = disturbance_blocks(piece.run.terms, piece.run.q, seconds, piece.inside)
+    for run, inside in free:
+        blocks = disturbance_blocks(run.terms, run.q, seconds, inside)
         motion = np.flatnonzero(blocks.known & ~blocks.rests.all(axis=1))
-        ends = (int(motion[0]), int(motion[-1]) + 1) if len(motion) else (0, len(blocks.t))
+        ends = (motion[0], motion[-1] + 1) if len(motion) else (0, len(blocks.t))
         pieces += long_stretches(blocks.part(slice(*ends)))
     if pieces:
         noise = fitted_noise(pieces, dry)
         resting = np.maximum(noise.variance, (REST_SHARE * dry) ** 2)
         unseen = ~noise.seen * (UNSEEN_SHARE * dry) ** 2
-        at_rest, pushed = resting - noise.variance, unseen + RESETTLED * resting
-        return replace(noise, at_rest=at_rest, pushed=pushed)
+        pushed = unseen + RESETTLED * resting
+        return noise._replace(at_rest=resting - noise.variance, pushed=pushed)
     moving, rest = (np.maximum(share * dry, TORQUE_SD) for share in (ASSUMED_SHARE, REST_SHARE))
     bend = log.d[1:-1] - 0.5 * (log.d[2:] + log.d[:-2])
-    white = np.full(len(dry), TORQUE_SD**2)
-    if len(bend):
-        # The median square of a normal variable is .455 of its mean square; the bend has
-        # 1.5 R.
-        white = np.median(bend**2, axis=0) / (0.455 * 1.5)
+    # The median square of a normal variable is .455 of its mean square; the bend has 1.5 R.
+    white = np.median(bend**2, axis=0) / (0.455 * 1.5) if len(bend) else TORQUE_SD**2 + 0.0 * dry
     return TorqueNoise(
         white=np.maximum(white, LEAST_NOISE),
         variance=moving**2,
@@ -170,19 +165,14 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
     if not pieces:
         return None
     share = (~np.concatenate([piece.rests for piece in pieces])).mean(axis=0)
-    bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
-    noise = fitted_noise(bridged, dry)
+    noise = fitted_noise([without_reversals(piece, share > MOVES) for piece in pieces], dry)
     # The tails of the innovations may ask for more than the spectrum.
-    processes = [error_process(noise, piece) for piece in pieces]
-    squares = np.concatenate(
-        [
-            innovations(error_model(piece.d, process), process.spikes)[0]
-            for piece, process in zip(pieces, processes, strict=True)
-        ]
-    )
-    each = [np.quantile(squares, share, axis=0) / value for share, value in QUANTILES]
-    factor = np.maximum(np.max(each, axis=0), 1.0)
-    return replace(noise, white=noise.white * factor, variance=noise.variance * factor)
+    processes = ((piece.d, error_process(noise, piece)) for piece in pieces)
+    each = [innovations(error_model(d, own), own.spikes)[0] for d, own in processes]
+    squares = np.concatenate(each)
+    asked = [np.quantile(squares, share, axis=0) / value for share, value in QUANTILES]
+    factor = np.maximum(np.max(asked, axis=0), 1.0)
+    return noise._replace(white=noise.white * factor, variance=noise.variance * factor)
 
 
 def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueNoise | None:
@@ -222,22 +212,22 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
 
 def fitted_noise(stretches: Sequence[Blocks], dry: Array) -> TorqueNoise:
     """Noise by Whittle's likelihood over all stretches together, joint by joint."""
+    whole = Blocks(*map(np.concatenate, zip(*stretches, strict=True)))
     # A block holds whole samples, so that it is not quite as long as was asked.
-    seconds = median(np.concatenate([s.length for s in stretches]))
+    seconds = median(whole.length)
     f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
     P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
-    longest = max(float(s.length.sum()) for s in stretches)
+    longest = max(s.length.sum() for s in stretches)
     white, variance, time = np.transpose([fit_spectrum(f, p, seconds, longest) for p in P.T])
     return TorqueNoise(
         white=white,
-        # An offset is an error too.
-        variance=variance + np.concatenate([s.d for s in stretches]).mean(axis=0) ** 2,
+        variance=variance + whole.d.mean(axis=0) ** 2,  # an offset is an error too
         time=time,
         dry=dry,
-        seen=(~np.concatenate([s.rests for s in stretches])).mean(axis=0) >= SEEN,
+        seen=(~whole.rests).mean(axis=0) >= SEEN,
         at_rest=(CREEP_SHARE * dry) ** 2,
         pushed=(PUSHED_SHARE * dry) ** 2,
-        free_seconds=float(sum(s.length.sum() for s in stretches)),
+        free_seconds=whole.length.sum(),
     )
 
 
@@ -279,12 +269,12 @@ def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[fl
         cost = np.log(S).sum(axis=2) + len(f) * np.log(np.maximum(levels, LEAST_NOISE**2))
         cost += 0.5 * ((times[:, None] - np.log(USUAL_TIME)) / TIME_SPREAD) ** 2
         i, j = np.unravel_index(cost.argmin(), cost.shape)
-        best, level = np.array([times[i], ratios[j]]), float(levels[i, j])
+        best, level = np.array([times[i], ratios[j]]), levels[i, j]
         reach = (high - low) / (count - 1)
         low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)
         count = 5
     time, ratio = np.exp(best)
-    return max(level, LEAST_NOISE), float(level * ratio), float(time)
+    return max(level, LEAST_NOISE), level * ratio, time
 
 
 class ErrorProcess(NamedTuple):
@@ -318,18 +308,18 @@ def steady_process(
 
 def error_process(noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None) -> ErrorProcess:
     """B along a log; in the `touched` blocks (K,) a contact may re-settle stiction at rest."""
-    rests, length = blocks.rests, float(np.median(blocks.length))
+    rests, length = blocks.rests, np.median(blocks.length)
     # Share of the `RECENT` blocks before each in which a joint moved.
     count, k = max(round(RECENT / length), 1), np.arange(len(rests))
     total = np.vstack([np.zeros((1, rests.shape[1])), np.cumsum(~rests, axis=0)])
     first = np.maximum(k - count, 0)
     moved = (total[:-1] - total[first]) / np.maximum(k - first, 1)[:, None]
     process = steady_process(noise, blocks, touched, ~rests & (moved < 1.0))
-    stops = rests & ~np.vstack([np.ones((1, rests.shape[1]), bool), rests[:-1]]) & (moved > 0.5)
+    stops, anew = rests & (moved > 0.5), (STOP_SHARE * noise.dry) ** 2
+    stops[1:] &= ~rests[:-1]
     process.decay[stops] = STOP_DECAY
-    anew = np.broadcast_to((STOP_SHARE * noise.dry) ** 2, rests.shape)
-    process.added[stops] = anew[stops]
-    process.added[0] += np.where(rests[0], anew[0], 0.0)
+    np.copyto(process.added, anew, where=stops)
+    process.added[0] += rests[0] * anew
     # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
     reach = max(round(SPIKE_REACH / length - TIE), 1)
     spikes = np.where(near(~rests, reach), SPIKES_MOVING, SPIKES_RESTING)

@@ -106,11 +106,12 @@ def sense(
     the robot's model alone has it (`plain`, found if not given) or as an observer has its
     own, and a gate where there is one.
     """
-    log, q, t = motion.log, motion.log.q, motion.log.t
-    chain = log.robot.chain
+    log, q, t, chain = motion.log, motion.log.q, motion.log.t, motion.log.robot.chain
     disturbance = mean_disturbance(log.terms)
-    to_smooth = [torque for torque in estimates if choice.smooths(torque.name)]
-    others = [torque for torque in estimates if not choice.smooths(torque.name)]
+    to_smooth, others = (
+        [torque for torque in estimates if choice.smooths(torque.name) == wanted]
+        for wanted in (True, False)
+    )
     # The disturbance is solved in base axes, so that --frame moves no zero; beside it,
     # what the pose says of the estimates that are smoothed.
     raw, *bare = VirtualSensor(frame="base").wrenches((disturbance, *to_smooth), q, chain)
@@ -123,18 +124,13 @@ def sense(
     del disturbance, raw  # of a long log each takes the room of an estimate
     log.recording.release()
     sds, on_sds = torque_error(choice.torque_sd, log, observers, estimates, chosen)
-    smoothed = smooth_all(
-        [wrench.name for wrench in bare],
-        plain or as_modelled(motion),
-        own or {},
-        unloaded=chosen,
-        gate=gate,
-    )
+    names, plain = [wrench.name for wrench in bare], plain or as_modelled(motion)
+    smoothed = smooth_all(names, plain, own or {}, unloaded=chosen, gate=gate)
     by_pose = sensor.wrenches(others, q, chain, sds) if others else ()
     made = {wrench.name: wrench for wrench in by_pose}
     made |= {w.name: smoothed_wrench(smoothed[w.name], w, sensor, log) for w in bare}
     wrenches = [made[torque.name] for torque in estimates]
-    bands = [remark for w in wrenches if w.name in smoothed for remark in w.remarks]
+    bands = [remark for name in names for remark in made[name].remarks]
     # Beside a smoothed wrench, what is said of the torques' error names those that it is
     # said of.
     if others:
@@ -142,18 +138,13 @@ def sense(
         bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in on_sds]
     # Drifts span by span: the first of each observer is its zero.
     drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in spans]
-    warnings = [
-        remark
-        for row in drifts
-        for wrench, drift in zip(wrenches, row, strict=True)
-        for remark in zero_warning(wrench, drift)
-    ]
+    read = [pair for row in drifts for pair in zip(wrenches, row, strict=True)]
+    warnings = [remark for pair in read for remark in zero_warning(*pair)]
     moved = [zero_moved(*pair) for row in drifts[1:] for pair in zip(drifts[0], row, strict=True)]
     # Only now: the band and the warnings are about the wrench as it was read.
     if drifts:
-        drifts[0] = [replace(drift, removed=True) for drift in drifts[0]]
-        wrenches = [without_drift(w, d) for w, d in zip(wrenches, drifts[0], strict=True)]
-    hides = any(w.hidden.any() for w in wrenches)
+        drifts[0] = [drift._replace(removed=True) for drift in drifts[0]]
+        wrenches = [*map(without_drift, wrenches, drifts[0])]
     return SensorReading(
         sensor=sensor,
         wrenches=tuple(wrenches),
@@ -165,7 +156,7 @@ def sense(
             *warnings,
             *fitted,
             *(() if drifts else payload_remark(log.recording, log.robot)),
-            *(mask_remark(hidden, sigma) if hides else ()),
+            *(mask_remark(hidden, sigma) if any(w.hidden.any() for w in wrenches) else ()),
             *moved,
             *bands,
             *vendor,
@@ -178,12 +169,12 @@ def smoothed_wrench(
     smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, log: Run
 ) -> Wrench:
     """A wrench with the smoother's values and band in the sensor's frame, nothing of it masked."""
-    t, values, sd = wrench.t, np.empty((len(wrench.t), 6)), np.empty((len(wrench.t), 6))
-    for start in range(0, len(t), CHUNK):
+    values, sd = np.empty((2, len(wrench.t), 6))
+    for start in range(0, len(values), CHUNK):
         span = slice(start, start + CHUNK)
         flange = link_poses(log.robot.chain, log.q[span]).rotation[:, -1]
         X = from_base(sensor.frame, flange, sensor.mounting)
-        there, covariance = smoothed.at(t[span])
+        there, covariance = smoothed.at(wrench.t[span])
         values[span] = np.squeeze(X @ there[:, :, None], axis=2)
         sd[span] = deviations(X @ covariance @ X.swapaxes(1, 2))
     return replace(
@@ -218,21 +209,21 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
     uncorrected log calls for one steady load it is left out, since a load and an error of
     the model look alike.
     """
-    free = log.known_free(unloaded)
+    run, free, load = log.run, log.known_free(unloaded), log.load
     if gate is not None:
-        found = smooth_wrench(without_load(log.run, log.load), free, gate.spans, gate.prior)
-        if log.load is None:
+        found = smooth_wrench(without_load(run, load), free, gate.spans, gate.prior)
+        if load is None:
             return found
-        q = resample_columns(found.t, log.run.t, log.run.q)
-        values, covariance = log.load.wrench(log.run.robot.chain, q)
+        q = resample_columns(found.t, run.t, run.q)
+        values, covariance = load.wrench(run.robot.chain, q)
         values, covariance = found.values + values, found.covariance + covariance
-        return replace(found, values=values, covariance=covariance, load=log.load)
-    if log.run is not plain.run:
+        return replace(found, values=values, covariance=covariance, load=load)
+    if run is not plain.run:
         modelled = plain.known_free(unloaded)
         prior = prior_of(plain.run, modelled)
         if prior.is_steady:
             return replace(smooth_wrench(plain.run, modelled, prior=prior), uncorrected=True)
-    return smooth_wrench(log.run, free)
+    return smooth_wrench(run, free)
 
 
 def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
@@ -259,17 +250,17 @@ def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:
     mounted = robot.payload.mass if robot.payload is not None else 0.0
     if stated is None or abs(stated - mounted) < PAYLOAD_SLACK:
         return ()
-    weight = float(np.linalg.norm(robot.chain.gravity)) * (stated - mounted)
+    weight = np.linalg.norm(robot.chain.gravity) * (stated - mounted)
     return (caution("payload-differs", told_kg=stated, mounted_kg=mounted, weight_N=weight),)
 
 
 def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
     """Count of the samples (T,) in which the pose hides the wrench, and the smallest σ_min [m]."""
-    count = int(np.count_nonzero(hidden))
+    count = np.count_nonzero(hidden)
     if not count or sigma is None:
         return ()
     values = {"masked": count, "samples": len(hidden), "share": count / len(hidden)}
-    return (caution("pose-hides-wrench", **values, sigma_min_m=float(sigma.min())),)
+    return (caution("pose-hides-wrench", **values, sigma_min_m=sigma.min()),)
 
 
 OWN = "own"  #: The word for the observers' own covariance as the torque error.
@@ -300,9 +291,9 @@ def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     """The torque error that ``virtual-sensor.torque-sd`` states."""
     if text == OWN:
         own = {torque.name: torque.sd for torque in torques if torque.sd is not None}
-        codes = {True: "band-of-observer", False: "no-covariance"}
-        order = sorted(torques, key=lambda torque: torque.sd is None)
-        return own, [caution(codes[one.name in own], Where(one.name)) for one in order]
+        without = [torque.name for torque in torques if torque.sd is None]
+        remarks = [caution("band-of-observer", Where(name)) for name in own]
+        return own, remarks + [caution("no-covariance", Where(name)) for name in without]
     joints = torques[0].joints if torques else 0
     values = np.array(numbers(text) or ())
     if len(values) not in {1, joints} or not np.all(np.isfinite(values) & (values > 0)):

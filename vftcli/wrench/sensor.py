@@ -43,11 +43,9 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     R solves Wahba's problem on the forces (Kabsch), p the linear least squares of N_F − R
     N_S = p × F_F, both on departures from the mean: constant offsets do not matter.
     """
-    known = np.all(np.isfinite(flange) & np.isfinite(sensor), axis=1)
-    ours, theirs = flange[known], sensor[known]
+    ours, theirs = centred(flange, sensor)
     if len(ours) < 4:
         raise ParameterError("the sensor's pose: too few samples in which both wrenches are known")
-    ours, theirs = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
     U, s, Vt = np.linalg.svd(theirs[:, :3].T @ ours[:, :3])
     if not s[1] > LEAST_DIRECTIONS * s[0]:
         raise ParameterError(
@@ -55,19 +53,15 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
             "directions, or give the pose with --set virtual-sensor.sensor=x,y,z,roll,pitch,yaw"
         )
     # A reflection may fit better than any rotation; the smallest direction gives way.
-    turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))])
-    R = Vt.T @ turn @ U.T
+    R = Vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
     lever = skew(-ours[:, :3]).reshape(-1, 3)
     excess = (ours[:, 3:] - theirs[:, 3:] @ R.T).ravel()
     p = np.linalg.lstsq(lever, excess, rcond=None)[0]
     left = excess - lever @ p
-    variance = float(np.mean(left**2))
-    return PoseFit(
-        pose=Pose(R, p),
-        force_rms=root_mean_square(ours[:, :3] - theirs[:, :3] @ R.T),
-        moment_rms=float(np.sqrt(variance)),
-        position_sd=np.sqrt(variance * np.diag(np.linalg.pinv(lever.T @ lever))),
-    )
+    variance = np.mean(left**2)
+    force_rms = root_mean_square(ours[:, :3] - theirs[:, :3] @ R.T)
+    position_sd = np.sqrt(variance * np.diag(np.linalg.pinv(lever.T @ lever)))
+    return PoseFit(Pose(R, p), force_rms, np.sqrt(variance), position_sd)
 
 
 def find_mounting(
@@ -122,19 +116,24 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
     The best orthogonal matrix (improper ones allowed, as loggers swap axes freely) is
     rounded to the signed permutation with the largest sum of matching entries.
     """
-    known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
-    x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)
+    x, y = centred(ours, theirs)
     U, _, Vt = np.linalg.svd(y.T @ x)
     Q, rows = U @ Vt, np.arange(3)
-    order = max(permutations(range(3)), key=lambda order: float(abs(Q[rows, order]).sum()))
+    order = max(permutations(range(3)), key=lambda order: abs(Q[rows, order]).sum())
     matrix = np.zeros((3, 3))
     matrix[rows, order] = np.sign(Q[rows, order])
     z = x @ matrix.T
-    power = float(np.sum(z**2))
-    gain = float(np.sum(z * y)) / power if power > 0 else float("nan")
-    scale = float(np.sqrt(power * np.sum(y**2)))
-    correlation = float(np.sum(z * y)) / scale if scale > 0 else float("nan")
-    return AxesFit(matrix=matrix, gain=gain, correlation=correlation)
+    power, both = np.sum(z**2), np.sum(z * y)
+    scale = np.sqrt(power * np.sum(y**2))
+    gain, correlation = (both / size if size > 0 else np.nan for size in (power, scale))
+    return AxesFit(matrix, gain, correlation)
+
+
+def centred(ours: Array, theirs: Array) -> tuple[Array, Array]:
+    """Departures from the mean of two readings (T, k) where both are known. (S, k) each"""
+    known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
+    x, y = ours[known], theirs[known]
+    return (x - x.mean(axis=0), y - y.mean(axis=0)) if len(x) else (x, y)
 
 
 def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Remark]:
@@ -143,28 +142,26 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
     if theirs is None:
         return []
     empty = ~theirs.any(axis=1)
-    share, remarks = float(empty.mean()), []
+    share, remarks = empty.mean(), list[Remark]()
     norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
-    force = root_mean_square(norm) if len(norm) else float("nan")
+    force = root_mean_square(norm) if len(norm) else np.nan
     if share == 1.0:
         return [caution("log-wrench-all-zero", force_N=force)]
-    if share > 0:
+    if share:
         remarks.append(caution("log-wrench-zero", share=share, force_N=force))
     # Zeros may stand for "not known", and would pull every fit towards nothing.
-    usable = ~empty & ~ours.hidden
+    t, usable = recording.t, ~(empty | ours.hidden)[:, None]
     if np.count_nonzero(usable) < 10:
         return [*remarks, caution("log-wrench-unlike")]
     flange = link_poses(chain, recording.q).rotation[:, -1]
     forces = {"base": ours.force, "flange": np.einsum("tji,tj->ti", flange, ours.force)}
-    given = np.where(usable[:, None], theirs[:, :3], np.nan)
+    given = np.where(usable, theirs[:, :3], np.nan)
     fits = {name: fit_axes(force, given) for name, force in forces.items()}
-    frame = max(fits, key=lambda name: fits[name].correlation)
-    turned = forces[frame] @ fits[frame].matrix.T
-    offset = time_offset(recording.t, given, turned)
-    moved = resample_columns(
-        recording.t - offset.lag, recording.t, bridge_unknown(recording.t, turned)
-    )
-    axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
+    frame, fit = max(fits.items(), key=lambda item: item[1].correlation)
+    turned = forces[frame] @ fit.matrix.T
+    lag = time_offset(t, given, turned).lag
+    moved = resample_columns(t - lag, t, bridge_unknown(t, turned))
+    axes = fit_axes(np.where(usable, moved, np.nan) @ fit.matrix, given)
     if not axes.correlation > RESEMBLES:
         return [*remarks, caution("log-wrench-unlike")]
     # The trace of a signed permutation is 3 for our own axes and −3 for the opposite
@@ -172,12 +169,12 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
     turn = {3: "log-wrench-fits", -3: "log-wrench-fits-turned"}
     remarks.append(
         fact(
-            turn.get(round(float(np.trace(axes.matrix))), "log-wrench-fits-other-axes"),
+            turn.get(round(np.trace(axes.matrix)), "log-wrench-fits-other-axes"),
             stated=str(recording.wrench_frame or "frame not stated"),
             frame=frame,
             axes=axes.words,
             gain=axes.gain,
-            lag_ms=offset.lag * 1e3,
+            lag_ms=lag * 1e3,
             correlation=axes.correlation,
         )
     )

@@ -1,11 +1,12 @@
 """Reading of a log's virtual sensor: wrenches, zero drift and its removal, masks, remarks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, seal
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.lag import time_offset
 from vftcli.signals.least_squares import robust_sd
@@ -33,8 +34,7 @@ BACK = 0.3  #: An unloaded start ends this long before the load shows: it began 
 SPREADS = 6.0  #: A departure of so many robust standard deviations counts as load.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Drift:
+class Drift(NamedTuple):
     """What one virtual sensor reads over one unloaded span."""
 
     name: str  #: The observer.
@@ -44,9 +44,6 @@ class Drift:
     samples: int  #: Known samples in the span.
     frame: str  #: Frame of the numbers.
     removed: bool = False  #: Whether it was subtracted.
-
-    def __post_init__(self) -> None:
-        seal(self, "mean", "sd")
 
     @property
     def remark(self) -> Remark:
@@ -62,11 +59,11 @@ class Drift:
 
 def null_space_limit(wrench: Wrench, free: Mask) -> float | None:
     """`MARGIN` times the largest null-space torque in the free part (T,), None without. [N·m]"""
-    if wrench.null_space is None:
+    if (torque := wrench.null_space) is None:
         return None
-    known = wrench.null_space[free & np.isfinite(wrench.null_space)]
+    known = torque[free & np.isfinite(torque)]
     # The largest, not a quantile: the free part holds no contact, so all of it is error.
-    return MARGIN * float(known.max()) if len(known) else None
+    return MARGIN * known.max() if len(known) else None
 
 
 def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
@@ -74,7 +71,7 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
     limit = null_space_limit(wrench, free)
     if limit is None or wrench.null_space is None:
         return ()
-    share = float(np.mean(np.nan_to_num(wrench.null_space) > limit))
+    share = np.mean(np.nan_to_num(wrench.null_space) > limit)
     if not share > LEAST_SHARE:
         return ()
     return (caution("contact-elsewhere", Where(wrench.name), share=share, threshold_Nm=limit),)
@@ -111,7 +108,7 @@ class SensorReading(Shown):
     @property
     def hides(self) -> bool:
         """Whether there are samples in which the pose hides a part of the wrench."""
-        return any(bool(wrench.hidden.any()) for wrench in self.wrenches)
+        return any(wrench.hidden.any() for wrench in self.wrenches)
 
     @property
     def solver(self) -> str:
@@ -137,7 +134,7 @@ def with_reference(
         return replace(reading, reference=reference)
     remarks = list(reading.remarks)
     if reading.zero_span is not None:
-        drift = replace(zero_drift(reference, reading.zero_span), removed=True)
+        drift = zero_drift(reference, reading.zero_span)._replace(removed=True)
         reference = without_drift(reference, drift)
         remarks.append(drift.remark)
     for wrench in reading.wrenches:
@@ -149,7 +146,7 @@ def with_reference(
 
 def zero_drift(wrench: Wrench, span: Span) -> Drift:
     """Mean and spread of the known samples in a span."""
-    start, stop = max(span[0], float(wrench.t[0])), min(span[1], float(wrench.t[-1]))
+    start, stop = max(span[0], wrench.t[0]), min(span[1], wrench.t[-1])
     where = f"zero interval {interval_text(*span)}"
     if not start < stop:
         raise ParameterError(
@@ -161,19 +158,13 @@ def zero_drift(wrench: Wrench, span: Span) -> Drift:
             f"{where}: no two of its samples have a known wrench (σ_min too "
             "small); choose a span in a regular pose"
         )
-    return Drift(
-        name=wrench.name,
-        span=(start, stop),
-        mean=inside.mean(axis=0),
-        sd=inside.std(axis=0),
-        samples=len(inside),
-        frame=wrench.frame,
-    )
+    mean, sd = inside.mean(axis=0), inside.std(axis=0)
+    return Drift(wrench.name, (start, stop), mean, sd, len(inside), wrench.frame)
 
 
 def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
     """The wrench with the drift subtracted, as a constant in the wrench's own frame."""
-    removed = replace(drift, removed=True)
+    removed = drift._replace(removed=True)
     return replace(
         wrench, values=wrench.values - drift.mean, remarks=(*wrench.remarks, removed.remark)
     )
@@ -226,26 +217,24 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     last = len(t) - 1
     runs = [(a, b) for a, b in runs_of(away & known) if t[min(b, last)] - t[a] >= 0.1]
     loaded = covered(runs, len(t)) & (t >= SETTLING)
-    stop = float(t[loaded.argmax()]) - BACK if loaded.any() else float(t[-1])
+    stop = t[loaded.argmax()] - BACK if loaded.any() else t[-1]
     if stop - SETTLING < LEAST_SPAN:
         return None
-    start = float(wrench.t[0])
+    start = wrench.t[0]
     return start + SETTLING, start + stop
 
 
 def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
     """A warning if a zero interval looks like a contact; none if it does not."""
-    inside, start = wrench.between(*drift.span), unloaded_start(wrench)
-    swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
-    tried: list[tuple[str, Array, Array, dict[str, object]]]
-    tried = [("zero-swings", swing, 4.0 * STEPS, {})]
+    inside, start, tried = wrench.between(*drift.span), unloaded_start(wrench), []
     if start is not None:
         level = zero_drift(wrench, start)
         away = abs(drift.mean - level.mean) - SPREADS * level.sd
-        tried.insert(0, ("zero-far-from-start", away, STEPS, {"start_s": list(start)}))
-    for code, value, limit, values in tried:
+        tried.append(("zero-far-from-start", away, STEPS, {"start_s": list(start)}))
+    swing = np.subtract(*np.percentile(inside, [95, 5], axis=0))
+    for code, value, limit, more in (*tried, ("zero-swings", swing, 4.0 * STEPS, {})):
         k = int(np.argmax(value / limit))
         if value[k] > limit[k]:
-            values |= {"axis": AXES[k], "size": float(value[k]), "unit": unit_of(k)}
+            values = {"axis": AXES[k], "size": value[k], "unit": unit_of(k), **more}
             return (warning(code, Where(wrench.name, span=drift.span), **values),)
     return ()

@@ -69,7 +69,7 @@ class WrenchPrior(NamedTuple):
         """Whether it is the prior of a load rather than of contacts that come and go."""
         # What the force changes by in a second, where that is short against τ_w.
         change = self.force * np.sqrt(2.0 / self.time)
-        return bool(self.time >= STEADY and change <= LOAD_CHANGE)
+        return self.time >= STEADY and change <= LOAD_CHANGE
 
     @property
     def looser(self) -> "WrenchPrior":
@@ -123,29 +123,28 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
     first block inside starts it with the prior's own variance, independent of before.
     """
     n, step, process = log.blocks.d.shape[1], steps(log.blocks), log.process
-    longest = max(lane.window[1] - lane.window[0] for lane in lanes)
+    longest, count = max(lane.window[1] - lane.window[0] for lane in lanes), len(lanes)
     # What is the same in all lanes is there once: of a long log G priors would have no room.
     alike = all(a is b for lane in lanes for a, b in zip(lane[:4], lanes[0][:4], strict=True))
-    each = 1 if alike else len(lanes)
+    each = 1 if alike else count
     d, jacobian = np.zeros((longest, each, n)), np.zeros((longest, each, 6, n))
     white = np.full((longest, each, n), UNKNOWN)
-    decay, added = np.ones((longest, len(lanes), 6 + n)), np.zeros((longest, len(lanes), 6 + n))
+    decay, added = np.ones((longest, count, 6 + n)), np.zeros((longest, count, 6 + n))
     decay[:, :, :6] = 0.0
     for i, lane in enumerate(lanes):
-        span = slice(*lane.window)
+        span, prior = slice(*lane.window), lane.prior
         own = slice(span.stop - span.start), i
         decay[*own, 6:], added[*own, 6:] = process.decay[span], process.added[span]
-        # A window begins with what b is like anywhere, not with what it was before.
-        added[0, i, 6:] /= np.maximum(1.0 - decay[0, i, 6:] ** 2, 1e-9)
-        decay[0, i, 6:] = 0.0
-        if lane.prior is not None:
-            moves = lane.prior.process(lane.gate[span], step[span])
-            decay[*own, :6], added[*own, :6] = moves
+        if prior is not None:
+            decay[*own, :6], added[*own, :6] = prior.process(lane.gate[span], step[span])
         if i < each:
             d[own] = log.blocks.d[span]
             white[own] = np.where(lane.hidden[span, None], UNKNOWN, process.white[span])
-            if lane.prior is not None:
+            if prior is not None:
                 jacobian[own] = lane.jacobian[span]
+    # A window begins with what b is like anywhere, not with what it was before.
+    added[0, :, 6:] /= np.maximum(1.0 - decay[0, :, 6:] ** 2, 1e-9)
+    decay[0, :, 6:] = 0.0
     return LinearModel(d, beside_errors(jacobian), white, decay, added)
 
 
@@ -182,30 +181,24 @@ def block_model(
 
 def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Mask:
     """Blocks in listed intervals [s] and one beside each; all without a list. (K,)"""
-    if intervals is None:
-        return np.ones(len(blocks.t), bool)
-    inside = np.zeros(len(blocks.t), bool)
-    half = 0.5 * blocks.length
-    for start, stop in intervals:
+    inside, half = np.full(len(blocks.t), intervals is None), 0.5 * blocks.length
+    for start, stop in intervals or ():
         inside |= (blocks.t + half > start) & (blocks.t - half < stop)
     return covered(runs_of(inside), len(inside), 1)
 
 
 def block_length(t: Array, *, fine: bool) -> float:
     """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
-    if len(t) < 2:
-        return COARSE
-    step, length = median_step(t), COARSE
-    if fine:
-        length = min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
+    length = COARSE
+    if fine and len(t) > 1:
+        length = min(COARSE, max(FINE, median_step(t) * (1 if is_uniform(t) else JITTERED)))
     return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
 
 
 def deviations(covariance: Array) -> Array:
     """Standard deviations of covariances. (T, k)"""
     # A model error that is known has no variance, which rounding may leave on either side.
-    variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
-    return np.sqrt(variances)
+    return np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,6 +260,7 @@ class SmoothedWrench:
     def remarks(self, name: str) -> tuple[Remark, ...]:
         """What a reader of the wrench should know."""
         where, free = Where(name), self.noise.free_seconds
+        learned = fact("wrench-noise-learned", where, free_s=free)
         found = [
             fact(
                 "wrench-smoothed",
@@ -274,11 +268,9 @@ class SmoothedWrench:
                 block_s=self.seconds,
                 time_s=self.prior.time,
                 force_N=self.prior.force,
-                error_Nm=np.sqrt(self.noise.moving).tolist(),
+                error_Nm=np.sqrt(self.noise.moving),
             ),
-            fact("wrench-noise-learned", where, free_s=free)
-            if free
-            else caution("wrench-noise-assumed", where),
+            learned if free else caution("wrench-noise-assumed", where),
         ]
         if self.uncorrected:
             found.append(fact("wrench-uncorrected", where))
@@ -310,15 +302,16 @@ def smooth_wrench(
     model = block_model(run, free, gate, seconds)
     mean, covariance = smoothed(LinearModel(*(series[:, 0] for series in model.under([prior]))))
     values, own, inside = mean[:, :6], covariance[:, :6, :6], model.inside
-    if gate is not None:
-        own = np.where(inside[:, None, None], own, unlisted(model, prior))
-    spread = own * np.outer(WIDENED, WIDENED)
-    if gate is not None:
-        spread = spread + inside[:, None, None] * hidden_by_blocks(values)
+    widened, listed = np.outer(WIDENED, WIDENED), inside[:, None, None]
+    if gate is None:
+        own = own * widened
+    else:
+        own = np.where(listed, own, unlisted(model, prior)) * widened
+        own += listed * hidden_by_blocks(values)
     return SmoothedWrench(
         t=model.blocks.t,
         values=values,
-        covariance=spread,
+        covariance=own,
         inside=inside,
         seconds=seconds,
         prior=prior,
@@ -355,7 +348,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     """
     blocks, J, noise, _ = model
     # A log of one sample is a block without length.
-    R, length = noise.white, float(np.median(blocks.length)) or FINE
+    R, length = noise.white, np.median(blocks.length) or FINE
     count = len(blocks.t)
     half = round(0.5 * UNLISTED / length - TIE)  # 12.5 blocks of 24 ms: rounding decides nothing
     variance, time = noise.stationary(blocks)

@@ -143,8 +143,7 @@ class FlangeWrench(NamedTuple):
 def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:
     """Least squares (46) from torques and given Jacobians, for logs and loops that hold one."""
     parts = decompose(jacobian)
-    gain = least_squares_gain(parts, left_out)
-    values = np.squeeze(gain @ tau[:, :, None], axis=2)
+    values = np.squeeze(least_squares_gain(parts, left_out) @ tau[:, :, None], axis=2)
     return FlangeWrench(values, parts.sigma_min >= LEAST_SIGMA)
 
 
@@ -193,8 +192,7 @@ class VirtualSensor(Shown):
             for torque in torques
         ]
         values, spread = ([np.empty((samples, 6)) for _ in torques] for _ in range(2))
-        residual = np.empty((len(torques), samples))
-        sigma = np.empty(samples)
+        residual, sigma = np.empty((len(torques), samples)), np.empty(samples)
         # Chunk by chunk, so that memory does not grow with the log.
         for start in range(0, samples, CHUNK):
             span = slice(start, min(start + CHUNK, samples))

@@ -43,5 +43,5 @@ def test_a_push_has_its_force_above_with_the_threshold(push: Replay) -> None:
 
 
 def test_what_never_moved_is_not_drawn(release: Replay) -> None:
-    still = replace(release.motion, x=np.zeros_like(release.motion.x))
+    still = release.motion._replace(x=np.zeros_like(release.motion.x))
     assert replay_figures(replace(release, motion=still, drags=())) == {}
