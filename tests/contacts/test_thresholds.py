@@ -1,7 +1,5 @@
 """Thresholds of noise whose tail is known: rates, the worst day, what is too short, counts."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -175,7 +173,7 @@ def test_logs_of_different_arms_or_estimates_are_refused() -> None:
     with pytest.raises(ParameterError, match="logs of one arm"):
         find_thresholds([log, free_log("b", 600.0, joints=7)], 1.0)
     with pytest.raises(ParameterError, match="recorded alike"):
-        find_thresholds([log, replace(log, of_vendor=False)], 1.0)
+        find_thresholds([log, log._replace(of_vendor=False)], 1.0)
 
 
 def test_a_joint_that_never_moved_alarms_at_whatever_it_reads() -> None:

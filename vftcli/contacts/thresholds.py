@@ -7,12 +7,11 @@ came out too low.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, seal
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -122,8 +121,7 @@ LONG_ENOUGH = SETTLING + 5 * ENOUGH * BLOCK
 SELDOM = 0.5  #: A wrench that is known in less than this share of the samples is said to be.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ComparedSignals:
+class ComparedSignals(NamedTuple):
     """Joint torques and wrench of one log, as they are compared with thresholds."""
 
     recording: Recording  #: The log.
@@ -134,9 +132,6 @@ class ComparedSignals:
     of_vendor: bool  #: Whether the torque is the robot's own estimate, not the observer's.
     logged_wrench: bool  #: Whether the wrench is the robot's own, not that of the torque.
     frame: str  #: Axes of the wrench and the point of its moment, in words; "" without a wrench.
-
-    def __post_init__(self) -> None:
-        seal(self, "torque", "wrench")
 
     @property
     def t(self) -> Array:

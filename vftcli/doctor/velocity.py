@@ -166,11 +166,10 @@ def weighed_means(recording: Recording) -> Array:
 
 def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
     """Findings on the velocity; a single cause if one explains all."""
-    if fit is None:
-        return
-    if (common := common_cause(fit)) is not None:
-        if common.code == "velocity-unit":
-            yield common
+    common = common_cause(fit)
+    if common is not None and common.code == "velocity-unit":
+        yield common
+    if fit is None or common is not None:
         return
     if swapped := exchanged(fit):
         yield warning("velocity-order", on_joints(swapped))
@@ -296,7 +295,7 @@ def clock_findings(
 ) -> Iterator[Remark]:
     """Findings about the clock, and on repeated rows in a part of the log or all of it."""
     common = common_cause(fit)
-    if common is not None and common.code in {"time-unit", "clock-rate"}:
+    if common is not None and common.code != "velocity-unit":
         yield common
         if common.code == "time-unit":
             return  # what else is odd about its steps is this
@@ -332,10 +331,10 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
         values = {"spread_percent": 100 * width, "low_ms": 1e3 * low, "high_ms": 1e3 * high}
         yield fact("jitter", **values, clock=source.clock)
     at = gaps_of(t, GAP_STEPS)
-    gaps = np.column_stack([steps[at], t[at]])
     for cut in source.cuts:  # has a finding of its own
-        gaps = gaps[(gaps[:, 1] > cut.start) | (gaps.sum(axis=1) < cut.start)]
-    if len(gaps):
-        longest, begun = gaps[gaps[:, 0].argmax()]
-        level = warning if longest > LONG_GAP else fact
-        yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=begun)
+        at = at[(t[at] > cut.start) | (t[at + 1] < cut.start)]
+    if at.size:
+        worst = at[steps[at].argmax()]
+        values = {"longest_s": steps[worst], "at_s": t[worst]}
+        level = warning if steps[worst] > LONG_GAP else fact
+        yield level("gaps", gaps=at.size, steps=GAP_STEPS, **values)

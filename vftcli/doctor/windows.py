@@ -161,7 +161,7 @@ class Windows:
     def friction(self) -> Terms:
         """Coulomb and viscous friction of every joint, which only ever take energy."""
         each = self.motion[..., None] * np.eye(self.q.shape[2])
-        return Terms(np.concatenate([each[:, 0], each[:, 1]], axis=2), positive=True)
+        return Terms(np.concatenate([*each.swapaxes(0, 1)], axis=2), positive=True)
 
     @cached_property
     def load(self) -> Terms:

@@ -217,12 +217,12 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
         q = resample_columns(found.t, run.t, run.q)
         values, covariance = load.wrench(run.robot.chain, q)
         values, covariance = found.values + values, found.covariance + covariance
-        return replace(found, values=values, covariance=covariance, load=load)
+        return found._replace(values=values, covariance=covariance, load=load)
     if run is not plain.run:
         modelled = plain.known_free(unloaded)
         prior = prior_of(plain.run, modelled)
         if prior.is_steady:
-            return replace(smooth_wrench(plain.run, modelled, prior=prior), uncorrected=True)
+            return smooth_wrench(plain.run, modelled, prior=prior)._replace(uncorrected=True)
     return smooth_wrench(run, free)
 
 

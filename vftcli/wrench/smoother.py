@@ -8,7 +8,6 @@ leans on its past and future, and its band grows.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
-from vftcli.signals.arrays import Array, Mask, is_uniform, seal
+from vftcli.signals.arrays import Array, Mask, is_uniform
 from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -201,8 +200,7 @@ def deviations(covariance: Array) -> Array:
     return np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
 
 
-@dataclass(frozen=True, kw_only=True)
-class SmoothedWrench:
+class SmoothedWrench(NamedTuple):
     """The wrench in base axes about the flange point, block by block, and what it rests on."""
 
     t: Array  #: Middle of each block. (K,) [s]
@@ -220,9 +218,6 @@ class SmoothedWrench:
     uncorrected: bool = False
     #: A load that the free motion carries, in the wrench with its weight; None without one.
     load: FreeLoad | None = None
-
-    def __post_init__(self) -> None:
-        seal(self, "t", "values", "covariance")
 
     @property
     def sd(self) -> Array:
