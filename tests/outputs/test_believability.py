@@ -129,6 +129,8 @@ def test_a_reference_that_a_warning_speaks_against_is_a_caution(
 def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> None:
     made = replace(examined(without_reference, LOAD), contacts=contact_list(contact()))
     assert headline(made).endswith("they may be its weight.")
+    dead = examined(made, warning("zero-effort", Where(joints=(3,)), signal="current"))
+    assert headline(dead) == "No contact is listed: the current of J3 is zero in every sample."
     for other in (
         replace(made, contacts=contact_list(contact(is_load=True))),
         replace(made, contacts=contact_list()),

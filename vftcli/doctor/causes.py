@@ -197,7 +197,7 @@ def readings(windows: Windows) -> Iterator[Cause]:
             given += gravity
         given[:, idle] = (windows.inertial + gravity)[:, idle]
         per_unit = constant if name == "current" and constant is not None else unit
-        yield Cause(code, Case(windows=windows, given=given, size=size, constant=per_unit))
+        yield Cause(code, Case(windows, given, size, per_unit))
 
 
 def tilted(case: Case) -> Iterator[Cause]:

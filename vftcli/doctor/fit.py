@@ -170,7 +170,7 @@ def maker_case(windows: Windows) -> tuple[str, Case | None]:
     given = windows.mean(target)
     if not 0 < (size := root_mean_square(given)) < 1e9:
         return MEASURED, None
-    return evidence, Case(windows=windows, given=given, size=size, constant=np.ones(log.joints))
+    return evidence, Case(windows, given, size, np.ones(log.joints))
 
 
 def arm_findings(

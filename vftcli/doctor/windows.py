@@ -260,7 +260,7 @@ FELT, REFUTED = 4.0, 0.6
 LASTING = 0.95  #: Share of the windows in which a cause that lasts must not be refuted.
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Case:
     """A log against an arm."""
 

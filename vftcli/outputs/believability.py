@@ -114,11 +114,13 @@ def headline(analysis: Analysis) -> str:
     if found is None:
         names = ", ".join(estimate.name for estimate in analysis.estimates)
         return f"External torque of {joints} joints by {names}; no contacts are listed."
+    findings = {f.code: f for one in analysis.examinations[:1] for f in one.warnings}
+    if (dead := findings.get("zero-effort")) is not None:
+        return f"No contact is listed: {dead}."
     text = answer(found)
-    codes = {finding.code for one in analysis.examinations[:1] for finding in one.warnings}
     # Rows may be the weight of a load that was found.
     pushed = found.contacts and not any(contact.is_load for contact in found.contacts)
-    if pushed and found.load is None and codes & LOADS:
+    if pushed and found.load is None and findings.keys() & LOADS:
         text += " But the arm carries an unknown load: they may be its weight."
     return text
 
