@@ -1,6 +1,7 @@
 """Motion that nobody touched, named or inferred: its noise, its level, the smallest force."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -164,11 +165,8 @@ def free_part(motion: FreeMotion) -> FreePart | None:
         if motion.choice.is_given:
             raise
         return None
-    if part.doubted and (
-        motion.cycles.whole < LEAST_CYCLES
-        or not motion.free_cycles.numbers
-        or is_touched(motion.log, part.own)
-    ):
+    few = part.doubted and (motion.cycles.whole < LEAST_CYCLES or not motion.free_cycles.numbers)
+    if few or (part.doubted and is_touched(motion.log, part.own)):
         return None
     runs = (fact("free-log", Where(about=run.recording.name)) for run in motion.runs)
     return part._replace(remarks=(*part.remarks, *runs))
@@ -176,12 +174,10 @@ def free_part(motion: FreeMotion) -> FreePart | None:
 
 def is_touched(log: Run, own: Mask) -> bool:
     """Whether a free part that was found is none: no quieter than the rest, and beyond friction."""
-    if not (beyond_threshold(log, None) & own).any():
-        return False
-    try:
-        return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
-    except ParameterError:  # too short for a spectrum
-        return False
+    if (beyond_threshold(log, None) & own).any():
+        with suppress(ParameterError):  # too short for a spectrum
+            return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
+    return False
 
 
 def beyond_threshold(run: Run, level: Array | None) -> Mask:

@@ -4,6 +4,7 @@ What method "targets" says of a joint's friction is made here too.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -102,11 +103,10 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
             f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
             "friction method has nothing to find; use --method base"
         )
-    data, fits, remarks = fitted or fit_without_contacts(data, strict=True)
-    remarks, robot = [*remarks], data.robot
+    data, fits, doubts = fitted or fit_without_contacts(data, strict=True)
+    remarks, numbers, robot = [*doubts], list[Number](), data.robot
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = None if robot.torque_constant is None else robot.torque_constant.copy()
-    numbers = list[Number]()
     for j, fit in fits.items():
         count, where = len(fit.shape.terms), on_joints([j])
         if fit.is_kept:
@@ -124,7 +124,8 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
             J, doubts = rotor_number(j, values[count], sd[count], rotor[j])
             numbers.append(J)
             remarks += doubts
-            rotor[j] = round_digits(J.value) if J.determined else rotor[j]
+            if J.determined:
+                rotor[j] = round_digits(J.value)
         if data.rubs:
             frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "friction")
             numbers += more
@@ -343,18 +344,14 @@ def chosen_method(data: Training) -> MethodResult:
     """
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)
-    free, fits = fitted.data, fitted.fits
-    spread = free.joined("tau").std(axis=0)
-    much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * spread
+    free, fits, remarks = fitted
+    much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * free.joined("tau").std(axis=0)
     ratio = links_explain(free, fits)[much[heavy_joints(free)]].max(initial=0.0)
-    doubted = any(remark.level == "warning" for remark in fitted.remarks)
-    if ratio <= OTHER_LINKS or doubted or data.fit_constants:
-        return kept
-    try:
-        freed = whole_arm(data)
-    except IdentificationError:
-        return kept
-    if freed.is_narrow:
-        return kept
-    remark = caution("links-identified", robot=data.robot.name, ratio=ratio)
-    return freed._replace(remarks=[remark, *freed.remarks])
+    doubted = any(remark.level == "warning" for remark in remarks)
+    if ratio > OTHER_LINKS and not doubted and not data.fit_constants:
+        with suppress(IdentificationError):
+            freed = whole_arm(data)
+            if not freed.is_narrow:
+                remark = caution("links-identified", robot=data.robot.name, ratio=ratio)
+                return freed._replace(remarks=[remark, *freed.remarks])
+    return kept

@@ -1,6 +1,7 @@
 """A load on the flange from logs with and without it, poses at rest, or motion."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -374,11 +375,9 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
     # rest. Two episodes of a dataset carry one load.
     moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
     if len(logs) == 2 and moved and not all(r.source.part for r in logs):
-        try:
+        # Two different motions with the load may still tell it.
+        with suppress(NotSameMotionError):
             return payload_from_pair(logs[0], logs[1], bare)
-        except NotSameMotionError:
-            pass  # two different motions with the load may still tell it
-    try:
+    with suppress(TooFewPosesError):
         return payload_from_poses(logs, bare)
-    except TooFewPosesError:
-        return payload_from_motion(logs, bare)
+    return payload_from_motion(logs, bare)
