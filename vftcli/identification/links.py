@@ -163,8 +163,8 @@ class Grouping(NamedTuple):
         for k, row in zip(self.independent, self.carried, strict=True):
             text = names[k]
             for place, factor in zip(self.dependent, row, strict=True):
-                if factor:
-                    size = f"{abs(factor):.5g} ".removeprefix("1 ")
+                if abs(factor) > 1e-9:
+                    size = "" if abs(abs(factor) - 1.0) < 1e-9 else f"{abs(factor):.5g} "
                     text += f" {'-' if factor < 0 else '+'} {size}{names[place]}"
             out.append(text)
         return out
