@@ -99,9 +99,10 @@ def test_the_flange_is_where_pinocchio_has_it(many: Simulation) -> None:
     """By measured and by commanded positions, its twist through Pinocchio's Jacobian."""
     model, seen, samples = load_robot("panda").model, many.measured.signals, many.samples
     data, frame, axes = model.createData(), model.getFrameId("flange"), pin.LOCAL_WORLD_ALIGNED
+    actual, target = many.flanges()
     for flange, q, dq in (
-        (many.actual_flange, seen["q"], seen["dq"]),
-        (many.target_flange, samples.target_q, samples.target_dq),
+        (actual, seen["q"], seen["dq"]),
+        (target, samples.target_q, samples.target_dq),
     ):
         for k in (0, 700, 1500):
             J = pin.computeFrameJacobian(model, data, q[k], frame, axes)

@@ -7,7 +7,7 @@ import typer
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for, give_back
+from vftcli.cli.analysis import ANALYSIS, choice_for
 from vftcli.cli.console import (
     detail,
     echo,
@@ -65,7 +65,6 @@ def admit(
     names = files_of_replay(figures)
     if output is not None:
         OutputFolder(output, force, names).check()
-    give_back()
     library = Library([log] if log else [])
     found = replayed(log, asked, lambda words: choice_for(words, library), release or (), seed)
     show(found, json=json, latex=latex)

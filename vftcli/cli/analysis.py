@@ -68,6 +68,8 @@ def choice_for(
     """What is asked of a command's logs; their health is said."""
     from vftcli.pipeline import choice_of
 
+    if "observer" in asked.words:
+        give_back()
     examiner = health_of(library, anyway=asked.anyway, on_screen=on_screen)
     return choice_of(asked, library, examiner, **others)
 

@@ -8,7 +8,7 @@ import typer
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for, give_back, outputs_of
+from vftcli.cli.analysis import ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import say
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -53,7 +53,6 @@ def batch(
     from vftcli.readers.library import Library, LogCollection, absolute
     from vftcli.signals.errors import LogError, ParameterError
 
-    give_back()
     choice, anyway = choice_for(asked, Library()), asked.anyway
     choice.robot.check()
     if do == "compare" and choice.reference is None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for, give_back
+from vftcli.cli.analysis import ANALYSIS, choice_for
 from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.errors import VftError
@@ -124,7 +124,6 @@ def compare(
     from vftcli.readers.library import Library
 
     folder, form = figure_folder(figures, output, force), opt.form_of(asked)
-    give_back()
     library = Library(logs)
     choice = for_comparison(choice_for(asked, library))
     left_out, analyses, judged = LeftOut(library, logs), [], []

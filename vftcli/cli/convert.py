@@ -88,16 +88,14 @@ def simulate_log(
     from vftcli.outputs.conversion import log_folder, save
     from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed
-    from vftcli.simulation import load_scenario
+    from vftcli.simulation import load_scenario, scenario_names
     from vftcli.simulation.experiment import simulate_pair
-    from vftcli.simulation.scenario import listing
     from vftcli.simulation.writers import usual_format
 
     if scenario == "list":
-        scenarios = listing()
-        width = max(len(name) for name, _ in scenarios)
-        for name, title in scenarios:
-            echo(f"{name:<{width}} {title}")
+        width = max(map(len, scenario_names()))
+        for name in scenario_names():
+            echo(f"{name:<{width}} {load_scenario(name).title}")
         return
     if output is None:
         raise typer.BadParameter("-o PATH says where the log goes")

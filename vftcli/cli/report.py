@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for, give_back, outputs_of
+from vftcli.cli.analysis import ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_written, show
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs import OutputChoice
@@ -59,7 +59,6 @@ def report(
     from vftcli.pipeline import WRITING, analyse_logs, sense
     from vftcli.readers.library import Library
 
-    give_back()
     library, published, written = Library(logs), asked.of(PrintChoice).table, outputs_of(asked)
     output, details = opt.folder_of(output, logs, asked), asked.words["details"]
     labels = [library.label(log) for log in logs]
@@ -147,7 +146,6 @@ def estimate(
     from vftcli.signals.recording import EXAMINED
     from vftcli.streaming import analysed_in_blocks, comes_in_blocks
 
-    give_back()
     output, library = opt.folder_of(output, [log], asked), Library([log])
     written = outputs_of(asked.but(rrd=asked.words["rrd"] or show))
     names = estimate_files(written.extras)

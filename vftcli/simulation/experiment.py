@@ -1,7 +1,6 @@
 """One simulated experiment from scenario and seed to the log and its truth."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,16 +65,11 @@ class Simulation:
     measured: Measured  #: The controller's log.
     truth: Truth  #: What really happened.
 
-    @cached_property
-    def actual_flange(self) -> "FlangeMotion":
-        """The flange as it is measured."""
-        seen = self.measured.signals
-        return flange_motion(self.nominal.chain, seen["q"], seen["dq"])
-
-    @cached_property
-    def target_flange(self) -> "FlangeMotion":
-        """The flange as it is commanded."""
-        return flange_motion(self.nominal.chain, self.samples.target_q, self.samples.target_dq)
+    def flanges(self) -> "tuple[FlangeMotion, FlangeMotion]":
+        """The flange as it is measured, and as it is commanded."""
+        seen, asked, chain = self.measured.signals, self.samples, self.nominal.chain
+        commanded = flange_motion(chain, asked.target_q, asked.target_dq)
+        return flange_motion(chain, seen["q"], seen["dq"]), commanded
 
     @property
     def recording(self) -> Recording:

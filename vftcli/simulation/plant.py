@@ -132,14 +132,26 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
             raise ParameterError(f"friction.{why}")
     n = robot.joints
     table = {name: np.zeros(n) for name in SHAPES}
-    table |= stated_friction(robot, spec)
+    # What the scenario states, for an arm without any in its robot file.
+    for name, own in {"coulomb": spec.coulomb, "viscous": spec.viscous}.items():
+        if own is None:
+            continue
+        if robot.friction:
+            raise ParameterError(
+                f"friction.{name} is for an arm file without friction; {robot.name!r} has some"
+            )
+        if len(own) != n or min(own) < 0 or out_of_bounds(name, own):
+            raise ParameterError(
+                f"friction.{name} must have one number a joint, {n} of them, none negative or "
+                "beyond what robots have"
+            )
+        table[name] += own if spec.enabled else 0.0
     table["logarithmic_velocity"] += 1.0  # where there is no rise, any velocity will do
     table["presliding_length"] += spec.presliding_length
     joints = (robot.friction if spec.enabled else ()) or (JointFriction(),) * n
     for j, joint in enumerate(joints):
-        for name, value in joint.parameters.items():
-            if name in table:
-                table[name][j] = value
+        for name in table.keys() & joint.parameters.keys():
+            table[name][j] = joint.parameters[name]
         table["coulomb"][j] += sum(joint.torques[:1])
     dry = spec.sticking * table["amplitude"]
     table["amplitude"] -= dry
@@ -149,24 +161,6 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
     table["presliding"] += giving
     table["bends"], table["bend_slopes"] = bends_of(joints)
     return TrueFriction(**table, stribeck=spec.stribeck, stribeck_velocity=spec.stribeck_velocity)
-
-
-def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
-    """Friction of the scenario, for an arm without any in its robot file. (n,) each"""
-    given = {"coulomb": spec.coulomb, "viscous": spec.viscous}
-    table = {name: np.array(own, float) for name, own in given.items() if own is not None}
-    for name, values in table.items():
-        if robot.friction:
-            raise ParameterError(
-                f"friction.{name} is for an arm file without friction; {robot.name!r} has some"
-            )
-        low = len(values) != robot.joints or np.any(values < 0)
-        if low or out_of_bounds(name, values.tolist()):
-            raise ParameterError(
-                f"friction.{name} must have one number a joint, {robot.joints} of them, none "
-                "negative or beyond what robots have"
-            )
-    return table if spec.enabled else {}
 
 
 def bends_of(joints: Sequence[JointFriction]) -> tuple[Array, Array]:

@@ -245,11 +245,6 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
-def listing() -> list[tuple[str, str]]:
-    """Name and one-line title of each built-in scenario."""
-    return [(name, load_scenario(name).title) for name in scenario_names()]
-
-
 def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """Read a built-in scenario or a user's TOML file and apply `key=value` overrides.
 

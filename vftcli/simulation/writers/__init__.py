@@ -105,7 +105,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
 
     samples, signals = simulation.samples, simulation.measured.signals
     model = simulation.nominal.model
-    actual, target = simulation.actual_flange, simulation.target_flange
+    actual, target = simulation.flanges()
     time = simulation.measured.stamp + simulation.scenario.sensing.start
     weightless = np.gradient(samples.target_dq, samples.time, axis=0)
     felt = np.einsum("kij,kj->ki", target.jacobian[:, :3], weightless) - model.gravity.linear

@@ -90,8 +90,7 @@ def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
     motor, external = "measured_joint_motor_state", "tau_ext_hat_filtered"
     q, dq, target_q, target_dq = (seen[name][rows] for name in ("q", "dq", "target_q", "target_dq"))
     actual, target = (
-        FlangeMotion(*(part[rows] for part in flange))
-        for flange in (simulation.actual_flange, simulation.target_flange)
+        FlangeMotion(*(part[rows] for part in flange)) for flange in simulation.flanges()
     )
     tau_ext = -seen["tau_ext"][rows]
     force, regular = wrench_of(tau_ext, actual.jacobian)
