@@ -7,7 +7,7 @@ import typer
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for
+from vftcli.cli.analysis import OF_ANALYSIS, choice_for
 from vftcli.cli.console import (
     detail,
     echo,
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from vftcli.admittance.closed_loop import Replayed
 
 
-@opt.command(ControlChoice, *ANALYSIS)
+@opt.command(ControlChoice, *OF_ANALYSIS)
 def admit(
     asked: Asked,
     release: Annotated[

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from vftcli.readers.library import Library
 
 #: How a log is read, which arm made it, and all that can be asked of it but a reference.
-LOG = (ReadChoice, RobotChoice)
-ANALYSIS = (
-    *LOG,
+OF_LOG = (ReadChoice, RobotChoice)
+OF_ANALYSIS = (
+    *OF_LOG,
     ObserverChoice,
     FreeChoice,
     RefinementChoice,

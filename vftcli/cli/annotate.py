@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LOG
+from vftcli.cli.analysis import OF_LOG
 from vftcli.cli.console import detail, echo_data, say
 from vftcli.observers.choice import ObserverChoice
 from vftcli.readers.reader import ReadChoice
@@ -18,7 +18,7 @@ from vftcli.wrench.choice import WrenchChoice
 ADDED = ("wrench", "sd", "contact")  #: What ``--add`` takes.
 
 
-@opt.command(*LOG, ObserverChoice, WrenchChoice, WorkersChoice, Anyway, opt.Talk)
+@opt.command(*OF_LOG, ObserverChoice, WrenchChoice, WorkersChoice, Anyway, opt.Talk)
 def annotate_dataset(
     dataset: Annotated[
         Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")

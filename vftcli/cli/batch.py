@@ -8,7 +8,7 @@ import typer
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for, outputs_of
+from vftcli.cli.analysis import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import say
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -20,7 +20,7 @@ WITHOUT_REFERENCE = ("estimate", "contacts")
 SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
 
 
-@opt.command(WorkersChoice, ReferenceChoice, *ANALYSIS, opt.Mcap, OutputChoice)
+@opt.command(WorkersChoice, ReferenceChoice, *OF_ANALYSIS, opt.Mcap, OutputChoice)
 def batch(
     logs: Annotated[
         list[Path],

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for
+from vftcli.cli.analysis import OF_ANALYSIS, choice_for
 from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.errors import VftError
@@ -101,7 +101,7 @@ def print_errors(
         echo_data(FORMS[form](rows, analyses))
 
 
-@opt.command(ReferenceChoice, *ANALYSIS, opt.TableForm)
+@opt.command(ReferenceChoice, *OF_ANALYSIS, opt.TableForm)
 def compare(
     logs: opt.Logs,
     reference: Annotated[str, ReferenceChoice.option("reference", group=COMPARE)],

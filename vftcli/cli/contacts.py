@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LOG, choice_for
+from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.signals.option import OUTPUT, Anyway, Asked, Choice, Option
@@ -27,7 +27,7 @@ class ListForm(Choice):
     all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.")]
 
 
-@opt.command(*LOG, FreeChoice, ListForm, Anyway, opt.Talk)
+@opt.command(*OF_LOG, FreeChoice, ListForm, Anyway, opt.Talk)
 def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     """List what touched the arm. The default command.
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from vftcli.bias.choice import RefinementChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LOG, choice_for
+from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import (
     detail,
     echo,
@@ -61,7 +61,7 @@ def file_for(robot: str) -> Path:
     return Path("my_" + re.sub(r"[^\w.-]", "_", robot) + ".toml")
 
 
-@opt.command(*LOG, Task, GoalChoice, FreeChoice, RefinementChoice, Anyway, opt.Talk)
+@opt.command(*OF_LOG, Task, GoalChoice, FreeChoice, RefinementChoice, Anyway, opt.Talk)
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[

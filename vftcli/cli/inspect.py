@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LOG, choice_for
+from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.config import NAME
 from vftcli.cli.console import echo, say, say_json, say_robots
 from vftcli.readers.reader import ReadChoice
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vftcli.proposal import ProposedOption
 
 
-@opt.command(*LOG, opt.Talk)
+@opt.command(*OF_LOG, opt.Talk)
 def inspect_log(
     logs: opt.Logs,
     asked: Asked,
@@ -76,7 +76,7 @@ def write_options(
     from vftcli.proposal import config_text, propose
     from vftcli.readers.library import Library
 
-    words = {word: asked.words.get(word) for kind in LOG for word in kind.options()}
+    words = {word: asked.words.get(word) for kind in OF_LOG for word in kind.options()}
     words |= asked.settings
     given = {name.replace("_", "-"): value for name, value in words.items() if value is not None}
     choice = choice_for(asked, Library(logs), on_screen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import ANALYSIS, choice_for, outputs_of
+from vftcli.cli.analysis import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_written, show
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs import OutputChoice
@@ -35,7 +35,7 @@ class Tables(Choice):
     rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.")]
 
 
-@opt.command(ReferenceChoice, *ANALYSIS, opt.Mcap, OutputChoice, PrintChoice)
+@opt.command(ReferenceChoice, *OF_ANALYSIS, opt.Mcap, OutputChoice, PrintChoice)
 def report(
     logs: opt.Logs,
     output: opt.LogFolder,
@@ -120,7 +120,7 @@ def show_answers(
             show(print_text(made.published))
 
 
-@opt.command(*ANALYSIS, opt.Mcap, OutputChoice, Tables)
+@opt.command(*OF_ANALYSIS, opt.Mcap, OutputChoice, Tables)
 def estimate(
     log: opt.Log,
     output: opt.LogFolder,

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import LOG, choice_for
+from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import echo, say, say_json, say_recording, say_robots
 from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
 from vftcli.signals.option import Anyway, Asked, Option
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from vftcli.signals.wrench import Wrench
 
 
-@opt.command(*LOG, ReferenceChoice, Anyway, opt.Talk)
+@opt.command(*OF_LOG, ReferenceChoice, Anyway, opt.Talk)
 def contact_thresholds(
     logs: opt.Logs,
     asked: Asked,
