@@ -136,10 +136,11 @@ def form_of(asked: Asked) -> str:
 
 
 def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a command for typer of a function: every option of these choices a parameter.
+    """Make a command for typer of a function: every option of these choices is a parameter.
 
-    They stand where its argument `Asked` does, but for those that it has itself. The command's
-    `options` are the option of every parameter by name, its `choices` what has its settings.
+    They come in the place of its argument `Asked`; an option that the function has as an argument
+    of its own is that one. The command has `options`, each by the name of its parameter, and
+    `choices`, which have its settings.
     """
 
     def of(function: Callable[..., None]) -> Callable[..., None]:
