@@ -226,7 +226,7 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
     """A baseline without spectra with the bias fit's free part (T,), where that is enough."""
-    share = float(quiet.mean())
+    share = quiet.mean()
     remark = fact("free-by-the-fit", share=share)
     if found.motion.choice.is_given and found.missing is not None:
         # What was given is dropped, and why has to be said.

@@ -103,9 +103,9 @@ def usual_friction(robot: Robot) -> Array:
     dry = dry_friction(robot.friction, robot.joints)
     for j, joint in enumerate(robot.friction):
         if "amplitude" in joint.parameters:
-            found[j, 0] = 0.7 * abs(float(joint.parameters["amplitude"]))
+            found[j, 0] = 0.7 * abs(joint.parameters["amplitude"])
         elif joint.model != "none":
-            limit = float(robot.limits.qd_max[j])
+            limit = robot.limits.qd_max[j]
             fastest = limit if np.isfinite(limit) and limit > 0.0 else USUAL_SPEED
             speed = np.linspace(0.05, 1.0, 40) * fastest
             A = np.column_stack([speed**0, speed, speed**2])
@@ -162,7 +162,7 @@ def expected_error(robot: Robot) -> ModelError:
     chain, (dry, viscous, quadratic) = robot.loaded_chain, usual_friction(robot)
     inertial = np.empty((chain.joints, LINK))
     for j, (m, c) in enumerate(zip(chain.mass, chain.com, strict=True)):
-        reach = float(np.dot(c, c))
+        reach = np.dot(c, c)
         tensor = 0.2 * (np.trace(chain.inertia[j]) + m * reach) + 0.02 * m * np.sqrt(reach) + 1e-4
         inertial[j] = [0.05 * m, *(0.01 * m + 0.05 * m * abs(c)), *[tensor] * len(TENSOR)]
     shapes = [

@@ -171,8 +171,8 @@ def friction_share(dq: Array, tau: Array) -> Array:
     for velocity, y in zip(dq.T, tau.T, strict=True):
         X = np.column_stack([np.tanh(velocity / SIGN_SPEED), velocity])
         weights, *_ = np.linalg.lstsq(X, y, rcond=None)
-        power = float(np.sum(y**2))
-        shares.append(1.0 - float(np.sum((y - X @ weights) ** 2)) / power if power > 0 else 0.0)
+        power = np.sum(y**2)
+        shares.append(1.0 - np.sum((y - X @ weights) ** 2) / power if power > 0 else 0.0)
     return np.clip(shares, 0.0, 1.0)
 
 
@@ -188,7 +188,7 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
         STICTION if rests else max(moving, key=lambda cause: float(moving[cause][j]))
         for j, rests in enumerate(decided)
     ]
-    size = [float(found.parts[cause][j]) for j, cause in enumerate(named)]
+    size = [found.parts[cause][j] for j, cause in enumerate(named)]
     total = np.hypot(found.total, np.where(stuck, stiction, 0.0))
     where = Where(about=found.name)
     return fact("limits", where, causes=named, size_Nm=size, total_Nm=total)
@@ -212,7 +212,7 @@ def expected_gap(
     errors = {}
     for name in (BEST, *(o.name for o in paper)):
         sd = known[name].error_sd
-        errors[name] = np.nan if sd is None else float(root_mean_squares(sd).mean())
+        errors[name] = np.nan if sd is None else root_mean_squares(sd).mean()
     return gap_remark(EXPECTED, errors, {o.name: o.tuning(step, n).delay for o in paper})
 
 
@@ -232,8 +232,8 @@ def gap_remark(
         codes[0] if ratio >= AHEAD else codes[1],
         ratio=ratio,
         ratios=ratios,
-        least_delay_ms=1e3 * float(spread.min()),
-        most_delay_ms=1e3 * float(spread.max()),
+        least_delay_ms=1e3 * spread.min(),
+        most_delay_ms=1e3 * spread.max(),
     )
 
 

@@ -87,7 +87,7 @@ def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
         lever = poses.translation[:, joint, None] - poses.translation[:, :joint]
         torque[:, :joint] = FORCE * np.cross(poses.rotation[:, :joint, :, 2], lever)
         along.append(torque)
-    length = float(t[-1] - t[0])
+    length = t[-1] - t[0]
     knots = 1 if length < CONSTANT else min(round(length / KNOTS) + 1, MOST_KNOTS)
     place = (t - t[0]) / length * (knots - 1)
     knot = np.minimum(place.astype(int), max(knots - 2, 0))
@@ -174,10 +174,7 @@ class Rows:
                 places = [*column_numbers(j, self.joints), *following, size - 1]
                 for k in inside:
                     totals[k][np.ix_(places, places)] += product
-        return [
-            NormalEquations(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]))
-            for total in totals
-        ]
+        return [NormalEquations(total[:-1, :-1], total[:-1, -1], total[-1, -1]) for total in totals]
 
     def solution(self, sums: NormalEquations, scale: float = 1.0) -> FittedError:
         """The most likely model error, with loads that make the rows likely.

@@ -156,14 +156,14 @@ def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
 def motion_of(run: Run) -> tuple[float, Remark | None]:
     """How long a log moves from first to last [s], and why it tells no error of the model."""
     t, dq = without_waits(run.t), run.dq
-    duration = float(t[-1] - t[0])
+    duration = t[-1] - t[0]
     if duration < LEAST_FRICTION:
         short = caution("whole-log-too-short", duration_s=duration, least_s=LEAST_FRICTION)
         return duration, short
     # noise is no motion
     moves = faster(zero_phase(t, dq, CUTOFF)).any(axis=1)
-    moving = float(np.count_nonzero(moves) * median_step(t))
-    span = float(np.ptp(t[moves])) if moves.any() else 0.0
+    moving = np.count_nonzero(moves) * median_step(t)
+    span = np.ptp(t[moves]) if moves.any() else 0.0
     share = moving / duration
     if not moves.any() or (moving < LEAST_MOTION <= span and share < LEAST_SHARE):
         return span, caution("whole-log-at-rest", motion_s=moving, share=share)
@@ -208,7 +208,7 @@ def bias_of(
     if (carried := fit.rows.loads.torque_of(found.loads)).any():
         load = handed_over(resample_columns(t, t[::stride], -carried))
     if found.solution is None:
-        said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
+        said = remarks_of(found, np.zeros(n), fit.free.mean())
         bare = untouched(run.terms, said[0])
         return replace(bare, free=free, load=load, remarks=said, fitted=True)
     error = error_of(expected.values * found.solution.model, n)
@@ -223,7 +223,7 @@ def bias_of(
         sd=handed_over(np.hypot(spread, undecided)),
         free=free,
         load=load,
-        remarks=remarks_of(found, root_mean_squares(bias), float(fit.free.mean())),
+        remarks=remarks_of(found, root_mean_squares(bias), fit.free.mean()),
         error=error,
     )
 

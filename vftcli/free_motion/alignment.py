@@ -65,7 +65,7 @@ def align(recording: Recording, free: Recording) -> Alignment:
         # A useless rate is no rate: report the distance at equal clocks.
         middle = 0.5 * (recording.t[0] + recording.t[-1])
         shift = closest.shift + (closest.rate - 1.0) * middle
-        distance = aligned_at(recording, free, float(shift), 1.0).deviation
+        distance = aligned_at(recording, free, shift, 1.0).deviation
         raise ReferenceTorqueError(
             f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
             f"shift ({shift:.3f} s) the joint positions still differ by {distance:.3g} rad rms; "
@@ -95,14 +95,14 @@ def why_slower(recording: Recording, free: Recording, rate: float) -> str:
             f"logged velocities would show which. If its speed: {again}. If a clock: correct the "
             "time stamps, or state them with --columns (t@125Hz, t[ms], t[ns])"
         )
-    own, theirs = (float(np.log(each)) for each in paces if each is not None)
-    if abs(theirs - own) < 0.5 * abs(float(np.log(rate))):
+    own, theirs = (np.log(each) for each in paces if each is not None)
+    if abs(theirs - own) < 0.5 * abs(np.log(rate)):
         return (
             f"{free.name} is the motion of {recording.name}, but ran {speed}, as its own "
             f"velocities say too: {again}"
         )
     off, wrong = (theirs, free) if abs(theirs) > abs(own) else (own, recording)
-    true = float(np.exp(off)) / wrong.median_step
+    true = np.exp(off) / wrong.median_step
     return (
         f"the clocks of {recording.name} and {free.name} run at different rates: {longer}, and the "
         f"velocities in {wrong.name} say that its clock is wrong: its rows come at {true:.4g} Hz; "
@@ -121,8 +121,8 @@ def pace(recording: Recording) -> float | None:
     steps = 0.5 * (recording.dq[1:] + recording.dq[:-1]) * np.diff(t)[:, None]
     ends = t.searchsorted(np.arange(t[0], t[-1], TRAVEL))
     by_position, by_velocity = (np.diff(x[ends], axis=0) for x in (recording.q, summed(steps)))
-    power = float(np.sum(by_position**2))
-    along = float(np.sum(by_position * by_velocity))
+    power = np.sum(by_position**2)
+    along = np.sum(by_position * by_velocity)
     return along / power if power > 0.0 and along > 0.0 else None
 
 
@@ -152,10 +152,10 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     path = np.append(abs(np.diff(q, axis=0)).max(axis=1), 0.0)
     span = recording.duration + free.duration
     shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, max(0.02, span / 5000.0))
-    shared = [float(np.sum(path * near(t + shift, q, free))) for shift in shifts]
-    if max(shared) < LEAST_OVERLAP * float(path.sum()):
+    shared = [np.sum(path * near(t + shift, q, free)) for shift in shifts]
+    if max(shared) < LEAST_OVERLAP * path.sum():
         return None
-    shift, rate = refined(recording, free, float(shifts[np.argmax(shared)]), 1.0)
+    shift, rate = refined(recording, free, shifts[np.argmax(shared)], 1.0)
     matched = near(rate * recording.t + shift, recording.q, free)
     long = covered(intervals(recording.t, matched, least=1.0), recording.samples)
     found = aligned_at(recording, free, shift, rate, long)
@@ -180,8 +180,8 @@ def explained_by_rate(recording: Recording, free: Recording) -> Alignment | None
             continue
         step = max(recording.median_step * rate, free.median_step, free.duration / 4000.0)
         fit = lag_fit(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP)
-        shift = fit.closest * step + float(free.t[0] - rate * recording.t[0])
-        found = aligned_at(recording, free, *refined(recording, free, shift, float(rate)))
+        shift = fit.closest * step + (free.t[0] - rate * recording.t[0])
+        found = aligned_at(recording, free, *refined(recording, free, shift, rate))
         if found.deviation <= 0.5 * SAME_TRAJECTORY and is_same_path(recording, found):
             return found
     return None
@@ -196,12 +196,12 @@ def uniform(recording: Recording, step: float) -> Array:
 def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
     """Shift [s] and clock rate of the closest fit; of equals the longest overlap."""
     step = max(recording.median_step, free.median_step)
-    offset = float(free.t[0] - recording.t[0])
+    offset = free.t[0] - recording.t[0]
     q = uniform(free, step)
     fit = lag_fit(q, uniform(recording, step), LEAST_OVERLAP)
     # Start from equal clocks; the steps below converge anyway.
     best = refined(recording, free, fit.closest * step + offset, 1.0)
-    spread = float(np.sqrt(q.var(axis=0).sum()))
+    spread = np.sqrt(q.var(axis=0).sum())
     limit = max(ALIKE * distance_moving(recording, free, *best), LEAST_ALIKE * spread)
     for lag in fit.rivals((SHORTLIST * spread) ** 2)[:RIVALS]:
         rival = refined(recording, free, lag * step + offset, 1.0)
@@ -239,11 +239,12 @@ def refined(
         if np.count_nonzero(inside) < 8:
             break
         own, distance = recording.t[inside], distance[inside]
-        middle = float(own.mean())
+        middle = own.mean()
         speed = resample_columns(t[inside], free.t, slope)
         scale = robust_sd(distance) + 1e-7
         share = speed / (scale**2 + distance**2)
         arm = (own - middle)[:, None]
+        # Python's numbers, of which a product that is too large warns nobody.
         a, b, c = (float(np.sum(share * speed * arm**k)) for k in range(3))
         e, f = float(np.sum(share * distance)), float(np.sum(share * distance * arm))
         determinant = a * c - b * b

@@ -67,16 +67,16 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     The search stays within `AROUND` of a stated period. [s]
     """
     t, q = moving_part(recording)
-    check_stated(recording, stated, float(t[-1] - t[0]))
+    check_stated(recording, stated, (t[-1] - t[0]))
     step = recording.median_step
-    if float(t[-1] - t[0]) > SPARSE * step * len(t):
+    if (t[-1] - t[0]) > SPARSE * step * len(t):
         raise ReferenceTorqueError(
             f"{recording.name}: {len(t)} samples over {t[-1] - t[0]:.4g} s: nearly all of that is "
             "a gap, in which no repetition can be looked for; leave the gap out with --interval"
         )
     step *= max(1, int(SEARCHED / step))
     x = resample_columns(np.arange(t[0], t[-1], step), t, q)
-    spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
+    spread = np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1])
     closest = (float("nan"), float("inf"))
     for lag in valleys(distances(x), step, stated):
         seconds, deviation = lag * step, returned(t, q, lag * step, -(-len(t) // ENOUGH))
@@ -193,10 +193,10 @@ def refined_period(t: Array, q: Array, period: float) -> float:
                 slope = m * resample_columns(there[inside], t, dq)
                 scale = robust_sd(distance) + 1e-7
                 share = 1.0 / (scale**2 + distance**2)
-                move += float(np.sum(share * slope * distance))
-                weight += float(np.sum(share * slope**2))
+                move += np.sum(share * slope * distance)
+                weight += np.sum(share * slope**2)
             step = move / weight if weight > 0 else 0.0
-            change = float(np.clip(step, -0.1 * period, 0.1 * period))
+            change = np.clip(step, -0.1 * period, 0.1 * period)
             period -= change
             if abs(change) < 1e-9 * period:
                 break
@@ -303,7 +303,7 @@ class FreeCycles(NamedTuple):
             return [found]
         # The mean of k cycles with independent noise adds 1/k of one cycle's to the
         # square.
-        wider = float(np.sqrt((1.0 + 1.0 / MOST_PAIRED) / (1.0 + 1.0 / count)) - 1.0)
+        wider = np.sqrt((1.0 + 1.0 / MOST_PAIRED) / (1.0 + 1.0 / count)) - 1.0
         return [found, fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider)]
 
 

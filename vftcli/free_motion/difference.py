@@ -180,7 +180,7 @@ def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
     floors = [chosen.floor_remark()]
     for candidate in steps:
         floors.append(candidate.floor_remark())
-        share = float((candidate.error.floor_moving / lowest)[trusted].mean())
+        share = (candidate.error.floor_moving / lowest)[trusted].mean()
         if share < WORTH * least:
             chosen, least = candidate, share
         del candidate  # it has no room beside the next
@@ -302,7 +302,7 @@ def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
     noise = np.random.default_rng(SEED).standard_normal((400 * size, 1))
     clock = step * np.arange(len(noise), dtype=float)
     smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)
-    return float(np.quantile(off_line(smooth, size), QUIET) / np.mean(smooth**2))
+    return np.quantile(off_line(smooth, size), QUIET) / np.mean(smooth**2)
 
 
 def rms(x: Array, where: Mask) -> Array:

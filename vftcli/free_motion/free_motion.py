@@ -176,7 +176,7 @@ class FreeMotion(Shown):
                 f"holds {np.count_nonzero(own)} of its {len(t)} samples; it must be "
                 f"a part of the log, which runs from {t[0]:g} to {t[-1]:g} s"
             )
-        ends = float(t[0]), float(t[-1])
+        ends = t[0], t[-1]
         remarks = [
             fact("free-span", begin_s=max(a, ends[0]), end_s=min(b, ends[1])) for a, b in spans
         ]
@@ -283,7 +283,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     moved = bare > 0.0  # a simulation without noise leaves nothing on a joint at rest
     share = root_mean_square(loaded[moved] / bare[moved])
     mass = float(weights[0])
-    if mass < max(LEAST, SURE * float(sd[0])) or share > PARTLY:
+    if mass < max(LEAST, SURE * sd[0]) or share > PARTLY:
         return None
     whole = np.hypot(sd[:4], gain_sd(pieces[0].run.recording, robot) * weights[:4])
     return FreeLoad(

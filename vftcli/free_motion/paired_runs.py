@@ -70,7 +70,7 @@ def by_phase(motion: Run, pairing: Pairing) -> Pairing:
         return pairing
     times, q, speed = pairing.times[known], motion.q[known], free.smooth_dq
     shift, ends = np.zeros(len(times)), (times.min(), times.max())
-    damping = 0.01 * float(np.sum(speed**2, axis=1).mean()) + 1e-6
+    damping = 0.01 * np.sum(speed**2, axis=1).mean() + 1e-6
     for _ in range(4):
         at = np.clip(times + shift, *ends)
         path = resample_columns(at, free.t, speed)

@@ -176,7 +176,7 @@ def measured_scale(
             )
         # One free run with another by way of the log both are paired with.
         rate, shift = np.polyfit(first.times[shared], second.times[shared], 1)
-        pair = [pair_with_run(first.free.t, second.free, float(shift), float(rate))]
+        pair = [pair_with_run(first.free.t, second.free, shift, rate)]
         both = {"found": pair, "commanded": pair}
         spread = next(differences(first.free, both, (chosen.rung,), (chosen.cutoff,)))
         ratios.append(error_ratio(spread, spread.error.known))
@@ -213,9 +213,9 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
         means = total[count > 0] / count[count > 0]
         if len(means) < 5:
             continue
-        spread = float(means.std(ddof=1)) / np.sqrt(len(means))
-        if abs(float(means.mean())) > SURE * spread:
-            change[j] = float(along.mean())
+        spread = means.std(ddof=1) / np.sqrt(len(means))
+        if abs(means.mean()) > SURE * spread:
+            change[j] = along.mean()
     return change
 
 

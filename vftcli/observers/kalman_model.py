@@ -69,33 +69,21 @@ def zero_order_hold(step: Array, d: Densities) -> Discrete:
         Q̂₁₁ = Q_p Ts + Q_τ ∫E² ds [Q_τ Ts³/3],  Q̂₁₂ = Q_τ E²/2 [Q_τ Ts²/2],
         Q̂₂₂ = Q_τ (1 − e^{−2aTs})/(2a) [Q_τ Ts]
     """
-    shape = np.broadcast_shapes(np.shape(step), d.r.shape)
-    if not d.decay.any():
-        q22 = step * d.q_tau
-        q12 = 0.5 * step * q22
-        q11 = step * (d.q_p + q12 / 1.5)
-        held = np.broadcast_to(step, shape)
-        return Discrete(
-            held, held, np.broadcast_to(1.0, shape), q11, q12, q22, np.broadcast_to(d.r, shape)
-        )
-    step, a = np.broadcast_to(step, shape), np.broadcast_to(d.decay, shape)
-    x = a * step
-    some = np.where(x > 0.0, a, 1.0)
-    reach = np.where(x > 0.0, -np.expm1(-x) / some, step)
-    squared = np.where(x > 0.0, -np.expm1(-2.0 * x) / (2.0 * some), step)
-    # ∫E² ds = (Ts − 2E + ∫e^{−2as})/a², as a series for small aTs.
-    series = step**3 * (1 / 3 - x / 4 + 7 * x**2 / 60 - x**3 / 24 + 31 * x**4 / 2520)
-    large = np.where(x > SERIES, a, 1.0)
-    integral = np.where(x > SERIES, (step - 2.0 * reach + squared) / large**2, series)
-    return Discrete(
-        step=step,
-        a12=reach,
-        a22=np.exp(-x),
-        q11=step * d.q_p + d.q_tau * integral,
-        q12=0.5 * d.q_tau * reach**2,
-        q22=d.q_tau * squared,
-        r=np.broadcast_to(d.r, shape),
-    )
+    step, r, q_p, q_tau, a = np.broadcast_arrays(step, *d)
+    reach, squared, integral = step, step, step * step * step / 3.0
+    decay = np.ones_like(integral)
+    if a.any():
+        x = a * step
+        some = np.where(x > 0.0, a, 1.0)
+        reach = np.where(x > 0.0, -np.expm1(-x) / some, step)
+        squared = np.where(x > 0.0, -np.expm1(-2.0 * x) / (2.0 * some), step)
+        # ∫E² ds = (Ts − 2E + ∫e^{−2as})/a², as a series for small aTs.
+        series = step**3 * (1 / 3 - x / 4 + 7 * x**2 / 60 - x**3 / 24 + 31 * x**4 / 2520)
+        large = np.where(x > SERIES, a, 1.0)
+        integral = np.where(x > SERIES, (step - 2.0 * reach + squared) / large**2, series)
+        decay = np.exp(-x)
+    q11, q12 = step * q_p + q_tau * integral, 0.5 * q_tau * reach * reach
+    return Discrete(step, reach, decay, q11, q12, q_tau * squared, r)
 
 
 SCHEMES = ("fe", "zoh")  #: Discretisations: forward Euler and zero-order hold.
@@ -115,22 +103,17 @@ def discretise(scheme: str, convention: str, step: Array, d: Densities) -> Discr
     """
     if scheme == "zoh":
         model = zero_order_hold(step, d)
-    elif (worst := float(np.max(step * d.decay))) > 2.0:
+    elif (worst := np.max(step * d.decay)) > 2.0:
         raise ParameterError(
             f"kfo-fe is unstable: decay·Ts = {worst:.3g} is above 2; "
             "choose a smaller kfo.decay or the observer kfo-zoh"
         )
     else:
-        r = np.broadcast_to(d.r, np.broadcast_shapes(np.shape(step), d.r.shape))
-        held, decay = np.broadcast_to(step, r.shape), 1.0 - step * d.decay
-        model = Discrete(held, held, decay, held * d.q_p, np.zeros(r.shape), held * d.q_tau, r)
-    if convention == "discrete":
-        return model
-    model = model._replace(r=model.r / model.step)
-    if convention == "literal" and scheme == "fe":
-        step = model.step
-        return model._replace(q11=step * model.q11, q12=step * model.q12, q22=step * model.q22)
-    return model
+        step, r, q_p, q_tau, a = np.broadcast_arrays(step, *d)
+        twice = step if convention == "literal" else 1.0
+        q11, q22 = twice * step * q_p, twice * step * q_tau
+        model = Discrete(step, step, 1.0 - step * a, q11, 0.0 * q11, q22, r)
+    return model if convention == "discrete" else model._replace(r=model.r / model.step)
 
 
 class Covariance(NamedTuple):
@@ -300,7 +283,7 @@ def kalman_steps(
     """
     samples, n = d.shape
     tau, sd = empty_series(samples, n), empty_series(samples, n)
-    dt, (error, posterior) = np.broadcast_to(terms.dt, (samples, 1)), state
+    error, posterior = state
     if begins:
         tau[0], sd[0] = 0.0, np.sqrt(posterior[2])
     # Joints with equal numbers have equal gains: compute one of each kind.
@@ -312,7 +295,7 @@ def kalman_steps(
     for span in spans(samples, begins=begins):
         fold = Fold.of(span.stop - span.start)
         # What is one for all joints is written out: rows of one size need no iterator.
-        model = model_of(fold.fold(dt[span]), own)
+        model = model_of(fold.fold(terms.dt[span]), own)
         model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
         gains = settle(model, entering, guess)
         entering = Covariance(*map(fold.last, gains.posterior))

@@ -274,7 +274,7 @@ class KalmanObserver(BlockObserver):
             sd = np.broadcast_to(handed_over(np.sqrt(settled.p22)), tau.shape)
             state = KalmanState(end, np.stack(settled.posterior))
         elif self.prints_hold:
-            every = self.model(np.broadcast_to(terms.dt, (len(d), 1)), n)
+            every = self.model(terms.dt, n)
             if state is None:
                 state = KalmanState(zero, settled_prior(self.model(step, n), densities))
             tau, sd, state = printed_hold_steps(d, every, densities, state, begins=begins)

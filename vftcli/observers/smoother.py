@@ -53,7 +53,7 @@ class KalmanSmoother(Shown):
         kalman, step, n = self.filter, terms.clock.step, terms.joints
         model, gains, d = kalman.model(step, n), kalman.steady(step, n), kalman.unexplained(terms)
         if not (even := terms.clock.uniform):
-            model = kalman.model(np.broadcast_to(terms.dt, (terms.samples, 1)), n)
+            model = kalman.model(terms.dt, n)
             gains = gain_sequence(model, kalman.first_prior(step, n), gains.posterior)
         (_, p12, p22), a12, S = gains.posterior, model.a12, gains.S
         # νᵗ = dᵗ + eᵗ⁻¹ − A₁₂ᵗτ̂ᵗ⁻¹

@@ -230,7 +230,7 @@ def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ..
     missing = [f"kfo.{k}" for k in ("r_diag", "q_p_diag", "q_tau_diag") if k not in values]
     if not missing:
         return observer, ()
-    omega = float(observer.tuning(setup.step, setup.joints).omega_n[0])
+    omega = observer.tuning(setup.step, setup.joints).omega_n[0]
     code = "kalman-gains-from-default"
     return observer, (fact(code, parameters=missing, omega_n_rad_per_s=omega),)
 

@@ -58,10 +58,8 @@ def momentum(rate: Array) -> Observer:
 
 def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
     """Kalman observer of ω_n at ζ = 1/√2: Q_τ = R ω_n⁴, Q_p = 0. (n,)"""
-    density = np.broadcast_to(np.asarray(r, float), omega_n.shape)
-    return KalmanObserver(
-        discretisation="zoh", r_diag=density, q_p_diag=0.0, q_tau_diag=density * omega_n**4
-    )
+    q_tau = r * omega_n**4
+    return KalmanObserver(discretisation="zoh", r_diag=r, q_p_diag=0.0, q_tau_diag=q_tau)
 
 
 def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
@@ -120,7 +118,7 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
     At the slowest the spectra do not separate external torque from noise; at the fastest,
     not noise from external torque.
     """
-    low, high = float(grid[0]), float(grid[-1])
+    low, high = grid[0], grid[-1]
     reached = (("slowest", rate <= low, low), ("fastest", rate >= high, high))
     return tuple(
         warning(f"gain-at-{end}", on_joints(joints, name), rate_rad_s=bound)
@@ -355,7 +353,7 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
         best_is_one = few[curve.rmse.argmin(axis=0), np.arange(n)]
         return np.where(best_is_one, curve.best, fastest)
     if goal.name == "bandwidth" and kind is kalman_smoother:
-        fraction = float(kalman_smoother(np.ones(1)).tuning(step, 1).bandwidth[0])
+        fraction = kalman_smoother(np.ones(1)).tuning(step, 1).bandwidth[0]
         return np.full(n, goal.value / fraction)
     if goal.name == "auto" or kind is kalman_smoother:
         return error_curve(kind, spectra).best

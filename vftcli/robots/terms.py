@@ -98,10 +98,7 @@ class RunningTerms:
         self._friction = RunningFriction(robot.friction)
 
     def next(self, recording: Recording) -> DynamicsTerms:
-        """Evaluate p and μ along the next block, chunk by chunk.
-
-        Beside the recording and the results it needs memory for one chunk only.
-        """
+        """Evaluate p and μ along the next block, chunk by chunk."""
         check_joints(recording, self.robot)
         q, dq = recording.q, recording.require("dq")
         effort, temperature = drive_torque(recording, self.robot), measured_temperature(recording)
@@ -115,8 +112,7 @@ class RunningTerms:
             chunks = momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
         for span, velocity, (momentum, bias, *loads) in chunks:
             p[span] = momentum
-            mu[span] = effort[span]
-            mu[span] += bias
+            mu[span] = effort[span] + bias
             if self.robot.friction:
                 load = loads[0] if loads else None
                 warm = None if temperature is None else temperature[span]
@@ -233,10 +229,8 @@ def disturbance_blocks(
         nothing, never = np.zeros((1, joints)), np.zeros(1, bool)
         return Blocks(t, np.zeros(1), nothing, q, nothing, never)
     size = max(round(seconds / median_step(t)), 1)
-    whole = np.ones(len(t) - 1, bool)
+    whole = np.ones(len(t) - 1, bool) if inside is None else inside[1:] & inside[:-1]
     whole[gaps_of(t, GAP)] = False
-    if inside is not None:
-        whole &= inside[1:] & inside[:-1]
     # The unbroken runs of intervals give the edges; between two runs one block reaches
     # across.
     places = {0, len(t) - 1}

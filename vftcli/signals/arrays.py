@@ -110,17 +110,14 @@ def check_clock(t: Array, what: str) -> None:
     """Raise unless a clock `t` [s] is one-dimensional, finite and strictly increasing."""
     if np.ndim(t) != 1:
         raise ShapeError(f"the clock of {what} has shape {np.shape(t)}; it must be one-dimensional")
-    # Between two finite ends a clock that always increases is finite.
-    if not len(t) or (np.isfinite(t[[0, -1]]).all() and np.all(t[1:] > t[:-1])):
-        return
-    if not np.isfinite(t).all():
-        k = int(np.isfinite(t).argmin())
-        raise ClockError(f"the clock of {what} is not finite at sample {k}")
-    k = int(np.argmax(np.diff(t) <= 0))
-    raise ClockError(
-        f"the clock of {what} stops increasing at sample {k + 1} "
-        f"({t[k]:.6f} s, then {t[k + 1]:.6f} s)"
-    )
+    if len(bad := np.flatnonzero(~np.isfinite(t))):
+        raise ClockError(f"the clock of {what} is not finite at sample {bad[0]}")
+    if len(back := np.flatnonzero(t[1:] <= t[:-1])):
+        before, here = t[back[0] : back[0] + 2]
+        raise ClockError(
+            f"the clock of {what} stops increasing at sample {back[0] + 1} "
+            f"({before:.6f} s, then {here:.6f} s)"
+        )
 
 
 def check_shape(value: ArrayLike, shape: tuple[int | str, ...], name: str, owner: str) -> None:

@@ -84,16 +84,15 @@ def filter_columns(t: Array, x: Array, sections: Array, settling: float | None =
     even = is_uniform(t, tolerance=UNEVEN)
     if not even:
         refuse_mostly_gap(t, step)
-        clock = np.linspace(t[0], t[-1], max(2, round(float(t[-1] - t[0]) / step) + 1))
+        clock = np.linspace(t[0], t[-1], max(2, round((t[-1] - t[0]) / step) + 1))
         x = resample_columns(clock, t, x)
     padding, smooth = min(len(x) - 1, padding), np.empty(x.shape)
     together = max(1, TOGETHER // len(x))
     for first in range(0, x.shape[1], together):
         own = x[:, first : first + together]
         # The ends are mirrored about their value.
-        before = 2.0 * own[:1] - own[padding:0:-1]
-        after = 2.0 * own[-1:] - own[-2 : -padding - 2 : -1]
-        once = cascade(sections, np.concatenate([before, own, after]))
+        ends = ((padding, padding), (0, 0))
+        once = cascade(sections, np.pad(own, ends, mode="reflect", reflect_type="odd"))
         both = cascade(sections, once[::-1])[::-1]
         smooth[:, first : first + together] = both[padding : len(both) - padding]
     return smooth if even else resample_columns(t, clock, smooth)
@@ -115,7 +114,7 @@ def cascade(sections: Array, x: Array) -> Array:
 
 def refuse_mostly_gap(t: Array, step: float) -> None:
     """Raise a ClockError if a clock of some step [s] is nearly all gap."""
-    if float(t[-1] - t[0]) > MOSTLY_GAP * len(t) * step:
+    if (t[-1] - t[0]) > MOSTLY_GAP * len(t) * step:
         after = int(np.diff(t).argmax())
         raise ClockError(
             f"the log waits {t[after + 1] - t[after]:.4g} s after t = {t[after]:.3f} s, over "
@@ -194,7 +193,7 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
             spectrum = np.fft.rfft(columns[:, first : first + size] * window)
             power += share * (spectrum.real**2 + spectrum.imag**2)
         count += len(starts)
-    power *= 2.0 * step / float(np.sum(window**2))
+    power *= 2.0 * step / np.sum(window**2)
     # The density is one-sided: every frequency counts for its negative too, but 0 and
     # Nyquist's.
     power[:, [0, -1]] *= 0.5

@@ -142,7 +142,7 @@ def time_offset(t: Array, late: Array, early: Array) -> Offset:
     best = int(value.argmax())
     inside = 0 < best < len(at) - 1
     shift = parabola(*value[best - 1 : best + 2]) if inside else 0.0
-    return Offset(lag=float((at[best] + shift) * step), correlation=float(value[best]))
+    return Offset(lag=(at[best] + shift) * step, correlation=value[best])
 
 
 class LagFit(NamedTuple):

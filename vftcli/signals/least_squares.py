@@ -132,7 +132,7 @@ def deviations(A: Array, residual: Array, weights: Array) -> Array:
     """Standard deviations of a fit, the residual correlated along time. (k,)"""
     used = weights > 0
     freedom = max(1, np.count_nonzero(used) - A.shape[1])
-    variance = float(np.sum(weights * residual**2)) / freedom
+    variance = np.sum(weights * residual**2) / freedom
     inverse = inverse_of((A * weights[:, None]).T @ A)
     sd: Array = np.sqrt(np.diag(inverse) * variance * correlation_time(residual[used]))
     return sd
@@ -169,5 +169,5 @@ def cross_validated(A: Array, y: Array, weights: Array, parts: Sequence[Array]) 
     for rows in parts:
         part = normal_equations(A[rows], y[rows], weights[rows])
         total += part.misfit(whole.minus(part).solution())
-        count += float(weights[rows].sum())
+        count += weights[rows].sum()
     return float(np.sqrt(total / count)) if count > 0 else float("nan")
