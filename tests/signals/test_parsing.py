@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.robots.robot_file import NUMBER, PER_JOINT, SWITCH, TEXT, WHOLE, spread, vector
+from vftcli.robots.robot_file import NUMBER, PER_JOINT, SWITCH, TEXT, WHOLE, vector
+from vftcli.signals.arrays import one_each
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
     Choice,
@@ -151,10 +152,10 @@ def test_a_list_is_spread_where_it_has_one_or_one_for_each(
     assert PER_JOINT.broken("key", numbers) == ""
     assert (vector(count).broken("key", numbers) == "") == (len(numbers) == count)
     text = ",".join(map(repr, numbers))
-    assert spread(set_value(text, text), len(numbers), "joints", "key").tolist() == numbers
+    assert one_each(set_value(text, text), len(numbers), "key").tolist() == numbers
     if len(numbers) not in {1, count}:
         with pytest.raises(ParameterError, match=f"give one, or one for each of {count} joints"):
-            spread(numbers, count, "joints", "key")
+            one_each(numbers, count, "key")
 
 
 def test_an_integer_beyond_every_float_is_no_number() -> None:

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots.robot_file import NUMBER, spread
-from vftcli.signals.arrays import Array, frozen, seal
+from vftcli.robots.robot_file import NUMBER
+from vftcli.signals.arrays import Array, frozen, one_each, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known
@@ -81,7 +81,7 @@ class Admittance:
         for name in PER_AXIS:
             if getattr(self, name) is None:
                 continue
-            array = spread(getattr(self, name), 6, "axes", f"admittance.{name}")
+            array = one_each(getattr(self, name), 6, f"admittance.{name}", "axes")
             if name == "xi":
                 array = np.where(np.isnan(array), self.drag_ratio, array)
             object.__setattr__(self, name, frozen(array))
@@ -145,7 +145,7 @@ def from_table(
         for name, value in entries.items():
             if name not in PLAIN:
                 check_known(name, PER_AXIS, f"the admittance has no parameter {name!r}")
-                values[name][axes] = spread(value, len(axes), "axes", f"{section}.{name}")
+                values[name][axes] = one_each(value, len(axes), f"{section}.{name}", "axes")
     where = "its [admittance]" if table else "an [admittance] section, which it lacks,"
     for name, found in values.items():
         absent = np.isnan(found)

@@ -74,15 +74,6 @@ class BlockObserver(Shown):
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), **more)
 
 
-def per_joint(value: Array | float, joints: int) -> Array:
-    """One number a joint from one number or one a joint. (n,)"""
-    found = np.asarray(value, float)
-    if found.size != 1 and found.shape != (joints,):
-        words = f"an observer's parameter has shape {found.shape}"
-        raise ShapeError(f"{words}; expected one number, or one a joint: ({joints},)")
-    return np.full(joints, found.ravel())
-
-
 def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
     """A parameter as a list of numbers, one or one a joint. (1,) or (n,)"""
     found = number_array(value, name, observer)

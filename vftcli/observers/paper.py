@@ -44,8 +44,8 @@ from vftcli.observers.kalman_model import (
     steady,
     update,
 )
-from vftcli.observers.observer import BlockObserver, Complex, Tuning, angular, numbers_of, per_joint
-from vftcli.signals.arrays import Array, frozen, handed_over, number_array
+from vftcli.observers.observer import BlockObserver, Complex, Tuning, angular, numbers_of
+from vftcli.signals.arrays import Array, frozen, handed_over, number_array, one_each
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, one_sample_earlier
 from vftcli.signals.parsing import check_known
@@ -197,7 +197,7 @@ class MomentumObserver(FirstOrderObserver):
 
     def rates(self, joints: int) -> Array:
         """K of every joint. (n,) [1/s]"""
-        return per_joint(self.gain, joints)
+        return one_each(self.gain, joints, "gmo.gain")
 
     def run(
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
@@ -290,8 +290,8 @@ class KalmanObserver(BlockObserver):
 
     def densities(self, joints: int) -> Densities:
         """The parameters, one a joint."""
-        values = (self.r_diag, self.q_p_diag, self.q_tau_diag, self.decay)
-        return Densities(*(per_joint(value, joints) for value in values))
+        names = ("r_diag", "q_p_diag", "q_tau_diag", "decay")
+        return Densities(*(one_each(getattr(self, k), joints, f"kfo.{k}") for k in names))
 
     def model(self, step: Array | float, joints: int) -> Discrete:
         """Discrete model at one sample time, or at each as a column (T, 1). [s]"""

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vftcli.observers.observer import Observer, per_joint
+from vftcli.observers.observer import Observer
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots.profile import checked_gains
-from vftcli.robots.robot_file import PER_JOINT, TEXT, RobotFile, spread
-from vftcli.signals.arrays import Array
+from vftcli.robots.robot_file import PER_JOINT, TEXT, RobotFile
+from vftcli.signals.arrays import Array, one_each
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known, shown
@@ -192,8 +192,8 @@ def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tu
     """
     given = parameters_given(setup, name, name)
     if parameter in given:
-        return spread(given[parameter], setup.joints, "joints", f"{name}.{parameter}"), ()
-    rate, origin = per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
+        return one_each(given[parameter], setup.joints, f"{name}.{parameter}"), ()
+    rate, origin = np.full(setup.joints, FALLBACK_RATE), "gain-from-default"
     if "kfo" in setup.gains or "kfo" in setup.settings:
         kalman, _ = build_kfo(read_as("density", setup), "kfo-fe")
         rate = 1.0 / kalman.tuning(setup.step, setup.joints).delay
@@ -218,9 +218,7 @@ def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ..
     """
     given = parameters_given(read_as("discrete", setup), "kfo", name)
     convention = str(given.pop("noise_convention", "density"))
-    values = {
-        key: spread(value, setup.joints, "joints", f"kfo.{key}") for key, value in given.items()
-    }
+    values = {key: one_each(value, setup.joints, f"kfo.{key}") for key, value in given.items()}
     observer = KalmanObserver(
         discretisation="fe" if name == "kfo-fe" else "zoh",
         noise_convention="literal" if setup.as_printed else convention,

@@ -87,16 +87,6 @@ PER_JOINT = one_each("a joint", is_finite)
 PER_AXIS = one_each("an axis", lambda v: is_finite(v) or v == math.inf)
 
 
-def spread(value: Any, count: int, each: str, what: str) -> Array:  # noqa: ANN401 - TOML's
-    """One number each from one number or a list with one for each. (count,)"""
-    array = np.atleast_1d(np.asarray(value, float))
-    if array.shape not in {(1,), (count,)}:
-        raise ParameterError(
-            f"{what} has {array.size} values; give one, or one for each of {count} {each}"
-        )
-    return np.array(np.broadcast_to(array, (count,)))
-
-
 class Bound(NamedTuple):
     """The range of a number of a robot file, its ends included."""
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vftcli.signals.errors import ClockError, ShapeError
+from vftcli.signals.errors import ClockError, ParameterError, ShapeError
 
 #: A float64 array; shapes and units stand in the docstrings, as ``(T, n) [N·m]``.
 Array = NDArray[np.float64]
@@ -94,6 +94,16 @@ def seal(
             object.__setattr__(owner, name, number_array(value, name, type(owner).__name__, kind))
             if shape:
                 check_shape(value, shape, name, called)
+
+
+def one_each(value: ArrayLike, count: int, what: str, each: str = "joints") -> Array:
+    """One number each from one number or a list with one for each. (count,)"""
+    array = np.atleast_1d(np.asarray(value, float))
+    if array.shape not in {(1,), (count,)}:
+        raise ParameterError(
+            f"{what} has {array.size} values; give one, or one for each of {count} {each}"
+        )
+    return np.full(count, array)
 
 
 def empty_series(samples: int, columns: int) -> Array:
