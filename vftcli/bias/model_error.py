@@ -106,10 +106,8 @@ def usual_friction(robot: Robot) -> Array:
             found[j, 0] = 0.7 * abs(joint.parameters["amplitude"])
         elif joint.model != "none":
             limit = robot.limits.qd_max[j]
-            fastest = limit if np.isfinite(limit) and limit > 0.0 else USUAL_SPEED
-            speed = np.linspace(0.05, 1.0, 40) * fastest
-            A = np.column_stack([speed**0, speed, speed**2])
-            found[j] = np.linalg.lstsq(A, steady_torque(joint, speed), rcond=None)[0]
+            speed = np.linspace(0.05, 1.0, 40) * (limit if np.isfinite(limit) else USUAL_SPEED)
+            found[j] = np.polyfit(speed, steady_torque(joint, speed), 2)[::-1]
             found[j, 0] = abs(dry[j] or found[j, 0])
     return found.T
 
@@ -152,9 +150,7 @@ def error_of(values: Array, joints: int) -> ModelError:
 def column_numbers(joint: int, joints: int) -> Indices:
     """Which of all columns the row of one joint has: links from it on, then its own."""
     own = LINK * joints + (SHAPES + 3) * joint
-    return np.concatenate(
-        [np.arange(LINK * joint, LINK * joints), np.arange(own, own + SHAPES + 3)]
-    ).astype(int)
+    return np.asarray(np.r_[LINK * joint : LINK * joints, own : own + SHAPES + 3])
 
 
 def expected_error(robot: Robot) -> ModelError:

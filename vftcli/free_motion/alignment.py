@@ -242,16 +242,13 @@ def refined(
         middle = own.mean()
         speed = resample_columns(t[inside], free.t, slope)
         scale = robust_sd(distance) + 1e-7
-        share = speed / (scale**2 + distance**2)
-        arm = (own - middle)[:, None]
-        # Python's numbers, of which a product that is too large warns nobody.
-        a, b, c = (float(np.sum(share * speed * arm**k)) for k in range(3))
-        e, f = float(np.sum(share * distance)), float(np.sum(share * distance * arm))
-        determinant = a * c - b * b
-        if not determinant > 1e-12 * max(a * c, 1e-300):
+        slopes = np.array([speed, speed * (own - middle)[:, None]])
+        weighted = slopes / (scale**2 + distance**2)
+        gram = np.einsum("atn,btn->ab", weighted, slopes)
+        if not np.linalg.det(gram) > 1e-12 * max(gram[0, 0] * gram[1, 1], 1e-300):
             break
-        more = (a * f - b * e) / determinant
-        later = (c * e - b * f) / determinant - more * middle
+        later, more = np.linalg.solve(gram, np.einsum("atn,tn->a", weighted, distance))
+        later -= more * middle
         shift, rate = shift - later, rate - more
         if abs(later) < 1e-9 and abs(more) < 1e-12:
             break

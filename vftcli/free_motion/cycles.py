@@ -67,11 +67,11 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     The search stays within `AROUND` of a stated period. [s]
     """
     t, q = moving_part(recording)
-    check_stated(recording, stated, (t[-1] - t[0]))
-    step = recording.median_step
-    if (t[-1] - t[0]) > SPARSE * step * len(t):
+    step, duration = recording.median_step, t[-1] - t[0]
+    check_stated(recording, stated, duration)
+    if duration > SPARSE * step * len(t):
         raise ReferenceTorqueError(
-            f"{recording.name}: {len(t)} samples over {t[-1] - t[0]:.4g} s: nearly all of that is "
+            f"{recording.name}: {len(t)} samples over {duration:.4g} s: nearly all of that is "
             "a gap, in which no repetition can be looked for; leave the gap out with --interval"
         )
     step *= max(1, int(SEARCHED / step))

@@ -242,7 +242,7 @@ def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None
     least `LEAST_BAND`, as contacts fill lower ones; assumed as dense throughout.
     """
     if cutoff is None:
-        return np.asarray(rms(x[:-2] - 2.0 * x[1:-1] + x[2:], moving[1:-1]) / np.sqrt(6.0))
+        return np.asarray(rms(np.diff(x, 2, axis=0), moving[1:-1]) / np.sqrt(6.0))
     middle = max(cutoff, min(LEAST_BAND, 0.2 / step))
     limits = (0.7 * middle, min(1.3 * middle, 0.45 / step))
     return noise_below(t, x, moving, step, limits, cutoff)

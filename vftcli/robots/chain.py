@@ -109,14 +109,13 @@ class Chain(Shown):
         model.name = name
         parent = 0
         for j, (mass, com, inertia) in enumerate(self.bodies):
-            placement = pin.SE3(np.array(self.rotation[j]), np.array(self.translation[j]))
+            placement = pin.SE3(self.rotation[j], self.translation[j])
             parent = model.addJoint(parent, pin.JointModelRZ(), placement, self.names[j])
-            body = pin.Inertia(mass, np.array(com), np.array(inertia))
-            model.appendBodyToJoint(parent, body, pin.SE3.Identity())
-        flange = pin.SE3(np.array(self.flange_rotation), np.array(self.flange_translation))
+            model.appendBodyToJoint(parent, pin.Inertia(mass, com, inertia), pin.SE3.Identity())
+        flange = pin.SE3(self.flange_rotation, self.flange_translation)
         model.addFrame(pin.Frame("flange", parent, flange, pin.FrameType.OP_FRAME))
-        model.armature = np.array(self.rotor_inertia)
-        model.gravity.linear = np.array(self.gravity)
+        model.armature = self.rotor_inertia
+        model.gravity.linear = self.gravity
         return model
 
 

@@ -53,7 +53,7 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     payloads = {}
     for own, section in root.section("payload").named_sections("mass").items():
         turn = Pose(rpy_matrix(section.vector("rpy", 3, ORIGIN)))
-        body = checked_body(section, default=[0.0] * 6).moved(turn)
+        body = checked_body(section, default=(0.0,) * 6).moved(turn)
         payloads[own] = Payload(**body._asdict())
     friction = tuple(friction_of(joint) for joint in joints)
     if all(joint.model == "none" for joint in friction):

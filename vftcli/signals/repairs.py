@@ -115,8 +115,7 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     made = np.array(x)
     if len(x) <= 6 * NEAR:
         return made, np.zeros(x.shape, bool)
-    bend, travel = 0.5 * abs(x[2:] - 2.0 * x[1:-1] + x[:-2]), 0.5 * abs(x[2:] - x[:-2])
-    travel += least
+    bend, travel = 0.5 * abs(np.diff(x, 2, axis=0)), 0.5 * abs(x[2:] - x[:-2]) + least
     # Stamps that jitter bend a moving joint's angles, and those of a resting one not at
     # all.
     by_travel = np.quantile(bend / travel, USUAL, axis=0) * travel
