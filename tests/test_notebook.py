@@ -181,7 +181,7 @@ def test_robots_scenarios_and_replays_are_asked_for(tmp_path: Path) -> None:
 
 MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "gain": ("one for each of 6", lambda: vft.MomentumObserver(gain=[5, 3]).estimate(TERMS)),
-    "gain 2d": (r"\(n,\)", lambda: vft.MomentumObserver(gain=[[5, 3]])),
+    "gain 2d": ("2 values", lambda: vft.MomentumObserver(gain=[[5, 3]]).estimate(TERMS)),
     "gain text": ("array of numbers", lambda: vft.MomentumObserver(gain="fast")),
     "kalman": ("r_diag has 2", lambda: vft.KalmanObserver(r_diag=[1, 2]).estimate(TERMS)),
     "omega": ("one number", lambda: vft.FilteredDynamicsObserver(omega=[1, 2])),

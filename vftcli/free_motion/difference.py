@@ -12,7 +12,7 @@ import numpy as np
 from vftcli.free_motion.paired_runs import PairedRuns, Pairing, by_phase
 from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
 from vftcli.robots.run import Run, signal_edge
-from vftcli.signals.arrays import Array, Mask, at, empty_series
+from vftcli.signals.arrays import Array, Mask, empty_series
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 from vftcli.signals.remarks import Remark, fact
@@ -303,6 +303,11 @@ def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
     clock = step * np.arange(len(noise), dtype=float)
     smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)
     return np.quantile(off_line(smooth, size), QUIET) / np.mean(smooth**2)
+
+
+def at(chosen: Mask, x: Array) -> Array:
+    """The chosen samples (T,) of a series (T, n), its columns contiguous. (S, n)"""
+    return np.compress(chosen, x.T, axis=1).T
 
 
 def rms(x: Array, where: Mask) -> Array:

@@ -4,10 +4,9 @@ from abc import abstractmethod
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, frozen, handed_over, number_array, seal
-from vftcli.signals.errors import ShapeError
+from vftcli.signals.arrays import Array, handed_over, seal
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.shown import Shown, record
@@ -36,19 +35,15 @@ class Observer(Protocol):
     @property
     def name(self) -> str:
         """Its name at the command line."""
-        ...
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Run over a whole log."""
-        ...
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """Meaning of the parameters at a sample time. [s]"""
-        ...
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
-        ...
 
 
 class BlockObserver(Shown):
@@ -72,15 +67,6 @@ class BlockObserver(Shown):
     def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
         """An estimate (T, n) [N·m] under the observer's name, its array for good."""
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), **more)
-
-
-def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
-    """A parameter as a list of numbers, one or one a joint. (1,) or (n,)"""
-    found = number_array(value, name, observer)
-    if found.ndim > 1:
-        words = f"{name} of {observer} has shape {found.shape}"
-        raise ShapeError(f"{words}; expected one number, or one a joint: (n,)")
-    return frozen(np.atleast_1d(found))
 
 
 def angular(frequency: Array) -> Array:

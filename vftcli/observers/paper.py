@@ -44,7 +44,7 @@ from vftcli.observers.kalman_model import (
     steady,
     update,
 )
-from vftcli.observers.observer import BlockObserver, Complex, Tuning, angular, numbers_of
+from vftcli.observers.observer import BlockObserver, Complex, Tuning, angular
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array, one_each
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, one_sample_earlier
@@ -190,9 +190,9 @@ class MomentumObserver(FirstOrderObserver):
     as_printed: bool = False  #: Feed back a sample late, as (35) is printed.
 
     def __post_init__(self) -> None:
-        gain = numbers_of(self.gain, "gain", self.name)
-        object.__setattr__(self, "gain", gain)
-        if not (np.isfinite(gain).all() and np.all(gain > 0)):
+        gain = np.atleast_1d(number_array(self.gain, "gain", self.name))
+        object.__setattr__(self, "gain", frozen(gain))
+        if not (np.isfinite(gain) & (gain > 0)).all():
             raise ParameterError(f"gmo.gain is {gain.tolist()} 1/s; every gain must be positive")
 
     def rates(self, joints: int) -> Array:
@@ -234,8 +234,7 @@ class KalmanObserver(BlockObserver):
     r_diag: Array | float = 0.5  #: R, one or one a joint. (n,) [(N·m·s)²·s under "density"]
     q_p_diag: Array | float = 0.01  #: Q_p. (n,) [(N·m)²·s]
     q_tau_diag: Array | float = 5000.0  #: Q_τ. (n,) [(N·m)²/s]
-    #: a in A_τ = −a, of either sign. (n,) [1/s]
-    decay: Array | float = 0.0
+    decay: Array | float = 0.0  #: a in A_τ = −a, of either sign. (n,) [1/s]
     noise_convention: str = "density"  #: A key of `NOISE_CONVENTIONS`.
     #: Use μᵗ alone (40), the literal noise convention, (44)'s printed block.
     as_printed: bool = False
@@ -245,12 +244,12 @@ class KalmanObserver(BlockObserver):
         check_known(scheme, SCHEMES, f"discretisation {scheme!r}")
         check_known(convention, NOISE_CONVENTIONS, f"kfo.noise_convention is {convention!r}")
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
-            value = numbers_of(getattr(self, name), name, self.name)
+            value = np.atleast_1d(number_array(getattr(self, name), name, self.name))
             # The paper gives A_τ = −a, its tables a: either sign means this decay.
-            value = frozen(abs(value)) if name == "decay" else value
-            object.__setattr__(self, name, value)
-            least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0
-            if not (np.isfinite(value).all() and least_allowed.all()):
+            value = abs(value) if name == "decay" else value
+            object.__setattr__(self, name, frozen(value))
+            allowed = (value > 0) | ((value == 0) & (name in {"q_p_diag", "decay"}))
+            if not (np.isfinite(value) & allowed).all():
                 raise ParameterError(
                     f"kfo.{name} is {value.tolist()}; R and Q_τ must be positive, Q_p and "
                     "decay must not be negative"

@@ -18,10 +18,7 @@ Indices = NDArray[np.int64]  #: Numbers of rows or samples, counted from 0.
 
 
 def frozen(value: ArrayLike, kind: type = float) -> Array:
-    """A read-only array that nobody else can write to; not copied where it is one.
-
-    Of float64, or as a mask of `bool`, non-zero true.
-    """
+    """A read-only array of float64, or a mask, that nobody else can write to; itself if it is."""
     if isinstance(value, np.ndarray) and value.dtype == kind and is_sealed(value):
         return value
     return handed_over(np.array(value, kind, order="K"))
@@ -50,8 +47,7 @@ def release(memory: object) -> None:
 def trim() -> None:
     """Give free memory back to the system, where the C library has a call for it.
 
-    Otherwise it keeps what lies between arrays in use: a long log's report held a tenth
-    more.
+    Otherwise it keeps what lies between arrays in use: a long log's report held a tenth more.
     """
     import ctypes
 
@@ -109,11 +105,6 @@ def one_each(value: ArrayLike, count: int, what: str, each: str = "joints") -> A
 def empty_series(samples: int, columns: int) -> Array:
     """An uninitialised (T, n) array of contiguous columns."""
     return np.empty((columns, samples)).T
-
-
-def at(chosen: Mask, x: Array) -> Array:
-    """The chosen samples (T,) of a series (T, n), its columns contiguous. (S, n)"""
-    return np.compress(chosen, x.T, axis=1).T
 
 
 def check_clock(t: Array, what: str) -> None:
