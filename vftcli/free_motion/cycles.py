@@ -323,22 +323,21 @@ def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
     freest = int(residual.argmin())
     times = pair_with_cycle(motion, cycles, freest, cycles.period).times
     first, last = motion.t.searchsorted(np.add(cycles.span(freest), (-SETTLES, SETTLES)))
-    free = motion.part(slice(int(first), int(last)))
-    also = []
+    free = motion.part(slice(first, last))
+    also = [freest]
     for cycle in np.flatnonzero(np.isfinite(residual)).tolist():
         inside = np.flatnonzero(number == cycle)
-        span = slice(int(inside[0]), int(inside[-1]) + 1)
+        span = slice(inside[0], inside[-1] + 1)
         if cycle != freest:
             pair = PairedRuns(motion=motion.part(span), pairings=[Pairing(free, times[span])])
             found = difference(pair, "model", signal_edge(pair.motion.step))
             shown = found.error.rms_moving(found.tau)
-            if not np.all(shown <= ALIKE * found.error.floor_moving):
-                continue
-        also.append(cycle)
+            if np.all(shown <= ALIKE * found.error.floor_moving):
+                also.append(cycle)
     if len(also) == cycles.whole > 1:
         # Something must be left that the free cycles can be paired with.
-        also.pop()
-    return FreeCycles(tuple(also), residual)
+        also.remove(max(also))
+    return FreeCycles(tuple(sorted(also)), residual)
 
 
 def residuals(motion: Run, cycles: Cycles) -> Array:

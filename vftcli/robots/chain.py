@@ -137,7 +137,7 @@ NO_BODY = Body(0.0, np.zeros(3), np.zeros((3, 3)))  #: That of a link without ma
 
 def merge_bodies(bodies: Sequence[Body]) -> Body:
     """One body of those that are joined rigidly, all in one frame (parallel axes)."""
-    mass = float(sum(body.mass for body in bodies))
+    mass = sum(body.mass for body in bodies)
     com = np.sum([body.mass * body.com for body in bodies], axis=0) / (mass or 1.0)
     inertias = [tensor + m * point_tensor(c - com) for m, c, tensor in bodies]
     return Body(mass, com, np.sum(inertias, axis=0))

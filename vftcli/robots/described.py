@@ -115,7 +115,7 @@ def load_described(path: Path, tip: str, arguments: Sequence[str]) -> Robot:
 def robot_of(lumped: LumpedArm, file: Section) -> Robot:
     """The robot of an arm: its chain and limits, the rest from the TOML beside it."""
     chain = lumped.chain
-    if why := weightless(float(chain.mass.sum())):
+    if why := weightless(chain.mass.sum()):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
     joints = matched_joints(file, chain, lumped.tree)
     rotor = column(joints, "rotor_inertia")

@@ -157,9 +157,9 @@ class Robot(Shown):
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "joint", "link mass [kg]", "K [N·m/A]", "friction", "speed limit [rad/s]"
         for j, name in enumerate(self.chain.names):
-            constant = None if self.torque_constant is None else float(self.torque_constant[j])
+            constant = None if self.torque_constant is None else self.torque_constant[j]
             model = self.friction[j].model if self.friction else "none"
-            mass, speed = float(self.chain.mass[j]), float(self.limits.qd_max[j])
+            mass, speed = self.chain.mass[j], self.limits.qd_max[j]
             yield f"J{j + 1} {name}", mass, constant, model, speed
 
     def to_polars(self) -> "pl.DataFrame":

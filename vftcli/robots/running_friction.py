@@ -114,11 +114,6 @@ class RunningFriction:
             self.friction, dq, load, deflection=self.deflection(q), temperature=temperature
         )
 
-    @property
-    def takes_load(self) -> bool:
-        """Whether the torque grows with what the gears carry, so that `load` matters."""
-        return any(joint.parameters.get("load_coulomb", 0.0) for joint in self.friction)
-
     def deflection(self, q: Array) -> Array | None:
         """State s of the play operator along the next angles; None without one."""
         if not self._joints:

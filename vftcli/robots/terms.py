@@ -108,7 +108,8 @@ class RunningTerms:
             momentum, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
             chunks = [(slice(0, len(q)), dq, [momentum, coriolis - gravity, gravity])]
         else:
-            wanted = ("p", "bias", *["gravity"] * self._friction.takes_load)
+            loaded = any(joint.parameters.get("load_coulomb") for joint in self.robot.friction)
+            wanted = ("p", "bias", *["gravity"] * loaded)
             chunks = momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
         for span, velocity, (momentum, bias, *loads) in chunks:
             p[span] = momentum

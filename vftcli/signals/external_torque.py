@@ -82,7 +82,7 @@ class DynamicsTerms(Shown):
     @property
     def last(self) -> Instant:
         """The last sample, which is the one before the next block's first."""
-        return Instant(float(self.t[-1]), self.p[-1], self.mu[-1])
+        return Instant(self.t[-1], self.p[-1], self.mu[-1])
 
     @property
     def joints(self) -> int:
@@ -142,7 +142,7 @@ class ExternalTorque(TimeSeries):
             sd = None if self.error_sd is None else self.error_sd[known, j]
             sizes: tuple[float | None, float | None] = (None, None)
             if len(tau):
-                sizes = root_mean_square(tau), float(abs(tau).max())
+                sizes = root_mean_square(tau), abs(tau).max()
             band = None if sd is None or not len(sd) else COVERS * root_mean_square(sd)
             yield f"J{j + 1}", *sizes, band, f"{known.mean():.0%}"
 

@@ -197,8 +197,7 @@ class Recording(TimeSeries):
         yield "signal", "what it is", "columns", "least", "most"
         for name in self.signals:
             values = getattr(self, name)
-            least, most = float(values.min()), float(values.max())
-            yield name, MEANINGS[name], values.shape[1], least, most
+            yield name, MEANINGS[name], values.shape[1], values.min(), values.max()
 
     def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
         """Every signal's columns, as ``q/1``, as `vftcli convert` writes them."""

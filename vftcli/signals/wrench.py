@@ -142,7 +142,7 @@ class Wrench(TimeSeries):
         for k, axis in enumerate(AXES):
             values, sd = self.values[sure, k], None if self.sd is None else self.sd[sure, k]
             figures = (values.min, values.max, None if sd is None else sd.max)
-            yield axis, unit_of(axis), *(float(f()) if f and sure.any() else None for f in figures)
+            yield axis, unit_of(axis), *(f() if f and sure.any() else None for f in figures)
 
     def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
         """Every axis, as ``wrench/best/fx``, and its standard deviation."""
@@ -188,9 +188,9 @@ class Wrench(TimeSeries):
 
         Where there is no force it is the largest of the axes', since F may point anywhere.
         """
-        if self.known_sd is None:
+        if self.sd is None:
             return None
-        sd, size = self.known_sd[:, :3], self.size
+        sd, size = self.sd[:, :3], self.size
         along = self.force / np.where(size > 0.0, size, 1.0)[:, None]
         found: Array = np.sqrt(np.sum((along * sd) ** 2, axis=1))
         found[size == 0.0] = sd[size == 0.0].max(axis=1)
