@@ -146,6 +146,8 @@ def test_gains_that_do_as_well_are_not_called_off_the_best() -> None:
 def test_what_is_measured_takes_the_place_of_what_was_expected(analysis: Analysis) -> None:
     rows = [("best", 1, 0.5), ("best", 2, 1.5), ("gmo", 1, 2.0), ("gmo", 2, 4.0), ("gmo", 3, None)]
     errors = pl.DataFrame(rows, schema=["observer", "joint", "rmse_Nm"], orient="row")
+    unknown = dict.fromkeys(("l1_Nm", "reference_rms_Nm", "reference_floor_Nm"), pl.lit(None))
+    errors = errors.with_columns(reference_trusted=pl.lit(True), **unknown)
     other = fact("band")
     before = (gaps(analysis)[0], other)
     after = with_measured_gap(before, errors, analysis.tunings)
