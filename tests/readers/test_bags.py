@@ -169,6 +169,17 @@ def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path: Path) -> None:
     assert_is_the_motion(read(changed_index(rosbag1(tmp_path / "x"), lambda _: b"")))
 
 
+def test_a_bag_cut_within_the_index_of_a_chunk_is_read(tmp_path: Path) -> None:
+    """Behind each chunk is a record of index a topic; the last one is gone."""
+    path = rosbag1(tmp_path / "x")
+    content = path.read_bytes()
+    places = [k for k in range(len(content)) if content.startswith(b"op=\x04", k)]
+    path.write_bytes(content[: places[3] - 8])  # before its header's and its first field's length
+    recording = read(path)
+    np.testing.assert_array_equal(recording.q, motion(7)["q"][: recording.samples])
+    assert [r.code for r in recording.source.remarks if r.level == "warning"] == ["chunks-missing"]
+
+
 @pytest.mark.parametrize("by", [1, 100, 2**31])
 def test_an_index_that_points_elsewhere_is_damage(tmp_path: Path, by: int) -> None:
     def moved(record: bytes) -> bytes:

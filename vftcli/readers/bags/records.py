@@ -124,6 +124,7 @@ def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
                 starts, indexed = [], []
                 counts.chunks += 1
             elif kind == CHUNK_INFO:
+                _check_index(starts, indexed, budget)
                 chunks += 1
                 counted += sum(count for _, count in struct.iter_unpack("<II", data))
                 counts.counted = counted if chunks == counts.counted_chunks else None
@@ -136,7 +137,6 @@ def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
                 counts.counted_chunks = found if counts.closed else None
             else:
                 raise budget.error("an unknown record; the bag is damaged.")
-        _check_index(starts, indexed, budget)
     counts.report(budget, len(file.content), "its index")
 
 
