@@ -8,7 +8,8 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import polars as pl
 
 from vftcli.outputs import Record
 from vftcli.outputs.files import (
@@ -23,9 +24,6 @@ from vftcli.outputs.files import (
 from vftcli.outputs.partial import check_writable, held
 from vftcli.outputs.run_record import to_json
 from vftcli.signals.errors import OutputError
-
-if TYPE_CHECKING:
-    import polars as pl
 
 #: What the rows of a folder were made with; the first file of a batch to come.
 MARKER = "batch.json"
@@ -104,17 +102,15 @@ class BatchFolder:
         found = self.rows.glob("*/*.parquet") if self.rows.is_dir() else ()
         return {path.stem for path in found}
 
-    def put_rows(self, key: str, rows: "pl.DataFrame") -> None:
+    def put_rows(self, key: str, rows: pl.DataFrame) -> None:
         """Write a log's rows: with them its result is complete."""
         path = self.row_file(key)
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic(path, force=True) as temporary, table_file(temporary) as file:
             rows.write_parquet(file, compression="zstd", statistics=False)
 
-    def gather(self, logs: "pl.DataFrame", schema: Record) -> "Iterator[pl.DataFrame]":
+    def gather(self, logs: pl.DataFrame, schema: Record) -> Iterator[pl.DataFrame]:
         """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first."""
-        import polars as pl
-
         for part in logs.iter_slices(PIECE) if logs.height else (logs,):
             files = [self.row_file(key) for key in part["key"].unique(maintain_order=True)]
             rows = pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
@@ -122,13 +118,12 @@ class BatchFolder:
 
     def put_gathered(
         self,
-        tables: "Iterable[pl.DataFrame]",
-        failures: "pl.DataFrame",
+        tables: Iterable[pl.DataFrame],
+        failures: pl.DataFrame,
         page: Callable[[], str],
         record: Record,
     ) -> None:
         """Write the tables, a row group a piece, and the page, and at last their seal."""
-        import polars as pl
         from pyarrow.parquet import ParquetWriter
 
         (self.path / SEAL).unlink(missing_ok=True)

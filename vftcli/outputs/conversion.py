@@ -13,7 +13,7 @@ channel of JSON messages in a ros2 file ends rosbags' reader.
 
 import json
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
@@ -41,6 +41,8 @@ from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from vftcli.simulation.experiment import Simulation
 
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
@@ -222,21 +224,20 @@ def check_conversion(path: Path, force: bool) -> None:
     check_file(path, force)
 
 
-def columns_of(recording: Recording) -> Iterator[tuple[str, Any]]:
-    """Name and values of every column: t from 0, the source's own stamps, then the signals.
+def flat_table(recording: Recording) -> "pl.DataFrame":
+    """A log as columns: t from 0, the source's own stamps, then the signals.
 
     The names are among the aliases of the table reader, so that the file reads back.
     """
-    yield "t", recording.t
+    import polars as pl
+
     # Whole numbers: a float of today's date in seconds is exact to 240 ns only.
-    yield "t_src_ns", source_stamps(recording)
-    yield from recording.columns()
+    clocks = {"t": recording.t, "t_src_ns": source_stamps(recording)}
+    return pl.DataFrame({**clocks, **dict(recording.columns())})
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
     """Write flat columns, zstd; what has no column (joint names, frame) is in the metadata."""
-    import polars as pl
-
     frame = recording.wrench_frame
     metadata = {
         "format": recording.source.format,
@@ -247,16 +248,13 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "repairs": list(map(str, recording.source.repairs)),
     }
     stated = {"wrench": StatedFrame(str(frame), frame.sign)} if frame is not None else None
-    table = pl.DataFrame(dict(columns_of(recording)))
-    put_table(path, table, stated, metadata={"vftcli": json.dumps(metadata)})
+    put_table(path, flat_table(recording), stated, metadata={"vftcli": json.dumps(metadata)})
 
 
 def write_csv(recording: Recording, path: Path) -> None:
     """Write flat columns as CSV, every number with the digits that restore it exactly."""
-    import polars as pl
-
     with table_file(path) as file:
-        pl.DataFrame(dict(columns_of(recording))).write_csv(file)
+        flat_table(recording).write_csv(file)
 
 
 def write_messages(recording: Recording, path: Path) -> None:

@@ -209,11 +209,12 @@ def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
     """Every further table of the RMSE table's shape that has something to say."""
     for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
         columns = *words("observer"), *joint_columns(group["joint"].unique().sort().to_list())
-        found: dict[str, list[tuple[str, ...]]] = {}
-        for row in group.iter_rows(named=True):
-            found.setdefault(row["observer"], []).append(details(row))
+        found = {
+            name: list(zip(*map(details, own.iter_rows(named=True)), strict=True))
+            for (name,), own in group.group_by("observer", maintain_order=True)
+        }
         for k, title in enumerate(DETAILS):
-            rows = [(name, *(texts[k] for texts in each)) for name, each in found.items()]
+            rows = [(str(name), *texts[k]) for name, texts in found.items()]
             if any(set(texts) != {DASH} for _, *texts in rows):
                 yield Grid(columns, rows, f"{group['recording'][0]}: {title}", swatches=True)
 

@@ -111,10 +111,7 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
     """
     step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
-    styles = observer_styles(analysis)
-    lines: dict[tuple[str, str], list[ChartLine]] = {
-        ("Gain", "dB"): [], ("Phase", "°"): [], ("Delay", "ms"): []
-    }  # fmt: skip
+    styles, lines = observer_styles(analysis), []
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)[:, :1]
         # Unwrapped, or a delay would jump by a period wherever the phase passes −180°.
@@ -122,12 +119,13 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
         decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
         # A phase of −φ degrees at f is a delay of φ / (360 f).
         delay = -1e3 * phase / (360.0 * frequency[:, None])
-        for own, values in zip(lines.values(), (decibel, phase, delay), strict=True):
-            own.append(ChartLine(observer.name, values, *styles[observer.name]))
+        name, each = observer.name, (decibel, phase, delay)
+        lines.append([ChartLine(name, values, *styles[name]) for values in each])
+    kinds = (("Gain", "dB", LOWEST), ("Phase", "°", None), ("Delay", "ms", None))
     return tuple(
         Chart(title.lower(), title, (unit,), (f"{title}, joint 1",), frequency, tuple(own),
-              unit="Hz", log=True, lowest=LOWEST if unit == "dB" else None)
-        for (title, unit), own in lines.items()
+              unit="Hz", log=True, lowest=lowest)
+        for (title, unit, lowest), own in zip(kinds, zip(*lines, strict=True), strict=True)
     )  # fmt: skip
 
 
