@@ -345,11 +345,13 @@ def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -
 def known_contacts(analysis: Analysis, choice: AnalysisChoice) -> "KnownContacts":
     """What is known of the log's contacts: its list, and where nothing touches the arm."""
     from vftcli.contacts.free_statistics import free_part
-    from vftcli.wrench.detection import KnownContacts, read_in_free_runs
+    from vftcli.wrench.detection import ContactInterval, KnownContacts, read_in_free_runs
 
     motion, rows = unloaded_motion(analysis.motion, choice), analysis.contacts
     part = free_part(motion)
-    listed = {} if rows is None else {BEST: rows.contacts}
+    listed = (
+        {} if rows is None else {BEST: [ContactInterval(c.start, c.stop) for c in rows.contacts]}
+    )
     if part is None:
         return KnownContacts(untouched=np.zeros(len(motion.log.t), bool), listed=listed)
     others = [] if part.own.any() else [p for p in part.pieces if p.run is not motion.log]

@@ -124,7 +124,7 @@ RELEASE = ("--release", "x=0.3", "--robot", "ur5")
         ((*RELEASE, "--alpha", "one"), 1, "is not a list of numbers"),
         ((*RELEASE, "--set", "admittance.xi=0"), 1, "xi of axis x is 0; it must be positive"),
         ((*RELEASE, "--set", "position.mass=0"), 1, "mass of axis x is 0"),
-        ((*RELEASE, "--set", "rx.K=-1"), 1, "stiffness of axis rx is -1"),
+        ((*RELEASE, "--set", "rx.stiffness=-1"), 1, "stiffness of axis rx is -1"),
         ((*RELEASE, "--set", "rx.threshold=nan"), 1, "no admittance threshold for rx"),
         ((*RELEASE, "--set", "foo.mass=3"), 1, "--set foo.mass is no setting here"),
         ((*RELEASE, "--set", "period=0.5"), 1, "= 4.25 must be below 4"),

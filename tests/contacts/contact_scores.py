@@ -12,7 +12,7 @@ import numpy as np
 from vftcli.contacts.contact_list import Contact
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import intervals
-from vftcli.wrench.detection import assignment, overlaps
+from vftcli.wrench.detection import ContactInterval, assignment, overlaps
 
 LEAST_FORCE, LEAST_MOMENT, GAP = 1.0, 0.2, 0.12
 
@@ -59,7 +59,8 @@ def true_contacts(t: Array, wrench: Array) -> list[TrueContact]:
 
 def score(rows: Sequence[Contact], true: Sequence[TrueContact]) -> Score:
     """Credit each row to one true contact; false is what overlaps none."""
-    given, shared = assignment(rows, true), overlaps(rows, true)
+    both = [[ContactInterval(x.start, x.stop) for x in some] for some in (rows, true)]
+    given, shared = assignment(*both), overlaps(*both)
     pairs = [(rows[i], met) for i, met in zip(given, true, strict=True) if i is not None]
     missed = [met for i, met in zip(given, true, strict=True) if i is None]
     false = [row for row, lies in zip(rows, shared, strict=True) if not lies.any()]

@@ -4,7 +4,7 @@ A contact is where a wrench or a joint torque leaves its free band, what is read
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,18 +84,6 @@ def departure(values: Array, quiet: Array, least: Array | float) -> Array:
     return np.asarray(np.nan_to_num(abs(values - centre) / half, nan=0.0).max(axis=1))
 
 
-class Interval(Protocol):
-    """Anything with a beginning and an end: a found interval, a listed contact, a true one."""
-
-    @property
-    def start(self) -> float:
-        """When it begins. [s]"""
-
-    @property
-    def stop(self) -> float:
-        """When it ends. [s]"""
-
-
 class Detection(NamedTuple):
     """How well found contacts agree with the true ones, one to one."""
 
@@ -126,15 +114,17 @@ class Detection(NamedTuple):
         return float(np.fmax.reduce(self.delay, initial=np.nan))
 
 
-def overlaps(found: Sequence[Interval], true: Sequence[Interval]) -> Array:
+def overlaps(found: Sequence[ContactInterval], true: Sequence[ContactInterval]) -> Array:
     """How long each found contact lies on each true one, within `EARLY` of it. (F, C) [s]"""
-    begin, end = np.reshape([(f.start, f.stop) for f in found], (-1, 2)).T[:, :, None]
-    first, last = np.reshape([(c.start, c.stop) for c in true], (-1, 2)).T
+    begin, end = np.reshape([*found], (-1, 2)).T[:, :, None]
+    first, last = np.reshape([*true], (-1, 2)).T
     shared = np.minimum(end, last + EARLY) - np.maximum(begin, first - EARLY)
     return np.asarray(np.maximum(shared, 0.0))
 
 
-def assignment(found: Sequence[Interval], true: Sequence[Interval]) -> list[int | None]:
+def assignment(
+    found: Sequence[ContactInterval], true: Sequence[ContactInterval]
+) -> list[int | None]:
     """Of each true contact the number of the found one that is credited to it, None if missed.
 
     A found contact is credited to one true contact, so that as many as possible are
@@ -154,7 +144,7 @@ def assignment(found: Sequence[Interval], true: Sequence[Interval]) -> list[int 
 
 
 def match_contacts(
-    found: Sequence[Interval], true: Sequence[Interval], duration: float
+    found: Sequence[ContactInterval], true: Sequence[ContactInterval], duration: float
 ) -> Detection:
     """Match found contacts one to one with the true ones of a log that lasts `duration` [s].
 
@@ -196,7 +186,7 @@ class KnownContacts(NamedTuple):
     #: What each observer reads in free runs of other logs, by name. (S, k) each
     beside: Mapping[str, Array] = {}
     #: Contacts of a list, by the observer that gave the wrench.
-    listed: Mapping[str, Sequence[Interval]] = {}
+    listed: Mapping[str, Sequence[ContactInterval]] = {}
 
 
 def read_in_free_runs(

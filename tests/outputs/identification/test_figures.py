@@ -1,4 +1,3 @@
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -27,5 +26,5 @@ def test_torque_measured_and_predicted_and_what_is_left(found: Any) -> None:
 
 def test_without_logs_there_is_nothing_to_draw(found: Any) -> None:
     identified, _ = found
-    bare = replace(identified, traces=(), residuals=identified.residuals.clear())
+    bare = identified._replace(traces=(), residuals=identified.residuals.clear())
     assert identification_figures(bare) == {}

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import polars as pl
 import pytest
 
@@ -26,7 +24,7 @@ def test_two_logs_of_one_label_are_two_rows(found):
     """They were one row of twelve numbers for six joints."""
     result, _ = found
     second = result.residuals.with_columns(log_index=pl.col("log_index") + 10)
-    both = replace(result, residuals=pl.concat([result.residuals, second]))
+    both = result._replace(residuals=pl.concat([result.residuals, second]))
     rows = residual_grid(both).rows
     assert len(rows) == 2 * len(residual_grid(result).rows)
     assert {len(row) for row in rows} == {8}
@@ -35,7 +33,7 @@ def test_two_logs_of_one_label_are_two_rows(found):
 def test_what_the_log_does_not_determine_is_said(found):
     result, _ = found
     doubted = result.parameters.with_columns(determined=pl.lit(False))
-    lines = terminal(parameter_grid(replace(result, parameters=doubted))).splitlines()
+    lines = terminal(parameter_grid(result._replace(parameters=doubted))).splitlines()
     assert lines[0].split() == ["number", "joint", "value", "sd", "profile", "unit"]
     assert all(line.endswith("  (not determined)") for line in lines[1:])
 
@@ -44,7 +42,7 @@ def test_what_is_no_number_is_a_dash(found):
     """A profile without a term read "nan", a spread that nothing bounds "inf"."""
     result, _ = found
     unknown = result.parameters.with_columns(profile=pl.lit(float("nan")), sd=pl.lit(float("inf")))
-    lines = terminal(parameter_grid(replace(result, parameters=unknown))).splitlines()[1:]
+    lines = terminal(parameter_grid(result._replace(parameters=unknown))).splitlines()[1:]
     assert all(line.count(" –") == 2 for line in lines)
     assert not any(word in line for line in lines for word in ("nan", "inf"))
 
@@ -65,7 +63,7 @@ def test_the_chosen_friction_is_marked():
 
 def test_what_was_not_identified_has_no_table(found):
     result, _ = found
-    bare = replace(result, residuals=result.residuals.clear(), parameters=result.parameters.clear())
+    bare = result._replace(residuals=result.residuals.clear(), parameters=result.parameters.clear())
     assert tables_text(bare) == ""
-    only = replace(result, residuals=result.residuals.clear())
+    only = result._replace(residuals=result.residuals.clear())
     assert tables_text(only).startswith("number ")
