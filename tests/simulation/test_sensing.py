@@ -77,7 +77,7 @@ def test_a_seed_is_zero_or_positive() -> None:
 def test_rows_that_are_logged_twice_are_dropped_and_counted(count: int, code: str) -> None:
     run = circle("duration=0.1")
     rows = tuple(sorted([*run.measured.rows, *run.measured.rows[:count]]))
-    log = replace(run, measured=run.measured._replace(rows=rows)).recording
+    log = run._replace(measured=run.measured._replace(rows=rows)).recording
     np.testing.assert_array_equal(log.q, run.recording.q)
     assert (log.source.rows, log.source.duplicates) == (len(rows), count)
     assert [remark.code for remark in log.source.remarks] == [code]

@@ -5,7 +5,6 @@ and checked as if they were typed. What is used is said, and is in the command l
 `run.json`.
 """
 
-import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from contextvars import ContextVar
@@ -96,12 +95,6 @@ def kept_words(ctx: Click, args: Sequence[str]) -> tuple[Path, list[str]] | None
             elif one is not None:  # what begins with a dash follows =
                 words += [f"--{key}={one}"] if one.startswith("-") else [f"--{key}", one]
     return path, words
-
-
-def say_kept(path: Path, words: Sequence[str]) -> None:
-    """Say what a file gives a command."""
-    said = shlex.join(words) or "nothing that this command takes and is not typed"
-    echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
 
 
 def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401

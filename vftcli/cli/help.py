@@ -3,6 +3,7 @@
 Nothing here loads more than the command line itself, so that help comes at once.
 """
 
+import shlex
 import shutil
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -24,7 +25,6 @@ from vftcli.cli.config import (
     every_command,
     is_configured,
     kept_words,
-    say_kept,
 )
 from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
@@ -61,7 +61,9 @@ class GroupedCommand(TyperCommand):
                 vars(error)["possibilities"] = [near] if near else None
             raise
         if kept:
-            say_kept(*kept)
+            said = shlex.join(kept[1]) or "nothing that this command takes and is not typed"
+            words = f"note: {kept[0]} gives {said} (--config none: without it)"
+            echo(printable(words), err=True)
         return rest
 
     def option(self, param: Click) -> Option:

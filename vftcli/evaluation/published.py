@@ -1,7 +1,7 @@
 """The error table that the paper prints, beside one's own log."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import polars as pl
@@ -15,8 +15,7 @@ from vftcli.signals.remarks import Remark, fact, on_joints
 SAME_FILTER = 1e-6
 
 
-@dataclass(frozen=True, kw_only=True)
-class Published:
+class Published(NamedTuple):
     """An RMSE table from print."""
 
     title: str  #: Its name and content.
@@ -38,8 +37,7 @@ TABLE_1 = Published(
 TABLES = {"table1": TABLE_1}  #: Name at the command line → printed table.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
+class Comparison(NamedTuple):
     """Printed numbers beside computed ones."""
 
     published: Published  #: The printed table.

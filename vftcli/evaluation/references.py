@@ -1,7 +1,7 @@
 """Reference torques, their sources, and estimates beside them: one table of errors."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -114,8 +114,7 @@ def touched_remarks(run: Run) -> tuple[Remark, ...]:
     return (warning("reference-zero-touched", where, **values),)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReferenceLoad:
+class ReferenceLoad(NamedTuple):
     """Torque and wrench that estimates are judged by, on the log's clock."""
 
     torque: ExternalTorque  #: The reference torque of every joint.

@@ -1,7 +1,7 @@
 """The simulated arm with its servo and its contacts, one inner step at a time."""
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -86,8 +86,7 @@ def rigid_torque(model: Any, reference: Reference) -> Array:  # noqa: ANN401
     return out
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrueArm:
+class TrueArm(NamedTuple):
     """The arm as it is, beside the robot the controller and the observers believe in."""
 
     chain: Chain  #: Geometry and inertia, payload and sensor mounted.

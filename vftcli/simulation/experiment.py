@@ -1,6 +1,6 @@
 """One simulated experiment from scenario and seed to the log and its truth."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,8 +31,7 @@ MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gi
 PAIR_SEED = 1_000_003
 
 
-@dataclass(frozen=True, kw_only=True)
-class Truth:
+class Truth(NamedTuple):
     """True torques and wrenches at each sample, on the log's clock."""
 
     t: Array  #: Time since the log's first sample, on its clock without jitter. (M,) [s]
@@ -53,8 +52,7 @@ class Truth:
         return table
 
 
-@dataclass(frozen=True, kw_only=True)
-class Simulation:
+class Simulation(NamedTuple):
     """A finished run."""
 
     scenario: Scenario  #: The experiment.

@@ -163,7 +163,11 @@ def controller_signals(
     torque = measured["torque"] if K is None else measured["current"] * K
     spec = arm.scenario.sensing
     step = 1.0 / log_rate(spec, arm.robot)
-    residual = first_order_low_pass(torque - model_torque, spec.vendor_cutoff, step)
+    # A first-order low-pass, exact for an input held over the step.
+    share, residual = 1.0 - np.exp(-2.0 * np.pi * spec.vendor_cutoff * step), torque - model_torque
+    one = np.ones((1, residual.shape[1]))
+    slow = (1.0 - share) * one[None], share * one
+    residual, _ = steady_filter(*slow, residual, residual[:1], one)
     return signals | {
         "target_q": samples.target_q,
         "target_dq": samples.target_dq,
@@ -171,14 +175,6 @@ def controller_signals(
         "tau_ext": -residual,
         "temperature": warm,
     }
-
-
-def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
-    """First-order low-pass at `cutoff` [Hz] of a signal (M, n) sampled every `step` [s]."""
-    # Exact discretisation of the first-order filter for an input held over the step.
-    share = 1.0 - np.exp(-2.0 * np.pi * cutoff * step)
-    one = np.ones((1, signal.shape[1]))
-    return steady_filter((1.0 - share) * one[None], share * one, signal, signal[:1], one)[0]
 
 
 def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None:
