@@ -227,7 +227,8 @@ class Unexplained(NamedTuple):
     at: float  #: When. [s]
 
 
-class ContactModel(NamedTuple):
+@record
+class ContactModel(Shown):
     """Noise model behind a list, for `run.json`."""
 
     #: How the wrench of the contacts moves, None where it was not learned.

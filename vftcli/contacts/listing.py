@@ -284,7 +284,9 @@ def without_list(run: Run) -> ContactList:
         contacts=(),
         basis="none",
         unexplained=Unexplained(float(torque[k, j]), int(j) + 1, float(run.t[k])),
-        model=ContactModel(None, unknown, unknown, unknown, np.nan),
+        model=ContactModel(
+            prior=None, noise_sd=unknown, error_sd=unknown, error_time=unknown, block=np.nan
+        ),
     )
 
 

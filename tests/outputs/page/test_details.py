@@ -60,7 +60,7 @@ def test_the_details_hold_every_number(found: ContactList) -> None:
     pairs = model_pairs(found)
     assert pairs["basis"] == "free motion"
     assert pairs["free motion"].endswith(" s")
-    unknown = found.model._replace(noise_sd=np.full(6, np.nan), prior=None)
+    unknown = replace(found.model, noise_sd=np.full(6, np.nan), prior=None)
     assert "nan" not in str(model_pairs(replace(found, model=unknown)))
 
 
