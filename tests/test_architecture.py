@@ -269,14 +269,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 54_417,
-    "files": 240,
-    "functions": 2925,
+    "lines of Python": 53_092,
+    "files": 239,
+    "functions": 2845,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 389_701,
-    "characters a line that is not blank": 50.92,
-    "noqa": 95,
-    "lines of TOML, JavaScript, CSS": 7463,
+    "names, operators, numbers": 376_072,
+    "characters a line that is not blank": 50.89,
+    "noqa": 81,
+    "lines of TOML, JavaScript, CSS": 7454,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 

@@ -141,14 +141,18 @@ def test_the_notebook_is_small_and_its_words_quote_its_cells() -> None:
 
 def test_the_notebook_says_that_it_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("VFT_LOGS", raising=False)
-    with pytest.raises(SystemExit, match="VFT_LOGS names no folder of logs: this story is skipped"):
+    with pytest.raises(
+        SystemExit, match="VFT_LOGS names no folder of logs: this story is skipped"
+    ):
         run_cells(json.loads(NOTEBOOK.read_text("utf-8")))
 
 
 def as_typed(path: Path) -> list[str]:
     """Every vftcli command of a document: of its blocks, and within its sentences."""
     text = path.read_text("utf-8").replace("\\\n", " ").replace("\\|", "|")
-    fenced = re.findall(r"^```(?:sh|bash|text|console)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    fenced = re.findall(
+        r"^```(?:sh|bash|text|console)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+    )
     lines = re.findall(r"(?:^|&& (?:\S*/)?)(?:\$ )?(vftcli .*)$", "\n".join(fenced), re.MULTILINE)
     return [*lines, *re.findall(r"`(vftcli [^`]+)`", text)]
 

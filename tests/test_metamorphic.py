@@ -105,7 +105,9 @@ def table(path: Path) -> Numbers:
         values = values[np.isfinite(values)]
         found[f"{column.name} samples"] = float(len(values))
         found[f"{column.name} mean"] = float(values.mean()) if len(values) else np.nan
-        found[f"{column.name} rms"] = float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
+        found[f"{column.name} rms"] = (
+            float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
+        )
     return found
 
 

@@ -88,7 +88,8 @@ def test_the_log_must_settle_its_robot_or_be_reported() -> None:
 
 def test_an_interval_keeps_the_logs_own_time() -> None:
     analysis = analyse_log(
-        FIXTURE, AnalysisChoice(read=ReadChoice(interval=(4.0, 8.0)), robot=RobotChoice(name="ur5"))
+        FIXTURE,
+        AnalysisChoice(read=ReadChoice(interval=(4.0, 8.0)), robot=RobotChoice(name="ur5")),
     )
     assert analysis.t[0] >= 4.0
     assert analysis.t[-1] <= 8.0
@@ -116,7 +117,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     for name, first, count in (("load", 700, 1000), ("free", 0, 520), ("more", 500, 520)):
         rows = [line.partition(" ")[2] for line in lines[first : first + count]]
         path = folder / f"{name}.csv"
-        path.write_text(head + "".join(f"{t} {row}" for t, row in zip(stamps, rows, strict=False)))
+        path.write_text(
+            head + "".join(f"{t} {row}" for t, row in zip(stamps, rows, strict=False))
+        )
         paths.append(path)
     return paths
 
@@ -247,7 +250,10 @@ def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_o
     record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
     assert record["input"]["derived"] == ["dq"]
     assert "derived-velocity" in {w["code"] for w in record["warnings"]}
-    for command in (["estimate", *words, "--causal", "-o", str(tmp_path / "o")], ["admit", *words]):
+    for command in (
+        ["estimate", *words, "--causal", "-o", str(tmp_path / "o")],
+        ["admit", *words],
+    ):
         with pytest.raises(MissingSignalError, match="need the complete log"):
             CliRunner().invoke(app, command, catch_exceptions=False)
     never = ["estimate", *words, "--set", "log.derive=none", "-o", str(tmp_path / "o")]

@@ -79,7 +79,9 @@ def readings(path: Path, reported: dict[str, Any]) -> Iterator[tuple[Recording, 
 
 def check_log(name: str, log: Recording, reported: dict[str, Any]) -> None:
     """Check the joints, the count, the clock, the signals, and their first and last values."""
-    joints = reported["joints"] if isinstance(reported["joints"], int) else len(reported["joints"])
+    joints = (
+        reported["joints"] if isinstance(reported["joints"], int) else len(reported["joints"])
+    )
     assert (log.joints, log.samples) == (joints, reported["samples"]), name
     assert 1 / log.median_step == pytest.approx(reported["rate_hz"], rel=1e-3), name
     np.testing.assert_allclose(log.t[[0, -1]], reported["t"], atol=2e-9, err_msg=name)

@@ -112,7 +112,9 @@ def with_wrench(folder: Path, *words: str) -> list[Any]:
 
 def robot_file(folder: Path, gravity: str = "[0.0, 0.0, -9.81]", more: str = "") -> str:
     """A copy of the UR5's profile with another gravity and more sections."""
-    text = re.sub(r"gravity = \[.*?\]", f"gravity = {gravity}", PROFILES["ur5"].read_text("utf-8"))
+    text = re.sub(
+        r"gravity = \[.*?\]", f"gravity = {gravity}", PROFILES["ur5"].read_text("utf-8")
+    )
     (folder / "my.toml").write_text(text + more, encoding="utf-8")
     return str(folder / "my.toml")
 
@@ -168,7 +170,9 @@ def sensed(folder: Path) -> list[Any]:
 def checked_thresholds(folder: Path) -> list[Any]:
     """Thresholds of half a minute that nobody touches, checked on a log of six seconds."""
     log = moving("ur5", seconds=30.0)
-    table = replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current"))
+    table = replace(
+        sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current")
+    )
     check = table.between(0.0, 6.0).write(folder / "check.csv")
     return ["thresholds", table.write(folder / "free.csv"), "--robot", "ur5", "--rate", "100",
             "--check", check]  # fmt: skip
@@ -198,7 +202,11 @@ def one_by_one(name: str, order: tuple[str, ...]) -> str:
 def gripping(plant: Callable[[Table], Table], kg: float, *words: str) -> Command:
     """A command on a planted log, the robot file with a gripper that is not mounted."""
     gripper = f"\n[payload.gripper]\nmass = {kg}\ncom = [0.0, 0.0, 0.05]\n"
-    return lambda folder: [*of(plant, *words)(folder), "--robot", robot_file(folder, more=gripper)]
+    return lambda folder: [
+        *of(plant, *words)(folder),
+        "--robot",
+        robot_file(folder, more=gripper),
+    ]
 
 
 THIRD_IN_DEGREES = np.array([1.0, 1.0, np.rad2deg(1.0), 1.0, 1.0, 1.0])
@@ -449,7 +457,9 @@ def test_every_remark_with_an_option_is_tried_or_says_why_not() -> None:
 def test_a_load_that_a_log_shows_is_found_and_mounted(tmp_path: Path) -> None:
     """The doctor's and the list's command, on a motion whose poses differ."""
     log = moving("ur5", load=2.8, seconds=12.0)
-    table = replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current"))
+    table = replace(
+        sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current")
+    )
     path, own = table.write(tmp_path / "log.csv"), tmp_path / "loaded.toml"
     said = reported("unmodelled-load", printed(["inspect", path, "--robot", "ur5"])[1])
     assert said is not None

@@ -52,7 +52,15 @@ def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
 
 def fixture(name: str, span: str, *words: str) -> Command:
     """A command on a part of a fixture of the UR5."""
-    return lambda _: [*words[:1], FIXTURES / name, "--robot", "ur5", "--interval", span, *words[1:]]
+    return lambda _: [
+        *words[:1],
+        FIXTURES / name,
+        "--robot",
+        "ur5",
+        "--interval",
+        span,
+        *words[1:],
+    ]
 
 
 def simulated(name: str, *words: str) -> Command:
@@ -350,7 +358,9 @@ def test_the_remedy_is_taken(row: Row, tmp_path: Path, monkeypatch: pytest.Monke
     assert row.code not in after
 
 
-def test_a_remedy_of_two_options_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_remedy_of_two_options_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A free run in the place of a period; a wrench left out with its solver."""
     monkeypatch.chdir(tmp_path)
     words = TOO_LONG(tmp_path)

@@ -31,7 +31,9 @@ FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 @pytest.fixture
 def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every table counts as a long log, in blocks of 320 samples."""
-    monkeypatch.setattr(importlib.import_module("vftcli.readers.delimited"), "BLOCK_BYTES", 1 << 16)
+    monkeypatch.setattr(
+        importlib.import_module("vftcli.readers.delimited"), "BLOCK_BYTES", 1 << 16
+    )
     monkeypatch.setattr(importlib.import_module("vftcli.readers.table"), "HELD", 1 << 14)
     monkeypatch.setattr(streaming, "WHOLE_ROWS", 0)
     monkeypatch.setattr(streaming, "PIECE", 320)
@@ -105,7 +107,15 @@ def test_interruption_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
         return whole(terms, block)
 
     monkeypatch.setattr(streaming.RunningTerms, "next", broken)
-    command = ["estimate", str(FIXTURE), "--robot", "ur5", "-o", str(tmp_path / "out"), "--causal"]
+    command = [
+        "estimate",
+        str(FIXTURE),
+        "--robot",
+        "ur5",
+        "-o",
+        str(tmp_path / "out"),
+        "--causal",
+    ]
     CliRunner().invoke(app, command)
     assert list(tmp_path.iterdir()) == []
 

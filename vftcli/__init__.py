@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     from vftcli.signals.external_torque import DynamicsTerms
     from vftcli.signals.recording import Recording
 else:
-    #: The modules in which a public name is looked for, those that load quickly first.
+    #: The modules in which a public name is looked for, those that load
+    #: quickly first.
     __getattr__ = door(
         __name__,
         "signals.errors",

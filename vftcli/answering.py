@@ -50,7 +50,9 @@ def errors_of(
         if a.reference is not None
     ]
     return marked(
-        pl.concat([e for e in (*errors, evaluate_pooled(judged)) if e is not None], how="diagonal"),
+        pl.concat(
+            [e for e in (*errors, evaluate_pooled(judged)) if e is not None], how="diagonal"
+        ),
         analyses,
     )
 

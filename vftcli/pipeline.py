@@ -98,7 +98,12 @@ KINDS: dict[str, type[Choice]] = {
 }
 
 
-def choice_of(asked: Asked, library: Library, examiner: Examiner, **others: Any) -> AnalysisChoice:  # noqa: ANN401
+def choice_of(
+    asked: Asked,
+    library: Library,
+    examiner: Examiner,
+    **others: Any,  # noqa: ANN401
+) -> AnalysisChoice:
     """What a command or a call asks of logs, with others of the choices."""
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.wrench.choice import WrenchChoice

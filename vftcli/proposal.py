@@ -56,7 +56,9 @@ def propose(
         yield from possible_robots(recording, error)
         return
     if "robot" not in given:
-        fits = [remark.values["fit"] for remark in robot.remarks if remark.code == "robot-guessed"]
+        fits = [
+            remark.values["fit"] for remark in robot.remarks if remark.code == "robot-guessed"
+        ]
         yield ProposedOption(f"by {fits[0]}" if fits else "the log names it", "robot", robot.name)
     if "log.effort" not in given:
         effort = effort_of(recording, robot, choice)
@@ -79,7 +81,9 @@ def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[Propo
         yield option
         free += [log] if option.holds else []
     if free:
-        yield ProposedOption("nothing touches the arm in them", "free", [str(log) for log in free])
+        yield ProposedOption(
+            "nothing touches the arm in them", "free", [str(log) for log in free]
+        )
     choice = replace(choice, free=FreeChoice(logs=tuple(free)))
     try:
         found = read(run, choice).part.remarks

@@ -75,7 +75,10 @@ def analysed_in_blocks(
         stage("estimating", done / log.samples)
         motion = replace(whole, log=Run(recording=block, robot=robot))
         every = slice(None)
-        yield replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed), every
+        yield (
+            replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed),
+            every,
+        )
     if sensed is not None:
         from vftcli.wrench.sensing import mask_remark
 

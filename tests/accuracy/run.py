@@ -47,7 +47,9 @@ def main() -> None:
     """Print a line a log, and the mean of every group."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("groups", nargs="*", default=GROUPS, help=f"of {', '.join(GROUPS)}")
-    parser.add_argument("--robot", help="robot file for the real UR10e logs instead of the profile")
+    parser.add_argument(
+        "--robot", help="robot file for the real UR10e logs instead of the profile"
+    )
     parser.add_argument("--oracle", action="store_true", help="the best fixed gains too")
     parser.add_argument("--best", action="store_true", help="the pipeline's observer `best` too")
     parser.add_argument("--length", type=float, default=10.0, help="of the pieces [s]")
@@ -124,7 +126,10 @@ def tuned_line(case, chosen) -> dict[str, object]:
     line["whole/capped"] = line["whole"] / line["capped"]
     if chosen.oracle:
         best = oracle(run.terms, case.truth)
-        line |= {"oracle": float(best.mean()), "capped/oracle": float(capped.mean() / best.mean())}
+        line |= {
+            "oracle": float(best.mean()),
+            "capped/oracle": float(capped.mean() / best.mean()),
+        }
         line["single joints"] = np.round(capped / best, 2).tolist()
     line["applied"] = "".join(str(int(x)) for x in bias.applied)
     line["free"] = round(float(bias.free.mean()), 2)

@@ -29,7 +29,9 @@ def test_both_kinds_where_none_is_named() -> None:
 
 def test_xi_and_threshold_mode_are_settings() -> None:
     parameters = (
-        ControlChoice.parsed(settings={"admittance.xi": "0.8", "admittance.threshold_mode": "soft"})
+        ControlChoice.parsed(
+            settings={"admittance.xi": "0.8", "admittance.threshold_mode": "soft"}
+        )
         .controllers(UR5)[0]
         .parameters
     )

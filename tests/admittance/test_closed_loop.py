@@ -59,7 +59,9 @@ def test_online_filter_is_the_batch_filter(convention: str) -> None:
     torque = 20.0 * np.random.default_rng(3).standard_normal((300, 6))
     kalman = observer("ur5", convention)
     recording = Recording(t=t, q=q, dq=dq, torque=torque)
-    batch = kalman.estimate(dynamics_terms(recording, replace(robot, torque_source="joint_torque")))
+    batch = kalman.estimate(
+        dynamics_terms(recording, replace(robot, torque_source="joint_torque"))
+    )
     online = OnlineKalman(kalman, robot, 0.008, averaged=False)
     found = np.array([online.sample(*row).copy() for row in zip(q, dq, torque, strict=True)])
     # kernels and Pinocchio differ by 1e-13 N·m·s in p, times L₂ ≈ 1e3 1/s²
@@ -205,4 +207,6 @@ def test_bearing_is_guided_assembled_released_and_knocks_do_not_move_it() -> Non
     knocked = loop.dragged[(t > 23.9) & (t < 27.0)]
     assert not np.any(knocked)
     still = x[(t > 24.0) & (t < 27.0), :3] - x[np.searchsorted(t, 24.0), :3]
-    assert np.linalg.norm(still, axis=1).max() < 2e-3  # servo give under a 10 N knock, and the tail
+    assert (
+        np.linalg.norm(still, axis=1).max() < 2e-3
+    )  # servo give under a 10 N knock, and the tail

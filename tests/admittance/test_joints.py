@@ -43,7 +43,9 @@ def test_the_arm_waits_where_it_cannot_follow() -> None:
     x[10:20, 0, 0] = 3.0  # out of reach for ten rows
     x[20:, 0, 1] = 0.01
     path = follow(FlangeSolver(UR5), START, x, 0.008)
-    np.testing.assert_array_equal(path.reached[:, 0], np.r_[[True] * 10, [False] * 10, [True] * 10])
+    np.testing.assert_array_equal(
+        path.reached[:, 0], np.r_[[True] * 10, [False] * 10, [True] * 10]
+    )
     np.testing.assert_array_equal(path.q[10:20, 0], np.tile(path.q[9, 0], (10, 1)))
     assert not np.allclose(path.q[25, 0], START)
 

@@ -75,7 +75,11 @@ def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
         ("speed-limit-acted", first): {"periods": 3},
         ("joint-too-fast", first): {"share": 1.5},
         ("motion-escaped", second): {"time_s": pytest.approx(2.0)},
-        ("poses-out-of-reach", second): {"lost": 10, "poses": ROWS, "first_s": pytest.approx(3.0)},
+        ("poses-out-of-reach", second): {
+            "lost": 10,
+            "poses": ROWS,
+            "first_s": pytest.approx(3.0),
+        },
     }
 
 

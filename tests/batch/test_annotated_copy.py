@@ -238,7 +238,9 @@ def test_poses_that_hide_the_wrench_stop_it(dataset: Path, tmp_path: Path) -> No
         made(dataset, tmp_path / "copy", by_map)
 
 
-def test_what_tells_no_forces_is_refused_and_leaves_nothing(dataset: Path, tmp_path: Path) -> None:
+def test_what_tells_no_forces_is_refused_and_leaves_nothing(
+    dataset: Path, tmp_path: Path
+) -> None:
     def zero(values: np.ndarray) -> None:
         values[:, :4] = 0.0
 

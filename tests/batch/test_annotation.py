@@ -60,7 +60,9 @@ def test_the_columns_and_what_they_say_of_themselves() -> None:
     derived = force_columns(asked, ["j1", "j2"], derived=True, valid=False)
     assert (len(derived), derived[0].about["causal"]) == (4, False)
     left = replace(asked, read=ReadChoice(arm="left"))
-    assert force_columns(left, ["j"], derived=False, valid=False)[0].name == "external_torque_left"
+    assert (
+        force_columns(left, ["j"], derived=False, valid=False)[0].name == "external_torque_left"
+    )
 
 
 def test_the_key_is_what_the_numbers_depend_on() -> None:

@@ -41,7 +41,9 @@ def test_every_choice_is_in_the_key() -> None:
         replace(plain, reference=ReferenceChoice(name="zero")),
     ]
     assert len({options_digest(choice) for choice in (plain, *others)}) == len(others) + 1
-    assert len({key_of("a", "b"), key_of("b", "a"), key_of("a", "b", 0), key_of("a", "b", 1)}) == 4
+    assert (
+        len({key_of("a", "b"), key_of("b", "a"), key_of("a", "b", 0), key_of("a", "b", 1)}) == 4
+    )
 
 
 def test_files_that_options_name_count_by_content_not_by_name(tmp_path: Path) -> None:

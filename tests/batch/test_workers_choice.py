@@ -65,7 +65,9 @@ def test_a_cluster_that_asks_nobody_for_a_certificate_is_refused_unless_accepted
 def test_workers_without_what_makes_certificates_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(choice, "find_spec", lambda name: None if name == "cryptography" else name)
+    monkeypatch.setattr(
+        choice, "find_spec", lambda name: None if name == "cryptography" else name
+    )
     assert WorkersChoice().in_process
     with pytest.raises(ParameterError, match=r"cryptography: pip install 'vftcli\[cluster\]'"):
         WorkersChoice(jobs=2)

@@ -283,7 +283,9 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=SAMPLES)
     parser.add_argument("--rounds", type=int, default=7)
     chosen = parser.parse_args()
-    print(f"{chosen.robot}, {chosen.samples} samples, {chosen.rounds} rounds, NumPy with {simd()}")
+    print(
+        f"{chosen.robot}, {chosen.samples} samples, {chosen.rounds} rounds, NumPy with {simd()}"
+    )
     run = (load_robot(chosen.robot), chosen.samples, chosen.rounds)
     with one_core():
         ratios = core_ratios(*run)

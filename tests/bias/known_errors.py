@@ -33,7 +33,15 @@ def shortened(robot, joints):
     chain, n = robot.chain, joints
     each = {
         name: getattr(chain, name)[:n]
-        for name in ("names", "rotation", "translation", "mass", "com", "inertia", "rotor_inertia")
+        for name in (
+            "names",
+            "rotation",
+            "translation",
+            "mass",
+            "com",
+            "inertia",
+            "rotor_inertia",
+        )
     }
     limits = Limits(**{key: value[:n] for key, value in vars(robot.limits).items()})
     noise = SensorNoise(**{key: value[:n] for key, value in vars(robot.noise).items()})

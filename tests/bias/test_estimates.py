@@ -116,7 +116,9 @@ def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None
     assert limits.values["causes"][4] == "stiction at rest"  # J5 rests
     for j in (0, 1, 2, 3, 5):
         cause, size = limits.values["causes"][j], limits.values["size_Nm"][j]
-        assert size == max(budget.parts[c][j] for c in ("noise", "friction", "model", "bandwidth"))
+        assert size == max(
+            budget.parts[c][j] for c in ("noise", "friction", "model", "bandwidth")
+        )
         assert size == budget.parts[cause][j]
     assert all(np.all(part >= 0.0) for part in budget.parts.values())
     # its parts but bandwidth are the free rms, cause by cause

@@ -71,7 +71,9 @@ def test_the_largest_cause_of_each_joint_is_named() -> None:
     assert stuck.values["causes"] == [STICTION, "bandwidth"]
     assert stuck.values["size_Nm"][0] == 9.0
     # 9 N·m beside the 5 of the other causes, and nothing beside the joint that moves
-    np.testing.assert_allclose(stuck.values["total_Nm"], [np.sqrt(9.0**2 + 5.0**2), np.sqrt(0.31)])
+    np.testing.assert_allclose(
+        stuck.values["total_Nm"], [np.sqrt(9.0**2 + 5.0**2), np.sqrt(0.31)]
+    )
     assert str(stuck).startswith(
         "gmo: largest error per joint, from J1: stiction at rest, bandwidth"
     )
@@ -144,7 +146,13 @@ def test_gains_that_do_as_well_are_not_called_off_the_best() -> None:
 
 @pytest.mark.slow
 def test_what_is_measured_takes_the_place_of_what_was_expected(analysis: Analysis) -> None:
-    rows = [("best", 1, 0.5), ("best", 2, 1.5), ("gmo", 1, 2.0), ("gmo", 2, 4.0), ("gmo", 3, None)]
+    rows = [
+        ("best", 1, 0.5),
+        ("best", 2, 1.5),
+        ("gmo", 1, 2.0),
+        ("gmo", 2, 4.0),
+        ("gmo", 3, None),
+    ]
     errors = pl.DataFrame(rows, schema=["observer", "joint", "rmse_Nm"], orient="row")
     unknown = dict.fromkeys(("l1_Nm", "reference_rms_Nm", "reference_floor_Nm"), pl.lit(None))
     errors = errors.with_columns(reference_trusted=pl.lit(True), **unknown)

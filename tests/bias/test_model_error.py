@@ -83,7 +83,9 @@ def test_values_and_columns_are_in_one_order():
     again = error_of(error.values, 3)
     for one, other in zip(again, error, strict=True):
         np.testing.assert_array_equal(one, other)
-    assert sorted(set(np.concatenate([column_numbers(j, 3) for j in range(3)]))) == list(range(54))
+    assert sorted(set(np.concatenate([column_numbers(j, 3) for j in range(3)]))) == list(
+        range(54)
+    )
 
 
 @pytest.mark.parametrize("name", ["ur10e", "panda"])

@@ -67,7 +67,9 @@ def test_run_json_records_what_was_chosen(worked_up: Analysis) -> None:
     assert reported["best"] is None  # it was not asked for
     assert len(reported["tuned"]["rts-auto"]["omega_n_rad_s"]) == 6
     assert set(reported["error_budget_Nm"]) == {e.name for e in worked_up.estimates}
-    assert "filter" in next(o["parameters"] for o in record["observers"] if o["name"] == "rts-auto")
+    assert "filter" in next(
+        o["parameters"] for o in record["observers"] if o["name"] == "rts-auto"
+    )
 
 
 def test_a_run_that_asks_for_nothing_shows_nothing() -> None:

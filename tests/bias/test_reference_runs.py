@@ -86,7 +86,9 @@ def test_mujoco_ur5e(logs: Path) -> None:
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")),
+        observers=ObserverChoice.parsed(
+            settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")
+        ),
         reference=ReferenceChoice(name="vendor"),
     )
     analysis = analyse_log(folder / "circle.csv", request)
@@ -107,7 +109,9 @@ def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
         free=FreeChoice(spans=((1.5, 6.0),)),
         read=ReadChoice(interval=(1.5, 27.5)),
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")),
+        observers=ObserverChoice.parsed(
+            settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")
+        ),
         reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
     )
     analysis = analyse_log(tmp_path / "pushes.csv", request)

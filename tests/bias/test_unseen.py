@@ -145,4 +145,6 @@ def test_a_joint_that_seldom_moves_is_judged_by_all_samples(wrong):
 def test_between_worth_it_and_not_a_part_is_used():
     """.9 of the unseen error left: all of the correction; .95: none; between in proportion."""
     share = np.array([0.3, 0.9, 0.91, 0.94, 0.95, 1.2])
-    np.testing.assert_allclose(faded(share, 0.9, 0.95), [1.0, 1.0, 0.8, 0.2, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(
+        faded(share, 0.9, 0.95), [1.0, 1.0, 0.8, 0.2, 0.0, 0.0], atol=1e-12
+    )

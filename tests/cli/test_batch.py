@@ -84,7 +84,9 @@ def test_a_second_run_does_what_is_left(run, folder: Path, tmp_path: Path) -> No
     assert rows_there(out) == done
     assert (out / "batch.parquet").read_bytes() == table
     failures = pl.read_parquet(out / "failures.parquet")
-    assert failures.select("log", "stage", "error").rows() == [("empty.csv", "reading", "LogError")]
+    assert failures.select("log", "stage", "error").rows() == [
+        ("empty.csv", "reading", "LogError")
+    ]
 
 
 def test_a_failure_stands_for_every_log_of_equal_bytes_and_names_it_once(

@@ -57,7 +57,9 @@ def record(manifest: Path) -> dict[str, object]:
 
 def check_colours(page: str) -> None:
     """A method has one colour in tables, legend and dots; zero, which has no dot, has none."""
-    tables = dict(re.findall(r'\[data-swatch="(.+?)"\]::before{border-top:3px solid (.+?)}', page))
+    tables = dict(
+        re.findall(r'\[data-swatch="(.+?)"\]::before{border-top:3px solid (.+?)}', page)
+    )
     dots = set(re.findall(r"<title>UR5, (.+?): .*?<circle [^>]*fill=\"(.+?)\"", page))
     (legend,) = re.findall(r'<p class="legend">(<span data-swatch=.*?)</p>', page)
     assert dots == set(tables.items())
@@ -260,7 +262,9 @@ def kinds(tmp_path: Path) -> Path:
 def test_every_kind_of_entry_is_scored_by_all_that_it_can_be(run, kinds: Path) -> None:
     """With estimates of 5 and of 7 joints, which fail."""
     words: list[object] = ["benchmark", kinds / "my.toml", "--jobs", "0", "-o", kinds / "o"]
-    rivals = [word for name in ("thin", "wide") for word in ("--outside", f"{name}={kinds / name}")]
+    rivals = [
+        word for name in ("thin", "wide") for word in ("--outside", f"{name}={kinds / name}")
+    ]
     code, _, err = run(*words, *rivals)
     assert code == 3
     for name, joints in (("thin", 5), ("wide", 7)):
@@ -281,9 +285,13 @@ def test_every_kind_of_entry_is_scored_by_all_that_it_can_be(run, kinds: Path) -
     assert robot.name.startswith("fitted-")
     rows = pl.read_parquet(kinds / "o" / "scores.parquet")
     best = rows.filter(method="best", part="contact", log="push")
-    errors = {p: best.filter(protocol=p)["rmse_Nm"].mean() for p in ("alone", "free", "identified")}
+    errors = {
+        p: best.filter(protocol=p)["rmse_Nm"].mean() for p in ("alone", "free", "identified")
+    }
     assert len(set(errors.values())) == 3  # each saw something else
-    assert max(errors.values()) < 0.3 * rows.filter(method="zero", part="contact")["rmse_Nm"].mean()
+    assert (
+        max(errors.values()) < 0.3 * rows.filter(method="zero", part="contact")["rmse_Nm"].mean()
+    )
     # Of the times of a push that the list finds no peak is known, and of its torque nothing.
     (times,) = rows.filter(log="times").to_dicts()[:1]
     assert (times["true_contacts"], times["peak_error_N"]) == (1, [])
@@ -329,7 +337,9 @@ def test_anyway_marks_the_rows(run, manifest: Path) -> None:
 def test_a_log_that_fails_leaves_the_others(run, manifest: Path) -> None:
     broken = manifest.with_name("broken.csv")
     broken.write_text("t,q1\n0,nothing\n")
-    entry = f'[[log]]\nname = "b"\narm = "UR5"\nfile = "{broken}"\nrobot = "ur5"\ntruth = "free"\n'
+    entry = (
+        f'[[log]]\nname = "b"\narm = "UR5"\nfile = "{broken}"\nrobot = "ur5"\ntruth = "free"\n'
+    )
     manifest.write_text(MANIFEST + entry)
     code, out, err = run(*asked(manifest))
     assert code == 3

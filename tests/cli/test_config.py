@@ -79,7 +79,9 @@ def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
 
 @pytest.mark.slow
 def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
-    keep(here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\n[contacts]\nlist = false\n')
+    keep(
+        here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\n[contacts]\nlist = false\n'
+    )
     code, _, err = run("estimate", LOG, "-o", "out")
     assert (code, "--columns=-t,q:6" in err) == (1, True)
     assert run("estimate", LOG, "-o", "out", "--config", "none", "--robot", "ur5")[0] == 0
@@ -99,7 +101,10 @@ def test_logs_behind_two_dashes_stay_behind_them(run, here: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('robt = "ur5"', "'robt' is no option of a command that reads a log. Did you mean robot?"),
+        (
+            'robt = "ur5"',
+            "'robt' is no option of a command that reads a log. Did you mean robot?",
+        ),
         ("dance = 1", "A key is an option without its dashes, as robot."),
         ('[compare]\nrobt = "ur5"', "'robt' is no option of compare. Did you mean robot?"),
         ("[compre]\nwrench = true", "compre.wrench is no setting here; vftcli help settings"),
@@ -203,7 +208,9 @@ def test_every_option_kept_otherwise_exists() -> None:
 def test_settings_stand_in_a_table_of_their_group_also_where_a_command_is_called_so(
     run, here: Path
 ) -> None:
-    keep(here, 'robot = "ur5"\n[identify]\ncutoff = 5\nmethod = "guess"\n[two-cycle]\nperiod = 4\n')
+    keep(
+        here, 'robot = "ur5"\n[identify]\ncutoff = 5\nmethod = "guess"\n[two-cycle]\nperiod = 4\n'
+    )
     code, _, err = run("identify", LOG)
     assert (code, "there is friction, base" in err) == (1, True)
     for word in ("--set identify.cutoff=5", "--set two-cycle.period=4", "--method guess"):

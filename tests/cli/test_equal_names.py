@@ -59,7 +59,9 @@ def test_csv_has_the_rows_of_both_logs(logs):
 @pytest.mark.slow
 def test_a_report_of_both_has_both_in_its_table(logs, tmp_path):
     both = [logs / name / "log.csv" for name in ROWS]
-    result = invoke("report", *both, "--robot", "ur5", "--reference", TRUTH, "-o", tmp_path / "out")
+    result = invoke(
+        "report", *both, "--robot", "ur5", "--reference", TRUTH, "-o", tmp_path / "out"
+    )
     assert result.exit_code == 0, result.output
     rows = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
     assert {row["recording"] for row in rows} == {"a/log.csv", "b/log.csv"}
@@ -91,7 +93,12 @@ def test_a_payload_pair_of_equal_names_is_scored_on_the_log_without_load(tmp_pat
     assert result.exit_code == 0, result.output
     record = json.loads(result.stdout)
     assert {row["log"] for row in record["residuals"]} == {"b/log.csv"}
-    assert {row["parameter"] for row in record["parameters"]} == {"mass", "com_x", "com_y", "com_z"}
+    assert {row["parameter"] for row in record["parameters"]} == {
+        "mass",
+        "com_x",
+        "com_y",
+        "com_z",
+    }
 
 
 def test_one_run_given_twice_is_refused(logs, tmp_path):

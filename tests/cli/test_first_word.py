@@ -44,7 +44,9 @@ def test_a_file_of_the_folder_is_a_log_and_a_command_goes_before_it(
     ("word", "said"),
     [("reprot", "No such command 'reprot'. Did you mean report?"), ("dance", "command 'dance'.")],
 )
-def test_any_other_word_is_refused_with_the_nearest_command(run: Run, word: str, said: str) -> None:
+def test_any_other_word_is_refused_with_the_nearest_command(
+    run: Run, word: str, said: str
+) -> None:
     code, out, err = run(word, "x.csv")
     assert (code, out) == (2, "")
     assert said in err
@@ -63,5 +65,7 @@ def test_an_arm_that_is_not_settled_is_asked_for(
     code, out, err = run(*words)
     assert code == 1
     assert out.startswith("push.csv: headerless\n  joints    6\n")
-    assert re.fullmatch(r"error: Which arm\? Best fits: ur5 .*%\), .*%\)\. Add --robot ur5\n", err)
+    assert re.fullmatch(
+        r"error: Which arm\? Best fits: ur5 .*%\), .*%\)\. Add --robot ur5\n", err
+    )
     assert run(*words, "--json") == (code, "", err)

@@ -35,7 +35,9 @@ def test_a_log_becomes_a_robot_that_estimate_uses(excitation, tmp_path):
         assert robot.with_suffix(ending).is_file()
     assert load_robot(robot).document["identification"]["base_parameters"]
     out = tmp_path / "out"
-    used = RUNNER.invoke(app, ["estimate", str(excitation), "--robot", str(robot), "-o", str(out)])
+    used = RUNNER.invoke(
+        app, ["estimate", str(excitation), "--robot", str(robot), "-o", str(out)]
+    )
     assert used.exit_code == 0, used.output
     assert (out / "estimates.parquet").is_file()
 

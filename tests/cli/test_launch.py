@@ -188,7 +188,9 @@ def test_the_caller_s_threads_of_linear_algebra_change_no_byte(tmp_path: Path) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["report", "estimate"])
-def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(command: str, tmp_path: Path) -> None:
+def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(
+    command: str, tmp_path: Path
+) -> None:
     """The screen is there before anything is written, and before what writes is loaded."""
     script = (
         "import sys, vftcli.outputs.files as files\n"

@@ -76,7 +76,9 @@ def parameters(command: str) -> dict[str, Any]:
     """Name as it is typed → what typer knows of it; of a setting, the setting."""
     group: Any = typer.main.get_command(make_app())
     found = group.commands[command]
-    return {p.opts[-1]: p for p in found.params} | settings_by_name(vars(found.callback)["choices"])
+    return {p.opts[-1]: p for p in found.params} | settings_by_name(
+        vars(found.callback)["choices"]
+    )
 
 
 def typed(name: str, value: str) -> tuple[str, ...]:

@@ -106,7 +106,9 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     assert "note: vftcli.toml" not in err
 
 
-def test_an_effort_that_is_not_what_it_is_called_is_written(run, here: Path, samples: Path) -> None:
+def test_an_effort_that_is_not_what_it_is_called_is_written(
+    run, here: Path, samples: Path
+) -> None:
     log = samples / "reach" / "ros2_ur_effort_torque"
     assert run("inspect", log, "--robot", "ur5", "-o", NAME)[0] == 0
     assert options(here) == {"robot": "ur5", "log": {"effort": "torque-without-gravity"}}
@@ -159,6 +161,8 @@ def test_the_file_that_is_there_is_not_read(run, here: Path) -> None:
 
 
 def test_nothing_is_written_without_a_name(run, here: Path) -> None:
-    code, out, _ = run("inspect", FIXTURES / "panda_bag", FIXTURES / "ur5_sensor.parquet", "--json")
+    code, out, _ = run(
+        "inspect", FIXTURES / "panda_bag", FIXTURES / "ur5_sensor.parquet", "--json"
+    )
     assert (code, list(here.iterdir())) == (0, [])
     assert [one["joints"] for one in json.loads(out)["logs"]] == [7, 6]

@@ -84,7 +84,9 @@ def test_a_contact_is_what_is_99_percent_sure(push: float) -> None:
     assert touched_blocks(log, jacobian).any() == (1.0 / (1.0 + np.exp(-odds)) > 0.99)
 
 
-def textbook_odds(d: Array, process: ErrorProcess, size: Array, time: float, lasts: float) -> Array:
+def textbook_odds(
+    d: Array, process: ErrorProcess, size: Array, time: float, lasts: float
+) -> Array:
     """Log odds of contact after each block: Blom and Bar-Shalom's cycle, in matrices. (K,)
 
     The state of a joint is (b, x); the mode "free" does not see x, which is as it may be there.
@@ -146,7 +148,9 @@ def test_the_odds_are_those_of_the_textbook_filter() -> None:
 
 
 @pytest.mark.slow
-def test_a_long_log_is_searched_in_stretches_as_if_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_log_is_searched_in_stretches_as_if_in_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     d = pushed(2000, 5)
     d[1200:1300] += 5.0
     log, _ = joints_of(d)

@@ -88,7 +88,9 @@ def test_cycles_that_do_not_exist_are_refused() -> None:
 
     short = motion(read(FIXTURES / "ur5_taps_ur_rtde.csv"), "ur5")
     with pytest.raises(ReferenceTorqueError):
-        free_part(replace(short, choice=FreeChoice.parsed(settings={"two-cycle.free-cycles": "9"})))
+        free_part(
+            replace(short, choice=FreeChoice.parsed(settings={"two-cycle.free-cycles": "9"}))
+        )
 
 
 def test_the_level_is_that_of_the_free_samples_that_move() -> None:
@@ -113,7 +115,9 @@ def test_resting_joints_are_given_their_stiction() -> None:
     speed = np.abs(LOG.require("dq"))
     far = np.convolve(speed[:, 0] < 0.01, np.ones(101), "same") == 0
     np.testing.assert_allclose(sd[far, 0], DRY_SHARE * dry[0])
-    assert np.all(sd[speed < 0.01] >= np.tile(NEAR_REST_SHARE * dry, (len(speed), 1))[speed < 0.01])
+    assert np.all(
+        sd[speed < 0.01] >= np.tile(NEAR_REST_SHARE * dry, (len(speed), 1))[speed < 0.01]
+    )
 
 
 def test_contacts_that_are_none_read_little() -> None:
@@ -127,7 +131,9 @@ def test_contacts_that_are_none_read_little() -> None:
     assert len(pseudo_contacts(free.pieces[0], 3)) == 3
 
 
-@pytest.mark.parametrize(("known", "runs"), [(23, []), (24, [(6, 18)]), (36, [(6, 18), (18, 30)])])
+@pytest.mark.parametrize(
+    ("known", "runs"), [(23, []), (24, [(6, 18)]), (36, [(6, 18), (18, 30)])]
+)
 def test_a_contact_that_is_made_up_has_free_blocks_on_either_side(
     known: int, runs: list[tuple[int, int]]
 ) -> None:

@@ -330,7 +330,9 @@ def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
     whole = read(FIXTURES / "ur5_taps_ur_rtde.csv")
     slow = list_contacts(motion(part(whole, np.arange(0, whole.samples, 2)), "ur5", "0.3:4"))
     assert slow.contacts
-    assert {remark.code for row in slow.contacts for remark in row.remarks} == {"peak-cut-by-rate"}
+    assert {remark.code for row in slow.contacts for remark in row.remarks} == {
+        "peak-cut-by-rate"
+    }
     fast = list_contacts(motion(whole, "ur5", "0.3:4"))
     assert not {remark.code for row in fast.contacts for remark in row.remarks}
 

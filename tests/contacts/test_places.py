@@ -32,7 +32,9 @@ def test_a_points_jacobian_is_how_it_moves(link: int) -> None:
     half = 0.5 * np.array(robot.chain.translation[link])
     frame = pin.Frame("point", link, pin.SE3(np.eye(3), half), pin.FrameType.OP_FRAME)
     number = model.addFrame(frame)
-    exact = pin.computeFrameJacobian(model, model.createData(), Q, number, pin.LOCAL_WORLD_ALIGNED)
+    exact = pin.computeFrameJacobian(
+        model, model.createData(), Q, number, pin.LOCAL_WORLD_ALIGNED
+    )
     np.testing.assert_allclose(
         link_jacobian(link_poses(robot.chain, Q[None]), link, 0.5)[0], exact, atol=1e-12
     )

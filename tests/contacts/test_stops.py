@@ -19,7 +19,9 @@ def log(speed: Array) -> Recording:
     return Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, torque=np.zeros_like(dq))
 
 
-def braked(left: float = 0.0, speed: float = 0.3, after: float = 2.0, again: float = 9.0) -> Array:
+def braked(
+    left: float = 0.0, speed: float = 0.3, after: float = 2.0, again: float = 9.0
+) -> Array:
     """A joint's speed: a brake at 2 s leaves it to ring with so much; it may start again."""
     ringing = left * np.cos(np.pi * 50.0 * T)
     return np.where((after > T) | (again < T), speed, ringing)

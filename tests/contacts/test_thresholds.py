@@ -17,7 +17,13 @@ RATE = 10.0
 
 
 def free_log(
-    name: str, seconds: float, scale: float = 1.0, *, seed: int = 0, joints: int = 6, axes: int = 6
+    name: str,
+    seconds: float,
+    scale: float = 1.0,
+    *,
+    seed: int = 0,
+    joints: int = 6,
+    axes: int = 6,
 ) -> ComparedSignals:
     """Joints and axes of exponential noise whose mean is `scale`. [N·m, N]"""
     rng = np.random.default_rng(seed)

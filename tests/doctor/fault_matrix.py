@@ -125,7 +125,9 @@ def matrix(
 
 def main(words: Sequence[str]) -> int:
     """Print the matrix and how many of the harmful pairs are named."""
-    parser = argparse.ArgumentParser(description="plant faults in sound logs; see what names them")
+    parser = argparse.ArgumentParser(
+        description="plant faults in sound logs; see what names them"
+    )
     parser.add_argument("--log", action="append", help="only this log: ur10e, ur5 or panda")
     parser.add_argument("--fault", action="append", choices=list(FAULTS), help="only this fault")
     parser.add_argument(

@@ -173,7 +173,10 @@ def base_tables(folder: Path, names: Sequence[str]) -> Iterator[tuple[str, Table
     for name, (path, start, stop) in SPANS.items():
         if not names or name in names:
             log = next(log for log in LOGS if log.path == path)
-            yield name, thinned(table_from(span_of(log, logs, start, stop), robot_word(log, logs)))
+            yield (
+                name,
+                thinned(table_from(span_of(log, logs, start, stop), robot_word(log, logs))),
+            )
     for name in ("ur5", "panda"):
         if not names or name in names:
             yield name, thinned(simulated(name, folder))

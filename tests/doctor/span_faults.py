@@ -204,7 +204,9 @@ def cell(log: str, name: str, fault: SpanFault, base: SpanLog, sound: Answer, pa
     new = sorted(made.said - sound.said)
     warned = [shown(code, joints) for level, code, joints in new if level == "warning"]
     noted = [shown(code, joints) for level, code, joints in new if level != "warning"]
-    verdict = "refused" if made.refused else "warned" if warned else "noted" if noted else "silent"
+    verdict = (
+        "refused" if made.refused else "warned" if warned else "noted" if noted else "silent"
+    )
     moved, vanished = moves(made, sound)
     harmful = any(moved[n] > HARM[n] for n in moved) or bool(vanished)
     fresh = [c for c in made.contacts if not any(meet(c, known) for known in sound.contacts)]
@@ -248,7 +250,9 @@ def moves(made: Answer, sound: Answer) -> tuple[dict[str, float], list[str]]:
 def bad_share(table: Table, sound: Table) -> float:
     """Share of a table's rows whose values or step of time differ from the sound log's."""
     assert table.sound_t is not None
-    rows = np.searchsorted(sound.t, np.where(np.isfinite(table.sound_t), table.sound_t, sound.t[0]))
+    rows = np.searchsorted(
+        sound.t, np.where(np.isfinite(table.sound_t), table.sound_t, sound.t[0])
+    )
     bad = ~np.isfinite(table.sound_t)
     for (_, made), (_, good) in zip(table.series(), sound.series(), strict=True):
         bad |= (made != good[rows]).any(axis=1)

@@ -46,12 +46,19 @@ def test_the_constants_of_another_joint_size_are_reported() -> None:
     constant = np.array([11.976, 11.976, 9.839, 7.7, 7.7, 7.7])
     current = np.full_like(q, 1.5)
     held = replace(
-        log, q=q, dq=rest, current=current, target_current=current, target_torque=current * constant
+        log,
+        q=q,
+        dq=rest,
+        current=current,
+        target_current=current,
+        target_torque=current * constant,
     )
     found = [f for f in examine(held, UR10E).findings if f.code == "drive-constants"]
     assert [finding.where.joints for finding in found] == [(4, 5, 6)]
     # no joint of UR has 8.5 N·m/A: an old controller's or freedrive's law, not a constant
-    odd = replace(held, target_torque=current * np.array([11.976, 11.976, 9.839, 8.5, 8.5, 10.763]))
+    odd = replace(
+        held, target_torque=current * np.array([11.976, 11.976, 9.839, 8.5, 8.5, 10.763])
+    )
     assert not [f for f in examine(odd, UR10E).findings if f.code == "drive-constants"]
 
 
@@ -86,7 +93,9 @@ def test_a_clock_of_another_rate_refuses() -> None:
     assert [finding.code for finding in made.refusals()] == ["clock-rate"]
 
 
-@pytest.mark.parametrize(("factor", "joints"), [(0.8, ALL), (1.3, ALL), (0.8, (2,)), (1.25, (3,))])
+@pytest.mark.parametrize(
+    ("factor", "joints"), [(0.8, ALL), (1.3, ALL), (0.8, (2,)), (1.25, (3,))]
+)
 def test_drives_of_another_size_are_named_with_their_factor(
     factor: float, joints: tuple[int, ...]
 ) -> None:
@@ -130,7 +139,10 @@ def test_an_effort_without_friction_is_no_measurement() -> None:
     log = moving()
     assert UR10E.torque_constant is not None
     friction = FRICTION * np.tanh(log.require("dq") / 0.01) / UR10E.torque_constant
-    for current in (log.require("current") - friction, gravity(UR10E, log) / UR10E.torque_constant):
+    for current in (
+        log.require("current") - friction,
+        gravity(UR10E, log) / UR10E.torque_constant,
+    ):
         made = examine(replace(log, current=current), UR10E)
         assert [finding.code for finding in made.refusals()] == ["no-friction-in-effort"]
     frictionless = replace(UR10E, friction=())

@@ -43,7 +43,9 @@ def first_match(log: Recording) -> RobotMatch:
     return found
 
 
-@pytest.mark.parametrize(("evidence", "limit"), [(MAKER, 0.02), (RESIDUAL, 0.02), (MEASURED, 0.15)])
+@pytest.mark.parametrize(
+    ("evidence", "limit"), [(MAKER, 0.02), (RESIDUAL, 0.02), (MEASURED, 0.15)]
+)
 def test_a_profile_fits_up_to_the_limit_of_its_evidence(evidence: str, limit: float) -> None:
     """In one pose no load is fitted, so the planted share is the misfit to rounding."""
     log = held()

@@ -21,7 +21,12 @@ RATES = 0.9 + 0.3 * np.arange(6)
 
 
 def log_of(
-    late: float = 0.0, push: float = 0.0, scale: float = 1.0, *, rate: float = 0.0, clock: Array = T
+    late: float = 0.0,
+    push: float = 0.0,
+    scale: float = 1.0,
+    *,
+    rate: float = 0.0,
+    clock: Array = T,
 ) -> Recording:
     """20 s of motion under the arm's own torque, friction and noise of 0.3 N·m.
 
@@ -37,7 +42,9 @@ def log_of(
     t = clock - late - rate * clock
     angle = np.outer(t, RATES) + np.arange(6)
     x, dx, ddx = np.sin(angle), RATES * np.cos(angle), -(RATES**2) * np.sin(angle)
-    torque = torque_regressor(ARM.chain, 0.6 * x, 0.6 * dx, 0.6 * ddx) @ chain_parameters(ARM.chain)
+    torque = torque_regressor(ARM.chain, 0.6 * x, 0.6 * dx, 0.6 * ddx) @ chain_parameters(
+        ARM.chain
+    )
     torque += 4 * np.tanh(60 * dx) + 3 * dx
     torque += push * np.clip(np.sin(2 * np.pi * t / 4) - 0.6, 0, None)[:, None] / 0.4
     torque += np.random.default_rng(0).normal(0, 0.3, torque.shape)
@@ -78,7 +85,9 @@ def test_pushes_hide_no_lag_and_are_none() -> None:
 
 @pytest.mark.parametrize("push", [0.0, 5.0])
 @pytest.mark.parametrize(("rate", "pace"), [(0.005, "slow"), (-0.01, "fast")])
-def test_a_clock_of_the_effort_is_reported_by_its_rate(rate: float, pace: str, push: float) -> None:
+def test_a_clock_of_the_effort_is_reported_by_its_rate(
+    rate: float, pace: str, push: float
+) -> None:
     """To half of the .05 s by which tried growths of the lag lie apart within 19.5 s: .13 %."""
     finding = reported(log_of(rate=rate, push=push))
     assert finding is not None
@@ -123,7 +132,9 @@ def test_two_joints_tell_no_lag(joints: int, agreed: bool) -> None:
 
 
 @pytest.mark.parametrize(("thinned", "reported_by"), [(3, True), (4, False)])
-def test_below_thirty_samples_a_second_no_lag_is_reported(thinned: int, reported_by: bool) -> None:
+def test_below_thirty_samples_a_second_no_lag_is_reported(
+    thinned: int, reported_by: bool
+) -> None:
     log = log_of(0.12)
     rows = slice(None, None, thinned)
     signals = {name: getattr(log, name)[rows] for name in ("t", *log.signals)}

@@ -189,6 +189,8 @@ def test_constants_of_another_joint_size_are_reported(wrist: float, reported: bo
 def test_no_constants_are_compared_without_a_robot_that_has_them() -> None:
     arm = controlled(TEN)
     assert list(controller_findings(arm, None)) == []
-    assert list(controller_findings(arm, replace(load_robot("ur10e"), torque_constant=None))) == []
+    assert (
+        list(controller_findings(arm, replace(load_robot("ur10e"), torque_constant=None))) == []
+    )
     unknown = replace(arm, target_torque=None)
     assert list(controller_findings(unknown, load_robot("ur10e"))) == []

@@ -209,7 +209,9 @@ def places(findings: Iterable[Remark]) -> set[tuple[str, tuple[int, ...]]]:
 
 
 @pytest.mark.parametrize("fault", SEEN_ANYHOW)
-def test_half_the_rows_tell_the_same(tables: dict[str, Table], fault: str, tmp_path: Path) -> None:
+def test_half_the_rows_tell_the_same(
+    tables: dict[str, Table], fault: str, tmp_path: Path
+) -> None:
     table = tables["ur5"]
     half = FAULTS[fault].plant(table.selected(np.arange(0, len(table.t), 2)))
     found = examine(read(half.write(tmp_path / "log.parquet")), robot_named(half.given))

@@ -13,7 +13,9 @@ from vftcli.doctor import examine, finding_record
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 
-SIZES = st.sampled_from([0.0, 5e-324, 1e-300, 1e-12, 1e-3, 1.0, 13.5, 70.0, 1e4, 9e8, 1e30, 1e308])
+SIZES = st.sampled_from(
+    [0.0, 5e-324, 1e-300, 1e-12, 1e-3, 1.0, 13.5, 70.0, 1e4, 9e8, 1e30, 1e308]
+)
 """From denormal to the largest numbers, past each limit of the doctor."""
 STEPS = st.sampled_from([1e-300, 1e-12, 1e-6, 1e-3, 8e-3, 0.5, 1.0, 1e3, 1e10, 1e290])
 

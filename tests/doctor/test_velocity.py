@@ -302,7 +302,9 @@ def test_noise_of_the_positions_hides_no_lag() -> None:
 def test_the_standard_errors_are_the_scatter() -> None:
     """Of 200 noises on a quarter turn to one and a half: 1/√400 = 5 % (one sigma)."""
     chance, short = np.random.default_rng(0), {"t": T[:250], "q": Q[:250]}
-    fits = [fit_of(**short, dq=2 * DQ[:250] + chance.normal(0, 0.02, (250, 6))) for _ in range(200)]
+    fits = [
+        fit_of(**short, dq=2 * DQ[:250] + chance.normal(0, 0.02, (250, 6))) for _ in range(200)
+    ]
     for values, errors in (("gain", "gain_error"), ("lag", "lag_error")):
         scatter = np.std([getattr(fit, values) for fit in fits], axis=0)
         stated = np.mean([getattr(fit, errors) for fit in fits], axis=0)

@@ -216,7 +216,9 @@ def test_a_resampled_series_closes_to_a_ring() -> None:
 @pytest.mark.parametrize("count", [30, 3000, 20_000])
 def test_a_correlation_time_by_blocks_is_that_of_the_whole(memory: float, count: int) -> None:
     """Of one transform of the whole series, whichever of the growing numbers of lags is enough."""
-    x = lfilter([1.0], [1.0, -memory], np.random.default_rng(8).standard_normal((count, 2)), axis=0)
+    x = lfilter(
+        [1.0], [1.0, -memory], np.random.default_rng(8).standard_normal((count, 2)), axis=0
+    )
     centred = x - x.mean(axis=0)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count, axis=0)) ** 2
     product = np.fft.irfft(spectrum, axis=0)[: count // 2]

@@ -75,7 +75,9 @@ def test_a_log_without_a_lag_does_not_pull_the_others() -> None:
     still = PoolMember("ur5", [torque("fdo", np.zeros_like(T))], torque("x", WAVE))
     assert row_of(delayed, still)["lag_s"] == pytest.approx(0.08, abs=2e-3)  # a quarter of a step
     # One of a third of the samples that is not late takes a quarter of the weight.
-    prompt = PoolMember("ur5", [torque("fdo", WAVE)], torque("x", np.where(T < 4.0, WAVE, np.nan)))
+    prompt = PoolMember(
+        "ur5", [torque("fdo", WAVE)], torque("x", np.where(T < 4.0, WAVE, np.nan))
+    )
     assert row_of(delayed, prompt)["lag_s"] == pytest.approx(0.06, abs=2e-3)
 
 

@@ -24,7 +24,9 @@ from vftcli.wrench.solvers import VirtualSensor
 ROBOT = load_robot("ur5")
 T = 0.01 * np.arange(300)
 RNG = np.random.default_rng(3)
-Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(np.outer(T, RNG.uniform(0.3, 1, 6)))
+Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(
+    np.outer(T, RNG.uniform(0.3, 1, 6))
+)
 RECORDING = Recording(t=T, q=Q, tau_ext=RNG.standard_normal((300, 6)))
 MOTION = FreeMotion(log=Run(recording=RECORDING, robot=ROBOT))
 WRENCH = 5.0 * RNG.standard_normal((300, 6))

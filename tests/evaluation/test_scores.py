@@ -16,7 +16,9 @@ FIXTURE = Path(__file__).parents[2] / "fixtures/ur5_circle.csv"
 CLOSE = {"rel": 1e-9}
 
 
-def oracle(t: Array, tau: Array, truth: Array, inside: Array, sd: Array | None) -> dict[str, float]:
+def oracle(
+    t: Array, tau: Array, truth: Array, inside: Array, sd: Array | None
+) -> dict[str, float]:
     """The definitions of docs/benchmark.md, sample by sample."""
     gaps = np.gradient(t)
     middle = float(np.median(gaps))

@@ -51,7 +51,9 @@ def test_all_cycles_without_a_push_are_free(
     run = pushed(*instants)
     gap = low_pass(run.t, run.drive_torque - run.model_torque, 5.0)
     power = [np.mean(part**2, axis=0) for part in np.split(gap, 3)]
-    np.testing.assert_allclose(found.residuals, np.sqrt(power / np.min(power, axis=0)).mean(axis=1))
+    np.testing.assert_allclose(
+        found.residuals, np.sqrt(power / np.min(power, axis=0)).mean(axis=1)
+    )
     # 5 N·m for half a second against noise of 0.1 N·m that is low-passed at 5 Hz: 40 times.
     assert np.all((found.residuals > 10.0) == ~np.isin(np.arange(3), free))
 
@@ -86,7 +88,9 @@ def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_t
     assert many.drawn == (3, 11, 20, 28, 36, 44, 53, 61)  # 58/7 cycles apart, rounded
     remark = many.remarks(64)[1]
     assert (remark.code, remark.values["free"]) == ("free-cycles-drawn", 59)
-    assert remark.values["wider"] == pytest.approx(0.0518, abs=1e-4)  # √((1 + 1/8)/(1 + 1/59)) − 1
+    assert remark.values["wider"] == pytest.approx(
+        0.0518, abs=1e-4
+    )  # √((1 + 1/8)/(1 + 1/59)) − 1
     for count in (3, 8):
         few = FreeCycles(tuple(range(count)), None)
         assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)

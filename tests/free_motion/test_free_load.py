@@ -82,7 +82,9 @@ def test_no_load_is_found_where_there_is_none(log: Recording) -> None:
 
 def test_a_simulation_without_noise_or_torque_carries_nothing(log: Recording) -> None:
     """No joint has anything left over then, and nothing is divided by it."""
-    still = replace(log, q=np.zeros_like(log.q), dq=np.zeros_like(log.q), current=0.0 * log.current)
+    still = replace(
+        log, q=np.zeros_like(log.q), dq=np.zeros_like(log.q), current=0.0 * log.current
+    )
     weightless = replace(ROBOT, chain=replace(ROBOT.chain, gravity=np.zeros(3)))
     run = Run(recording=still, robot=weightless)
     assert free_load((RunSamples(run, log.t > 1.0),)) is None
@@ -111,7 +113,9 @@ def test_the_fit_finds_the_weights_of_its_own_columns() -> None:
     rng = np.random.default_rng(4)
     A = rng.standard_normal((400, 2, 3))
     weights = np.array([2.0, -1.0, 0.5])
-    found, sd, left = weigh(A @ weights + 0.1 * rng.standard_normal((400, 2)), A, np.full(3, 20.0))
+    found, sd, left = weigh(
+        A @ weights + 0.1 * rng.standard_normal((400, 2)), A, np.full(3, 20.0)
+    )
     np.testing.assert_allclose(found, weights, atol=0.02)  # 4 sd of .1/√800
     np.testing.assert_allclose(left, 0.1, rtol=0.15)
     # nine samples count as one: sd = .1·√(9/800)

@@ -252,7 +252,9 @@ def text(path: Path) -> str:
         return ""
 
 
-def batch(pipe: int, indices: range, asked: argparse.Namespace, seeds: Seeds, folder: Path) -> None:
+def batch(
+    pipe: int, indices: range, asked: argparse.Namespace, seeds: Seeds, folder: Path
+) -> None:
     """Be the child of a batch: try one input after the other, a line through the pipe for each."""
     for index in indices:
         clear(folder)

@@ -66,7 +66,10 @@ def with_hand() -> str:
         held,
         '<joint name="pan" type="revolute"><parent link="l0"/><child link="head"/></joint>',
     ]
-    for k, follows in (("left", ""), ("right", '<mimic joint="left" multiplier="-1" offset="0"/>')):
+    for k, follows in (
+        ("left", ""),
+        ("right", '<mimic joint="left" multiplier="-1" offset="0"/>'),
+    ):
         parts.append(
             f'<link name="{k}_finger"><inertial><mass value="0.05"/><inertia {TENSOR}/></inertial>'
             f'</link><joint name="{k}" type="prismatic"><parent link="tool0"/>'
@@ -127,7 +130,12 @@ def jacobian_table(path: Path) -> Path:
     J = rng.standard_normal((MOST, 6, 7))
     J[:, 3:] /= np.linalg.norm(J[:, 3:], axis=1)[:, None]
     wrench = rng.standard_normal((MOST, 6))
-    parts = [np.arange(MOST) / 80, np.einsum("tij,ti->tj", J, wrench), J.reshape(MOST, 42), wrench]
+    parts = [
+        np.arange(MOST) / 80,
+        np.einsum("tij,ti->tj", J, wrench),
+        J.reshape(MOST, 42),
+        wrench,
+    ]
     names = ["timestamp", *(f"tau_ext_{j}" for j in range(7))]
     names += [f"jacobian_{r}_{c}" for r in range(6) for c in range(7)]
     names += ["fx", "fy", "fz", "mx", "my", "mz"]

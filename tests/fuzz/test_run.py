@@ -26,7 +26,9 @@ def test_a_short_run_finds_nothing() -> None:
     assert int(read.split()[2]) > 0  # some are read: it does not only meet refusals
 
 
-@pytest.mark.parametrize(("name", "family"), [("table", "table"), ("npz", "npz"), ("mcap", "mcap")])
+@pytest.mark.parametrize(
+    ("name", "family"), [("table", "table"), ("npz", "npz"), ("mcap", "mcap")]
+)
 def test_the_same_seed_makes_the_same_input(tmp_path: Path, name: str, family: str) -> None:
     from message_mutants import mcap_messages
 

@@ -193,7 +193,9 @@ def moves(old: Leaves, new: Leaves, rtol: float) -> list[str]:
 
     A column of a Parquet file that moved by less than `ROUNDING` is where it was.
     """
-    lost = [f"{p}: gone" for p in old if p not in new] + [f"{p}: new" for p in new if p not in old]
+    lost = [f"{p}: gone" for p in old if p not in new] + [
+        f"{p}: new" for p in new if p not in old
+    ]
     least = {p: ROUNDING * (".parquet " in p) for p in old}
     both = {p: difference(old[p], new[p], rtol, least[p]) for p in old if p in new}
     return lost + [f"{place}: {how}" for place, how in both.items() if how]
@@ -229,14 +231,18 @@ def main() -> int:
     listed |= items(FIXTURES, MORE, HERE / "fixtures")
     if "VFT_LOGS" in os.environ:
         listed |= items(REAL, MORE_REAL, ROOT / ".golden")
-    listed = {k: v for k, v in listed.items() if re.search(given.only, f"{k.parent.name}/{k.stem}")}
+    listed = {
+        k: v for k, v in listed.items() if re.search(given.only, f"{k.parent.name}/{k.stem}")
+    }
     chosen = {k: v for k, v in listed.items() if k.exists() == (given.do != "make")}
     changed = []
     with ThreadPoolExecutor(2) as pool:
         for path, found in zip(chosen, pool.map(seen, chosen.values()), strict=True):
             text = path.read_text("utf-8") if path.exists() else "{}"
             if how := moves(json.loads(text), found, given.rtol):
-                changed.append(f"{path.parent.name}/{path.stem}: {len(how)}, {'; '.join(how[:3])}")
+                changed.append(
+                    f"{path.parent.name}/{path.stem}: {len(how)}, {'; '.join(how[:3])}"
+                )
                 print(changed[-1], flush=True)
                 if given.do == "accept" and not found:
                     path.unlink()  # no longer listed
@@ -248,7 +254,9 @@ def main() -> int:
         with (HERE / "changes.md").open("a", encoding="utf-8") as reasons:
             reasons.write("\n  - ".join([f"- {given.why}", *changed]) + "\n")
     done, rest = ("kept", "kept before") if given.do == "make" else ("moved", "not kept yet")
-    print(f"golden: {len(chosen)} items, {len(changed)} {done}, {len(listed) - len(chosen)} {rest}")
+    print(
+        f"golden: {len(chosen)} items, {len(changed)} {done}, {len(listed) - len(chosen)} {rest}"
+    )
     return int(given.do == "check" and (bool(changed) or not chosen))
 
 

@@ -115,7 +115,9 @@ def test_growth_with_a_load_there_is_none_of_does_not_compete(prepared):
         "load_coulomb" not in shape.terms for shape in candidate_shapes(Shape((), 0.03), light)
     )
     heavy = equations(prepared, {"coulomb": 3.0, "viscous": 5.0}, load=5.0)
-    assert any("load_coulomb" in shape.terms for shape in candidate_shapes(Shape((), 0.03), heavy))
+    assert any(
+        "load_coulomb" in shape.terms for shape in candidate_shapes(Shape((), 0.03), heavy)
+    )
 
 
 def test_stribeck_velocities_stand_clear_of_the_smoothing(prepared):
@@ -131,7 +133,11 @@ def test_stribeck_velocities_stand_clear_of_the_smoothing(prepared):
     [
         (("coulomb", "viscous"), (0.0, -1.0), False),
         (("coulomb", "viscous", "quadratic"), (1.0, -1.0, 2.0), False),  # falls up to .25 rad/s
-        (("coulomb", "viscous", "quadratic"), (1.0, 3.0, -1.0), True),  # 1.5 rad/s is out of range
+        (
+            ("coulomb", "viscous", "quadratic"),
+            (1.0, 3.0, -1.0),
+            True,
+        ),  # 1.5 rad/s is out of range
         (("coulomb", "viscous", "quadratic"), (1.0, 2.0, -1.0), False),  # falls from 1 rad/s on
         (("coulomb", "logarithmic"), (1.0, 2.0), True),
         (("coulomb", "viscous"), (-0.1, 1.0), False),

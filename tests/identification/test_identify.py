@@ -138,7 +138,9 @@ def test_links_are_identified_for_another_trajectory():
         (found.residuals["role"] == "held-out") & (found.residuals["model"] == "identified")
     )
     noise = prepare(log(true, 7), true)
-    floor = np.sqrt(np.mean((noise.tau - prepare(log(true, 7, noise=0.0), true).tau) ** 2, axis=0))
+    floor = np.sqrt(
+        np.mean((noise.tau - prepare(log(true, 7, noise=0.0), true).tau) ** 2, axis=0)
+    )
     # the filter's rounding of reversals is in both; 1.3 covers the 46 numbers of 1400 samples
     assert np.mean(test["rms_Nm"].to_numpy()) < 1.3 * np.mean(floor)
     assert found.base is not None
@@ -293,7 +295,9 @@ def test_missing_targets_are_reported():
         identify([log(UR5)], UR5, Task(method="targets"))
 
 
-@pytest.mark.parametrize(("name", "error"), [("panda", RobotError), ("ur10e", IdentificationError)])
+@pytest.mark.parametrize(
+    ("name", "error"), [("panda", RobotError), ("ur10e", IdentificationError)]
+)
 def test_the_wrong_robot_is_refused(name, error):
     with pytest.raises(error, match="another"):
         identify([log(rubbed(UR5))], load_robot(name), Task(method="friction"))

@@ -21,7 +21,9 @@ from vftcli.robots import load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 
 CHAIN = load_robot("ur5").chain
-LAYOUT = ParameterColumns(CHAIN, True, (Shape(("coulomb", "viscous")), *(Shape(("viscous",)),) * 5))
+LAYOUT = ParameterColumns(
+    CHAIN, True, (Shape(("coulomb", "viscous")), *(Shape(("viscous",)),) * 5)
+)
 
 
 def test_columns_are_inertias_then_rotors_then_friction():

@@ -103,7 +103,9 @@ def test_a_load_says_how_it_was_found_and_in_which_log():
 def test_residuals_are_one_table_a_log_even_of_one_name(prepared):
     t, left = np.arange(0, 1, 0.01), np.tile([1.123456, 1.246912], (100, 1))
     roles = enumerate(("train", "held-out"))
-    traces = [Trace(prepared(t, tau=left), role, left + k, 0 * left, left[0]) for k, role in roles]
+    traces = [
+        Trace(prepared(t, tau=left), role, left + k, 0 * left, left[0]) for k, role in roles
+    ]
     scored = found()._replace(traces=tuple(traces))
     robot = with_provenance(scored, "", [log("a.csv")], [log("a.csv")], None)
     assert robot.document["identification"]["residuals"] == [

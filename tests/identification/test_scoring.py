@@ -32,7 +32,9 @@ def trace(motion, residual, role="held-out"):
 
 
 def test_rms_is_the_root_of_the_mean_square():
-    np.testing.assert_allclose(root_mean_squares(np.array([[3.0, 1], [-4.0, 1]])), [3.5355339, 1.0])
+    np.testing.assert_allclose(
+        root_mean_squares(np.array([[3.0, 1], [-4.0, 1]])), [3.5355339, 1.0]
+    )
 
 
 def test_rigid_torque_is_pinocchios_without_rotors(motion):

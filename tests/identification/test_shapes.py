@@ -105,7 +105,11 @@ def test_points_and_presliding_are_the_robot_files_friction(prepared):
     shape = line._replace(terms=terms, smoothing=0.003, presliding_length=1e-3)
     values = np.array([3.0, 5.0, 0.4, 2.0])
     friction = shape.friction(values)
-    assert (friction.model, friction.speeds, friction.torques) == ("points", BENDS[:2], (3.0, 5.0))
+    assert (friction.model, friction.speeds, friction.torques) == (
+        "points",
+        BENDS[:2],
+        (3.0, 5.0),
+    )
     assert friction.parameters["presliding_length"] == 1e-3
     warmth = np.linspace(1.2, 0.9, len(t))[:, None]
     log = prepared(t, q=q, dq=dq, warmth=warmth)
@@ -115,7 +119,9 @@ def test_points_and_presliding_are_the_robot_files_friction(prepared):
     np.testing.assert_allclose(log.friction(0, shape) @ values, expected, atol=1e-12)
 
 
-@pytest.mark.parametrize(("speed", "points"), [(0.1, 0), (0.16, 2), (0.79, 2), (0.81, 3), (2.1, 4)])
+@pytest.mark.parametrize(
+    ("speed", "points"), [(0.1, 0), (0.16, 2), (0.79, 2), (0.81, 3), (2.1, 4)]
+)
 def test_a_point_is_reported_by_a_motion_that_goes_a_third_of_the_way_to_it(speed, points):
     """.01 + .3·.49 = .157, .5 + .3·1 = .8 and 1.5 + .3·1.7 = 2.01 rad/s."""
     shape = bent(speed)

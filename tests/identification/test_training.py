@@ -121,10 +121,14 @@ def test_drive_constants_need_currents(recording):
 def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_reported(data):
     fine = JointFriction(model="coulomb-viscous", parameters={"coulomb": 1.0, "viscous": 1.0})
     assert not list(check_friction(0, fine, data))
-    pushing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -5.0, "viscous": -5.0})
+    pushing = JointFriction(
+        model="coulomb-viscous", parameters={"coulomb": -5.0, "viscous": -5.0}
+    )
     with pytest.raises(IdentificationError, match=r"of joint 1 comes out .* it would push"):
         list(check_friction(0, pushing, data))
-    crossing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -2.0, "viscous": 5.0})
+    crossing = JointFriction(
+        model="coulomb-viscous", parameters={"coulomb": -2.0, "viscous": 5.0}
+    )
     (remark,) = check_friction(2, crossing, data)
     speed = np.max(np.abs(data.logs[0].dq[:, 2]))
     assert remark.where.joints == (3,)

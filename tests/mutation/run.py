@@ -204,7 +204,10 @@ Span = tuple[tuple[int, int], tuple[int, int]]  # Line and column of a beginning
 def products_of(source: str) -> list[Span]:
     """Between the operands of products and powers: any other star unpacks or parts arguments."""
     return [
-        ((n.left.end_lineno or 0, n.left.end_col_offset or 0), (n.right.lineno, n.right.col_offset))
+        (
+            (n.left.end_lineno or 0, n.left.end_col_offset or 0),
+            (n.right.lineno, n.right.col_offset),
+        )
         for n in ast.walk(ast.parse(source))
         if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mult | ast.Pow)
     ]

@@ -28,7 +28,9 @@ def clock(samples: int, jitter: float = 0.0, seed: int = 0, rate: float = RATE) 
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def wandering(samples: int = 3000, jitter: float = 0.0, seed: int = 0, n: int = 6) -> DynamicsTerms:
+def wandering(
+    samples: int = 3000, jitter: float = 0.0, seed: int = 0, n: int = 6
+) -> DynamicsTerms:
     """Momentum and μ that wander like a real log's, starting in motion."""
     rng = np.random.default_rng(seed)
     t = clock(samples, jitter, seed)
@@ -150,7 +152,9 @@ def test_a_slow_clock_that_jitters_has_no_gaps(episode: int, samples: Path) -> N
     (gmo,), _ = build_observers(["gmo"], setup)
     estimate = gmo.estimate(terms)
     assert estimate.remarks == ()
-    truth = pl.read_parquet(samples / f"droid_raw_{episode}.truth.parquet")["tau_ext/6"].to_numpy()
+    truth = pl.read_parquet(samples / f"droid_raw_{episode}.truth.parquet")[
+        "tau_ext/6"
+    ].to_numpy()
     # Every observer has .14 to .15 N·m there; with 78 restarts it was .30.
     assert np.sqrt(np.mean((estimate.tau[:, 5] - truth) ** 2)) <= 0.17
 
@@ -245,7 +249,9 @@ def test_blocks_of_a_log_give_the_whole_log_s_estimate(
     np.testing.assert_array_equal(in_blocks(fdo, log, PIECE)[0], whole)
     for size in (1, 37, 5000):
         short = slice(0, 300 if size == 1 else None)
-        part = DynamicsTerms(t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock)
+        part = DynamicsTerms(
+            t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock
+        )
         # the same sums in another order; momenta of 10 times ω
         found = in_blocks(fdo, part, size)[0]
         np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)

@@ -148,7 +148,10 @@ def test_as_printed_hold_settles_to_what_its_loop_does(wandering: MakesTerms) ->
 
 def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_sample() -> None:
     """Its unsymmetric part (Q_τ + Q_p)Ts²/2 pulls: 137.506 → 135.506 ms on J1, to first order."""
-    corrected, printed = paper("zoh").tuning(STEP, 6), paper("zoh", as_printed=True).tuning(STEP, 6)
+    corrected, printed = (
+        paper("zoh").tuning(STEP, 6),
+        paper("zoh", as_printed=True).tuning(STEP, 6),
+    )
     np.testing.assert_allclose(corrected.delay - printed.delay, STEP / 4, rtol=0.05)
     assert 1e3 * printed.delay[0] == pytest.approx(135.506, abs=0.001)
 
@@ -324,7 +327,9 @@ def test_blocks_of_a_log_give_the_whole_log_s_estimate(
     np.testing.assert_array_equal(in_blocks(observer, log, PIECE)[0], whole)
     for size in (37, 5000):
         short = slice(0, 400 if size == 37 else None)
-        part = DynamicsTerms(t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock)
+        part = DynamicsTerms(
+            t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock
+        )
         # the same sums in another order; some 100 N·m
         found = in_blocks(observer, part, size)[0]
         np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)

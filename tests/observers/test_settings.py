@@ -40,7 +40,8 @@ def test_the_profile_gives_the_papers_gains() -> None:
 
 def test_the_command_line_wins_over_the_profile() -> None:
     (gmo, zoh), _ = build_observers(
-        ["gmo", "kfo-zoh"], setup("ur5", "gmo.gain=30", "kfo.r_diag=1,2,3,4,5,6", "kfo-zoh.decay=2")
+        ["gmo", "kfo-zoh"],
+        setup("ur5", "gmo.gain=30", "kfo.r_diag=1,2,3,4,5,6", "kfo-zoh.decay=2"),
     )
     np.testing.assert_array_equal(gmo.gain, [30.0] * 6)
     np.testing.assert_array_equal(zoh.r_diag, [1, 2, 3, 4, 5, 6])

@@ -105,7 +105,13 @@ def flat_spectra(free: float = 1.0, loaded: float = 3.0) -> Spectra:
 
 @pytest.mark.parametrize(
     ("response", "missed", "passed"),
-    [(0.5, 0.25, 0.25), (1j, 2.0, 1.0), (-1.0, 4.0, 1.0), (2.0, 1.0, 4.0), (0.6 + 0.8j, 0.8, 1.0)],
+    [
+        (0.5, 0.25, 0.25),
+        (1j, 2.0, 1.0),
+        (-1.0, 4.0, 1.0),
+        (2.0, 1.0, 4.0),
+        (0.6 + 0.8j, 0.8, 1.0),
+    ],
 )
 def test_power_goes_with_the_square_of_the_complex_response(
     response: complex, missed: float, passed: float

@@ -167,7 +167,9 @@ def test_the_one_rate_of_filtered_dynamics_lies_between_those_of_the_joints() ->
 
 
 def test_a_threshold_is_one_or_one_a_joint() -> None:
-    with pytest.raises(ParameterError, match=r"alarm.threshold has 3 values; .* each of 2 joints"):
+    with pytest.raises(
+        ParameterError, match=r"alarm.threshold has 3 values; .* each of 2 joints"
+    ):
         tune_all(spectra(), parse_goal("auto", "1,2,3"))
     for line in tune_all(spectra(), parse_goal("auto", "1,2")):
         assert line.alarms is not None

@@ -34,7 +34,8 @@ def test_the_table_is_in_the_order_of_the_logs_and_equal_logs_share_rows(
 ) -> None:
     folder.put_rows(OTHER, rows(OTHER, 7))
     logs = pl.DataFrame(
-        {"log": ["z", "b", "a"], "episode": [None, 1, None], "key": [OTHER, KEY, KEY]}, schema=LOGS
+        {"log": ["z", "b", "a"], "episode": [None, 1, None], "key": [OTHER, KEY, KEY]},
+        schema=LOGS,
     )
     (table,) = folder.gather(logs, {})
     assert list(table.select("log", "joint").iter_rows()) == [

@@ -99,12 +99,21 @@ def test_a_finding_has_its_subject_and_remedy(
     [
         ({"false_on_free": 0}, "good", "0 contacts listed in its 4 s", ""),
         ({"false_on_free": 1}, "caution", "1 contact listed in its 4 s", ""),
-        ({"basis": "friction", "free": ()}, "caution", "none is given: pushes", "--free free.csv"),
+        (
+            {"basis": "friction", "free": ()},
+            "caution",
+            "none is given: pushes",
+            "--free free.csv",
+        ),
         ({"basis": "none", "free": ()}, "unknown", "no contact is listed", "--free free.csv"),
     ],
 )
 def test_free_motion_counts_its_false_rows_or_is_asked_for(
-    without_reference: Analysis, changed: dict[str, object], standing: str, words: str, remedy: str
+    without_reference: Analysis,
+    changed: dict[str, object],
+    standing: str,
+    words: str,
+    remedy: str,
 ) -> None:
     found = contact_list(contact(), remarks=(), **changed)
     (ground,) = of(replace(without_reference, contacts=found), "free motion")
@@ -168,7 +177,9 @@ def test_a_joint_at_rest_hides_its_dry_friction(without_reference: Analysis, as_
     assert len(of(still, "the arm is still")) == 1
 
 
-def test_friction_of_a_profile_names_the_command_for_ones_own(without_reference: Analysis) -> None:
+def test_friction_of_a_profile_names_the_command_for_ones_own(
+    without_reference: Analysis,
+) -> None:
     (ground,) = of(without_reference, "friction")
     assert ground.standing == "caution"
     assert ground.remedy == "vftcli identify free.csv --robot ur5 -o my_ur5.toml"
@@ -244,7 +255,9 @@ def test_few_rows_that_miss_the_sensor_are_named(without_reference: Analysis) ->
     assert ground.sentence.endswith("row 3 by 45 N, row 4 by 45 N and 2 more")
 
 
-def test_a_check_and_a_caution_do_not_share_their_name(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
+def test_a_check_and_a_caution_do_not_share_their_name(
+    without_reference: Analysis, as_if
+) -> None:  # type: ignore[no-untyped-def]
     """The joints that a free part leaves still, and stamps that repeat between sound ones."""
     found = contact_list(
         contact(), remarks=(caution("free-part-misses-joints", Where(joints=(5,))),)

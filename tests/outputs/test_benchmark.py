@@ -33,7 +33,9 @@ def rows_of(
         "penalties": (4.0 + 40.0 * max(error - 2.0, 0.0)) * CELLS,
     }  # fmt: skip
     each = {name: values.tolist() for name, values in sums.items()}
-    return [shared | each | {"joint": joint, "rmse_Nm": error, "l1_Nm": error} for joint in (1, 2)]
+    return [
+        shared | each | {"joint": joint, "rmse_Nm": error, "l1_Nm": error} for joint in (1, 2)
+    ]
 
 
 def counted(log: str, arm: str, **counts: Any) -> dict[str, Any]:

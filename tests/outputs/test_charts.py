@@ -23,7 +23,10 @@ def test_observers_keep_their_colours_whatever_runs_beside_them() -> None:
 def test_others_get_colours_that_nobody_has() -> None:
     found = colours_of_names(["a", "fdo", "b", "gmo"])
     assert len(set(found.values())) == 4
-    assert found["a"] not in COLOURS.values() or found["a"] not in (COLOURS["fdo"], COLOURS["gmo"])
+    assert found["a"] not in COLOURS.values() or found["a"] not in (
+        COLOURS["fdo"],
+        COLOURS["gmo"],
+    )
 
 
 def test_when_there_are_no_more_colours_they_come_again() -> None:

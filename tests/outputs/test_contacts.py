@@ -193,7 +193,9 @@ def test_trust_says_why() -> None:
     assert reason(sure) == "the band is 10% of the force"
     assert "the place" in reason(replace(sure, anywhere=(20.0, 90.0)))
     assert "friction" in reason(replace(sure, evidence=14.0))
-    assert "stopped" in reason(replace(sure, remarks=(caution("arm-stopped-abruptly", at_s=3.0),)))
+    assert "stopped" in reason(
+        replace(sure, remarks=(caution("arm-stopped-abruptly", at_s=3.0),))
+    )
     assert "few joints" in reason(replace(sure, peak_force=None, peak_band=None))
     assert reason(replace(sure, is_load=True)) == "lasts for most of the log"
 
@@ -213,7 +215,9 @@ def test_a_list_survives_its_record() -> None:
         ('{"contacts": null, "input": {"path": "a.csv", "sha256": ""}}', "log, a.csv"),
     ],
 )
-def test_without_a_list_the_log_is_asked_for(text: str | None, words: str, tmp_path: Path) -> None:
+def test_without_a_list_the_log_is_asked_for(
+    text: str | None, words: str, tmp_path: Path
+) -> None:
     if text is not None:
         (tmp_path / "run.json").write_text(text, encoding="utf-8")
     with pytest.raises(LogError, match=words):

@@ -62,7 +62,9 @@ def test_every_signal_reads_back(tmp_path: Path, ending: str, names: tuple[str, 
 @pytest.mark.parametrize("kept", [("current",), ("torque",), ()])
 def test_the_kind_of_effort_survives(tmp_path: Path, ending: str, kept: tuple[str, ...]) -> None:
     recording = full(6)
-    recording = Recording(t=recording.t, q=recording.q, **{k: getattr(recording, k) for k in kept})
+    recording = Recording(
+        t=recording.t, q=recording.q, **{k: getattr(recording, k) for k in kept}
+    )
     convert(recording, tmp_path / f"x{ending}")
     assert read(tmp_path / f"x{ending}").signals == ("q", *kept)
 
@@ -173,7 +175,9 @@ def test_the_wrench_of_best_stands_in_the_flange(
     np.testing.assert_array_equal(np.hstack([force, moment]), touched.wrenches[0].known)
 
 
-def test_wrenches_in_base_axes_say_about_which_point(with_wrench: Analysis, tmp_path: Path) -> None:
+def test_wrenches_in_base_axes_say_about_which_point(
+    with_wrench: Analysis, tmp_path: Path
+) -> None:
     """The flange is where their moment refers to: the frame of base would be another."""
     write_mcap(tmp_path / "wrench.mcap", with_wrench)
     frames = set()

@@ -58,7 +58,9 @@ def test_values_that_print_alike_are_both_the_best() -> None:
 
 def test_bold_is_only_where_the_reference_can_tell() -> None:
     """J1: both at the floor of .5; J2: it rests most of the time."""
-    (block,) = blocks(errors_of({}, {"reference_trusted": False}, {}, {"reference_trusted": False}))
+    (block,) = blocks(
+        errors_of({}, {"reference_trusted": False}, {}, {"reference_trusted": False})
+    )
     assert not block.best.any()
 
 

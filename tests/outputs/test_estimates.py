@@ -84,7 +84,9 @@ def test_what_the_pose_hides_is_apart(analysis: Analysis) -> None:
     sd = np.tile(rising[:, None], 6)
     wrench = replace(sensed.wrenches[0], masked=first, null_space=rising, sigma_min=2.0 * rising)
     for solver, apart in (("map", True), ("pinv", False)):
-        sensing = replace(sensed, wrenches=(wrench,), sensor=replace(sensed.sensor, solver=solver))
+        sensing = replace(
+            sensed, wrenches=(wrench,), sensor=replace(sensed.sensor, solver=solver)
+        )
         made = replace(analysis, virtual_sensor=sensing, reference=replace(reference, sd=sd))
         table = estimates_table(made)
         name = wrench.name

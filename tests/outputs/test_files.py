@@ -146,7 +146,10 @@ def test_a_file_is_no_folder(tmp_path: Path) -> None:
 
 def test_below_a_file_there_is_no_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be written"), OutputFolder(tmp_path / "file/out"):
+    with (
+        pytest.raises(OutputError, match="cannot be written"),
+        OutputFolder(tmp_path / "file/out"),
+    ):
         pytest.fail("the block ran")
     assert names(tmp_path) == ["file"]
 
@@ -211,7 +214,12 @@ def test_files_of_the_run_before_go_if_nobody_changed_them(tmp_path: Path) -> No
 def test_a_seal_is_not_believed_outside_its_folder(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "precious.txt").write_text("precious")
-    lies = {"../precious.txt": digest(tmp_path / "precious.txt"), "": "", "\0": "x", "run.json": 3}
+    lies = {
+        "../precious.txt": digest(tmp_path / "precious.txt"),
+        "": "",
+        "\0": "x",
+        "run.json": 3,
+    }
     for files in (lies, [], None, "text"):
         (tmp_path / "out" / "run.json").write_text(json.dumps({"files": files}))
         sealed(tmp_path / "out", {"a.txt": "a"})

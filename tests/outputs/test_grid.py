@@ -150,9 +150,8 @@ def test_latex_takes_its_tables(grid: Grid, tmp_path: Path) -> None:
         latex(replace(grid, title="|F| of link 3 … link 4, 65 ± 7")),
         latex(replace(joints, title="α − ξ ≤ τ", rows=((*row[:-1], "1234567890123"),))),
     ]
-    above = (
-        r"\documentclass[twocolumn]{article}\usepackage{booktabs}\textwidth=7.16in\columnsep=.16in"
-    )
+    above = r"\documentclass[twocolumn]{article}\usepackage{booktabs}"
+    above += r"\textwidth=7.16in\columnsep=.16in"
     text = "\n".join([above, r"\begin{document}", *tables, r"\end{document}"])
     (tmp_path / "tables.tex").write_text(text, encoding="utf-8")
     run([compiler, "-interaction=nonstopmode", "-halt-on-error", "tables.tex"], tmp_path)

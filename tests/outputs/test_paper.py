@@ -174,7 +174,9 @@ def test_letters_and_lines_can_be_read_in_print() -> None:
             for collection in axes.collections:
                 filled = isinstance(collection, matplotlib.collections.PolyCollection)
                 assert (
-                    (0.0 if filled else 0.5) <= collection.get_linewidth()[0] <= 1.3 * (not filled)
+                    (0.0 if filled else 0.5)
+                    <= collection.get_linewidth()[0]
+                    <= 1.3 * (not filled)
                 )
             assert all(patch.get_linewidth() == 0.0 for patch in axes.patches)
 
@@ -207,7 +209,9 @@ def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:
     figure = drawn_lines(
         3.5, plots_of(chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor"))
     )
-    boxes = [axes.get_tightbbox() for axes in figure.axes] + [figure.legends[0].get_window_extent()]
+    boxes = [axes.get_tightbbox() for axes in figure.axes] + [
+        figure.legends[0].get_window_extent()
+    ]
     wide, high = figure.bbox.width, figure.bbox.height
     for box in boxes:
         assert box.x0 >= -1.0
@@ -264,7 +268,9 @@ def test_a_second_chart_has_its_axis_to_the_right_named_at_the_end_of_a_row() ->
 
 def test_marks_stand_where_they_are_reported_each_shape_its_own() -> None:
     marks = {"a": (np.arange(6.0), np.zeros(6)), "b": (np.ones(6), np.zeros(6))}
-    figure = drawn_lines(7.16, [Plot(chart(), 0), Plot(chart(), 3)], marks=marks, below="Rate (Hz)")
+    figure = drawn_lines(
+        7.16, [Plot(chart(), 0), Plot(chart(), 3)], marks=marks, below="Rate (Hz)"
+    )
     one, other = figure.axes[1].lines[-2:]
     assert list(one.get_xdata()) == [3.0]
     assert one.get_marker() != other.get_marker()

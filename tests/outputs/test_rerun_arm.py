@@ -90,7 +90,10 @@ def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path) -> Non
     (tmp_path / "b.dae").write_bytes(b'<COLLADA><unit meter="0.5"/></COLLADA>')
     gone = whole._replace(link=4, file=tmp_path / "gone.stl")
     meshes = (whole, coloured, gone, whole._replace(link=5), whole._replace(link=5, file=None))
-    path, painted = tmp_path / "r.rrd", {2: {1.0: "#dd6415", 2.0: ""}, 3: {1.0: "#dd6415", 2.0: ""}}
+    path, painted = (
+        tmp_path / "r.rrd",
+        {2: {1.0: "#dd6415", 2.0: ""}, 3: {1.0: "#dd6415", 2.0: ""}},
+    )
     with rerun_file(path, "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
         send_arm(stream, replace(ROBOT, meshes=meshes), POSES, painted)
     capsules_of = [rows_of(path, f"/robot/link_{j}", "Capsules3D:lengths") for j in range(1, 7)]

@@ -74,7 +74,12 @@ def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
     tab = Tab("one", [force], log)
     with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, POSES, "Arm", (1.0, 2.0)):
         pass
-    assert rows_of(tmp_path / "r.rrd", "/force", "Scalars:scalars") == [[0.0], [1.0], [2.0], [3.0]]
+    assert rows_of(tmp_path / "r.rrd", "/force", "Scalars:scalars") == [
+        [0.0],
+        [1.0],
+        [2.0],
+        [3.0],
+    ]
     assert rows_of(tmp_path / "r.rrd", "/force/points", "Scalars:scalars") == [[7.0]]
     assert rows_of(tmp_path / "r.rrd", "/contacts/2", "TextLog:text") == [["second -> end"]]
     assert rows_of(tmp_path / "r.rrd", "/remarks", "TextLog:text") == [["first"], ["last"]]
@@ -88,7 +93,9 @@ def test_small_plots_say_where_their_axes_end() -> None:
 
 
 def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:
-    small, large = (plot("/a", np.array([[0.0], [high], [5.0]]), family=1) for high in (1.0, 10.0))
+    small, large = (
+        plot("/a", np.array([[0.0], [high], [5.0]]), family=1) for high in (1.0, 10.0)
+    )
     alone = plot("/b", np.array([[0.0], [1.0]]))
     tab = Tab("torques", [small, large, alone])
     # A twentieth of what is shown on either side.

@@ -15,7 +15,13 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.contacts import answer
 from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
-from vftcli.outputs.rerun_recording import contact_log, force_arrow, plot_groups, tabs_of, write_rrd
+from vftcli.outputs.rerun_recording import (
+    contact_log,
+    force_arrow,
+    plot_groups,
+    tabs_of,
+    write_rrd,
+)
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.choice import RobotChoice

@@ -223,7 +223,9 @@ def test_a_thousand_samples_a_second_are_written_out(analysis: Analysis) -> None
     t = np.arange(analysis.recording.samples) * 1e-3
     fast = replace(analysis.recording, t=t)
     run = replace(analysis.motion.log, recording=fast)
-    assert facts(replace(analysis, motion=replace(analysis.motion, log=run))).endswith("at 1000 Hz")
+    assert facts(replace(analysis, motion=replace(analysis.motion, log=run))).endswith(
+        "at 1000 Hz"
+    )
 
 
 @pytest.mark.parametrize(("columns", "width"), [(40, 72), (88, 88), (240, 100)])

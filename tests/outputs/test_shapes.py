@@ -140,7 +140,9 @@ def test_a_link_has_a_surface_where_all_of_its_meshes_are_read(tmp_path: Path) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ur_description/urdf/ur5_robot", "panda_description/urdf/panda"])
+@pytest.mark.parametrize(
+    "name", ["ur_description/urdf/ur5_robot", "panda_description/urdf/panda"]
+)
 def test_a_makers_arm_has_few_triangles_that_fill_its_meshes(name: str) -> None:
     """The box about each link stays within 10 mm, a third of the widest cell."""
     from test_example_robots import files

@@ -161,7 +161,10 @@ SEEDS: dict[str, tuple[Callable[[Path], Path], str | None]] = {
     "mat": (matlab, None),
     "mat-struct": (lambda path: matlab(path, turned=True), None),
     "mat-73": (matlab_73, None),
-    "hdf5": (lambda path: hdf5(path, {n: motion()[n] for n in ("t", "q", "dq", "current")}), None),
+    "hdf5": (
+        lambda path: hdf5(path, {n: motion()[n] for n in ("t", "q", "dq", "current")}),
+        None,
+    ),
     "aloha": (aloha, None),
 }
 """Name → how a log of that kind is made, and its --columns."""

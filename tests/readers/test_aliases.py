@@ -119,4 +119,8 @@ def test_what_a_text_with_positions_leaves_out_is_found_where_one_group_fits(
     # Of two efforts neither is.
     write(tmp_path / "log", {**columns, "current_1": 0.5})
     assert read(tmp_path / "log", columns="q=arm_{i}").signals == ("q", "dq")
-    assert read(tmp_path / "log", columns="q=arm_{i},tau=tau_{i}").signals == ("q", "dq", "torque")
+    assert read(tmp_path / "log", columns="q=arm_{i},tau=tau_{i}").signals == (
+        "q",
+        "dq",
+        "torque",
+    )

@@ -117,7 +117,9 @@ def test_bulk_and_typed_decoding_agree(tmp_path: Path) -> None:
     np.testing.assert_array_equal(recording.wrench, [m.O_F_ext_hat_K for m in typed])
 
 
-@pytest.mark.parametrize(("make", "code"), [(rosbag1, "chunks-missing"), (bare_mcap, "chunks-cut")])
+@pytest.mark.parametrize(
+    ("make", "code"), [(rosbag1, "chunks-missing"), (bare_mcap, "chunks-cut")]
+)
 def test_cut_files_are_read_up_to_their_last_whole_chunk(
     tmp_path: Path, make: Callable[[Path], Path], code: str
 ) -> None:
@@ -177,7 +179,9 @@ def test_a_bag_cut_within_the_index_of_a_chunk_is_read(tmp_path: Path) -> None:
     path.write_bytes(content[: places[3] - 8])  # before its header's and its first field's length
     recording = read(path)
     np.testing.assert_array_equal(recording.q, motion(7)["q"][: recording.samples])
-    assert [r.code for r in recording.source.remarks if r.level == "warning"] == ["chunks-missing"]
+    assert [r.code for r in recording.source.remarks if r.level == "warning"] == [
+        "chunks-missing"
+    ]
 
 
 @pytest.mark.parametrize("by", [1, 100, 2**31])

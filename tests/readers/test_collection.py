@@ -83,7 +83,11 @@ def test_bags_in_a_folder_without_their_list_are_logs_each(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("name", "episodes"),
-    [("lerobot_v3_effort", [0, 1, 2]), ("lerobot_v21_effort", [0, 1]), ("droid_raw", [None, None])],
+    [
+        ("lerobot_v3_effort", [0, 1, 2]),
+        ("lerobot_v21_effort", [0, 1]),
+        ("droid_raw", [None, None]),
+    ],
 )
 def test_an_episode_of_a_data_set_is_a_log(
     samples: Path, name: str, episodes: list[int | None]

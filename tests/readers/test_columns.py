@@ -55,7 +55,9 @@ def test_minus_turns_the_sign_and_is_said(tmp_path: Path) -> None:
     assert "turned the sign of current (--columns)" in turned.source.repairs
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]
+)
 def test_time_units(tmp_path: Path, unit: str, factor: float) -> None:
     rows = "\n".join(f"{1000 * k},{0.1 * k}" for k in range(5))
     recording = read(write(tmp_path / "x", rows + "\n"), columns=f"t[{unit}],q")
@@ -197,7 +199,10 @@ def test_a_headed_table_that_is_described_wrongly(
 def test_columns_of_lists_hold_the_clock_or_are_no_numbered_columns(tmp_path: Path) -> None:
     """A pair of seconds and nanoseconds may be one list; q_{i} finds no lists."""
     path = tmp_path / "x.parquet"
-    rows = {"stamp": [[k, 5 * 10**8] for k in range(9)], "q_0": [[0.1 * k, 0.2] for k in range(9)]}
+    rows = {
+        "stamp": [[k, 5 * 10**8] for k in range(9)],
+        "q_0": [[0.1 * k, 0.2] for k in range(9)],
+    }
     pl.DataFrame(rows).write_parquet(path)
     for clock in ("stamp", "stamp[0]|stamp[1]"):
         assert read(path, columns=f"t={clock},q=q_0").source.t0_ns == 5 * 10**8

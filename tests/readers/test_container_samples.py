@@ -62,7 +62,9 @@ def test_the_droid_sample_is_read_by_its_robot_s_clock(episode: int, samples: Pa
         stamps = file["observation/timestamp/robot_state"]
         seconds = stamps["robot_timestamp_seconds"][()] - stamps["robot_timestamp_seconds"][0]
         nanos = stamps["robot_timestamp_nanos"][()] - stamps["robot_timestamp_nanos"][0]
-    np.testing.assert_allclose(recording.t, seconds + 1e-9 * nanos, atol=1e-9)  # whole nanoseconds
+    np.testing.assert_allclose(
+        recording.t, seconds + 1e-9 * nanos, atol=1e-9
+    )  # whole nanoseconds
     assert (recording.samples, recording.robot_hint) == (419, "panda")
     alone = read(path)
     np.testing.assert_array_equal(alone.q, recording.q)

@@ -63,7 +63,9 @@ def test_joints_by_samples_are_turned_and_said(tmp_path: Path) -> None:
 def test_a_square_log_is_not_turned(tmp_path: Path) -> None:
     from scipy.io import savemat
 
-    q = np.arange(36.0).reshape(6, 6) / 36  # six samples of six joints: nothing says which is which
+    q = (
+        np.arange(36.0).reshape(6, 6) / 36
+    )  # six samples of six joints: nothing says which is which
     with (tmp_path / "x").open("wb") as file:
         savemat(file, {"t": np.arange(6.0), "q": q})
     np.testing.assert_array_equal(read(tmp_path / "x").q, q)
@@ -160,7 +162,9 @@ def test_the_blocks_of_a_long_file_are_joined(tmp_path: Path) -> None:
         ("[" * 200_000, "nested too deeply"),
     ],
 )
-def test_what_is_no_log_in_json_is_refused_in_a_line(text: str, words: str, tmp_path: Path) -> None:
+def test_what_is_no_log_in_json_is_refused_in_a_line(
+    text: str, words: str, tmp_path: Path
+) -> None:
     (tmp_path / "x").write_text(text)
     with pytest.raises(LogError, match=words):
         read(tmp_path / "x")
@@ -235,7 +239,9 @@ class TestHdf5:
         assert [r.code for r in first.source.remarks] == ["episode-taken", "episode-place"]
         assert str(first.source.remarks[0]) == "episode 0 of 3: --episode K|all"
 
-    def test_an_episode_beyond_the_last_is_refused_with_their_number(self, tmp_path: Path) -> None:
+    def test_an_episode_beyond_the_last_is_refused_with_their_number(
+        self, tmp_path: Path
+    ) -> None:
         with pytest.raises(LogError, match="no episode 3; it holds 3 episodes, 0 to 10"):
             read(seeds.aloha_set(tmp_path / "x"), episode=3)
 

@@ -32,7 +32,9 @@ def table(joints: int = 6, seed: int = 3) -> dict[str, np.ndarray]:
 
 def guess(*names: str, extra: int = 0, joints: int = 6) -> Guess | None:
     signals = table(joints)
-    return guess_columns(list(np.hstack([*(signals[n] for n in names), np.ones((2000, extra))]).T))
+    return guess_columns(
+        list(np.hstack([*(signals[n] for n in names), np.ones((2000, extra))]).T)
+    )
 
 
 @pytest.mark.parametrize("order", [(3, 4, 5), (5, 4, 3), (4, 3, 5)])
@@ -56,7 +58,9 @@ def test_positions_with_velocities_alone_are_settled(joints: int, fits: bool) ->
 
 
 @pytest.mark.parametrize(("pause", "fits"), [(19.5, True), (20.5, False)])
-def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(pause: float, fits: bool) -> None:
+def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(
+    pause: float, fits: bool
+) -> None:
     t = np.cumsum(np.where(np.arange(2000) % 16 == 5, pause, 1.0)) * 0.001  # 6 % of the steps
     w = 0.6 + 0.2 * np.arange(6)
     columns = np.hstack([t[:, None], np.sin(np.outer(t, w)), w * np.cos(np.outer(t, w))])

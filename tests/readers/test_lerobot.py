@@ -68,7 +68,9 @@ def dataset(
             folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet",
         )
     else:
-        lines = [json.dumps({"episode_index": k, "tasks": [], "length": ROWS[k]}) for k in range(3)]
+        lines = [
+            json.dumps({"episode_index": k, "tasks": [], "length": ROWS[k]}) for k in range(3)
+        ]
         (folder / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n")
     info = {
         "codebase_version": f"v{version}.0", "robot_type": "fr3", "fps": FPS, "total_episodes": 3,
@@ -219,7 +221,9 @@ def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:
         ("episodes.jsonl", "\xe5", "not text in UTF-8"),
     ],
 )
-def test_a_damaged_description_is_refused(name: str, text: str, words: str, tmp_path: Path) -> None:
+def test_a_damaged_description_is_refused(
+    name: str, text: str, words: str, tmp_path: Path
+) -> None:
     path = dataset(tmp_path, version=2)
     (path / "meta" / name).write_text(text, encoding="latin-1")
     with pytest.raises(LogError, match=words):

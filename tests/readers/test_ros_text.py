@@ -40,7 +40,14 @@ def bagpy(path: Path, names: Sequence[str] = ALPHABETICAL) -> Path:
     for k, row in enumerate(rows(names)):
         stamp = START + k * STEP
         listed = "[" + ", ".join(f"'{name}'" for name in names) + "]"
-        cells = [stamp * 1e-9 + 3e-4 * (k % 2), k, stamp // 10**9, stamp % 10**9, "", f'"{listed}"']
+        cells = [
+            stamp * 1e-9 + 3e-4 * (k % 2),
+            k,
+            stamp // 10**9,
+            stamp % 10**9,
+            "",
+            f'"{listed}"',
+        ]
         lines.append(",".join(map(str, [*cells, *row])))
     path.write_text("\n".join(lines) + "\n", "utf-8")
     return path
@@ -52,7 +59,9 @@ def rostopic(path: Path, names: Sequence[str] = ALPHABETICAL) -> Path:
         numbered(f"field.{field}", names, "")
         for field in ("name", "position", "velocity", "effort")
     ]
-    lines = ["%time,field.header.seq,field.header.stamp,field.header.frame_id," + ",".join(fields)]
+    lines = [
+        "%time,field.header.seq,field.header.stamp,field.header.frame_id," + ",".join(fields)
+    ]
     for k, row in enumerate(rows(names)):
         stamp = START + k * STEP
         lines.append(",".join(map(str, [stamp + 300_000 * (k % 2), k, stamp, "", *names, *row])))
@@ -65,7 +74,9 @@ def ros2_echo(path: Path, names: Sequence[str] = ALPHABETICAL) -> Path:
     lines = []
     for k, row in enumerate(rows(names)):
         stamp = START + k * STEP
-        lines.append(",".join(map(str, [stamp // 10**9, stamp % 10**9, "base_link", *names, *row])))
+        lines.append(
+            ",".join(map(str, [stamp // 10**9, stamp % 10**9, "base_link", *names, *row]))
+        )
     path.write_text("\n".join(lines) + "\n", "utf-8")
     return path
 

@@ -76,12 +76,15 @@ def test_ur_joints_by_name_and_effort_as_current(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("columns", "signal", "sign"), [("tau=effort", "torque", 1), ("-current=effort", "current", -1)]
+    ("columns", "signal", "sign"),
+    [("tau=effort", "torque", 1), ("-current=effort", "current", -1)],
 )
 def test_columns_say_what_effort_is(tmp_path: Path, columns: str, signal: str, sign: int) -> None:
     path = write_joint_states(tmp_path / "x", [ur_message(k) for k in range(20)])
     recording = read(path, columns=columns)
-    np.testing.assert_allclose(getattr(recording, signal)[0], sign * 0.1 * np.arange(6), rtol=1e-12)
+    np.testing.assert_allclose(
+        getattr(recording, signal)[0], sign * 0.1 * np.arange(6), rtol=1e-12
+    )
     assert len({"torque", "current"} & set(recording.signals)) == 1
     with pytest.raises(LogError, match="no field 'nonsense'; it has position"):
         read(path, columns="tau=nonsense")
@@ -143,7 +146,9 @@ def test_columns_state_the_frame_and_sign_of_a_bags_wrench(tmp_path: Path) -> No
     messages = [ur_message(k) for k in range(50)]
     for k in range(50):
         time = START + k * 8_000_000
-        messages.append({"topic": "/wrench", "time": time, "force": (1.0, 0, -5.0), "frame": "ft"})
+        messages.append(
+            {"topic": "/wrench", "time": time, "force": (1.0, 0, -5.0), "frame": "ft"}
+        )
     messages.sort(key=lambda message: message["time"])
     bag = write_joint_states(tmp_path / "x", messages)
     plain = read(bag).wrench
@@ -277,7 +282,9 @@ def test_stamps_are_compared_with_stamps_of_one_clock(
             message["force"] = ((message["time"] - START) * 1e-9, 0.0, 0.0)
     recording = read(write_joint_states(tmp_path / "x", messages))
     # stamps are whole nanoseconds
-    np.testing.assert_allclose(recording.require("wrench")[:, 0], 0.008 * np.arange(50), atol=2e-9)
+    np.testing.assert_allclose(
+        recording.require("wrench")[:, 0], 0.008 * np.arange(50), atol=2e-9
+    )
 
 
 @pytest.mark.parametrize(

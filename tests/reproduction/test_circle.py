@@ -23,7 +23,9 @@ One commit on two processors gave .0400 and .0672 s to the turn.
 
 def documented(name: str) -> dict[str, list[str]]:
     """Label of a line → what the document's table of an item has of ours."""
-    text = DOCUMENT.read_text("utf-8").split(f"## {HUANG.items[name].label}: ")[1].split("\n## ")[0]
+    text = (
+        DOCUMENT.read_text("utf-8").split(f"## {HUANG.items[name].label}: ")[1].split("\n## ")[0]
+    )
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     return {row[0].replace("\\", ""): row[3:] for row in rows[2:]}
 

@@ -44,7 +44,9 @@ def test_the_traditional_law_turns_within_arccos_zeta_over_omega_d() -> None:
 
     How much earlier the variable law can be is an independent run's: .43–.47 and .29–.31 s.
     """
-    values = {key: found[CORRECTED] for key, found in latest_turns(0, alphas=ALPHAS).values.items()}
+    values = {
+        key: found[CORRECTED] for key, found in latest_turns(0, alphas=ALPHAS).values.items()
+    }
     assert values["latest/x"] == pytest.approx(0.737, abs=5e-4)
     assert values["latest/rx"] == pytest.approx(0.504, abs=5e-4)
     assert 0.43 <= values["most/x/1.9"] <= 0.47

@@ -43,7 +43,13 @@ def test_a_response_is_read_within_three_seconds() -> None:
 
 def test_an_observers_rmse_is_its_own_mean_over_joints() -> None:
     """Two observers, three joints, rows of a wrench and an unknown joint among them."""
-    each = [("gmo", 1, 1.0), ("gmo", 2, 3.0), ("gmo", 3, None), ("fdo", 1, 50.0), ("fdo", 2, 70.0)]
+    each = [
+        ("gmo", 1, 1.0),
+        ("gmo", 2, 3.0),
+        ("gmo", 3, None),
+        ("fdo", 1, 50.0),
+        ("fdo", 2, 70.0),
+    ]
     rows = [dict(zip(("observer", "joint", "rmse_Nm"), row, strict=True)) for row in each]
     errors = pl.DataFrame([*rows, {"observer": "gmo", "rmse_Nm": 900.0}], SCHEMA)
     observers = MomentumObserver(gain=5.0), FilteredDynamicsObserver(omega=5.0), KalmanObserver()

@@ -102,7 +102,10 @@ ROBOT = '[[robot]]\nname = "r"\ntrain = ["{}"]\n'
     ("text", "line"),
     [
         # Another name for the scored file.
-        (ROBOT.format("b") + ENTRY + 'identified = "r"\n' + other("b", "tuesday"), "another name"),
+        (
+            ROBOT.format("b") + ENTRY + 'identified = "r"\n' + other("b", "tuesday"),
+            "another name",
+        ),
         (ENTRY + 'free = ["b"]\n' + other("b", "tuesday"), "another name"),
         # The same day.
         (ROBOT.format("c") + ENTRY + 'identified = "r"\n' + other("c", "monday"), "same day"),
@@ -146,7 +149,9 @@ def test_a_wrong_hash_and_a_missing_log(tmp_path: Path) -> None:
 def test_a_log_with_pushes_has_every_line_once(tmp_path: Path) -> None:
     text = ENTRY + f'sha256 = "{"0" * 64}"\nfree = ["0:9.5"]\npushes = [[4, 0.5, [10, 0, 0]]]\n'
     near, sha = lines(made(tmp_path, text))
-    assert near.startswith("a: free (0 s to 9.5 s) must stay 1 s away from score (1 s to the end)")
+    assert near.startswith(
+        "a: free (0 s to 9.5 s) must stay 1 s away from score (1 s to the end)"
+    )
     assert "sha256" in sha
 
 
@@ -168,7 +173,10 @@ def test_a_rival_says_what_it_was_trained_on(tmp_path: Path) -> None:
         ("best={}", "one of our rows"),
         ("next={}/none", "no folder"),
         ("next={}", "protocol 'magic'"),
-        ("next={}/empty", "empty has no file; LOG.csv or LOG.parquet is looked for, LOG one of a"),
+        (
+            "next={}/empty",
+            "empty has no file; LOG.csv or LOG.parquet is looked for, LOG one of a",
+        ),
         ("next={}/other", "other has zz.csv; LOG.csv"),
     ],
 )

@@ -27,7 +27,9 @@ def test_items_come_in_the_papers_order() -> None:
 
 @pytest.mark.parametrize("words", ["fig14", "table1,nothing", ","])
 def test_what_is_not_there_is_reported_with_what_is(words: str) -> None:
-    with pytest.raises(ParameterError, match="there is table1, table2, guidelines, fig1") as error:
+    with pytest.raises(
+        ParameterError, match="there is table1, table2, guidelines, fig1"
+    ) as error:
         HUANG.chosen(words)
     assert "\n" not in str(error.value)
 

@@ -176,7 +176,9 @@ def test_a_torque_alone_shows_its_contacts(tmp_path: Path) -> None:
     tau[150:160, 4] = 0.03
     tau[160:170, 4] = 0.02
     tau[250:300, 2] = 0.04  # below where one starts
-    truth = read_truth(tmp_path / "truth.csv", {"t": t, "tau": tau}, "t,tau_ext:6", truth="torque")
+    truth = read_truth(
+        tmp_path / "truth.csv", {"t": t, "tau": tau}, "t,tau_ext:6", truth="torque"
+    )
     assert truth.tau == pytest.approx(tau)
     assert [x[:2] for x in truth.contacts] == [pytest.approx((1.0, 1.6))]
     assert np.isnan(truth.contacts[0][2])
@@ -235,7 +237,9 @@ def test_stamps_within_a_microsecond_are_the_logs_own(
     for name in ("a.csv", "a.contacts.csv"):
         (tmp_path / name).touch()
     task = ScoreTask(tmp_path, "", LOG, "own", AnalysisChoice(), tmp_path, None, rival, False)
-    (answer,) = scoring.outside_answer(task, Recording(t=t, q=np.zeros((50, 6))), load_robot("ur5"))
+    (answer,) = scoring.outside_answer(
+        task, Recording(t=t, q=np.zeros((50, 6))), load_robot("ur5")
+    )
     assert np.array_equal(answer.torque.tau, steps) == own
     assert (answer.future, answer.lists) == (False, {"list": listed})
 

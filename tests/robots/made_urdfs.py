@@ -12,7 +12,9 @@ from vftcli.signals.arrays import Array
 TENSOR = (0.03, 0.001, 0.002, 0.028, -0.001, 0.025)
 
 
-def link(name: str, mass: float = 1.0, tensor: Sequence[float] = TENSOR, rpy: str = "0 0 0") -> str:
+def link(
+    name: str, mass: float = 1.0, tensor: Sequence[float] = TENSOR, rpy: str = "0 0 0"
+) -> str:
     """A link whose centre of mass lies off its frame; without inertia where its mass is zero."""
     if not mass:
         return f'<link name="{name}"/>'
@@ -182,7 +184,9 @@ def reduced_model(
     q = pin.neutral(model)
     for name, angle in angles.items():
         one = model.joints[model.getJointId(name)]
-        q[one.idx_q : one.idx_q + one.nq] = angle if one.nq == 1 else [np.cos(angle), np.sin(angle)]
+        q[one.idx_q : one.idx_q + one.nq] = (
+            angle if one.nq == 1 else [np.cos(angle), np.sin(angle)]
+        )
     locked = [k for k in range(1, model.njoints) if model.names[k] not in names]
     reduced = pin.buildReducedModel(model, locked, q) if locked else model
     assert list(reduced.names)[1:] == list(names)

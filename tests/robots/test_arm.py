@@ -121,13 +121,17 @@ def test_a_list_of_tips_is_no_longer_than_a_message(tmp_path: Path) -> None:
 def test_a_heavy_branch_is_a_second_arm_and_no_hand(tmp_path: Path) -> None:
     """Five joints of a body, then two arms: each weighs more than a quarter of what is before."""
     text = robot(link("base"), arm(5), arm(4, "left_", "link5"), arm(4, "right_", "link5"))
-    with pytest.raises(RobotError, match="two arms of 9 joints: --tip left_link4 or --tip right_l"):
+    with pytest.raises(
+        RobotError, match="two arms of 9 joints: --tip left_link4 or --tip right_l"
+    ):
         loaded(tmp_path, text)
 
 
 def test_a_joint_within_the_arm_that_follows_another_is_refused(tmp_path: Path) -> None:
     old, new = '<child link="link3"/>', '<child link="link3"/><mimic joint="joint2"/>'
-    with pytest.raises(RobotError, match=r"joint 'joint3' within the arm follows 'joint2' \(mimic"):
+    with pytest.raises(
+        RobotError, match=r"joint 'joint3' within the arm follows 'joint2' \(mimic"
+    ):
         loaded(tmp_path, robot(link("base"), arm(6)).replace(old, new))
 
 

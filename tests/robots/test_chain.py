@@ -90,7 +90,9 @@ def test_a_payload_that_no_body_can_be_is_refused() -> None:
 
 def test_a_payload_is_merged_into_the_last_link_as_pinocchio_does() -> None:
     chain = load_robot("ur5").chain
-    load = Payload(mass=2.5, com=np.array([0.02, -0.03, 0.11]), inertia=np.diag([0.02, 0.03, 0.01]))
+    load = Payload(
+        mass=2.5, com=np.array([0.02, -0.03, 0.11]), inertia=np.diag([0.02, 0.03, 0.01])
+    )
     model = chain.to_pinocchio()
     flange = pin.SE3(chain.flange_rotation, chain.flange_translation)
     model.inertias[6] += flange.act(pin.Inertia(load.mass, load.com, load.inertia))

@@ -144,7 +144,9 @@ def test_a_file_that_gives_only_the_moment_about_the_axis_keeps_it(tmp_path: Pat
 
 def test_a_negative_moment_is_refused(tmp_path: Path) -> None:
     text = flattened(robot(link("base"), arm(6)), "link2", (-1e-3, 2e-3, 2e-3))
-    with pytest.raises(RobotError, match="joint 'joint2' is unphysical: inertia has the negative"):
+    with pytest.raises(
+        RobotError, match="joint 'joint2' is unphysical: inertia has the negative"
+    ):
         load_robot(written(tmp_path, text))
 
 
@@ -219,13 +221,17 @@ def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
         ("arm.urdf", "<COLLADA/>", "a mesh; take the URDF that names it"),
     ],
 )
-def test_what_is_no_description_is_named(name: str, text: str, words: str, tmp_path: Path) -> None:
+def test_what_is_no_description_is_named(
+    name: str, text: str, words: str, tmp_path: Path
+) -> None:
     with pytest.raises(RobotError, match=words):
         load_robot(written(tmp_path, text, name))
 
 
 def test_options_of_descriptions_are_refused_where_they_mean_nothing(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="--tip is for a URDF, xacro or MJCF; ur5 is a robot file"):
+    with pytest.raises(
+        RobotError, match="--tip is for a URDF, xacro or MJCF; ur5 is a robot file"
+    ):
         load_robot("ur5", tip="tool0")
     with pytest.raises(RobotError, match="name:=ur is for a URDF, xacro or MJCF; ur5"):
         load_robot("ur5 name:=ur")

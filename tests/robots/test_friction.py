@@ -127,7 +127,9 @@ STRIBECK = {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity"
 def test_dry_friction_of_every_model() -> None:
     robot = (
         JointFriction(model="coulomb-viscous-stribeck", parameters=STRIBECK),
-        JointFriction(model="sigmoid", parameters={"amplitude": -1.5, "slope": 10.0, "shift": 0.1}),
+        JointFriction(
+            model="sigmoid", parameters={"amplitude": -1.5, "slope": 10.0, "shift": 0.1}
+        ),
         JointFriction(),
     )
     # at breakaway; a sigmoid's two saturations lie its amplitude apart
@@ -202,7 +204,9 @@ def test_loaded_joints_of_a_ur5e_rub_more() -> None:
     dq, carried = np.full((1, 6), 0.5), np.array([[0.0, 45.0, 20.0, 0.0, 0.0, 0.0]])
     more = friction_torque(robot.friction, dq, carried) - friction_torque(robot.friction, dq)
     # .067 of the torque on joint 2, .01 to .02 on joint 3
-    np.testing.assert_allclose(more, [[0.0, 0.067 * 45.0, 0.015 * 20.0, 0.0, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(
+        more, [[0.0, 0.067 * 45.0, 0.015 * 20.0, 0.0, 0.0, 0.0]], atol=1e-12
+    )
 
 
 def test_the_ur10e_profile_rubs_as_its_controller_does() -> None:
@@ -304,8 +308,16 @@ def test_presliding_and_temperature_stand_beside_any_model(tmp_path: Path) -> No
     ("old", "new", "words"),
     [
         ("presliding = 2.0", "presliding = -2.0", r"presliding is -2 N·m; on a robot it is"),
-        ("presliding_length = 3e-4", "presliding_length = 0.0", "presliding_length is 0 rad; on a"),
-        ("presliding_length = 3e-4", "presliding_length = 3.0", "presliding_length is 3 rad; on a"),
+        (
+            "presliding_length = 3e-4",
+            "presliding_length = 0.0",
+            "presliding_length is 0 rad; on a",
+        ),
+        (
+            "presliding_length = 3e-4",
+            "presliding_length = 3.0",
+            "presliding_length is 3 rad; on a",
+        ),
         ("presliding_length = 3e-4\n", "", "presliding_length is missing; presliding needs it"),
         ("presliding = 2.0\n", "", "presliding is missing; presliding_length needs it"),
         ("temperature_at = 44.6\n", "", "temperature_at is missing; temperature needs it"),
@@ -314,7 +326,11 @@ def test_presliding_and_temperature_stand_beside_any_model(tmp_path: Path) -> No
         ("-0.085741]", "-0.085741, 1.0]", "temperature is .*; it must be 4 finite numbers"),
         ("speeds = [0.01, 0.5, 1.5, 3.2]\n", "", "speeds is missing; it must be a list of at"),
         ("0.01, 0.5, 1.5, 3.2", "0.01", r"speeds is \[0.01\]; it must be a list of at least 2"),
-        ("0.01, 0.5, 1.5, 3.2", "0.01, 0.5, 0.5, 3.2", "speeds is .*; each must be above the one"),
+        (
+            "0.01, 0.5, 1.5, 3.2",
+            "0.01, 0.5, 0.5, 3.2",
+            "speeds is .*; each must be above the one",
+        ),
         ("0.01, 0.5, 1.5, 3.2", "0.0, 0.5, 1.5, 3.2", "speeds is 0 rad/s; on a robot it is"),
         ("0.01, 0.5, 1.5, 3.2", "0.01, 0.5, 1.5", "there are 4 torques for 3 speeds"),
         ("5.73, 9.32", "nan, 9.32", "torques is .*; it must be a list of at least 2 finite"),
@@ -383,5 +399,7 @@ def test_a_file_needs_the_models_keys(tmp_path):
         load_robot(path)
     with_velocity = 'model = "coulomb-logarithmic"\nstribeck = 1.0\nstribeck_velocity = 0.0'
     path.write_text(text.replace(model, with_velocity, 1), encoding="utf-8")
-    with pytest.raises(RobotError, match=r"stribeck_velocity is 0 rad/s; on a robot it is within"):
+    with pytest.raises(
+        RobotError, match=r"stribeck_velocity is 0 rad/s; on a robot it is within"
+    ):
         load_robot(path)

@@ -47,7 +47,9 @@ def put(file: Path) -> Path:
 )  # fmt: skip
 def test_a_mesh_is_found_by_its_name(tmp_path: Path, name: str, place: str | None) -> None:
     for folder, package in (("some_folder", "held"), ("other", "beside")):
-        put(tmp_path / "ws" / folder / "package.xml").write_text(f"<name>{package}</name>", "utf-8")
+        put(tmp_path / "ws" / folder / "package.xml").write_text(
+            f"<name>{package}</name>", "utf-8"
+        )
     (tmp_path / "ws/some_folder/urdf").mkdir()
     named = name.format(folder=tmp_path)
     put(tmp_path / (place or "ws/meshes/f.txt"))
@@ -142,4 +144,7 @@ def test_meshes_that_no_recording_has_room_for_are_left_out(tmp_path: Path) -> N
         with (tmp_path / name).open("wb") as file:
             file.truncate(LARGEST // 2 + 1)
     text = shaped(robot(link("base"), arm(6)), "link2", shape("a.stl") + shape("b.stl"))
-    assert [bool(mesh.file) for mesh in load_robot(written(tmp_path, text)).meshes] == [True, False]
+    assert [bool(mesh.file) for mesh in load_robot(written(tmp_path, text)).meshes] == [
+        True,
+        False,
+    ]

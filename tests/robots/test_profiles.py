@@ -28,7 +28,9 @@ POSITION, TORQUE = 1e-6, 1e-6
 @pytest.mark.parametrize("name", PROFILES)
 def test_flange_and_gravity_are_the_makers(name: str) -> None:
     robot = load_robot(name)
-    rows = [row[1:] for row in csv.reader(POSES.read_text("utf-8").splitlines()) if row[0] == name]
+    rows = [
+        row[1:] for row in csv.reader(POSES.read_text("utf-8").splitlines()) if row[0] == name
+    ]
     assert len(rows) == 2
     for numbers in rows:
         q, position, gravity = (np.array(text.split(), float) for text in numbers)
@@ -67,7 +69,9 @@ def test_the_hand_is_mounted_turned_as_the_maker_mounts_it() -> None:
     ("name", "meant"),
     [("pnada", "panda"), ("ru5e", "ur5e"), ("ur6e", ""), ("ur9", ""), ("fr4", "")],
 )
-def test_a_misspelt_name_suggests_the_arm_it_means_and_never_another(name: str, meant: str) -> None:
+def test_a_misspelt_name_suggests_the_arm_it_means_and_never_another(
+    name: str, meant: str
+) -> None:
     """A profile of another arm gives wrong newtons, however near its name is."""
     words = f"Did you mean {meant}?" if meant else "Built in: ur3"
     with pytest.raises(RobotError, match=rf"no robot '{name}'\. {re.escape(words)}"):

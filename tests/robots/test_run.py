@@ -100,7 +100,11 @@ def log_of(names: tuple[str, ...]) -> Recording:
         (tuple(f"ns/{name}" for name in UR_NAMES), UR.chain.names, (0, 1, 2, 3, 4, 5)),
         (("Wrist 3", *UR_WORDS[:5]), UR.chain.names, (1, 2, 3, 4, 5, 0)),
         (
-            ("fr3_finger_joint1", *(f"fr3_joint{j}" for j in range(7, 0, -1)), "fr3_finger_joint2"),
+            (
+                "fr3_finger_joint1",
+                *(f"fr3_joint{j}" for j in range(7, 0, -1)),
+                "fr3_finger_joint2",
+            ),
             PANDA.chain.names,
             (7, 6, 5, 4, 3, 2, 1),
         ),
@@ -185,7 +189,9 @@ def test_a_gear_is_read_from_the_robot_file(tmp_path) -> None:
     path.write_text(text.replace("mass = 3.7\n", "mass = 3.7\ngear = 0.0\n", 1), "utf-8")
     with pytest.raises(RobotError, match=r"joint 1 \(shoulder_pan\): gear is 0"):
         load_robot(path)
-    path.write_text(text.replace("mass = 3.7\n", "mass = 3.7\ngear_efficiency = 1.2\n", 1), "utf-8")
+    path.write_text(
+        text.replace("mass = 3.7\n", "mass = 3.7\ngear_efficiency = 1.2\n", 1), "utf-8"
+    )
     with pytest.raises(RobotError, match=r"gear_efficiency is 1.2; it is above 0, at most 1"):
         load_robot(path)
 

@@ -121,7 +121,9 @@ def test_blocks_of_a_log_have_the_whole_log_s_terms(size: int) -> None:
     running = RunningTerms(robot, clock_of(t))
     for first in range(0, len(t), size):
         span = slice(first, first + size)
-        block = running.next(Recording(t=t[span], q=q[span], dq=dq[span], current=np.cos(q[span])))
+        block = running.next(
+            Recording(t=t[span], q=q[span], dq=dq[span], current=np.cos(q[span]))
+        )
         for name in ("p", "mu", "d", "dt"):
             np.testing.assert_array_equal(getattr(block, name), getattr(whole, name)[span])
 

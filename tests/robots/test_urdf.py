@@ -133,7 +133,11 @@ def test_a_urdf_that_is_no_serial_revolute_arm_is_refused(
         ('"0.1 0.2 0.05"', '"0.1 0.2"', "link 'one': origin xyz is .* it must be 3 numbers"),
         ('"0.2 0.1 0"', '"0 90 0"', "joint 'a': origin rpy is 90 rad; on a robot it is"),
         ('axis xyz="1 2 -0.5"', 'axis xyz="0 0 0"', "joint 'a': axis is '0 0 0'"),
-        ('axis xyz="1 2 -0.5"', 'axis xyz="1e154 2 0"', "joint 'a': axis is '1e154 2 0'; it must"),
+        (
+            'axis xyz="1 2 -0.5"',
+            'axis xyz="1e154 2 0"',
+            "joint 'a': axis is '1e154 2 0'; it must",
+        ),
         ('axis xyz="1 2 -0.5"', 'axis xyz="z"', "joint 'a': axis xyz is 'z'; it must be 3"),
         ('lower="-1"', 'lower="-1rad"', "joint 'b': limit lower is '-1rad'"),
         ('<joint name="b"', '<joint name="a"', "two joints are named 'a'; each needs its own"),
@@ -180,7 +184,11 @@ def test_what_a_urdf_leaves_out_has_its_default(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('type="fixed"', 'type="welded"', "joint 'tool': type is 'welded'; it is one of revolute"),
+        (
+            'type="fixed"',
+            'type="welded"',
+            "joint 'tool': type is 'welded'; it is one of revolute",
+        ),
         ('<link name="hand">', "<link>", "link 'without a name': it needs a name"),
         ('<child link="hand"/>', "", "joint 'tool': <child> is missing, or names no link"),
         ('link="hand"', 'link="paw"', "joint 'tool': no link 'paw'"),
@@ -255,7 +263,9 @@ def test_an_mjcf_is_pinocchio_s_model_of_it(tmp_path: Path) -> None:
     ours = found.chain.to_pinocchio()
     for q, v, a in np.random.default_rng(0).uniform(-2, 2, (10, 3, 5)):
         expected = pin.rnea(theirs, theirs.createData(), q, v, a)
-        np.testing.assert_allclose(pin.rnea(ours, ours.createData(), q, v, a), expected, atol=1e-12)
+        np.testing.assert_allclose(
+            pin.rnea(ours, ours.createData(), q, v, a), expected, atol=1e-12
+        )
 
 
 def test_a_body_is_a_tip(tmp_path: Path) -> None:
@@ -282,7 +292,9 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
     assert left.values["damping_Nms_rad"] == [0, 20, 0, 0, 0]
     arm = RobotChoice(name=str(path), friction="model").load(log)
     assert arm.friction[1].parameters == {"coulomb": 0.3, "viscous": 20.0}
-    with pytest.raises(RobotError, match=r"model\.friction=model is what an MJCF gives its joints"):
+    with pytest.raises(
+        RobotError, match=r"model\.friction=model is what an MJCF gives its joints"
+    ):
         RobotChoice(name="ur5", friction="model").load(log)
     damped = load_robot(str(written(tmp_path, mjcf('damping="20"'), "damped.xml")))
     assert "simulator-friction-left" in {remark.code for remark in damped.remarks}
@@ -292,7 +304,10 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
     ("text", "words"),
     [
         ("<mujoco/>", "no moving joint|Pinocchio can read"),
-        (mjcf('axis="0 0 0"').replace('axis="1 1 0"', "", 1), "'joint2': its axis points nowhere"),
+        (
+            mjcf('axis="0 0 0"').replace('axis="1 1 0"', "", 1),
+            "'joint2': its axis points nowhere",
+        ),
         (mjcf('armature="-1"'), "joint 'joint2': armature is -1"),
         (mjcf().replace(TURN, 'xyaxes="1 0 0 2 0 0"', 1), "'joint1': its orientation is no rot"),
         (mjcf().replace('mass="4.0"', 'mass="1e9"'), "'joint1': mass is 1e.09 kg; on a robot"),

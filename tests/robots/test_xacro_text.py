@@ -50,7 +50,9 @@ def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None
     own.mkdir(parents=True)
     written(parts, "<package><name>other_parts</name></package>", "package.xml")
     argument = '<xacro:arg name="far" default="1"/>'
-    part = f'<robot xmlns:xacro="http://xacro">{argument}{fixed("far_link", "link5", 0.2)}</robot>'
+    part = (
+        f'<robot xmlns:xacro="http://xacro">{argument}{fixed("far_link", "link5", 0.2)}</robot>'
+    )
     written(parts, part, "part.xacro")
     include = '<xacro:include filename="$(find other_parts)/part.xacro"/>'
     path = written(own, xacro(include), "arm.xacro")

@@ -111,7 +111,9 @@ def test_even_clocks_are_reported_from_jittering_ones() -> None:
 )
 def test_what_is_no_array_of_numbers_is_refused(value: object, reported: str) -> None:
     assert number_array([[1, 2]], "q", "x").tolist() == [[1.0, 2.0]]
-    with pytest.raises(ShapeError, match=f"^q of x is {reported}.*; expected an array of numbers$"):
+    with pytest.raises(
+        ShapeError, match=f"^q of x is {reported}.*; expected an array of numbers$"
+    ):
         number_array(value, "q", "x")  # type: ignore[arg-type]
 
 

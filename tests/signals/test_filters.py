@@ -82,7 +82,9 @@ def test_a_log_too_short_for_the_start_up_is_left_alone() -> None:
 @pytest.mark.parametrize("cutoff", [0.0, 50.0, 70.0])
 def test_a_cutoff_beyond_half_the_rate_is_refused(cutoff: float) -> None:
     t = 0.01 * np.arange(100)
-    with pytest.raises(ParameterError, match="log of 100 Hz; choose a cutoff between 0 and 50 Hz"):
+    with pytest.raises(
+        ParameterError, match="log of 100 Hz; choose a cutoff between 0 and 50 Hz"
+    ):
         low_pass(t, np.zeros((100, 1)), cutoff)
 
 
@@ -99,7 +101,9 @@ def test_what_is_differentiated_goes_through_a_steep_filter() -> None:
     """Order 4 a pass, three periods of the cutoff to settle; a slow clock leaves it as it is."""
     t = 0.01 * np.arange(500)
     x = RNG.standard_normal((500, 2))
-    np.testing.assert_array_equal(zero_phase(t, x, 6.0), low_pass(t, x, 6.0, order=4, settling=0.5))
+    np.testing.assert_array_equal(
+        zero_phase(t, x, 6.0), low_pass(t, x, 6.0, order=4, settling=0.5)
+    )
     np.testing.assert_array_equal(zero_phase(10.0 * t, x, 6.0), x)
     with pytest.raises(ClockError, match=r"0\.19 s of log are too short for a 6 Hz filter"):
         zero_phase(t[:20], x[:20], 6.0)

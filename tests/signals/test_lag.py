@@ -151,7 +151,10 @@ def whole_lags(late: np.ndarray, early: np.ndarray, step: float) -> np.ndarray:
         x, y = (np.where(known, z - z[known].mean(), 0.0) for z in (column, other))
         fit = []
         for lag in range(first - 1, last + 2):
-            here = slice(max(lag, 0), count + min(lag, 0)), slice(max(-lag, 0), count - max(lag, 0))
+            here = (
+                slice(max(lag, 0), count + min(lag, 0)),
+                slice(max(-lag, 0), count - max(lag, 0)),
+            )
             a, b, both = x[here[0]], y[here[1]], known[here[0]] & known[here[1]]
             power = np.sum(a[both] ** 2) * np.sum(b[both] ** 2)
             fit.append(np.sum(a * b) / np.sqrt(power) if power > 0 else 0.0)

@@ -101,7 +101,9 @@ def test_cross_validation_equals_fitting_each_time_anew():
     parts = left_out([len(y)], [True])
     assert cross_validated(A, y, weights, parts) == pytest.approx(expected, rel=1e-9)
     # sums of squares far below 1 count as they are
-    assert cross_validated(A, 1e-6 * y, weights, parts) == pytest.approx(1e-6 * expected, rel=1e-9)
+    assert cross_validated(A, 1e-6 * y, weights, parts) == pytest.approx(
+        1e-6 * expected, rel=1e-9
+    )
 
 
 def test_the_robust_spread_of_normal_noise():

@@ -30,7 +30,9 @@ def test_a_package_that_lacks_another_is_not_called_missing(
     monkeypatch.setattr(
         "vftcli.signals.packages.import_module", lambda _: __import__("no_such_module")
     )
-    with pytest.raises(PackageError, match=r"cannot be loaded \(No module named 'no_such_module'"):
+    with pytest.raises(
+        PackageError, match=r"cannot be loaded \(No module named 'no_such_module'"
+    ):
         needed("rerun", "a thing")
 
 

@@ -38,7 +38,12 @@ from vftcli.signals.parsing import (
 
 @pytest.mark.parametrize(
     ("text", "span"),
-    [("1:2", (1.0, 2.0)), (":2", (-np.inf, 2.0)), ("1:", (1.0, np.inf)), (":", (-np.inf, np.inf))],
+    [
+        ("1:2", (1.0, 2.0)),
+        (":2", (-np.inf, 2.0)),
+        ("1:", (1.0, np.inf)),
+        (":", (-np.inf, np.inf)),
+    ],
 )
 def test_intervals(text: str, span: tuple[float, float]) -> None:
     assert interval(text) == span
@@ -58,7 +63,9 @@ def test_a_span_is_said_as_it_is_typed(text: str) -> None:
 
 def test_an_endless_line_of_toml_is_refused_before_it_is_parsed() -> None:
     """50 000 dots took 15 s; so many letters in lines of their own are fine."""
-    with pytest.raises(ParameterError, match="line 2 has 50001 letters; a line of TOML has at mos"):
+    with pytest.raises(
+        ParameterError, match="line 2 has 50001 letters; a line of TOML has at mos"
+    ):
         toml_tables(f"a = 1\n{'.' * 50_000}a")
     assert len(toml_tables("".join(f"a{k} = 1\n" for k in range(2_000)))) == 2_000
 
@@ -93,7 +100,9 @@ def test_an_unknown_word_is_refused_with_what_there_is() -> None:
 
 def test_a_thing_of_another_kind_is_refused_with_what_gives_one() -> None:
     check_kind(True, int, "the count", "len(x)")  # a subclass is of the kind
-    with pytest.raises(ParameterError, match=r"^the count is 'a'; expected int: len\(x\) is one$"):
+    with pytest.raises(
+        ParameterError, match=r"^the count is 'a'; expected int: len\(x\) is one$"
+    ):
         check_kind("a", int, "the count", "len(x)")
     with pytest.raises(ParameterError, match=r"^the count is ndarray; expected int"):
         check_kind(np.zeros(3), int, "the count", "len(x)")
@@ -172,7 +181,12 @@ NAMES = Option("--name", "NAME", "A name.", several=True, completes=lambda: ("on
 def test_an_option_has_a_word_a_name_in_complaints_and_values() -> None:
     options = (RATE, DETAILS, FORM, NAMES)
     assert [option.word for option in options] == ["a.rate", "details", "form_of_it", "name"]
-    assert [option.typed for option in options] == ["a.rate", "--details", "--form-of-it", "--name"]
+    assert [option.typed for option in options] == [
+        "a.rate",
+        "--details",
+        "--form-of-it",
+        "--name",
+    ]
     assert [option.is_setting for option in options] == [True, False, False, False]
     assert [option.values() for option in options] == [[], [], ["svg", "png"], ["one", "two"]]
     assert (FORM.read("svg"), FORM.read(None), NAMES.read(("a",))) == ("SVG", None, ("a",))

@@ -78,6 +78,10 @@ def test_folding_is_undone(samples: int) -> None:
 
 
 def test_pieces_end_at_the_same_samples_wherever_a_block_begins() -> None:
-    assert spans(40000, begins=True) == [slice(1, 16384), slice(16384, 32768), slice(32768, 40000)]
+    assert spans(40000, begins=True) == [
+        slice(1, 16384),
+        slice(16384, 32768),
+        slice(32768, 40000),
+    ]
     assert spans(40000, begins=False)[0] == slice(0, 16384)
     assert spans(1, begins=True) == []

@@ -51,7 +51,9 @@ def test_the_factor_turns_to_force_on_the_robot() -> None:
 
 def wrench(masked: np.ndarray | None = None) -> Wrench:
     values = np.arange(24.0).reshape(4, 6)
-    return Wrench(name="x", t=np.arange(4.0), values=values, frame="base", sd=values, masked=masked)
+    return Wrench(
+        name="x", t=np.arange(4.0), values=values, frame="base", sd=values, masked=masked
+    )
 
 
 def test_hidden_samples_are_not_known() -> None:

@@ -101,7 +101,8 @@ def test_a_controller_knows_payload_and_sensor_if_it_is_told_to():
 
 
 @pytest.mark.parametrize(
-    ("name", "most"), [(name, {"com": 1.0, "torque_offset": 1e4}.get(name, 0.45)) for name in SIZES]
+    ("name", "most"),
+    [(name, {"com": 1.0, "torque_offset": 1e4}.get(name, 0.45)) for name in SIZES],
 )
 def test_sizes_beyond_what_leaves_all_positive_are_refused(name, most):
     arm(f"mismatch.{name}={most}")

@@ -76,7 +76,9 @@ def test_circle_is_a_horizontal_circle_of_fixed_orientation() -> None:
     assert spec.motion(robot).duration == 20.0
 
 
-MIDWAY = 0.103515625  # of a minimum-jerk move after a quarter of its time: 10/64 − 15/256 + 6/1024
+MIDWAY = (
+    0.103515625  # of a minimum-jerk move after a quarter of its time: 10/64 − 15/256 + 6/1024
+)
 
 
 def test_moves_lead_straight_to_where_they_say() -> None:
@@ -208,7 +210,10 @@ ROW, SHORT = (0.1,) * 6, (0.1,) * 5
 @pytest.mark.parametrize(
     ("spec", "words"),
     [
-        (JointMovesSpec(moves=((0.0, 1.0, *SHORT),), length=1.0), "two times and 6 displacements"),
+        (
+            JointMovesSpec(moves=((0.0, 1.0, *SHORT),), length=1.0),
+            "two times and 6 displacements",
+        ),
         (PosesSpec(move=0.0), "count at least 2"),
         (PosesSpec(dwell=-0.1), "dwell not negative"),
         (PosesSpec(count=1), "count at least 2"),

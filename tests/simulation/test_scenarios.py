@@ -105,7 +105,12 @@ def test_wrong_keys_are_named(overrides: list[str], words: str) -> None:
         simulate(load_scenario("ur5-circle", [*overrides]))
 
 
-RUNAWAY = ["duration=1", "servo.damping=200", "servo.torque_limits=false", "friction.enabled=false"]
+RUNAWAY = [
+    "duration=1",
+    "servo.damping=200",
+    "servo.torque_limits=false",
+    "friction.enabled=false",
+]
 
 
 @pytest.mark.parametrize(
@@ -117,7 +122,10 @@ RUNAWAY = ["duration=1", "servo.damping=200", "servo.torque_limits=false", "fric
         (["mismatch.mass=-0.1"], "mismatch.mass is -0.1; it is within 0 to 0.45"),
         (["duration=-3"], "must be positive"),
         (["step=0"], "must be positive"),
-        (["pair=true", "contacts=[]", "duration=0.05"], "pair = true needs a payload or contacts"),
+        (
+            ["pair=true", "contacts=[]", "duration=0.05"],
+            "pair = true needs a payload or contacts",
+        ),
         (["friction.temperature_end=200.5"], "temperature_end is 200.5 °C; a joint has"),
         (["sensing.start=1.1e10"], "a finite number, 1e.10 at most"),
         (["duration=1e9"], "shorten it"),
@@ -157,7 +165,9 @@ ExcitationSpec = {period = 10, cycles = 2}
 
 
 @pytest.mark.parametrize(("kind", "stated"), tomllib.loads(LEFT_OUT).items())
-def test_what_a_file_leaves_out_is_off_but_for_these(kind: str, stated: dict[str, object]) -> None:
+def test_what_a_file_leaves_out_is_off_but_for_these(
+    kind: str, stated: dict[str, object]
+) -> None:
     """An old file makes the same log again: what it does not say has not moved."""
     section = getattr(scenario, kind, None) or getattr(trajectories, kind)
     needed = [f.name for f in fields(section) if f.default is f.default_factory is MISSING]

@@ -65,7 +65,11 @@ def test_torque_and_positions_stay_inside_the_limits():
         (ServoSpec(stiffness="hard"), 1e-3, "there is stiff, soft"),
         (ServoSpec(stiffness=0.0), 1e-3, "must be positive"),
         (ServoSpec(damping=-0.1), 1e-3, "must be positive and damping not negative"),
-        (ServoSpec(stiffness=401.0), 1e-3, "chatters at a step of 0.001 s; it can be at most 400"),
+        (
+            ServoSpec(stiffness=401.0),
+            1e-3,
+            "chatters at a step of 0.001 s; it can be at most 400",
+        ),
     ],
 )
 def test_impossible_loops_are_refused(spec, step, words):

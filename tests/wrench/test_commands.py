@@ -56,7 +56,9 @@ def test_any_wrench_option_asks_for_the_wrench(monkeypatch, capsys, tmp_path, op
 def test_without_one_there_is_none(monkeypatch, capsys, tmp_path) -> None:
     code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, "-o", str(tmp_path))
     assert code == 0, err
-    assert not [n for n in pl.read_parquet_schema(tmp_path / "estimates.parquet") if "wrench" in n]
+    assert not [
+        n for n in pl.read_parquet_schema(tmp_path / "estimates.parquet") if "wrench" in n
+    ]
 
 
 def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:

@@ -147,7 +147,8 @@ def test_what_begins_too_early_or_late_is_false(start: float, false: int, split:
 
 
 @pytest.mark.parametrize(
-    ("pause", "floor", "count"), [(0.10, None, 1), (0.13, None, 2), (0.23, 0.1, 1), (0.26, 0.1, 2)]
+    ("pause", "floor", "count"),
+    [(0.10, None, 1), (0.13, None, 2), (0.23, 0.1, 1), (0.26, 0.1, 2)],
 )
 def test_contacts_of_an_exact_reference_are_parted_by_a_shorter_pause(
     pause: float, floor: float | None, count: int

@@ -49,7 +49,9 @@ def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
         assert both is not None
         assert (both.white[0], both.time[0], both.free_seconds) == (4.0, found, 4.0)
         assert both.variance[0] == max(variance, alone.variance[0])
-    strong = infer_noise(log, np.array([10.0]), noise())  # its friction says more than the quietest
+    strong = infer_noise(
+        log, np.array([10.0]), noise()
+    )  # its friction says more than the quietest
     assert strong is not None
     assert strong.variance[0] == pytest.approx((0.2 * 10.0) ** 2)
     assert (strong.at_rest[0], strong.pushed[0]) == (noise().at_rest[0], noise().pushed[0])

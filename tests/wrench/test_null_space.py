@@ -9,7 +9,9 @@ from vftcli.wrench.sensor_reading import MARGIN, contact_elsewhere
 
 def wrench(null_space: np.ndarray | None) -> Wrench:
     t = np.arange(1000.0)
-    return Wrench(name="gmo", t=t, values=np.zeros((1000, 6)), frame="base", null_space=null_space)
+    return Wrench(
+        name="gmo", t=t, values=np.zeros((1000, 6)), frame="base", null_space=null_space
+    )
 
 
 FREE = np.arange(1000) < 500

@@ -92,7 +92,9 @@ def test_unasked_it_is_nobodys_here() -> None:
     assert not sensed.smoothed
 
 
-def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion: FreeMotion) -> None:
+def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(
+    motion: FreeMotion,
+) -> None:
     log = motion.log
     unloaded = log.t < 4.0
     (found,) = FreeLog(log, ()).known_free(unloaded)
@@ -135,9 +137,9 @@ def test_a_list_of_contacts_is_its_gate(motion: FreeMotion) -> None:
     log = motion.log
     estimates = [
         observer.estimate(log.terms)
-        for observer in ObserverChoice(names=("gmo",)).build(log.robot, log.recording.median_step)[
-            0
-        ]
+        for observer in ObserverChoice(names=("gmo",)).build(
+            log.robot, log.recording.median_step
+        )[0]
     ]
     asked = WrenchChoice(solver="smoother", frame="base")
     sensed = sense(motion, (), estimates, asked, gate=Gate([(4.5, 5.0)]))

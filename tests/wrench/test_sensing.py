@@ -113,7 +113,9 @@ def test_the_band_says_where_it_comes_from(choice: dict[str, object], code: str)
 
 
 def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed() -> None:
-    short = analysed("ur5_circle.csv", ("best", "gmo", "fdo"), WrenchChoice(), interval=(0.0, 2.0))
+    short = analysed(
+        "ur5_circle.csv", ("best", "gmo", "fdo"), WrenchChoice(), interval=(0.0, 2.0)
+    )
     found = short.virtual_sensor
     assert found is not None
     (unknown,) = [remark for remark in found.remarks if remark.code == "no-wrench-band"]
@@ -163,7 +165,9 @@ def test_a_smoothed_wrench_turns_with_the_flange() -> None:
     turn = link_poses(load_robot("ur5").chain, log.q).rotation[:, -1]
     for part in (slice(0, 3), slice(3, 6)):
         expected = np.einsum("tji,tj->ti", turn, base.values[:, part])
-        np.testing.assert_allclose(flange.values[:, part], expected, atol=1e-9)  # rounding of 100 N
+        np.testing.assert_allclose(
+            flange.values[:, part], expected, atol=1e-9
+        )  # rounding of 100 N
 
 
 def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value() -> None:

@@ -85,7 +85,9 @@ def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(
     sign: float, frame: WrenchFrame | None
 ) -> None:
     recording = log(sign * PUSH @ adjoint(inverse(POSE)).T, frame)
-    mounting, remarks = find_mounting(recording, UR5, disturbance(), WrenchChoice(sensor_pose=FIT))
+    mounting, remarks = find_mounting(
+        recording, UR5, disturbance(), WrenchChoice(sensor_pose=FIT)
+    )
     assert mounting.sensor is not None
     np.testing.assert_allclose(mounting.sensor.rotation, POSE.rotation, atol=1e-9)
     np.testing.assert_allclose(mounting.sensor.translation, POSE.translation, atol=1e-9)

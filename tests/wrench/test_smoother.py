@@ -51,7 +51,9 @@ def simulated(robot: Robot, q: Array, wrench: Array, t: Array, seed: int = 1) ->
 
 def swing(robot: Robot, t: Array) -> Array:
     """A motion of all joints about a regular pose. (T, n) [rad]"""
-    middle = [0.3, -1.2, 1.5, -1.0, 1.2, 0.4] if robot.joints == 6 else [0, 0.3, 0, -1.8, 0, 2, 0.7]
+    middle = (
+        [0.3, -1.2, 1.5, -1.0, 1.2, 0.4] if robot.joints == 6 else [0, 0.3, 0, -1.8, 0, 2, 0.7]
+    )
     phases = np.arange(robot.joints)
     return np.array(middle) + 0.3 * np.sin(0.9 * t[:, None] + phases)
 

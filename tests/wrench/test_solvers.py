@@ -114,7 +114,9 @@ NEAR_WRIST = np.array([0.3, -1.2, 1.4, -1.7, 0.02, 0.2])
 STRAIGHT_ELBOW = np.array([0.3, -1.2, 1e-3, -1.7, -1.5, 0.2])
 
 
-@pytest.mark.parametrize("pose", [NEAR_WRIST, STRAIGHT_ELBOW], ids=["q5 = 0.02", "straight elbow"])
+@pytest.mark.parametrize(
+    "pose", [NEAR_WRIST, STRAIGHT_ELBOW], ids=["q5 = 0.02", "straight elbow"]
+)
 def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> None:
     """0.3 N·m of joint noise: masked, tens of newtons of pinv, the prior's width at most of map."""
     rng = np.random.default_rng(11)

@@ -54,7 +54,9 @@ def test_what_is_no_error(text: str) -> None:
 
 def test_a_measured_band_is_taken_as_it_is() -> None:
     varying = torque(error_sd=np.linspace(0.1, 0.2, 2 * len(T)).reshape(-1, 2))
-    deviations, remarks = torque_error(None, log_run(np.zeros((len(T), 6))), (), [varying], T < 0.0)
+    deviations, remarks = torque_error(
+        None, log_run(np.zeros((len(T), 6))), (), [varying], T < 0.0
+    )
     np.testing.assert_array_equal(deviations["gmo"], varying.error_sd)
     assert [r.code for r in remarks] == ["band-from-torques"]
 
@@ -69,7 +71,9 @@ def test_where_nothing_is_known_there_is_no_band() -> None:
 
 def log_run(dq: np.ndarray) -> Run:
     """A UR5 log whose joints move as given."""
-    recording = Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, current=np.zeros((len(T), 6)))
+    recording = Recording(
+        t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, current=np.zeros((len(T), 6))
+    )
     return Run(recording=recording, robot=load_robot("ur5"))
 
 

@@ -57,9 +57,12 @@ class ControlChoice(Choice):
     #: observer's wrench.
     force: Annotated[
         str | None,
-        setting("admittance.force", "sensor|file:PATH", "What drives the replay, if no observer."),
+        setting(
+            "admittance.force", "sensor|file:PATH", "What drives the replay, if no observer."
+        ),
     ] = None
-    #: Joint positions at which a release starts; None for the robot file's. (n,) [rad]
+    #: Joint positions at which a release starts; None for the robot
+    #: file's. (n,) [rad]
     start: Annotated[
         tuple[float, ...] | None,
         setting(
@@ -99,7 +102,9 @@ class ControlChoice(Choice):
         for kind in self.kinds:
             check_known(kind, KINDS, f"no controller {kind!r}")
         if self.force is not None and self.force != "sensor" and not self.force.startswith(FILE):
-            raise ParameterError(f"admittance.force={self.force} is neither sensor nor {FILE}PATH")
+            raise ParameterError(
+                f"admittance.force={self.force} is neither sensor nor {FILE}PATH"
+            )
         _ = self.settings  # malformed ones are refused before a log is read
 
     @property

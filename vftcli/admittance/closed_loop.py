@@ -50,7 +50,8 @@ class ClosedLoop(NamedTuple):
     controller: Controller  #: The controller in the loop.
     t: Array  #: Control instants. (T,) [s]
     estimate: Array  #: Wrench that the controller saw, zero removed, base axes. (T, 6) [N, N·m]
-    #: Wrench of the contacts on the flange, about its origin, base axes. (T, 6) [N, N·m]
+    #: Wrench of the contacts on the flange, about its origin, base
+    #: axes. (T, 6) [N, N·m]
     truth: Array
     dragged: Mask  #: Phases. (T, 6)
     commanded: Array  #: Deviation X̃ that was commanded. (T, 6) [m, rad]
@@ -321,9 +322,11 @@ class Latency(NamedTuple):
     motion: float | None
     #: Time from the true force's fall below the threshold to the estimate's.
     withdrawal: float | None
-    #: Time from detection until the flange has moved by as much from where it was then.
+    #: Time from detection until the flange has moved by as much from
+    #: where it was then.
     reaction: float | None
-    #: Time from the estimate's fall below the threshold until the flange goes no farther.
+    #: Time from the estimate's fall below the threshold until the
+    #: flange goes no farther.
     turn: float | None
     #: Whether the flange was at rest when the force came; else `motion` says nothing.
     rested: bool

@@ -94,7 +94,9 @@ class JointPath(NamedTuple):
     #: (T, N, n) [rad]
     q: Array
     reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
-    speed: Array  #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
+    speed: (
+        Array  #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
+    )
 
 
 def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> JointPath:

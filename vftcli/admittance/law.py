@@ -23,7 +23,8 @@ from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, warning
 
-#: The six axes: translation of the flange point along the base axes, rotation about them.
+#: The six axes: translation of the flange point along the base axes,
+#: rotation about them.
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 #: Section of an assignment or of a robot file → the axes it speaks of.
 GROUPS: dict[str, tuple[int, ...]] = {
@@ -176,7 +177,9 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
     """
     settings: dict[str, dict[str, Any]] = {}
     for text in assignments:
-        left, value = assignment(text, "--set", "SECTION.PARAMETER=VALUE, as position.stiffness=12")
+        left, value = assignment(
+            text, "--set", "SECTION.PARAMETER=VALUE, as position.stiffness=12"
+        )
         section, _, name = (left if "." in left else f"admittance.{left}").rpartition(".")
         whole = ("period", "threshold_mode", "source") if section == "admittance" else ()
         if section not in GROUPS or name not in (*PER_AXIS, *whole):

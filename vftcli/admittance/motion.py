@@ -39,7 +39,8 @@ def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = abs(wrench)
     on, off = size > parameters.threshold, size <= parameters.release_threshold
-    # The last row at which anything was switched tells the state: no loop over samples.
+    # The last row at which anything was switched tells the state: no
+    # loop over samples.
     last = np.maximum.accumulate(np.where(on | off, np.arange(len(on))[:, None], -1), axis=0)
     dragged = np.where(last < 0, before, np.take_along_axis(on, np.maximum(last, 0), axis=0))
     if parameters.threshold_mode == "literal":

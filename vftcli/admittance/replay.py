@@ -60,7 +60,9 @@ STILL = 0.01
 class Lyapunov(NamedTuple):
     """Energies of the recovery phases along a run. All (T+1, N, 6), NaN in a drag phase."""
 
-    corrected: Array  #: W, which must not rise in a recovery phase into which no force enters. [J]
+    corrected: (
+        Array  #: W, which must not rise in a recovery phase into which no force enters. [J]
+    )
     printed: Array  #: V of (52). [J]
 
 
@@ -73,12 +75,14 @@ class Replay:
     #: Where the force comes from.
     source: Remark = field(default_factory=lambda: fact("force-of-release"))
     start: Array  #: Joint positions of the target pose X_d. (n,) [rad]
-    #: Force and moment on the robot at each control period, base axes. (T, 6) [N, N·m]
+    #: Force and moment on the robot at each control period, base axes.
+    #: (T, 6) [N, N·m]
     wrench: Array
     phases: Phases  #: Algorithm 1's phases, the same for all controllers.
     motion: AxisMotion  #: Deviations and velocities, row 0 before the first force.
     drags: tuple[Drag, ...]  #: The drags of every axis.
-    #: Flange deviation of the log's own arm from X_d, None for a release. (T, 6) [m, rad]
+    #: Flange deviation of the log's own arm from X_d, None for a
+    #: release. (T, 6) [m, rad]
     logged: Array | None = None
     force_remarks: tuple[Remark, ...] = ()  #: Remarks on the force and on stability.
 
@@ -101,8 +105,13 @@ class Replay:
     @cached_property
     def lyapunov(self) -> Lyapunov:
         """Energies along the run."""
-        dragged, motion, each = self.phases.dragged, self.motion, list(enumerate(self.controllers))
-        # Row k + 1 is in the phase of the force before it, row 0 in that of the first.
+        dragged, motion, each = (
+            self.phases.dragged,
+            self.motion,
+            list(enumerate(self.controllers)),
+        )
+        # Row k + 1 is in the phase of the force before it, row 0 in
+        # that of the first.
         hidden = np.concatenate([dragged[:1], dragged])[:, None] if len(dragged) else False
         with np.errstate(over="ignore", invalid="ignore"):
             energies = (
@@ -214,7 +223,9 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
     return float(np.clip(6.0 / np.min(rates, axis=0)[x != 0.0].min(), 1.0, LONGEST))
 
 
-def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[Array, list[Array]]:
+def on_control_clock(
+    t: Array, values: Sequence[Array], period: float
+) -> tuple[Array, list[Array]]:
     """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
     clock = t[0] + np.arange(np.floor((t[-1] - t[0]) / period + 1e-6) + 1) * period
     # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay

@@ -232,7 +232,9 @@ def joint_names(made: Record) -> list[str]:
     return known[0]["joints"] or [f"joint_{k + 1}" for k in range(known[0]["joint_count"])]
 
 
-def write_file(dataset: Dataset, columns: list[ForceColumn], suffix: str, task: FileTask) -> Record:
+def write_file(
+    dataset: Dataset, columns: list[ForceColumn], suffix: str, task: FileTask
+) -> Record:
     """Write a data file with its columns; return its place and the statistics of its episodes."""
     begin("writing")
     rows: dict[str, Any] = {}

@@ -36,7 +36,8 @@ class WorkersChoice(Choice):
         str | None,
         setting("cluster.address", "ADDRESS", "A running Dask cluster, as tls://host:8786."),
     ] = None
-    #: What a worker of this machine may take before it is ended, None for its share. [GB]
+    #: What a worker of this machine may take before it is ended, None
+    #: for its share. [GB]
     memory_gb: Annotated[
         float | None,
         setting(

@@ -38,7 +38,9 @@ class LogJob:
 
     do: str  #: One of `COMMANDS`.
     choice: AnalysisChoice  #: What is asked of each log.
-    anyway: bool = False  #: Whether results are wanted even where a finding makes them meaningless.
+    anyway: bool = (
+        False  #: Whether results are wanted even where a finding makes them meaningless.
+    )
     written: OutputChoice = PLAIN  #: What is written of each log besides what always is.
 
     def __post_init__(self) -> None:
@@ -141,7 +143,8 @@ OF_ESTIMATE: Kinds = {
     "p99_N": Float64,
 }
 COMPARED = "compared_samples"  #: Samples of a comparison; `samples` are the log's.
-#: Columns of the errors, as `vftcli compare --json` has them; null without a reference.
+#: Columns of the errors, as `vftcli compare --json` has them; null
+#: without a reference.
 OF_ERROR: Kinds = {
     COMPARED if name == "samples" else name: kind
     for name, kind in WRENCH_SCHEMA.items()

@@ -33,7 +33,8 @@ class Baseline:
 
     motion: FreeMotion  #: The log and its free motion, without samples that stand alone.
     part: FreePart | None = None  #: Its free part, None where there is none.
-    #: Spectra of the raw disturbance, None where the free part is too short or not free.
+    #: Spectra of the raw disturbance, None where the free part is too
+    #: short or not free.
     spectra: Spectra | None = None
     #: Why there is no free part, or are no spectra; None where there are both.
     missing: Remark | None = None
@@ -93,7 +94,8 @@ class Baseline:
     def samples(self) -> list[RunSamples]:
         """The free samples as the observers have them, less a load, which is no noise."""
         return [
-            RunSamples(without_load(self.of(run), self.load), inside) for run, inside in self.pieces
+            RunSamples(without_load(self.of(run), self.load), inside)
+            for run, inside in self.pieces
         ]
 
     def measured(self, part: FreePart) -> Spectra:

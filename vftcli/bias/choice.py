@@ -6,7 +6,8 @@ from typing import Annotated
 from vftcli.signals.option import ESTIMATE, Choice, is_yes, setting
 from vftcli.signals.parsing import check_known
 
-#: The word for what the log allows: the whole log's bias for `best`, none for the others.
+#: The word for what the log allows: the whole log's bias for `best`,
+#: none for the others.
 AUTOMATIC = "auto"
 #: The word for the bias fitted to the whole log and subtracted before observers run.
 WHOLE_LOG = "whole-log"

@@ -38,7 +38,8 @@ SMOOTHING = 0.003  #: Velocity over which its sign turns. [rad/s]
 #: [s]
 WAIT = 1.0
 SHAPES = 5  #: Columns of friction a joint beside its offset.
-#: Speed up to which a joint's friction is looked at where its limit is unknown. [rad/s]
+#: Speed up to which a joint's friction is looked at where its limit is
+#: unknown. [rad/s]
 USUAL_SPEED = np.pi
 
 
@@ -184,7 +185,9 @@ def friction_alone(robot: Robot) -> ModelError:
     return none._replace(friction=expected.friction)
 
 
-def error_columns(run: Run, motion: SmoothMotion, expected: ModelError, stride: int) -> list[Array]:
+def error_columns(
+    run: Run, motion: SmoothMotion, expected: ModelError, stride: int
+) -> list[Array]:
     """The rows of A of every joint, each column of `column_numbers` times its deviation. (S, p)"""
     n, kept, sds = run.robot.joints, slice(None, None, stride), expected.values
     shapes = [

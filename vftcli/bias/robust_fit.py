@@ -174,7 +174,9 @@ class Rows:
                 places = [*column_numbers(j, self.joints), *following, size - 1]
                 for k in inside:
                     totals[k][np.ix_(places, places)] += product
-        return [NormalEquations(total[:-1, :-1], total[:-1, -1], total[-1, -1]) for total in totals]
+        return [
+            NormalEquations(total[:-1, :-1], total[:-1, -1], total[-1, -1]) for total in totals
+        ]
 
     def solution(self, sums: NormalEquations, scale: float = 1.0) -> FittedError:
         """The most likely model error, with loads that make the rows likely.
@@ -272,7 +274,9 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
         threshold = np.quantile(worst, FIRST) if first else threshold / NARROWED
         threshold = max(threshold, NARROWEST)
         share = (1.0 + (worst / threshold) ** 2) ** -2
-        residual = rows.residual(rows.solution(rows.sums(share[:, None] / (counted * scale**2))[0]))
+        residual = rows.residual(
+            rows.solution(rows.sums(share[:, None] / (counted * scale**2))[0])
+        )
         trusted = residual[share > TRUSTED]
         if len(trusted):
             scale = np.maximum(robust_sd(trusted), least)
@@ -308,7 +312,8 @@ WORTHLESS = 0.95
 class Guarded(NamedTuple):
     """A model error tested on unseen samples."""
 
-    #: From all free samples, at the freedom of the best prediction; None if not at all.
+    #: From all free samples, at the freedom of the best prediction;
+    #: None if not at all.
     solution: FittedError | None
     share: Array  #: Unseen error with over without it, in motion. (n,)
     #: Each joint's part: 0 if not worth having, 1 if clearly worth it. (n,)

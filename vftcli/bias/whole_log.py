@@ -42,7 +42,8 @@ from vftcli.signals.series import median_step, resample_columns
 #: From its first to its last motion a log has to take this long: a shorter one tells
 #: inertia from a push no more, and friction alone is fitted. [s]
 LEAST_MOTION = 10.0
-#: A log that moves for less tells nothing: ten times the `CORRELATED` of a residual. [s]
+#: A log that moves for less tells nothing: ten times the `CORRELATED`
+#: of a residual. [s]
 LEAST_FRICTION = 3.0
 #: An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a
 #: pose.
@@ -82,7 +83,9 @@ class WholeLogBias:
     #: estimates; zero where it believes in none. (T, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
-    fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing of the log.
+    fitted: bool = (
+        True  #: Whether there was a fit; else `free` and `load` say nothing of the log.
+    )
     #: The model's error on the joints left alone too, None where nothing was fitted.
     error: ModelError | None = field(default=None, repr=False)
 

@@ -175,7 +175,8 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # Else the next file that is opened gets its number, and a library's words.
+            # Else the next file that is opened gets its number, and a
+            # library's words.
             os.open(os.devnull, os.O_RDWR)
     if sys.stdout is None:
         sys.stdout = ClosedOutput()

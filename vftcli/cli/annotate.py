@@ -58,7 +58,9 @@ def annotate_dataset(
         read=asked.of(ReadChoice),
         robot=asked.of(RobotChoice),
         observers=asked.but(observer=asked.words["observer"] or [USUAL]).of(ObserverChoice),
-        wrench=asked.of(WrenchChoice) if "wrench" in added or asked.states(WrenchChoice) else None,
+        wrench=asked.of(WrenchChoice)
+        if "wrench" in added or asked.states(WrenchChoice)
+        else None,
         sd="sd" in added,
         contact="contact" in added,
         anyway=anyway,
@@ -102,7 +104,9 @@ def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
         lines.append(f"  the first {delay} frames of an episode still show the observer's start")
     clocks = dict.fromkeys(one["clock"] for one in record["episodes"] if "clock" in one)
     lines += [f"  clock: {clock}" for clock in clocks]
-    overridden = sorted({code for one in record["episodes"] for code in one.get("overridden", ())})
+    overridden = sorted(
+        {code for one in record["episodes"] for code in one.get("overridden", ())}
+    )
     if overridden:
         lines.append(doubt(", ".join(overridden)))
     return lines

@@ -63,7 +63,8 @@ DEFAULT = "contacts"  #: The command of words that name none.
 #: Options of the program itself.
 OF_PROGRAM = frozenset({"-h", "--help", "--version", "--install-completion", "--show-completion"})
 
-#: What the `commands` and `options` of the release before are now, and what is `gone`.
+#: What the `commands` and `options` of the release before are now, and
+#: what is `gone`.
 former = partial(tables_beside, __file__, "former.toml")
 
 
@@ -98,7 +99,9 @@ def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[
         else:
             if "VALUE" in now and not equals:
                 if (value := next(rest, "")) == "":
-                    raise ParameterError(f"{name} is now {now.replace('VALUE', '…')}; give a value")
+                    raise ParameterError(
+                        f"{name} is now {now.replace('VALUE', '…')}; give a value"
+                    )
                 now = now_of(name, value) or now
             notes.append(f"{name} is now {now.replace('VALUE', '…')}")
             if name == "--robot-arg":

@@ -23,9 +23,11 @@ from vftcli.signals.parsing import did_you_mean, printable, shown, toml_file
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
 NONE = "none"  #: Value of ``--config`` with which no file is read.
-#: Options that are only ever typed: what asks before it overwrites shall ask each time.
+#: Options that are only ever typed: what asks before it overwrites
+#: shall ask each time.
 TYPED = frozenset({"config", "force", "help", "set"})
-#: Command → options that it takes otherwise than the rest: only its own table gives them.
+#: Command → options that it takes otherwise than the rest: only its own
+#: table gives them.
 OTHERWISE = {
     "identify": {"free", "gains"},  # the motion without the load, what gains are found for
     "thresholds": {"reference", "reference-columns"},  # of --check alone
@@ -74,7 +76,9 @@ def kept_words(ctx: Click, args: Sequence[str]) -> tuple[Path, list[str]] | None
         return None
     path = Path(named or NAME)
     given = [opts[param.name] for param in params if param.param_type_name == "argument"]
-    each_log = (log for one in given for log in (one if isinstance(one, list | tuple) else (one,)))
+    each_log = (
+        log for one in given for log in (one if isinstance(one, list | tuple) else (one,))
+    )
     logs = [Path(log) for log in each_log if isinstance(log, str)]
     keys, typed = keys_for(command, path), [param.name for param in params]
     asked = [word.partition("=")[0].strip() for word in opts.get("set") or ()]
@@ -225,7 +229,9 @@ def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> 
         return value or None
     words = list(words_in(value))
     if not words or (len(words) > 1 and not option.multiple):
-        several = "a text, a number or a list of them" if option.multiple else "a text or a number"
+        several = (
+            "a text, a number or a list of them" if option.multiple else "a text or a number"
+        )
         raise ParameterError(f"{path}: {key} = {shown(value)} is not {several}")
     words = [beside(path.parent, word, option) for word in words]
     made = words if option.multiple else words[0]
@@ -252,7 +258,8 @@ def beside(folder: Path, word: str, option: Click) -> str:
         interval(name)
         return word
     takes_file = any(kind in str(option.metavar) for kind in ("FILE", "LOG", "REF"))
-    # A word without an ending is a name of ours, as of a robot, unless a log is called so.
+    # A word without an ending is a name of ours, as of a robot, unless
+    # a log is called so.
     is_file = Path(name).suffix or len(Path(name).parts) > 1
     is_file = is_file or ("LOG" in str(option.metavar) and (folder / name).exists())
     return f"{prefix}{folder / name}" if takes_file and (prefix or is_file) else word

@@ -231,7 +231,9 @@ def say_analysis(analysis: "Analysis") -> None:
         from vftcli.outputs.grids import drift_grid
         from vftcli.wrench.frames import FRAMES
 
-        detail(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
+        detail(
+            f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}"
+        )
         if sensed.drifts:
             detail(terminal(drift_grid(sensed.drifts)).rstrip())
         say_remarks(sensed.remarks)

@@ -107,7 +107,9 @@ def identify_robot(
     output = output or file_for(profile.name)
     OutputFolder(output.parent, force, files_beside(output, figures)).check()
     found = identified(logs, check or (), choice, replace(task, name=output.stem), say_recording)
-    record = write_identification(output, found, examiner.examinations, asked.line, force, figures)
+    record = write_identification(
+        output, found, examiner.examinations, asked.line, force, figures
+    )
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")

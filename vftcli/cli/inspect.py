@@ -27,7 +27,9 @@ def inspect_log(
         Path | None,
         opt.OUT._replace(help="Write here; the options that the log calls for."),
     ],
-    strict: Annotated[bool, Option("--strict", "", "Exit with 1 if anything looks wrong, for CI.")],
+    strict: Annotated[
+        bool, Option("--strict", "", "Exit with 1 if anything looks wrong, for CI.")
+    ],
     json: opt.Json,
     force: opt.Force,
 ) -> None:
@@ -86,7 +88,9 @@ def write_options(
     for option in proposed:
         if not option.key:
             say(f"note: {option.why}")
-    how = "unasked by commands run beside it" if output.name == NAME else f"with --config {output}"
+    how = (
+        "unasked by commands run beside it" if output.name == NAME else f"with --config {output}"
+    )
     say(f"wrote {output}: {', '.join(settled) or 'nothing that is settled'}; read {how}")
     if "robot" not in settled:
         say("which arm it is remains open: name it with --robot, or in the file")

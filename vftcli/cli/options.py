@@ -160,7 +160,8 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
                 function(**dict.fromkeys(own, asked) | own_values)
 
         called.__name__, called.__doc__ = function.__name__, function.__doc__
-        # typer asks for the signature; without annotations of its own it finds nothing else.
+        # typer asks for the signature; without annotations of its own
+        # it finds nothing else.
         vars(called)["__signature__"] = inspect.Signature([each for each, _ in parts])
         vars(called).update(options=options, choices=choices)
         called.__annotations__ = {}

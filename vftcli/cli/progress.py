@@ -103,7 +103,9 @@ class Stages:
                 if gained > ENOUGH:
                     seconds = (time.monotonic() - since) * (1.0 - self._share) / gained
                     left = f"  {clock(seconds)} left"
-                room = min(WIDTH, shutil.get_terminal_size().columns - 1) - len(bar) - len(left) - 2
+                room = (
+                    min(WIDTH, shutil.get_terminal_size().columns - 1) - len(bar) - len(left) - 2
+                )
                 line = f"{bar}  {self._stage[: max(room, 0)]}{left}"
                 typer.echo(f"\r{line:<{self._shown}}", err=True, nl=False)
                 self._shown = len(line)

@@ -46,7 +46,9 @@ def contact_thresholds(
     choice = choice_for(asked, Library([*logs, *(check or ())]))
     library, reference = choice.library, choice.reference
     if reference is not None and not check:
-        raise ParameterError("--reference says where a log was touched: name that with --check LOG")
+        raise ParameterError(
+            "--reference says where a log was touched: name that with --check LOG"
+        )
     free, signals, thresholds = free_thresholds(logs, choice, rate)
     counted = left_out(signals, rate)
     checks = []
@@ -58,7 +60,9 @@ def contact_thresholds(
     if json:
         record = thresholds_record(thresholds, counted, checks)
         health = health_record(choice.examiner.examinations)
-        say_json([run.recording for run in free], thresholds.remarks, **record, examination=health)
+        say_json(
+            [run.recording for run in free], thresholds.remarks, **record, examination=health
+        )
         return
     for run in free:
         say_recording(run.recording)

@@ -28,14 +28,16 @@ SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
 #: Where only forces larger than this are detected along an axis, the pose is blind to it.
 #: [N]
 BLIND = 500.0
-#: A payload of the robot's file is named where it weighs as much as a load to this share.
+#: A payload of the robot's file is named where it weighs as much as a
+#: load to this share.
 SAME_MASS = 0.1
 #: Fields of a contact that are unknown where no wrench is.
 OF_FORCES = (
     "peak_force", "peak_band", "place_band", "wrench", "wrench_sd", "mean_force", "impulse",
     "anywhere", "course", "vendor_force",
 )  # fmt: skip
-#: Field of a contact → its key in a record and in columns, in order; a wrench has four.
+#: Field of a contact → its key in a record and in columns, in order; a
+#: wrench has four.
 KEYS = {
     "number": "number", "kind": "kind", "start": "start_s", "stop": "stop_s", "peak": "peak_s",
     "peak_force": "peak_force_N", "peak_band": "peak_force_band_N", "place_band": "place_band_N",
@@ -83,7 +85,9 @@ class Contact(Shown):
     #: Smallest and largest |F| over every place that fits, bands included. [N]
     anywhere: tuple[float, float] | None
     where: "ArmPart"  #: Part of the arm.
-    lead: float | None  #: Evidence of that part's best place less that of every other part. [nats]
+    lead: (
+        float | None
+    )  #: Evidence of that part's best place less that of every other part. [nats]
     places: tuple[int, ...]  #: Links that fit; 0 is the flange.
     evidence: float | None  #: Evidence of the best place less that of nothing. [nats]
     joint_torque: Array  #: Torque on each joint at the peak. (n,) [N·m]
@@ -94,7 +98,9 @@ class Contact(Shown):
     #: |F| of the log's own wrench at the peak, None without one. [N]
     sensor_force: float | None = None
     course: ForceCourse | None = None  #: |F| from start to end, None where no force is known.
-    inferred: bool = False  #: Whether neither free motion nor a reference lets its size be checked.
+    inferred: bool = (
+        False  #: Whether neither free motion nor a reference lets its size be checked.
+    )
     remarks: tuple[Remark, ...] = ()  #: What limits this row.
 
     def __post_init__(self) -> None:
@@ -279,7 +285,9 @@ class ContactList(Shown):
 
     def _headline(self) -> str:
         count, hardest = len(self), self.hardest
-        every = f"of {self.recording}: {count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
+        every = (
+            f"of {self.recording}: {count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
+        )
         if hardest is None:
             return every
         return f"{every}, the hardest {hardest._size} at {hardest.peak:.2f} s"

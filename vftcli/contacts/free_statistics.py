@@ -37,7 +37,8 @@ BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
-#: How long it must stay there, and the pause up to which two such stretches are one. [s]
+#: How long it must stay there, and the pause up to which two such
+#: stretches are one. [s]
 LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
 #: What tells a contact from an error of the model: motion that is known to be free; the
@@ -63,7 +64,8 @@ class FreeStatistics(NamedTuple):
     runs: tuple[Run, ...]  #: Free runs in other logs, less a load that they carry.
     free: tuple[RunSamples, ...]  #: Every free piece, less a load that it carries.
     pieces: tuple[Blocks, ...]  #: The same in blocks.
-    #: A load that the arm carries in this log and its model lacks, None where none shows.
+    #: A load that the arm carries in this log and its model lacks, None
+    #: where none shows.
     load: FreeLoad | None
     remarks: tuple[Remark, ...]  #: What it is and how it was found, and a load that it carries.
     basis: Basis = "free motion"  #: What tells a contact from an error of the model.

@@ -57,9 +57,13 @@ from vftcli.wrench.smoother import (
     smooth_wrench,
 )
 
-FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
+FINE = (
+    0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
+)
 SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
-SLOWEST = 10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
+SLOWEST = (
+    10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
+)
 #: A contact's evidence must be this much above that of any row in the log's own free
 #: part.
 FALSE_MARGIN = 1.5
@@ -294,7 +298,8 @@ POSES = 20_000  #: Samples that say what a median pose of a log is.
 #: The arm rests at the beginning of a contact if no joint moves for so long on either
 #: side. [s]
 EDGE = 1.0
-#: Share of the time since the first motion that contacts must fill together to be a load.
+#: Share of the time since the first motion that contacts must fill
+#: together to be a load.
 SHARE = 0.5
 #: Several contacts are one load if their forces add up to more than this share of their
 #: sizes: pushes that follow one another come from different sides.

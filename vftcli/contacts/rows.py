@@ -39,7 +39,8 @@ from vftcli.wrench.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
 #: logs.
 WIDENED = np.repeat([1.3, 2.0], 3)
 BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
-#: Share of its bend that the peak of a contact may hide that is short beside the others.
+#: Share of its bend that the peak of a contact may hide that is short
+#: beside the others.
 BENT_SHORT = 0.4
 NORMAL = 1.96  #: Half width of a 95 % band in standard deviations.
 #: A contact's wrench changes within this share of its duration, however slow the others
@@ -187,7 +188,9 @@ class ContactMeasurement:
         white = self.log.process.white[core].mean(axis=0) / len(core)
         chain, sd = self.run.robot.loaded_chain, np.sqrt(variance.mean(axis=0) + white)
         fits, nats = point_fits(chain, blocks.q[peak], torque, sd), self.found.evidence[number]
-        likely = [self.found.places[k].link for k in np.flatnonzero(nats > nats.max() - SURE_NATS)]
+        likely = [
+            self.found.places[k].link for k in np.flatnonzero(nats > nats.max() - SURE_NATS)
+        ]
         return ContactLocation(fits, chain.joints, tuple(likely))
 
     def row(
@@ -215,14 +218,14 @@ class ContactMeasurement:
         rate = 1.0 / self.run.step
         if length.sum() < SHORT and rate < SLOW:
             remarks.append(caution("peak-cut-by-rate", rate_hz=rate))
-        start, stop = times_of(blocks, run)
-        cuts = self.run.recording.source.cuts
-        for cut in [c for c in cuts if c.start <= stop + BESIDE and c.stop >= start - BESIDE][:1]:
-            remarks.append(caution("samples-cut-inside", at_s=cut.start))
+        (start, stop), cuts = times_of(blocks, run), self.run.recording.source.cuts
+        near = [c.start for c in cuts if c.start <= stop + BESIDE and c.stop >= start - BESIDE]
+        remarks += [caution("samples-cut-inside", at_s=at) for at in near[:1]]
         J, at, values = jacobian[peak], blocks.t[peak], inside.values[k]
         wrench = values.copy()
         if not location.on_wrist:
-            poses, fit = link_poses(self.run.robot.loaded_chain, blocks.q[[peak]]), location.fits[0]
+            poses = link_poses(self.run.robot.loaded_chain, blocks.q[[peak]])
+            fit = location.fits[0]
             lever = points_on(poses, fit.link, fit.share) - poses.translation[:, -1]
             wrench[3:] += np.cross(lever[0], values[:3])
         return Contact(

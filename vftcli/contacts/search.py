@@ -244,7 +244,11 @@ def filtered_odds(
 
 
 def imm_predict(
-    state: ImmState, begins: Array, ends: Array, moves: tuple[Array, Array, Array], variance: Array
+    state: ImmState,
+    begins: Array,
+    ends: Array,
+    moves: tuple[Array, Array, Array],
+    variance: Array,
 ) -> ImmState:
     """The states of each mode a block later, moments matched.
 

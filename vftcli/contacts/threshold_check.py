@@ -78,7 +78,8 @@ class CheckedContact(NamedTuple):
     peak_force: float  #: Its largest force, NaN where that is not known. [N]
     delay: float  #: From its start to the first alarm; NaN where there is none, or no truth. [s]
     by: str  #: The joint or axis that raises the alarm, "" where there is none.
-    #: Whether none begins because one was on already, left over from a contact before.
+    #: Whether none begins because one was on already, left over from a
+    #: contact before.
     already_above: bool = False
 
 

@@ -208,7 +208,8 @@ class Thresholds(Shown):
     #: One an axis of the wrench, none for an arm of fewer than six joints; one that is
     #: wide is none. [N, N·m]
     axes: tuple[SignalThreshold, ...]
-    #: That of the force's size, or none; its rate is `rate` itself; as of an axis. [N]
+    #: That of the force's size, or none; its rate is `rate` itself; as
+    #: of an axis. [N]
     force: tuple[SignalThreshold, ...]
     of_vendor: bool  #: Whether the joints' are of the robot's own estimate.
     logged_wrench: bool  #: Whether those of axes and force are of the robot's own wrench.
@@ -306,7 +307,8 @@ def thresholds_of_set(
         tails = {name: tail for name, own in maxima.items() if (tail := tail_of(own)) is not None}
         if not tails:
             return ()
-        # Of few readings a tail is a guess, and a guess may not outdo what others know.
+        # Of few readings a tail is a guess, and a guess may not outdo
+        # what others know.
         sure = {name: tail for name, tail in tails.items() if tail.size >= ENOUGH} or tails
         levels = [
             SignalThreshold(*tail.threshold(share), share, name, tail)

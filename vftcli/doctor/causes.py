@@ -68,7 +68,8 @@ LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
 SURE = 4.0  #: Least standard deviations of an offset, a factor or missing friction.
 KNOWN = 0.05  #: Largest standard deviation of a factor from motion.
 CLEARER = 1.5  #: Ratio of misfits by which a factor beats a load.
-#: Misfit of a model of the arm to another model; measured efforts leave 1.3 % and more.
+#: Misfit of a model of the arm to another model; measured efforts leave
+#: 1.3 % and more.
 MODELLED = 0.02
 #: Least share of the robot file's friction in any arm, and joints that judge it.
 RUBS, WITHOUT = 0.1, 3
@@ -259,7 +260,9 @@ def shifted(case: Case) -> Iterator[Cause]:
         fit = solve(case.given - case.needed, Terms(column), load, friction)
         offset, sd = fit.values[0], fit.sd[0]
         change = offset * column[:, :, 0]
-        if abs(offset) >= max(OFFSET * case.effort_sizes[j], SURE * sd) and case.lasts(fit, change):
+        if abs(offset) >= max(OFFSET * case.effort_sizes[j], SURE * sd) and case.lasts(
+            fit, change
+        ):
             healed = replace(case, given=case.given - change)
             yield Cause("effort-offset", healed, (j,), {"offset_Nm": offset, "sd_Nm": sd})
 
@@ -320,7 +323,8 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
         return Diagnosis(case)
     best = found[0]
     if best.code == "joint-sign" and 2 * len(best.joints) > len(case.constant):
-        # Of most joints it is the sign of all: joints that rub or carry nothing hide it.
+        # Of most joints it is the sign of all: joints that rub or carry
+        # nothing hide it.
         all_turned = (c for c in found if c.code == "effort-sign")
         best = next((c for c in all_turned if c.misfit < AMBIGUOUS * best.misfit), best)
     # The sign of all covers that of single joints.

@@ -20,7 +20,8 @@ from vftcli.signals.remarks import Remark, Where, fact, on_joints, warning
 from vftcli.signals.rest import REST
 from vftcli.signals.series import covered, runs_of
 
-#: Multiple of its largest torque that no drive gives: drive constants are uncertain. [1]
+#: Multiple of its largest torque that no drive gives: drive constants
+#: are uncertain. [1]
 BEYOND = 1.5
 #: Share of the joint's largest torque, and robust deviations of noise, between a bad
 #: sample and its neighbours. [1, -]
@@ -115,7 +116,9 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     beyond = abs(torque) > BEYOND * limit
     yield Bad("effort-beyond-drive", beyond, torque)
     alone = isolated(torque, AWAY * limit, step) & ~beyond
-    yield Bad("isolated-effort", alone & ~blows(dq, np.asarray(alone.any(axis=1)))[:, None], torque)
+    yield Bad(
+        "isolated-effort", alone & ~blows(dq, np.asarray(alone.any(axis=1)))[:, None], torque
+    )
     yield Bad("zero-burst", zero_bursts(torque, ZERO * limit))
     if name != "torque_without_gravity":
         yield from braked(recording, robot, torque)
@@ -147,7 +150,9 @@ def blows(dq: Array, rows: Mask) -> Mask:
     found = np.zeros(len(dq), bool)
     for start, stop in runs_of(rows):
         before, behind = max(start - 1, 0), min(stop, len(dq) - 1)
-        trend = dq[before] - dq[max(before - 2, 0)] + dq[min(behind + 2, len(dq) - 1)] - dq[behind]
+        trend = (
+            dq[before] - dq[max(before - 2, 0)] + dq[min(behind + 2, len(dq) - 1)] - dq[behind]
+        )
         found[start:stop] = abs(dq[behind] - dq[before] - 0.5 * trend).max() > BLOW
     return found
 

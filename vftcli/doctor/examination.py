@@ -189,7 +189,12 @@ class Examiner:
         return tuple(self._robots.values())
 
     def read_as(
-        self, recording: Recording, robot: Robot, choice: ReadChoice, *, in_stretches: bool = False
+        self,
+        recording: Recording,
+        robot: Robot,
+        choice: ReadChoice,
+        *,
+        in_stretches: bool = False,
     ) -> Recording:
         """A log in its robot's joints; an open effort is read by the model's best fit.
 

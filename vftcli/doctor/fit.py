@@ -13,7 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, diagnose, is_modelled
+from vftcli.doctor.causes import (
+    AMBIGUOUS,
+    RANGE,
+    Cause,
+    Diagnosis,
+    case_of,
+    diagnose,
+    is_modelled,
+)
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import efforts_of, inverted_effort
@@ -78,7 +86,9 @@ class RobotMatch(NamedTuple):
     def in_short(self) -> str:
         """Its name and model error, as ``ur10 with 0.19 kg (0.50 %)``."""
         load = f" with {self.load:.2g} kg" if self.load else ""
-        percent = f"{100 * self.misfit:{'.0f' if self.misfit > 0.1 else '#.2g'}}".removesuffix(".")
+        percent = f"{100 * self.misfit:{'.0f' if self.misfit > 0.1 else '#.2g'}}".removesuffix(
+            "."
+        )
         return f"{self.robot}{load} ({percent} %)"
 
 
@@ -132,7 +142,9 @@ def is_judgeable(recording: Recording) -> bool:
     return motion < 1e4 and all(1e-9 < size < 1e9 for size in sizes)
 
 
-def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> RobotMatch | None:
+def match_of(
+    recording: Recording, robot: Robot, ignored: Sequence[int] = ()
+) -> RobotMatch | None:
     """Robot's fit to the log's best torque, some joints ignored; None where nothing tells."""
     if recording.joints != robot.joints or not is_judgeable(recording):
         return None
@@ -241,7 +253,9 @@ def explained(diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Re
         return
     if (other := diagnosis.unclear) is not None:
         left = 100 * other.misfit
-        yield warning("effort-unclear", other=other.code, misfit_percent=misfit, other_percent=left)
+        yield warning(
+            "effort-unclear", other=other.code, misfit_percent=misfit, other_percent=left
+        )
     yield from declared_payload(recording, robot)
     yield from load_remarks(healed)
     yield from vendor_sign(healed)

@@ -99,7 +99,9 @@ class Lateness(NamedTuple):
 
     def rest(self, rate: float = 0.0) -> Array:
         """Rest of each joint's effort at lags that grow by a rate [s/s]; NaN at rest. (n, L)"""
-        tried = np.round(self.lags[:, None] / self.step + rate * self.when / self.step).astype(int)
+        tried = np.round(self.lags[:, None] / self.step + rate * self.when / self.step).astype(
+            int
+        )
         rows = np.clip(self.starts[:, None] + tried, 0, len(self.effort) - 1)
         change = self.effort[rows[1]] - self.effort[rows[0]]
         rest = np.full((self.effort.shape[1], len(self.lags)), np.nan)

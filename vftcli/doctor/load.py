@@ -19,7 +19,9 @@ MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly expla
 USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives lie. [N·m/A]
 #: Torque per current of UR's five joint sizes, e-Series and CB3, by the controllers'
 #: own tables. [N·m/A]
-JOINT_CONSTANTS = np.array([3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756])
+JOINT_CONSTANTS = np.array(
+    [3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756]
+)
 SAME = 0.02  #: Constants of one joint size scatter by this much from firmware to firmware.
 #: Load that is worth a remark, as a hand is; and one that nobody overlooks.
 #:
@@ -78,7 +80,11 @@ def load_remarks(case: Case) -> Iterator[Remark]:
         return
     mass, sd = case.loaded.values[0], case.loaded.sd[0]
     carried = case.windows.load.columns @ case.loaded.values[:4]
-    if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded, carried):
+    if (
+        not case.carries_load
+        or mass < max(HAND, SURE * sd)
+        or not case.lasts(case.loaded, carried)
+    ):
         return
     missing = missing_payload(recording, robot)
     if missing and abs(mass - missing) < DECLARED + 0.3 * abs(missing):

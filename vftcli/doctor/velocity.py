@@ -191,7 +191,10 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
     wrong = judged & ~late & (abs(gain - 1) - sure > GAIN)
     turned = wrong & (abs(gain + 1) < 0.3)
     beyond = wrong & ~turned & ((gain - sure > BEYOND) | (gain + sure < 1 / BEYOND))
-    for code, mask in (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned & ~beyond)):
+    for code, mask in (
+        ("velocity-sign", turned),
+        ("velocity-mismatch", wrong & ~turned & ~beyond),
+    ):
         if mask.any():
             yield warning(code, on_joints(mask), slopes=gain[mask])
     seen = {j: quantity_of(fit, j) for j in np.flatnonzero(beyond).tolist()}

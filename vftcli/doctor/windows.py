@@ -39,7 +39,9 @@ ROUGH = 0.1, 0.025
 #: Factor on their prior from fit to fit, so many at most, until a fit needs no larger ones.
 TIGHTER, ROUGH_FITS = 0.5, 8
 LIGHT = 0.1  #: Links below are as rough as one of this mass. [kg]
-KEPT = 0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
+KEPT = (
+    0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
+)
 ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
 OVERLAP = 2.0  #: Windows that overlap by half count half.
 

@@ -343,7 +343,9 @@ def joint_means(errors: pl.DataFrame) -> JointMeans:
     doubted = set(rows.filter(~trusted)["joint"])
     without = tuple(sorted(doubted)) if set(rows["joint"]) - doubted else ()
     used = rows.filter(~pl.col("joint").is_in(without))
-    floor = used.unique("joint").select(pl.col("reference_floor_Nm").cast(pl.Float64).mean()).item()
+    floor = (
+        used.unique("joint").select(pl.col("reference_floor_Nm").cast(pl.Float64).mean()).item()
+    )
     known = used.filter(pl.col("rmse_Nm").is_finite()).group_by("observer", maintain_order=True)
     found, l1, skills = {}, {}, {}
     for name, rmse, size, level in known.agg(

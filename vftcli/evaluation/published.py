@@ -96,7 +96,9 @@ class Comparison(NamedTuple):
             yield fact("print-other-best", same=same, joints=joints, differing=other)
         else:
             yield fact("print-same-best", joints=joints)
-        median, least, most = (float(size(ratio)) for size in (np.nanmedian, np.nanmin, np.nanmax))
+        median, least, most = (
+            float(size(ratio)) for size in (np.nanmedian, np.nanmin, np.nanmax)
+        )
         yield fact("print-sizes", median=median, least=least, most=most)
 
 

@@ -101,7 +101,11 @@ def touched_remarks(run: Run) -> tuple[Remark, ...]:
         return ()
     worst = max(found, key=lambda touch: touch.torque / max(touch.quiet, LEAST))
     t = run.recording.t
-    edges = [float(t[0]), *(x for touch in found for x in (touch.start, touch.stop)), float(t[-1])]
+    edges = [
+        float(t[0]),
+        *(x for touch in found for x in (touch.start, touch.stop)),
+        float(t[-1]),
+    ]
     spans = list(zip(edges[::2], edges[1::2], strict=True))
     begin, end = max(spans, key=lambda span: span[1] - span[0])
     values = {

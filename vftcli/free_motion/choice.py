@@ -30,7 +30,9 @@ def cycle_numbers(text: str) -> tuple[int, ...]:
             )
         found += range(int(first), int(last or first) + 1)
     if not found or min(found) < 1:
-        raise ReferenceTorqueError(f"two-cycle.free-cycles={text} names no cycle; they begin at 1")
+        raise ReferenceTorqueError(
+            f"two-cycle.free-cycles={text} names no cycle; they begin at 1"
+        )
     return tuple(dict.fromkeys(found))
 
 

@@ -209,7 +209,8 @@ def error_model(
     t, step = motion.t[known], motion.step
     moving = ~pair.standing[known]
     noise = np.maximum(
-        noise_of(t, signal, moving, step, cutoff), noise_when_quiet(t, smooth, moving, step, cutoff)
+        noise_of(t, signal, moving, step, cutoff),
+        noise_when_quiet(t, smooth, moving, step, cutoff),
     )
     low = signal_edge(step) if cutoff is None else signal_edge(step, cutoff)
 
@@ -262,7 +263,9 @@ def noise_below(
     return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, slope)))
 
 
-def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
+def noise_when_quiet(
+    t: Array, x: Array, moving: Mask, step: float, cutoff: float | None
+) -> Array:
     """Coloured noise of a low-passed difference (S, n) from its quietest pieces. (n,) [N·m]
 
     Real noise is denser at low frequencies than above contacts. In a piece of `PIECE` it

@@ -32,12 +32,16 @@ class Task(Choice):
     #: Whether the friction method also fits drive constants.
     constants: Annotated[
         bool,
-        setting("identify.constants", "yes|no", "Whether friction fits drive constants K.", is_yes),
+        setting(
+            "identify.constants", "yes|no", "Whether friction fits drive constants K.", is_yes
+        ),
     ] = False
     #: The span of the logs that the result is tried on, None for all. [s]
     check_interval: Annotated[
         tuple[float, float] | None,
-        setting("identify.check-interval", "A:B", "Seconds A to B of the --check logs.", interval),
+        setting(
+            "identify.check-interval", "A:B", "Seconds A to B of the --check logs.", interval
+        ),
     ] = None
     name: str = ""  #: Name of the new robot.
     #: Whether the joints have friction to be fitted; a simulator's may have none.

@@ -140,7 +140,9 @@ def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
     for trace in traces:
         left, before = trace.rms.mean(), trace.before.mean()
         if left > BEHIND * before > 0.0:
-            yield caution("worse-than-profile", trace.where, identified_Nm=left, profile_Nm=before)
+            yield caution(
+                "worse-than-profile", trace.where, identified_Nm=left, profile_Nm=before
+            )
     for test in held_out:
         for other in (trace.motion for trace in train):
             if (share := repeated_share(other, test.motion)) >= REPEATED:

@@ -306,7 +306,9 @@ def whole_arm(data: Training) -> MethodResult:
     return MethodResult("base", robot, numbers, remarks, fits, base, narrow)
 
 
-def initial_columns(data: Training, fits: Mapping[int, JointFit]) -> tuple[ParameterColumns, Array]:
+def initial_columns(
+    data: Training, fits: Mapping[int, JointFit]
+) -> tuple[ParameterColumns, Array]:
     """The unknowns of the whole arm, and the profile with its fitted friction. (size,)"""
     chain = data.robot.loaded_chain
     shapes, values, rotor = list[Shape](), list[float](), chain.rotor_inertia.copy()
@@ -345,7 +347,9 @@ def chosen_method(data: Training) -> MethodResult:
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)
     free, fits, remarks = fitted
-    much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * free.joined("tau").std(axis=0)
+    much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * free.joined("tau").std(
+        axis=0
+    )
     ratio = links_explain(free, fits)[much[heavy_joints(free)]].max(initial=0.0)
     doubted = any(remark.level == "warning" for remark in remarks)
     if ratio > OTHER_LINKS and not doubted and not data.fit_constants:

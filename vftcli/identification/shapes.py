@@ -43,7 +43,9 @@ class Shape(NamedTuple):
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
     stribeck_velocity: float = 0.05  #: Velocity over which the Stribeck term fades. [rad/s]
-    logarithmic_velocity: float = 1.0  #: Velocity from which the logarithmic term flattens. [rad/s]
+    logarithmic_velocity: float = (
+        1.0  #: Velocity from which the logarithmic term flattens. [rad/s]
+    )
     #: Way over which the teeth of the gear give before they slide. [rad]
     presliding_length: float = 0.0
     speeds: tuple[float, ...] = ()  #: Speeds of the bent line's points. [rad/s]

@@ -48,7 +48,8 @@ SHAPES = (
 )
 #: Friction shapes, the best of them written where the law has too few points.
 WRITTEN = tuple(
-    Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend) for bend in LOGARITHMIC_VELOCITIES
+    Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend)
+    for bend in LOGARITHMIC_VELOCITIES
 )
 UNASKED = 0.5  #: Least share of motion with a target velocity: below it a hand led the arm.
 #: Most of the law in a joint's friction under a guiding hand; programs feed .8 to 1.3 of

@@ -90,7 +90,8 @@ class PreparedLog:
         """Filter signals on the log's whole clock (T, m) and keep what is kept. (M, m)"""
         recording = self.recording
         columns = [
-            zero_phase(recording.t, column[:, None], self.cutoff)[self.kept] for column in signals.T
+            zero_phase(recording.t, column[:, None], self.cutoff)[self.kept]
+            for column in signals.T
         ]
         return np.concatenate(columns, axis=1)
 

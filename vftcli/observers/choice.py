@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
     from vftcli.signals.remarks import Remark
 
-PAPER_GAINS = "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
+PAPER_GAINS = (
+    "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
+)
 LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.
 
 

@@ -115,7 +115,9 @@ def overlay_gains(under: Gains, over: Gains) -> Gains:
 def parameters_given(setup: "Setup", section: str, name: str) -> dict[str, Any]:
     """Parameters of one observer: the user's win over the file's, its own over the shared."""
     # kfo-zoh.r_diag is meant for that one filter, kfo.r_diag for all of them.
-    places = ((source, key) for source in (setup.gains, setup.settings) for key in (section, name))
+    places = (
+        (source, key) for source in (setup.gains, setup.settings) for key in (section, name)
+    )
     return {key: value for source, at in places for key, value in source.get(at, {}).items()}
 
 
@@ -146,7 +148,9 @@ class Setup(NamedTuple):
     shown: LogSpectra = LogSpectra()  #: What the complete log shows of noise and contact.
 
 
-Built = tuple[Observer, tuple[Remark, ...]]  #: An observer, and remarks on gains that nobody gave.
+Built = tuple[
+    Observer, tuple[Remark, ...]
+]  #: An observer, and remarks on gains that nobody gave.
 
 
 class Entry(NamedTuple):

@@ -258,7 +258,10 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
     if not np.all(excess(a) * excess(b) <= 0.0):
         unit, limit = "s", f"a delay of more than half a sample ({0.5 * step:g} s)"
         if rising:
-            unit, limit = "Hz", f"a bandwidth well below half the sample rate ({0.5 / step:.4g} Hz)"
+            unit, limit = (
+                "Hz",
+                f"a bandwidth well below half the sample rate ({0.5 / step:.4g} Hz)",
+            )
         raise ParameterError(
             f"no gain gives {observer.name} a {goal.name} of {goal.value:g} {unit} at "
             f"{1.0 / step:.4g} Hz; choose {limit}"

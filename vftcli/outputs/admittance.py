@@ -27,7 +27,14 @@ from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.grid import csv_rows
 from vftcli.outputs.page.shell import page
-from vftcli.outputs.paper import NARROW, Drawing, figure_files, line_figure, plots_of, write_figures
+from vftcli.outputs.paper import (
+    NARROW,
+    Drawing,
+    figure_files,
+    line_figure,
+    plots_of,
+    write_figures,
+)
 from vftcli.outputs.quantity import counted
 from vftcli.outputs.run_record import (
     envelope,
@@ -239,7 +246,15 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
         for key, title, unit, turning, shown, band, label in (
             ("x", "Deviation", "m", "rad", deviation, None, ""),
             ("force", "Force on the robot", "N", "N·m", force, force_band, "± threshold"),
-            ("v", "Velocity", "m/s", "rad/s", lines(replay.motion.v), speed_band, "± speed limit"),
+            (
+                "v",
+                "Velocity",
+                "m/s",
+                "rad/s",
+                lines(replay.motion.v),
+                speed_band,
+                "± speed limit",
+            ),
             ("energy-w", "Lyapunov function W (recovery phases)", "J", "J", lines(w), None, ""),
             ("energy-v", "The printed V (52): it rises", "J", "J", lines(v), None, ""),
         )

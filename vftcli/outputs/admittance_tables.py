@@ -101,7 +101,9 @@ def latency_text(run: ClosedLoop) -> str:
         return f"closed loop: the arm ran away at {run.t[-1]:.2f} s"
     lines = []
     for row in latency_rows(run):
-        said = {k: "never" if x is None else f"{x:.3f} s" for k, x in row.items() if k[-2:] == "_s"}
+        said = {
+            k: "never" if x is None else f"{x:.3f} s" for k, x in row.items() if k[-2:] == "_s"
+        }
         moving = "" if row["at_rest_before"] else " (the arm was moving already)"
         lines.append(
             f"closed loop: force past the threshold of {row['axis']} at {row['force_s']:.2f} s, "

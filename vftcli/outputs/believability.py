@@ -45,7 +45,9 @@ SUBJECTS = {
     "vendor's torque": ("vendor-sign", "zero-tau-ext"),
 }  # fmt: skip
 #: Findings that ``identify --method payload`` answers.
-LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | {"contact-is-load"}
+LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | {
+    "contact-is-load"
+}
 
 
 #: What the remarks of a list of contacts are about.
@@ -185,7 +187,9 @@ def robot_ground(analysis: Analysis) -> Ground:
             f"{name} leaves {left} of {own.evidence} unexplained{load}",
             command("inspect", analysis.recording, "--robot", robot_option(analysis)),
         )
-    who = f"{own.evidence} agrees" if own.by_maker else f"the {own.evidence} agrees with the model"
+    who = (
+        f"{own.evidence} agrees" if own.by_maker else f"the {own.evidence} agrees with the model"
+    )
     return Ground("good", subject, f"{who} to {left}{load}")
 
 
@@ -346,7 +350,12 @@ def missed_words(contacts: Sequence[Contact]) -> str:
         # A sensor at the flange does not feel a push on a link before it.
         if row.is_load or not row.size_known or (row.places and 0 not in row.places):
             continue
-        if force is not None and band is not None and read is not None and abs(force - read) > band:
+        if (
+            force is not None
+            and band is not None
+            and read is not None
+            and abs(force - read) > band
+        ):
             off.append(f"row {row.number} by {abs(force - read):.2g} N")
     more = f" and {len(off) - MOST_OFF} more" if len(off) > MOST_OFF else ""
     return f"; off by more than the band: {', '.join(off[:MOST_OFF])}{more}" if off else ""

@@ -94,7 +94,9 @@ class Results:
     def rows(self) -> list[dict[str, Any]]:
         """One row an arm, protocol, method and part, for machines and tables."""
         joints, shifts = (
-            self.table.drop_nulls(key).partition_by(*BY, "part", maintain_order=True, as_dict=True)
+            self.table.drop_nulls(key).partition_by(
+                *BY, "part", maintain_order=True, as_dict=True
+            )
             for key in ("joint", "lag_squares")
         )
         scores = {
@@ -213,7 +215,9 @@ class Results:
         wrench = self.table.filter(part="wrench").group_by(*BY, maintain_order=True)
         squares, second = pl.col("^.*_squares$"), pl.col("wrench_s")
         pooled = wrench.agg(pl.col(*[*WRENCH_COLUMNS][3:], "wrench_s").sum())
-        shares = pooled.with_columns((squares / second).sqrt(), pl.col("wrench_missing_s") / second)
+        shares = pooled.with_columns(
+            (squares / second).sqrt(), pl.col("wrench_missing_s") / second
+        )
         for columns, table, title in (
             (WRENCH_COLUMNS, shares, "Wrench in contact, rms error"),
             (WEIGHT_COLUMNS, self.table.filter(part="weight"), "A carried weight"),
@@ -227,7 +231,10 @@ def arm_texts(rows: Sequence[dict[str, Any]], error: float) -> list[dict[str, An
     least = min((row["rmse_Nm"] for row in rows if row["method"] != "zero"), default=0.0)
     found = []
     for row in rows:
-        text, lag = significant(row["rmse_Nm"]), f"{row['lag_s']:+.2f} (× {row['rmse_at_lag']:.2f})"
+        text, lag = (
+            significant(row["rmse_Nm"]),
+            f"{row['lag_s']:+.2f} (× {row['rmse_at_lag']:.2f})",
+        )
         near = 0.0 < row["rmse_Nm"] - least < error
         soft = f'<span class="soft">{text}</span>'
         over = between(row["over_best_low_Nm"], row["over_best_high_Nm"], "+.3g", " to ")

@@ -93,7 +93,9 @@ class Chart(NamedTuple):
     highest: float | None = None  #: Upper end, None for what the lines need.
 
     @classmethod
-    def of_one(cls, key: str, title: str, unit: str, x: Array, lines: Iterable[ChartLine]) -> Self:
+    def of_one(
+        cls, key: str, title: str, unit: str, x: Array, lines: Iterable[ChartLine]
+    ) -> Self:
         """A chart of one panel, which has its title."""
         return cls(key, title, (unit,), (title,), x, tuple(lines))
 

@@ -113,7 +113,9 @@ def list_words(found: ContactList) -> str:
     weak = " (weak)" if hardest.trust == "weak" else ""
     # One of unknown size may be harder.
     most = max(c.peak_force or 0.0 for c in found.contacts)
-    sure = (hardest.peak_force or 0.0) >= most and not any(c.place_unknown for c in found.contacts)
+    sure = (hardest.peak_force or 0.0) >= most and not any(
+        c.place_unknown for c in found.contacts
+    )
     name = "The hardest" if sure else "The hardest of known size"
     return f"{what} {name}, at {hardest.peak:.1f} s: {force_size(hardest)}{where}{weak}."
 

@@ -114,7 +114,9 @@ def write_mcap(path: Path, analysis: Analysis) -> None:
     for wrench in analysis.wrenches:
         # Flange, tool or sensor, or base axes there.
         frame = "base@flange" if wrench.frame == "base" else wrench.frame
-        topics.append(wrench_topic(f"/vftcli/wrench/{ros_name(wrench.name)}", frame, wrench.known))
+        topics.append(
+            wrench_topic(f"/vftcli/wrench/{ros_name(wrench.name)}", frame, wrench.known)
+        )
     write_topics(path, stamps, topics, events(analysis, int(stamps[0])))
 
 

@@ -336,7 +336,9 @@ def left_out(names: Iterable[str]) -> list[str]:
         ".parquet": ("pyarrow", "without units beside its columns"),
     }
     each = (
-        (name, *lacks[end]) for name in dict.fromkeys(names) if (end := Path(name).suffix) in lacks
+        (name, *lacks[end])
+        for name in dict.fromkeys(names)
+        if (end := Path(name).suffix) in lacks
     )
     return [
         f"{name} {what}: {remedy(module)}" for name, module, what in each if not installed(module)

@@ -236,7 +236,9 @@ def latex(*grids: Grid) -> str:
             parts.append(rf"\multicolumn{{{len(spec)}}}{{l}}{{{title}}} \\")
         parts += lines
     parts += [r"\bottomrule", r"\end{tabular}"]
-    notes = [escape_latex(note) for note in dict.fromkeys(n for grid in grids for n in grid.notes)]
+    notes = [
+        escape_latex(note) for note in dict.fromkeys(n for grid in grids for n in grid.notes)
+    ]
     if notes:
         below = r" \\ ".join(notes)
         parts.append(rf"\\[2pt] \parbox{{\linewidth}}{{\footnotesize {below}}}")

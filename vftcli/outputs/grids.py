@@ -94,7 +94,9 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
 
 def robot_text(robot: "Robot") -> str:
     """One robot in full: joints, drives, friction, gains, sources."""
-    head = f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}"
+    head = (
+        f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}"
+    )
     lines = [head, "", *terminal(joints_grid(robot)).splitlines()]
     for observer, gains in robot.gains.items():
         lines += ["", *(f"{observer}.{key} = {value}" for key, value in gains.items())]

@@ -71,7 +71,10 @@ DIGIT, BETWEEN = 0.046, 0.02
 SPREAD = 0.66  #: Share of a joint's room that its dots take.
 RANGE = 10.0  #: Numbers that differ by more than this factor have a logarithmic axis.
 PLOTTED = 0.75  #: About which share of a plot's room its axes take.
-AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}  #: Unit of a horizontal axis → what it is called.
+AXES = {
+    "s": "Time (s)",
+    "Hz": "Frequency (Hz)",
+}  #: Unit of a horizontal axis → what it is called.
 
 Look = dict[str, Any]  #: What matplotlib draws with.
 BAND_LOOK: Look = {
@@ -206,7 +209,9 @@ def line_figure(
         draw_plot(axes, plot, ends_row=(k + 1) % columns == 0)
         axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
         last = k + columns >= len(grid)
-        if last or (k + columns < len(plots) and plots[k + columns].chart.unit != plot.chart.unit):
+        if last or (
+            k + columns < len(plots) and plots[k + columns].chart.unit != plot.chart.unit
+        ):
             axes.set_xlabel(below or AXES[plot.chart.unit])
         else:
             axes.tick_params(labelbottom=False)

@@ -71,7 +71,9 @@ def arrow_scale(hardest: float) -> float:
     return next((scale for scale in SCALES if hardest <= LONGEST * scale), SCALES[-1])
 
 
-def send_arm(stream: Stream, robot: Robot, poses: ArmPoses, painted: Mapping[int, Changes]) -> None:
+def send_arm(
+    stream: Stream, robot: Robot, poses: ArmPoses, painted: Mapping[int, Changes]
+) -> None:
     """Send the arm's shape once, its poses over time, and when links have another colour."""
     time = rr.TimeColumn("t", duration=poses.t)
     for j, shapes in enumerate(capsules(robot.chain)):

@@ -62,7 +62,8 @@ def thinned(plot: Chart, stretches: int, whole: Sequence[tuple[float, float]]) -
     if rows is None:
         return plot
     series = tuple(
-        line._replace(values=line.values[rows]) if line.x is None else line for line in plot.series
+        line._replace(values=line.values[rows]) if line.x is None else line
+        for line in plot.series
     )
     return plot._replace(x=plot.x[rows], series=series)
 
@@ -102,7 +103,9 @@ def rerun_file(
             send_plot(stream, tab.plots.pop(0))
         # Each line to its entity, in the order of time.
         for entity in dict.fromkeys(line.path for line in tab.log):
-            own = sorted((line for line in tab.log if line.path == entity), key=lambda line: line.t)
+            own = sorted(
+                (line for line in tab.log if line.path == entity), key=lambda line: line.t
+            )
             rows = rr.TextLog.columns(
                 text=[drawable(line.text) for line in own],
                 level=[line.level for line in own],
@@ -220,13 +223,17 @@ def send_plot(stream: Stream, plot: Chart) -> None:
     ]  # fmt: skip
     style = rr.SeriesLines(
         names=[drawable(line.name) for line in lines],
-        colors=rgba(*(GREY if line.colour in {INK, REFERENCE} else line.colour for line in lines)),
+        colors=rgba(
+            *(GREY if line.colour in {INK, REFERENCE} else line.colour for line in lines)
+        ),
         widths=widths,
         aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
     )
     stream.log(plot.key, style, static=True)
     values = np.hstack([line.values for line in lines])
-    scalars = rr.Scalars.columns(scalars=values.ravel()).partition(np.full(len(values), len(lines)))
+    scalars = rr.Scalars.columns(scalars=values.ravel()).partition(
+        np.full(len(values), len(lines))
+    )
     stream.send_columns(plot.key, [rr.TimeColumn("t", duration=plot.x)], scalars)
     for points in plot.series:
         if points.x is not None:

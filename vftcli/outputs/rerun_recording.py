@@ -188,7 +188,9 @@ def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
     if found is not None:
         title += " as at the flange, 95 % band; bars: touched; diamonds: peaks by place"
         if (least := found.detectable_force) is not None:
-            lines.append(ChartLine("smallest that is listed", np.full_like(size, least), SPARE[7]))
+            lines.append(
+                ChartLine("smallest that is listed", np.full_like(size, least), SPARE[7])
+            )
             title += f"; green: {at_least_shown(least)}, the smallest that is listed"
         # The peak of every contact with a force; a load has a mean and no peak.
         felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]

@@ -25,7 +25,14 @@ from vftcli.outputs.believability import (
     log_line,
     own_match,
 )
-from vftcli.outputs.contacts import LEGEND, MOST_ROWS, answer, contact_grid, hardest_rows, otherwise
+from vftcli.outputs.contacts import (
+    LEGEND,
+    MOST_ROWS,
+    answer,
+    contact_grid,
+    hardest_rows,
+    otherwise,
+)
 from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
 from vftcli.outputs.grid import Column, Grid, GridCell, Rows, terminal
@@ -136,7 +143,9 @@ def log_screen(
 
 def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
     """A list that was made earlier: its log, the answer, the rows."""
-    head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
+    head = (
+        f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
+    )
     lines = [canvas.painted(head, "bold"), "", f"  {answer(found)}", ""]
     rows = list_lines(found, None if every else MOST_ROWS, canvas)
     end = "Whether it can be believed, and |F| over time: vftcli contacts on the log itself"

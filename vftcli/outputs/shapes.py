@@ -15,7 +15,9 @@ from vftcli.signals.errors import RobotError
 
 #: Radius of the first and of the last link, as a share of the arm's length.
 THICKNESS = (0.048, 0.030)
-SHORTEST = 0.02  #: A link shorter than this share of the arm's length is not drawn: its joints are.
+SHORTEST = (
+    0.02  #: A link shorter than this share of the arm's length is not drawn: its joints are.
+)
 MOST_TRIANGLES = 400  #: Triangles of a link on a page.
 FINEST = 7.0  #: The finest grid has 2 to this power of cells along the longest side.
 FLAT = 1e-3  #: Where a surface bends less than this, of its most, a corner is in the middle.

@@ -318,7 +318,11 @@ UR_WORDS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 FRANKA = re.compile(r"(?:.*_)?(panda|fr3|fer|fp3)_joint([1-7])")
 NUMBERED = re.compile(r"(?i).*?joint[_ ]?(\d{1,9})")
 
-HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}  #: Stem of Franka's joint names → profile.
+HINTS = {
+    "panda": "panda",
+    "fer": "panda",
+    "fr3": "fr3",
+}  #: Stem of Franka's joint names → profile.
 
 
 def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:

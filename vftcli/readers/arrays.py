@@ -127,7 +127,9 @@ def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:
         try:
             array = np.asarray(value)
         except ValueError:
-            raise LogError(f"{file.path}: {name!s:.40} holds rows of different lengths.") from None
+            raise LogError(
+                f"{file.path}: {name!s:.40} holds rows of different lengths."
+            ) from None
         if array.dtype.kind in "fiub" and array.ndim and len(array):
             arrays[str(name)] = array
     if not arrays:
@@ -229,11 +231,14 @@ def _matlab_73(file: LogFile) -> Columns:
     """The variables of numbers of a file of version 7.3, as MATLAB shows them."""
     with opened(file) as content:
         table = table_of(file.path, content, fewest_rows=1)
-        names = {k: n.replace("/", ".") for k, n in enumerate(table.names) if not n.startswith("#")}
+        names = {
+            k: n.replace("/", ".") for k, n in enumerate(table.names) if not n.startswith("#")
+        }
         table.check_size(list(names))
         # MATLAB writes column by column, which HDF5 reads as rows.
         return {
-            name: table.load([k], k if _is_clock(name) else None)[k].T for k, name in names.items()
+            name: table.load([k], k if _is_clock(name) else None)[k].T
+            for k, name in names.items()
         }
 
 

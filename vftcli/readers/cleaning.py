@@ -324,7 +324,9 @@ def _segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
     """One of several recordings in a file, counted from 1; the clock's restarts part them."""
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(raw.stamps) < 0)), len(raw.stamps)]
     if not 1 <= number < len(edges):
-        raise ClockError(f"{path}: there is no segment {number}; the file holds {len(edges) - 1}.")
+        raise ClockError(
+            f"{path}: there is no segment {number}; the file holds {len(edges) - 1}."
+        )
     first, last = edges[number - 1], edges[number]
     count, row = len(edges) - 1, first + 1
     said = fact("segment-taken", number=number, recordings=count, first_row=row, last_row=last)

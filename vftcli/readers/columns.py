@@ -100,7 +100,9 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     """Parse a --columns text, of a log unless it is of a reference, which has no positions."""
     parts = [part.strip() for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
     if not parts:
-        raise LogError("--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6.")
+        raise LogError(
+            "--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6."
+        )
     numbers = [part.removeprefix("segment=") for part in parts if part.startswith("segment=")]
     if numbers and (len(numbers) > 1 or not re.fullmatch(r"[0-9]+", numbers[0])):
         raise LogError(f"--columns: segment={numbers[0]} must be one whole number, from 1.")
@@ -124,7 +126,9 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     if sum(item.width == 0 for item in items) > 1:
         raise LogError("--columns: _:* covers all columns that are left; give it once.")
     if log and items and "q" not in names and not named:
-        raise LogError("--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6.")
+        raise LogError(
+            "--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6."
+        )
     return ColumnSpec(items=items, named=named, segment=segment)
 
 
@@ -308,7 +312,9 @@ def _efforts(parts: Sequence[Array], dq: Array) -> tuple[list[tuple[str, ...]], 
     if len(readings) != 1:
         return list(readings), ""
     (shown,) = readings.values()
-    return list(readings), f", target_torque is target_current times {shown} N·m/A but for friction"
+    return list(
+        readings
+    ), f", target_torque is target_current times {shown} N·m/A but for friction"
 
 
 def _fitted(torque: Array, current: Array, dq: Array) -> tuple[float, float]:

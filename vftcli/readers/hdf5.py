@@ -69,7 +69,9 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
     dataset.id.chunk_iter(look)
     for offset in suspects:
         _, packed = dataset.id.read_direct_chunk(offset)
-        with suppress(zlib.error):  # no more than this was unpacked; HDF5 says where it breaks off
+        with suppress(
+            zlib.error
+        ):  # no more than this was unpacked; HDF5 says where it breaks off
             if len(zlib.decompressobj().decompress(packed, size + 1)) > size:
                 raise LogError(
                     f"{name}: a chunk unpacks to more than the {size} bytes that it holds."
@@ -198,7 +200,10 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     # The serial number in the episode's metadata begins with the robot's name.
     serial = ""
     for path in sorted(Path(table.path).parent.glob("metadata_*.json"))[:1]:
-        with suppress(OSError, ValueError, RecursionError, AttributeError), path.open("rb") as file:
+        with (
+            suppress(OSError, ValueError, RecursionError, AttributeError),
+            path.open("rb") as file,
+        ):
             serial = str(json.loads(file.read(DESCRIPTION_BYTES)).get("robot_serial", "")).lower()
     hint = next((name for name in FRANKA if serial.startswith(f"{name}-")), None)
     return replace(raw, robot_hint=hint)
@@ -289,7 +294,9 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
         paths = [path for path in trajectories(file.path) if path is not None]
         if not paths:
             raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
-        each = {str(path.parent.relative_to(file.path)): partial(read_file, path) for path in paths}
+        each = {
+            str(path.parent.relative_to(file.path)): partial(read_file, path) for path in paths
+        }
         yield {k: partial(_placed, len(each) > 1, *one) for k, one in enumerate(each.items())}
         return
     with opened(file) as content:

@@ -164,7 +164,9 @@ def _elements_of(name: str, table: ParquetTable, labels: Json) -> Iterable[Eleme
         pose = AXES.fullmatch(re.split("[_.]", joint)[-1])
         if signal and not pose and not NO_JOINT.search(joint):
             side = SIDE.search(label.replace("_", ".")) or SIDE.search(name)
-            yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
+            yield Element(
+                f"{name}[{k}]" if width else name, signal, joint, side[1] if side else ""
+            )
 
 
 def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:
@@ -174,7 +176,9 @@ def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:
         return raw
     column = table.names.index(FRAME)
     frames = table.load([column], clock=column)[column]
-    exact = frames.ndim == 1 and np.all(np.abs(raw.stamps * raw.tick - frames / fps) < CLOCK_SLACK)
+    exact = frames.ndim == 1 and np.all(
+        np.abs(raw.stamps * raw.tick - frames / fps) < CLOCK_SLACK
+    )
     if frames.dtype.kind != "i" or not exact:
         return raw
     return replace(raw, stamps=frames, tick=1 / fps, clock=f"column {FRAME} at {fps:g} Hz")
@@ -211,7 +215,9 @@ def _by_table(folder: Path, path: Path) -> Iterator[Episode]:
         raise LogError(f"{path}: a row of the table of episodes lacks a number.")
     for number, length, start, end, chunk, file in np.stack(columns, 1).astype(int).tolist():
         if end - start != length:
-            raise LogError(f"{path}: episode {number} has {length} frames and spans {end - start}.")
+            raise LogError(
+                f"{path}: episode {number} has {length} frames and spans {end - start}."
+            )
         place = folder / "data" / f"chunk-{chunk:03d}" / f"file-{file:03d}.parquet"
         yield Episode(number, place, length, start)
 

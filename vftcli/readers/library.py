@@ -148,7 +148,9 @@ class LogCollection:
             meta = tuple(files_of(path / "meta"))
             for episode in lerobot.dataset_episodes(path):
                 if chosen in {None, episode.number}:
-                    yield LogEntry(path, episode.number, (*meta, lerobot.data_file(path, episode)))
+                    yield LogEntry(
+                        path, episode.number, (*meta, lerobot.data_file(path, episode))
+                    )
             return
         numbers = reader.numbers(open_log(path)) if chosen is None else ()
         for number in numbers if len(numbers) > 1 else (chosen,):

@@ -263,7 +263,9 @@ def load_arrays_only(file: LogFile) -> Data:
     """Load a pickle that holds only arrays, numbers, strings, lists and dictionaries."""
     content = bytes(file.content)
     if len(content) > PICKLE_LIMIT:
-        raise LogError(f"{file.path}: a pickle of {len(content) >> 20} MiB. Save it with np.savez.")
+        raise LogError(
+            f"{file.path}: a pickle of {len(content) >> 20} MiB. Save it with np.savez."
+        )
     remedy = "Pickles are opened only if they hold nothing but NumPy arrays; save with np.savez."
     try:
         with warnings.catch_warnings():

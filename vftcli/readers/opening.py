@@ -57,7 +57,9 @@ DAMAGE = (
 
 
 @contextmanager
-def naming_damage(path: Path, what: str, *own: type[Exception], remedy: str = "") -> Iterator[None]:
+def naming_damage(
+    path: Path, what: str, *own: type[Exception], remedy: str = ""
+) -> Iterator[None]:
     """Turn errors of a library, some of its own kinds too, into one that names the file."""
     errors: tuple[type[Exception], ...] = (*DAMAGE, *own)
     try:

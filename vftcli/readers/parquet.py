@@ -60,9 +60,13 @@ class ColumnarTable(Table):
             schema, self._count = self._opened(file)
             self._about = (schema.metadata or {}).get(b"vftcli", b"{}")
             lists = ("list<", "large_list<", "fixed_size_list<")
-            self._lists = [k for k, kind in enumerate(schema.types) if str(kind).startswith(lists)]
+            self._lists = [
+                k for k, kind in enumerate(schema.types) if str(kind).startswith(lists)
+            ]
             if self._count == 0:
-                raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
+                raise LogError(
+                    f"{file.path}: the table has no rows; nothing was recorded into it."
+                )
         self.names = tuple(schema.names)
         self.width = len(self.names)
 

@@ -29,7 +29,9 @@ class RawLog:
     clock: str  #: Which clock the stamps are from, in words.
     #: Which of several recordings in the file is wanted, from 1; None for all.
     segment: int | None = None
-    signals: "Mapping[str, Array]"  #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
+    signals: (
+        "Mapping[str, Array]"  #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
+    )
     wrench_frame: "WrenchFrame | None" = None  #: What the log states of its wrench.
     joint_names: tuple[str, ...] = ()  #: The joints' names, base to tip, or empty.
     robot_hint: str | None = None  #: Name of the profile that the log itself settles, or None.

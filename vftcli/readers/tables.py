@@ -100,7 +100,9 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
                 f"{table.path}: no {item.pattern} among its {table.width} columns. {layout.remedy}"
             )
     # Of the vendors' signals libfranka's residual alone is turned.
-    picks = {s: p._replace(remark=RESIDUAL_TURNED if p.remark else None) for s, p in picks.items()}
+    picks = {
+        s: p._replace(remark=RESIDUAL_TURNED if p.remark else None) for s, p in picks.items()
+    }
     payload = layout.payload.split()
     if payload and set(payload) <= set(names):
         picks[PAYLOAD] = Item(PAYLOAD, cells=tuple(Cell(names.index(n)) for n in payload))

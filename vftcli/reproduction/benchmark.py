@@ -51,7 +51,9 @@ class BenchmarkRun:
     tell: Tell = field(repr=False)
     failures: list[tuple[str, Failure]] = field(default_factory=list)
     efforts: list[dict[str, Any]] = field(default_factory=list)
-    files: dict[str, Path] = field(default_factory=dict)  #: Name → file of each log that is there.
+    files: dict[str, Path] = field(
+        default_factory=dict
+    )  #: Name → file of each log that is there.
     robots: dict[str, Path] = field(default_factory=dict)  #: Name → file of each trained robot.
 
     def __post_init__(self) -> None:

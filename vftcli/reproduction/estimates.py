@@ -22,7 +22,14 @@ from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.reproduction.control import deviation_chart
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, Given, gathered_results
+from vftcli.reproduction.paper import (
+    AS_PRINTED,
+    CORRECTED,
+    DENSITY,
+    FLOOR,
+    Given,
+    gathered_results,
+)
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array, Mask

@@ -88,7 +88,9 @@ def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> dict[Job, Resul
     alone = [job for job in jobs if experiments[job].alone]
     beside = ([job] for job in jobs if job not in alone)
     found: dict[Job, Result] = {}
-    with closing(run_tasks(beside, run_job, WorkersChoice(jobs=workers), lambda _: None)) as ended:  # type: ignore[type-var]
+    with closing(
+        run_tasks(beside, run_job, WorkersChoice(jobs=workers), lambda _: None)
+    ) as ended:  # type: ignore[type-var]
         for job, value, failure, _ in chain(ended, (perform(run_job, job) for job in alone)):
             where = f"{experiments[job].title}, seed {job.seed}"
             found[job] = value if failure is None else f"{where}: {failure.line}"
@@ -97,7 +99,9 @@ def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> dict[Job, Resul
     return {job: found[job] for job in jobs}
 
 
-def gather(paper: Paper, names: Sequence[str], results: dict[Job, Result]) -> dict[str, ShownItem]:
+def gather(
+    paper: Paper, names: Sequence[str], results: dict[Job, Result]
+) -> dict[str, ShownItem]:
     """Name of an item → its values, a list over the seeds for each."""
     found = {}
     for name in names:

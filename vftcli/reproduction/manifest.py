@@ -70,7 +70,9 @@ class BenchmarkLog:
     truth_columns: str = ""  #: Its columns, as of ``--reference-columns``.
     vendor: str = ""  #: Columns of the controller's own estimate, "" for none.
     score: Spans = ((SETTLED, 1e9),)  #: What is scored, from the first sample. [s]
-    vouched: Spans = ALWAYS  #: Where a row is false if nothing touched; `score` if it is given. [s]
+    vouched: Spans = (
+        ALWAYS  #: Where a row is false if nothing touched; `score` if it is given. [s]
+    )
     #: True contacts, where the truth does not show them: start, end [s], peak [N] if
     #: known.
     contacts: tuple[tuple[float, ...], ...] = ()
@@ -324,7 +326,9 @@ def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
 
 def in_words(spans: Spans) -> str:
     """Spans as a complaint names them. [s]"""
-    ends = ((start, "the end" if stop >= ALWAYS[0][1] else f"{stop:g} s") for start, stop in spans)
+    ends = (
+        (start, "the end" if stop >= ALWAYS[0][1] else f"{stop:g} s") for start, stop in spans
+    )
     return ", ".join(f"{start:g} s to {end}" for start, end in ends)
 
 

@@ -146,7 +146,9 @@ def load_paper(name: str) -> Paper:
         lines = [line for row in entry.pop("lines", ()) for line in lines_of(row, each)]
         if published := entry.pop("published", None):
             lines += [
-                PrintedLine(f"{name}/{j}", f"{each['observer'][name]}, J{j}", "N·m", f"{rmse:.4f}")
+                PrintedLine(
+                    f"{name}/{j}", f"{each['observer'][name]}, J{j}", "N·m", f"{rmse:.4f}"
+                )
                 for name, numbers in TABLES[published].rmse.items()
                 for j, rmse in enumerate(numbers, start=1)
             ]

@@ -97,7 +97,9 @@ def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
 
 def jittering(motion: Recording) -> Recording:
     """A motion on a clock that jitters by 5 %, seed 1."""
-    strayed = np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples) * motion.median_step
+    strayed = (
+        np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples) * motion.median_step
+    )
     return replace(motion, t=motion.t + 0.5 * strayed)
 
 
@@ -221,7 +223,9 @@ def computing_time(_seed: int) -> Iterator[Given]:
             yield variant, f"zoh/{name}", cost["kfo-zoh"] / cost[name]
 
 
-def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> tuple[Array, Array]:
+def first_order_loops(
+    p: Array, mu: Array, step: float, rate: float = 10.0
+) -> tuple[Array, Array]:
     """FDO and GMO, one sample after another."""
     a = 0.5 * rate * step
     y1, y2, r = np.zeros(p.shape[1]), -rate * p[0], np.zeros(p.shape[1])

@@ -73,7 +73,9 @@ def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
 
         if isinstance(robot, Robot):
             return robot
-        raise RobotError(f"the robot is {robot!r}; expected a profile's name, as 'ur5', or a file")
+        raise RobotError(
+            f"the robot is {robot!r}; expected a profile's name, as 'ur5', or a file"
+        )
     from vftcli.robots.profile import load_profile
     from vftcli.robots.robot_file import DESCRIPTIONS
 

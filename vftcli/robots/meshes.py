@@ -51,7 +51,9 @@ def meshes_of(arm: LumpedArm, root: ET.Element) -> tuple[Mesh, ...]:
     above = reversed(arm.tree.path.resolve().parents[:ABOVE])
     packages = {folder.name: str(folder) for folder in above}
     packages |= packages_near(arm.tree.path) if asked else ()
-    links = {link.get("name", ""): UrdfPart(arm.tree.path, link) for link in root.iterfind("link")}
+    links = {
+        link.get("name", ""): UrdfPart(arm.tree.path, link) for link in root.iterfind("link")
+    }
     turns = [IDENTITY, *(Pose(turn.T) for turn, _ in arm.turned)]
     found = []
     for name, (joint, pose) in arm.groups.items():

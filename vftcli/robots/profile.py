@@ -8,7 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots.chain import CONVENTIONS, Body, Chain, Payload, kinematics, symmetric, unphysical
+from vftcli.robots.chain import (
+    CONVENTIONS,
+    Body,
+    Chain,
+    Payload,
+    kinematics,
+    symmetric,
+    unphysical,
+)
 from vftcli.robots.friction import FRICTION_MODELS, PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import (
@@ -128,7 +136,8 @@ def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
     convention = root.choice("convention", CONVENTIONS)
     numbers, vectors = CONVENTIONS[convention]
     frames: list[dict[str, Any]] = [
-        {key: joint.number(key) for key in numbers} | {key: joint.vector(key, 3) for key in vectors}
+        {key: joint.number(key) for key in numbers}
+        | {key: joint.vector(key, 3) for key in vectors}
         for joint in joints
     ]
     end: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}

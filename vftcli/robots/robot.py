@@ -52,7 +52,9 @@ class JointFriction(Shown):
             return {}
         known = {key: value for key, value in vars(self).items() if value not in ((), None, "")}
         table = {"model": known.pop("model"), **known.pop("parameters"), **known}
-        return {k: list(value) if isinstance(value, tuple) else value for k, value in table.items()}
+        return {
+            k: list(value) if isinstance(value, tuple) else value for k, value in table.items()
+        }
 
 
 class PerJoint(Shown):

@@ -92,7 +92,9 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
 class RunningTerms:
     """The terms of a log's blocks in turn, together those of the whole log."""
 
-    def __init__(self, robot: Robot, clock: Clock | None = None, *, literal: bool = False) -> None:
+    def __init__(
+        self, robot: Robot, clock: Clock | None = None, *, literal: bool = False
+    ) -> None:
         self.robot, self.clock, self.literal = robot, clock, literal
         self.before: Instant | None = None
         self._friction = RunningFriction(robot.friction)

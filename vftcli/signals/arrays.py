@@ -110,7 +110,9 @@ def empty_series(samples: int, columns: int) -> Array:
 def check_clock(t: Array, what: str) -> None:
     """Raise unless a clock `t` [s] is one-dimensional, finite and strictly increasing."""
     if np.ndim(t) != 1:
-        raise ShapeError(f"the clock of {what} has shape {np.shape(t)}; it must be one-dimensional")
+        raise ShapeError(
+            f"the clock of {what} has shape {np.shape(t)}; it must be one-dimensional"
+        )
     if len(bad := np.flatnonzero(~np.isfinite(t))):
         raise ClockError(f"the clock of {what} is not finite at sample {bad[0]}")
     if len(back := np.flatnonzero(t[1:] <= t[:-1])):

@@ -24,7 +24,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
     **{COLUMN_NAMES.get(name, name): facts for name, facts in SIGNALS.items()},
     "tau_ext": (TORQUE, "external joint torque"),
     "sd": (TORQUE, "standard deviation of the external torque by the estimator's own account"),
-    "band": (TORQUE, "standard deviation of the external torque, what the model errs by included"),
+    "band": (
+        TORQUE,
+        "standard deviation of the external torque, what the model errs by included",
+    ),
     "wrench": (FORCE, "external force and moment"),
     "wrench_sd": (
         FORCE,
@@ -34,7 +37,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "wrench_masked": (FORCE, "force and moment by a prior, where the pose is near-singular"),
     "null_space": (TORQUE, "joint torque that no wrench at the flange explains"),
     "sigma_min": ("m", "smallest singular value of J, angular rows × 0.3 m"),
-    "contact": ("1", "number of the contact in the list that the sample belongs to, null outside"),
+    "contact": (
+        "1",
+        "number of the contact in the list that the sample belongs to, null outside",
+    ),
 }
 ON_ROBOT = "on the robot"  #: Whose force it is: the environment's on the robot.
 

@@ -162,7 +162,9 @@ class LagFit(NamedTuple):
     def rivals(self, most: float) -> list[float]:
         """Lags of valleys with a longer overlap than the closest, longest first."""
         inner, best = self.difference[1:-1], int(self.difference.argmin())
-        valley = (inner <= self.difference[:-2]) & (inner <= self.difference[2:]) & (inner <= most)
+        valley = (
+            (inner <= self.difference[:-2]) & (inner <= self.difference[2:]) & (inner <= most)
+        )
         found = 1 + np.flatnonzero(valley & (self.overlap[1:-1] > self.overlap[best]))
         return [float(k) for k in self.lag[found[np.argsort(-self.overlap[found])]]]
 

@@ -16,7 +16,9 @@ PASSES = 6  #: Reweighting passes.
 #: Eigenvalues of scaled normal equations below this share of the largest tell a solution
 #: nothing.
 NULL = 1e-12
-NULL_OF_INVERSE = 1e-10  #: `NULL` of an inverse, in which a single such value outweighs all others.
+NULL_OF_INVERSE = (
+    1e-10  #: `NULL` of an inverse, in which a single such value outweighs all others.
+)
 SD_PER_MEDIAN = 1.4826  #: Standard deviation of normal noise over the median of its size.
 FOLDS = 5  #: Contiguous stretches of the log for cross-validation.
 

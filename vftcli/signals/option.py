@@ -173,7 +173,9 @@ class Choice:
         """The words that settings state, by name; those of other choices are left out."""
         own = {name: text for name, text in settings.items() if cls.takes(name)}
         words = {name: own.pop(name) for name in cls.options() if name in own}
-        return words | ({NUMBERS: [f"{name}={text}" for name, text in own.items()]} if own else {})
+        return words | (
+            {NUMBERS: [f"{name}={text}" for name, text in own.items()]} if own else {}
+        )
 
     @classmethod
     def parsed(

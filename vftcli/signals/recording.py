@@ -66,7 +66,9 @@ class Awaited:
 class Source(Shown):
     """Where a recording came from and what was done to it on the way in."""
 
-    path: Path | None = None  #: The file or bag directory, or None for a recording made in memory.
+    path: Path | None = (
+        None  #: The file or bag directory, or None for a recording made in memory.
+    )
     #: What the log is called in tables, unique within a command; the file's name where
     #: that is unique.
     label: str = ""
@@ -77,7 +79,9 @@ class Source(Shown):
     sha256: Awaited = Awaited()
     clock: str = "as given"  #: Which clock the stamps are from, in words.
     t0: float = 0.0  #: The log's own stamp of the first sample. [s]
-    t0_ns: int | None = None  #: The same stamp in whole nanoseconds where the log counts them. [ns]
+    t0_ns: int | None = (
+        None  #: The same stamp in whole nanoseconds where the log counts them. [ns]
+    )
     rows: int = 0  #: Samples the file held before any were dropped.
     duplicates: int = 0  #: Rows dropped because their stamp repeated the one before.
     derived: tuple[str, ...] = ()  #: Signals that were made of others here and stand in no log.

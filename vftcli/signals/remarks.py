@@ -142,7 +142,9 @@ class ListFormatter(string.Formatter):
         """A value by its format; a list's items by it, numbers apart by spaces, words by commas."""
         if isinstance(value, str) or not isinstance(value, Iterable):
             return str(super().format_field(value, format_spec))
-        items = [str(super(ListFormatter, self).format_field(item, format_spec)) for item in value]
+        items = [
+            str(super(ListFormatter, self).format_field(item, format_spec)) for item in value
+        ]
         return (" " if format_spec else ", ").join(items)
 
 

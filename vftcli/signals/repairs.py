@@ -26,7 +26,9 @@ CUTOFF = 12.0
 OF_NYQUIST = 0.4  #: The same in a slow log, as a share of half its rate.
 #: Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz.
 BLUNTED = 0.48
-ONE_TURN = 2 * np.pi + 0.1  #: How far positions travel at most that are logged within a turn. [rad]
+ONE_TURN = (
+    2 * np.pi + 0.1
+)  #: How far positions travel at most that are logged within a turn. [rad]
 RATE = 50.0  #: Rate from which velocities are derived without being asked for. [Hz]
 
 
@@ -77,7 +79,9 @@ END = 4.0
 #: An effort is no further off than so many times what its three closest neighbours in
 #: size differ by: a tap of three samples is a tap. Two samples of one stand alone.
 PEAK = 2.0
-FINEST = 1e-6  #: And efforts off by less: a log in single precision keeps 1e-5 of 100 N·m. [A, N·m]
+FINEST = (
+    1e-6  #: And efforts off by less: a log in single precision keeps 1e-5 of 100 N·m. [A, N·m]
+)
 
 
 def without_isolated(recording: Recording) -> Recording:
@@ -126,7 +130,9 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     around = np.arange(-NEAR, NEAR + 1)
     for ends, far in ((made, limit), (made[::-1], limit[::-1])):
         ends[:NEAR] = at_an_end(ends[: 3 * NEAR], END * far[:NEAR])
-    for _ in range(NEAR):  # the worst of its neighbours first: beside a bad sample others look bad
+    for _ in range(
+        NEAR
+    ):  # the worst of its neighbours first: beside a bad sample others look bad
         near = np.sort(made[rows[:, None] + around], axis=1)
         others = np.median(made[rows[:, None] + around[around != 0]], axis=1)
         three = np.min(near[:, NEAR:] - near[:, : NEAR + 1], axis=1)

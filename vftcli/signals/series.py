@@ -62,7 +62,9 @@ def runs_of(mask: Mask) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def intervals(t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0) -> list[tuple[int, int]]:
+def intervals(
+    t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0
+) -> list[tuple[int, int]]:
     """Runs of a mask, joined across less than `gap`, of `least` or more. [s]"""
     found: list[tuple[int, int]] = []
     for start, stop in runs_of(mask):

@@ -47,7 +47,9 @@ def filtered(
     return found, states[:, -1]
 
 
-def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> tuple[Array, Array]:
+def steady_filter(
+    F: Array, g: Array, d: Array, start: Array, wanted: Array
+) -> tuple[Array, Array]:
     """Run `filtered` with F (m, m, n) and g (m, n) of the whole log, for one combination (m, n)."""
     toeplitz, ends, carry, powers = blocks_of(F.transpose(2, 0, 1), g.T, wanted.T)
     out, state, columns = empty_series(*d.shape), start.T, np.ascontiguousarray(d.T)

@@ -134,7 +134,9 @@ class Wrench(TimeSeries):
 
     def _headline(self) -> str:
         most = self.size[np.isfinite(self.size)].max(initial=0.0)
-        return f"of {self.name}, frame {self.frame}: {len(self.t)} samples, |F| up to {most:.3g} N"
+        return (
+            f"of {self.name}, frame {self.frame}: {len(self.t)} samples, |F| up to {most:.3g} N"
+        )
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "axis", "unit", "least", "most", "largest sd"

@@ -235,7 +235,9 @@ class Touching:
     ) -> None:
         names = [spec.name for spec in specs]
         if doubled := {name for name in names if names.count(name) > 1}:
-            raise ParameterError(f"two contacts are named {doubled.pop()!r}; name each its own way")
+            raise ParameterError(
+                f"two contacts are named {doubled.pop()!r}; name each its own way"
+            )
         # A generator a contact: adding one leaves what the others draw as it was.
         rngs = [np.random.default_rng(s) for s in seed.spawn(len(specs))]
         self.mounted: list[Mounted] = []

@@ -115,7 +115,9 @@ def prepare(scenario: Scenario, seed: int) -> tuple[Arm, Reference]:
             "steps; shorten it"
         )
     steps = int(np.ceil(duration / scenario.step - 1e-9))
-    reference = plan(scenario.trajectory, robot, np.arange(steps + 1, dtype=float) * scenario.step)
+    reference = plan(
+        scenario.trajectory, robot, np.arange(steps + 1, dtype=float) * scenario.step
+    )
     arm = Arm(scenario, seed, Reference(*(rows[:1] for rows in reference)), duration)
     return arm, reference
 

@@ -123,7 +123,9 @@ class SensingSpec(Spec):
 
     rate: float = 0.0  #: Samples per second; 0 takes the vendor's own. [Hz]
     torque: str = "average"  #: "average" over the sampling interval, or "instant".
-    noise: float = 1.0  #: Factor on the profile's noise of position, velocity, current and torque.
+    noise: float = (
+        1.0  #: Factor on the profile's noise of position, velocity, current and torque.
+    )
     #: Standard deviation of the current in place of the profile's. [A]
     current_noise: float | None = None
     position_step: float = 5e-6  #: Quantisation of positions. [rad]
@@ -260,7 +262,9 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     if not path.is_file():
         path = Path(name)
         if path.suffix.lower() != ".toml":
-            check_known(str(name), scenario_names(), f"no FILE.toml and no scenario {str(name)!r}")
+            check_known(
+                str(name), scenario_names(), f"no FILE.toml and no scenario {str(name)!r}"
+            )
     table = toml_file(path, "a scenario")
     table.setdefault("name", path.stem)
     for override in overrides:
@@ -299,7 +303,9 @@ def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Se
                 f"{paths[key.name]} is missing; [{where or 'scenario'}] takes {', '.join(paths)}"
             )
     hints = get_type_hints(cls)
-    return cls(**{name: convert(value, hints[name], paths[name]) for name, value in table.items()})
+    return cls(
+        **{name: convert(value, hints[name], paths[name]) for name, value in table.items()}
+    )
 
 
 def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML values

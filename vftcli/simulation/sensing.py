@@ -164,7 +164,10 @@ def controller_signals(
     spec = arm.scenario.sensing
     step = 1.0 / log_rate(spec, arm.robot)
     # A first-order low-pass, exact for an input held over the step.
-    share, residual = 1.0 - np.exp(-2.0 * np.pi * spec.vendor_cutoff * step), torque - model_torque
+    share, residual = (
+        1.0 - np.exp(-2.0 * np.pi * spec.vendor_cutoff * step),
+        torque - model_torque,
+    )
     one = np.ones((1, residual.shape[1]))
     slow = (1.0 - share) * one[None], share * one
     residual, _ = steady_filter(*slow, residual, residual[:1], one)
@@ -202,7 +205,9 @@ def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None
         spin = pin.getFrameVelocity(model, data, frame, axes).angular
         R = flange @ turn  # of the sensor in the base
         arm_of_tool = flange @ position + R @ tool
-        swing = np.cross(moving.angular, arm_of_tool) + np.cross(spin, np.cross(spin, arm_of_tool))
+        swing = np.cross(moving.angular, arm_of_tool) + np.cross(
+            spin, np.cross(spin, arm_of_tool)
+        )
         weight = spec.tool_mass * (R.T @ (model.gravity.linear - (moving.linear + swing)))
         force = R.T @ wrench[k, :3]
         moment = R.T @ wrench[k, 3:] - np.cross(turn.T @ position, force)

@@ -128,7 +128,9 @@ class CircleSpec(Spec, kind="circle"):
     radius: float = 0.2  #: Radius. [m]
     period: float = 4.0  #: Time of one round. [s]
     cycles: float = 5.0  #: Rounds.
-    towards: float = 0.0  #: Direction from the start to the centre, from base x about base z. [rad]
+    towards: float = (
+        0.0  #: Direction from the start to the centre, from base x about base z. [rad]
+    )
 
     def motion(self, robot: Robot) -> Command:
         """The circle as a Fourier series of the joints."""
@@ -276,7 +278,9 @@ class ExcitationSpec(Spec, kind="excitation"):
     period: float = 10.0  #: Time of one round. [s]
     cycles: float = 2.0  #: Rounds.
     mean: tuple[float, ...]  #: Mean positions. (n,) [rad]
-    cosine: tuple[tuple[float, ...], ...]  #: Cosine coefficients, one row a harmonic. (H, n) [rad]
+    cosine: tuple[
+        tuple[float, ...], ...
+    ]  #: Cosine coefficients, one row a harmonic. (H, n) [rad]
     sine: tuple[tuple[float, ...], ...]  #: Sine coefficients. (H, n) [rad]
 
     def motion(self, robot: Robot) -> Command:

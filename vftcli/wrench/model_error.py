@@ -251,7 +251,9 @@ def periodogram(d: Array, seconds: float) -> Array:
     return (spectrum.real**2 + spectrum.imag**2) * (seconds / len(d))
 
 
-def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[float, float, float]:
+def fit_spectrum(
+    f: Array, P: Array, seconds: float, longest: float
+) -> tuple[float, float, float]:
     """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
 
     The level follows in closed form, so that two numbers are left to search. No
@@ -306,7 +308,9 @@ def steady_process(
     return ErrorProcess(decay, variance * (1.0 - decay**2), white, np.zeros(decay.shape))
 
 
-def error_process(noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None) -> ErrorProcess:
+def error_process(
+    noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None
+) -> ErrorProcess:
     """B along a log; in the `touched` blocks (K,) a contact may re-settle stiction at rest."""
     rests, length = blocks.rests, np.median(blocks.length)
     # Share of the `RECENT` blocks before each in which a joint moved.

@@ -45,7 +45,9 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     """
     ours, theirs = centred(flange, sensor)
     if len(ours) < 4:
-        raise ParameterError("the sensor's pose: too few samples in which both wrenches are known")
+        raise ParameterError(
+            "the sensor's pose: too few samples in which both wrenches are known"
+        )
     U, s, Vt = np.linalg.svd(theirs[:, :3].T @ ours[:, :3])
     if not s[1] > LEAST_DIRECTIONS * s[0]:
         raise ParameterError(

@@ -30,7 +30,9 @@ SETTLING = 1.0
 LEAST_SPAN = 0.5  #: Shortest unloaded start. [s]
 #: A departure from the start's own level that counts as load whatever the noise. [N, N·m]
 STEPS = np.repeat([3.0, 0.6], 3)
-BACK = 0.3  #: An unloaded start ends this long before the load shows: it began to rise earlier. [s]
+BACK = (
+    0.3  #: An unloaded start ends this long before the load shows: it began to rise earlier. [s]
+)
 SPREADS = 6.0  #: A departure of so many robust standard deviations counts as load.
 
 

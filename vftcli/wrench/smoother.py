@@ -52,7 +52,9 @@ LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]
 TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  #: Correlation times of a wrench that are tried. [s]
 FORCES = (10.0, 30.0, 60.0)  #: Standard deviations of a force that are tried. [N]
 STEADY = 30.0  #: A wrench that keeps for at least this long is a load, … [s]
-LOAD_CHANGE = 5.0  #: … if it changes by no more than this (one standard deviation) in a second. [N]
+LOAD_CHANGE = (
+    5.0  #: … if it changes by no more than this (one standard deviation) in a second. [N]
+)
 
 
 class WrenchPrior(NamedTuple):

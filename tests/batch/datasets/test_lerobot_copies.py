@@ -15,7 +15,9 @@ from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of, with_fe
 from vftcli.signals.errors import LogError
 
 FIXTURE = Path(__file__).parents[3] / "fixtures" / "panda_episodes"
-TORQUE = ForceColumn("external_torque", tuple(f"j{k}.external_torque" for k in range(7)), {"a": 1})
+TORQUE = ForceColumn(
+    "external_torque", tuple(f"j{k}.external_torque" for k in range(7)), {"a": 1}
+)
 VALID = ForceColumn("valid", (), {})
 COLUMNS = [TORQUE, VALID]
 
@@ -54,7 +56,9 @@ def test_the_other_columns_the_rows_and_their_groups_stay(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("codec", ["none", "snappy", "zstd"])
-def test_compression_row_groups_and_rows_in_any_order_are_kept(codec: str, tmp_path: Path) -> None:
+def test_compression_row_groups_and_rows_in_any_order_are_kept(
+    codec: str, tmp_path: Path
+) -> None:
     """An episode's rows may stand apart: its values go to its own rows, in their order."""
     dataset = tmp_path / "set"
     shutil.copytree(FIXTURE, dataset)

@@ -5,14 +5,18 @@ import numpy as np
 from vftcli.batch.datasets.lerobot import KEYS, pooled, statistics_of
 
 RNG = np.random.default_rng(4)
-EPISODES = [RNG.standard_normal((n, 3)).astype(np.float32) + k for k, n in enumerate((30, 50, 20))]
+EPISODES = [
+    RNG.standard_normal((n, 3)).astype(np.float32) + k for k, n in enumerate((30, 50, 20))
+]
 
 
 def test_an_episode_s_are_exact():
     found = statistics_of(EPISODES[0])
     assert set(found) == set(KEYS)
     np.testing.assert_array_equal(found["count"], [30])
-    np.testing.assert_array_equal(found["q10"], np.quantile(EPISODES[0].astype(float), 0.1, axis=0))
+    np.testing.assert_array_equal(
+        found["q10"], np.quantile(EPISODES[0].astype(float), 0.1, axis=0)
+    )
     np.testing.assert_array_equal(found["std"], EPISODES[0].astype(float).std(axis=0))
 
 

@@ -23,7 +23,9 @@ from vftcli.outputs.run_record import to_json
 
 def test_controllers_stand_under_each_other_by_axis_and_drag(release: Replay) -> None:
     rows = [dict(row) for row in release.rows]
-    late = [row | {"axis": "z", "drag": 2} for row in rows] + [row | {"axis": "z"} for row in rows]
+    late = [row | {"axis": "z", "drag": 2} for row in rows] + [
+        row | {"axis": "z"} for row in rows
+    ]
     grid = comparison_grid([*late, *rows])
     keys = list(COLUMNS)
     axes = [(row[keys.index("axis")], row[keys.index("drag")]) for row in grid.rows]

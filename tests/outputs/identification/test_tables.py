@@ -41,7 +41,9 @@ def test_what_the_log_does_not_determine_is_said(found):
 def test_what_is_no_number_is_a_dash(found):
     """A profile without a term read "nan", a spread that nothing bounds "inf"."""
     result, _ = found
-    unknown = result.parameters.with_columns(profile=pl.lit(float("nan")), sd=pl.lit(float("inf")))
+    unknown = result.parameters.with_columns(
+        profile=pl.lit(float("nan")), sd=pl.lit(float("inf"))
+    )
     lines = terminal(parameter_grid(result._replace(parameters=unknown))).splitlines()[1:]
     assert all(line.count(" –") == 2 for line in lines)
     assert not any(word in line for line in lines for word in ("nan", "inf"))
@@ -63,7 +65,9 @@ def test_the_chosen_friction_is_marked():
 
 def test_what_was_not_identified_has_no_table(found):
     result, _ = found
-    bare = result._replace(residuals=result.residuals.clear(), parameters=result.parameters.clear())
+    bare = result._replace(
+        residuals=result.residuals.clear(), parameters=result.parameters.clear()
+    )
     assert tables_text(bare) == ""
     only = result._replace(residuals=result.residuals.clear())
     assert tables_text(only).startswith("number ")

@@ -26,7 +26,9 @@ def test_a_ribbon_is_grey_where_no_contact_is_listed() -> None:
 def test_a_ribbon_goes_along_its_upper_edge_and_back_along_the_lower() -> None:
     """Between two level lines it fills its whole box: the area of its outline, by Gauss."""
     line = ChartLine("best", np.zeros((6, 1)), "#112233", half=np.full((6, 1), 2.0))
-    (outline,) = set(re.findall(r'"(M[^"]*)Z"', part("svg/multiples", chart(np.arange(6.0), line))))
+    (outline,) = set(
+        re.findall(r'"(M[^"]*)Z"', part("svg/multiples", chart(np.arange(6.0), line)))
+    )
     steps = np.array([float(number) for number in re.findall(r"-?\d*\.?\d+", outline)])
     x, y = np.cumsum(steps.reshape(-1, 2), axis=0).T
     area = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))

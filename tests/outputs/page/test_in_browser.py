@@ -206,7 +206,9 @@ STROKES = """() => {
 
 
 @pytest.fixture(scope="module")
-def shaped(pushed: Analysis, as_if: Callable, tmp_path_factory: pytest.TempPathFactory) -> Analysis:
+def shaped(
+    pushed: Analysis, as_if: Callable, tmp_path_factory: pytest.TempPathFactory
+) -> Analysis:
     """The log on an arm of seven meshes of 400 triangles, and an eighth that is not there."""
     file = tmp_path_factory.mktemp("mesh") / "ball.stl"
     file.write_text("\n".join("vertex {} {} {}".format(*x) for x in sphere(0.06).reshape(-1, 3)))
@@ -247,7 +249,9 @@ def test_meshes_are_drawn_where_the_links_are(opened: Callable, shaped: Analysis
     ratio = min(size / view.span) / min(2 * middle / view.span)
     origins = ratio * (np.stack([x, y], axis=1) - middle) + size / 2
     # How far its outermost corner is from each origin, in metres there; weak perspective.
-    apart = np.linalg.norm(corners[:, :, None, :2] - origins, axis=-1).max(axis=1) / (ratio * near)
+    apart = np.linalg.norm(corners[:, :, None, :2] - origins, axis=-1).max(axis=1) / (
+        ratio * near
+    )
     assert apart.min(axis=1).max() == pytest.approx(0.06, rel=0.05)
     assert apart.min(axis=0).max() < 0.03  # each has some that face the eye
 
@@ -274,7 +278,9 @@ def test_the_force_is_drawn_where_it_acts_and_comes_from_where_it_should(
     tail, tip = view.seen(arrow_of(pushed, contact, view.reach))[:, :2]
     (width, height), middle = drawn["size"], np.array([WIDTH, HEIGHT]) / 2
     ratio = min(np.array([width, height]) / view.span) / min(2 * middle / view.span)
-    tail, tip = (ratio * (place - middle) + np.array([width, height]) / 2 for place in (tail, tip))
+    tail, tip = (
+        ratio * (place - middle) + np.array([width, height]) / 2 for place in (tail, tip)
+    )
     # The peak is half a sample away at most, 2 mm; the shaft ends 9 pixels before its tip.
     np.testing.assert_allclose(shaft[0], tail, atol=1.5)
     ahead = (tip - tail) / np.linalg.norm(tip - tail)

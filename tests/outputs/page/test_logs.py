@@ -107,5 +107,7 @@ def test_one_line_a_log_the_worst_first_and_what_failed() -> None:
 
 
 def test_a_batch_of_failures_alone_has_a_page() -> None:
-    page = render_batch(list(batch_lines(table(SOUND).clear(), {})), pl.DataFrame(schema=FAILURES))
+    page = render_batch(
+        list(batch_lines(table(SOUND).clear(), {})), pl.DataFrame(schema=FAILURES)
+    )
     assert "0 logs." in page

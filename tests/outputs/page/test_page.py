@@ -122,7 +122,9 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
 
 
 @pytest.mark.slow
-def test_without_contacts_the_page_says_why(pushed: Analysis, without_reference: Analysis) -> None:
+def test_without_contacts_the_page_says_why(
+    pushed: Analysis, without_reference: Analysis
+) -> None:
     reason = caution("contacts-not-told", reason="a hostile <b>")
     bare = replace(pushed, contacts=None, remarks=(*pushed.remarks, reason))
     page = Page(render(bare))
@@ -196,7 +198,9 @@ def test_what_nothing_is_known_of_is_no_caution_and_a_file_keeps_its_letters(
 
 
 def test_no_command_of_the_page_breaks_in_an_option(without_reference: Analysis) -> None:
-    made = replace(without_reference, run=run_record(without_reference, "vftcli report a --free b"))
+    made = replace(
+        without_reference, run=run_record(without_reference, "vftcli report a --free b")
+    )
     commands = re.findall(r"(?s)<(code|pre)[^>]*>(.*?)</\1>", render(made))
     texts = [re.sub(r'<span class="option">--?[a-z-]+</span>', "", text) for _, text in commands]
     assert "vftcli report a  b" in texts

@@ -52,7 +52,10 @@ def test_nothing_to_say_is_nothing_shown() -> None:
 
 
 def test_a_remark_is_said_once_and_the_worst_first() -> None:
-    turned, cut = fact("sign-turned", signal="q"), warning("topic-too-short", signal="a", topic="b")
+    turned, cut = (
+        fact("sign-turned", signal="q"),
+        warning("topic-too-short", signal="a", topic="b"),
+    )
     html = part("parts/all_remarks", [turned, cut, turned])
     assert html.count("<li>") == 2
     assert html.index("/b" if "/b" in html else "b") < html.index("turned the sign")
@@ -85,7 +88,8 @@ def test_an_option_is_one_word_and_the_text_stays() -> None:
 
 def test_provenance_without_a_log_names_none() -> None:
     html = part(
-        "parts/provenance", {"command": "", "input": None, "robot": {"name": "ur5"}, "versions": {}}
+        "parts/provenance",
+        {"command": "", "input": None, "robot": {"name": "ur5"}, "versions": {}},
     )
     assert "Log sha256" not in html
     assert "through the Python interface" in html

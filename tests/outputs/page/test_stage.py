@@ -95,7 +95,9 @@ def test_the_cone_is_that_of_a_force_known_evenly(pushed: Analysis) -> None:
 
 def test_a_cone_that_would_fill_the_picture_is_left_out_and_said(pushed: Analysis) -> None:
     """The band across the force is 2 s: at 45° it is as long as the force."""
-    one = replace(listed(pushed).contacts[0], wrench=np.array([50.0, *[0.0] * 5]), peak_force=50.0)
+    one = replace(
+        listed(pushed).contacts[0], wrench=np.array([50.0, *[0.0] * 5]), peak_force=50.0
+    )
     for half, words in ((49.0, ""), (51.0, " (± 46°)")):
         wide = replace(one, wrench_sd=np.full(6, half / 1.96))
         data = staged(replace(pushed, contacts=replace(listed(pushed), contacts=(wide,))))
@@ -170,7 +172,9 @@ def test_a_log_without_a_list_claims_nothing(pushed: Analysis) -> None:
 def test_what_touches_a_loaded_arm_comes_before_its_load(pushed: Analysis) -> None:
     first, second, *rest = listed(pushed).contacts
     load = replace(first, is_load=True, start=0.0, stop=20.0)
-    data = staged(replace(pushed, contacts=replace(listed(pushed), contacts=(load, second, *rest))))
+    data = staged(
+        replace(pushed, contacts=replace(listed(pushed), contacts=(load, second, *rest)))
+    )
     assert [row["number"] for row in data["contacts"]] == [*range(2, 13), 1]
 
 

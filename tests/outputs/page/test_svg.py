@@ -16,7 +16,9 @@ from vftcli.outputs.page.shell import (
     ticks,
 )
 
-SCALES = Scales(Box(128, 112, left=20, bottom=5, top=7, right=8), Span(2.0, 12.0), Span(-1.0, 4.0))
+SCALES = Scales(
+    Box(128, 112, left=20, bottom=5, top=7, right=8), Span(2.0, 12.0), Span(-1.0, 4.0)
+)
 """A plot of 100 by 100 with another room on each side."""
 
 

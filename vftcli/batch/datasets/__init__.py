@@ -15,7 +15,8 @@ class ForceColumn(NamedTuple):
 
     name: str  #: Its name, as external_torque; the dataset decides its place.
     elements: tuple[str, ...]  #: What each of its numbers is, empty for a single one.
-    #: Unit, sign, frame, observer and whether it is causal, for who reads the dataset.
+    #: Unit, sign, frame, observer and whether it is causal, for who
+    #: reads the dataset.
     about: Mapping[str, Any]
 
     @property
@@ -38,4 +39,6 @@ class DataFile(NamedTuple):
 #: Episode → name of a column → its values, a row a frame of the episode.
 Forces = Mapping[int, Mapping[str, Single]]
 Statistics = Mapping[str, NDArray[Any]]  #: Key of a statistic, as mean → its values. (width,)
-OfEpisodes = Mapping[int, Mapping[str, Statistics]]  #: Episode → name of a column → its statistics.
+OfEpisodes = Mapping[
+    int, Mapping[str, Statistics]
+]  #: Episode → name of a column → its statistics.

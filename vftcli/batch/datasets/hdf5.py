@@ -26,7 +26,9 @@ class Hdf5Dataset:
 
     has_statistics = False
 
-    def __init__(self, folder: Path, only: Path | None = None, columns: str | None = None) -> None:
+    def __init__(
+        self, folder: Path, only: Path | None = None, columns: str | None = None
+    ) -> None:
         self.folder, self._only, self._columns = folder, only, columns
 
     def files(self) -> Iterator[DataFile]:

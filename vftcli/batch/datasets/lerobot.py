@@ -111,7 +111,9 @@ class LeRobotDataset:
                 part = slice(first, first + table.num_rows)
                 first = part.stop
                 arrays = [*table.columns, *(as_column(each[part]) for each in whole)]
-                writer.write_table(pa.table(arrays, schema=schema), row_group_size=len(table) or 1)
+                writer.write_table(
+                    pa.table(arrays, schema=schema), row_group_size=len(table) or 1
+                )
 
     def finish(self, columns: ForceColumns, statistics: OfEpisodes, copy: Path) -> None:
         """Write info.json with the new features, and their statistics wherever others are."""

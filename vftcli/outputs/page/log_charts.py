@@ -129,7 +129,9 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
     )  # fmt: skip
 
 
-def over_frequency(key: str, title: str, unit: str, x: Array, lines: Sequence[ChartLine]) -> Chart:
+def over_frequency(
+    key: str, title: str, unit: str, x: Array, lines: Sequence[ChartLine]
+) -> Chart:
     """A chart over frequency, a panel a joint. (T,) [Hz]"""
     panels = joint_panels(lines[0].values)
     units = (unit,) * len(panels)
@@ -206,7 +208,9 @@ def spectra_chart(found: Spectra) -> Chart:
     """Spectra of the raw disturbance over both parts of the log; 0 Hz is left out."""
     # In decibels; the least number above 0 replaces zero.
     lines = [
-        ChartLine(name, 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny)), colour, dash)
+        ChartLine(
+            name, 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny)), colour, dash
+        )
         for name, power, colour, dash in (
             ("free part, S_n", found.free, FREE, ""),
             ("loaded part, S_d", found.loaded, LOADED, "5 2"),

@@ -152,7 +152,8 @@ def page_data(
         drawn.append(
             {
                 **{
-                    key: getattr(chart, key) for key in ("key", "title", "panels", "units", "spans")
+                    key: getattr(chart, key)
+                    for key in ("key", "title", "panels", "units", "spans")
                 },
                 "clock": list(clocks).index(id(chart.x)),
                 "ends": [tuple(chart.ends(j)) for j in range(len(chart.panels))],

@@ -177,7 +177,9 @@ def errors_view(analysis: Analysis) -> Record:
 
 def least_error(means: JointMeans) -> str:
     """The least mean RMSE and its observer."""
-    return DASH if means.least is None else f"{significant(means.least[1])} N·m ({means.least[0]})"
+    return (
+        DASH if means.least is None else f"{significant(means.least[1])} N·m ({means.least[0]})"
+    )
 
 
 def contact_details(found: ContactList) -> tuple[Grid, ...]:
@@ -316,7 +318,9 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
     title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
     if not touched:
         title = "Nothing pushed the arm, as far as these logs can tell."
-    if hard := [(by_force(found.hardest), found) for found in pushed if found.hardest is not None]:
+    if hard := [
+        (by_force(found.hardest), found) for found in pushed if found.hardest is not None
+    ]:
         most = max(hard, key=itemgetter(0))[1]
         lead = f"Hardest in {most.recording}: {hardest_words(most)}."
     if loads:

@@ -202,7 +202,9 @@ def scales_of(chart: Chart, box: Box) -> Iterator[Scales]:
 def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:
     """A line's paths in a panel: its ribbon, the ribbon's grey part, and itself; "" for none."""
     t, y, halves = drawn_line(chart, line, panel)
-    own, quiet = (ribbon(scales, t, y - half, y + half) for half in halves) if halves else ("", "")
+    own, quiet = (
+        (ribbon(scales, t, y - half, y + half) for half in halves) if halves else ("", "")
+    )
     return own, quiet, path_of(scales, t, y)
 
 

@@ -85,7 +85,11 @@ def view_of(analysis: Analysis) -> View:
     points += (arrow_of(analysis, contact, reach)[:1] for contact in sized)
     mean = flange.mean(axis=0)
     yaw = float(np.arctan2(mean[1], mean[0])) - ASIDE if np.hypot(*mean[:2]) > 0.05 else -ASIDE
-    axes, places, view = axes_of(yaw, PITCH), np.vstack(points), View(yaw, PITCH, mean, mean, reach)
+    axes, places, view = (
+        axes_of(yaw, PITCH),
+        np.vstack(points),
+        View(yaw, PITCH, mean, mean, reach),
+    )
     for _ in range(3):
         # What is near looks larger: the middle of what is seen is not the places' own.
         x, y = ((places - view.centre) @ axes[:2].T * view.nearness(places)[:, None]).T
@@ -225,7 +229,9 @@ def contact_words(contact: Contact) -> str:
 def contact_data(contact: Contact, joints: int, clock: PageClock) -> Record:
     """A contact for the script: its moment, its words, its place."""
     cone = cone_of(contact)
-    size, _, band = force_size(contact).partition(" ") if contact.wrench is not None else ("",) * 3
+    size, _, band = (
+        force_size(contact).partition(" ") if contact.wrench is not None else ("",) * 3
+    )
     return {
         "number": contact.number,
         "name": contact_name(contact),

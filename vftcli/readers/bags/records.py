@@ -287,7 +287,9 @@ def db3_messages(file: LogFile, budget: ReadBudget) -> Messages:
         of_types = rows("message_definitions", columns) if len(tables) > 2 else ()
         definitions = {kind: more for kind, *more in of_types}
         channels = {}
-        for number, topic, kind, encoding in rows("topics", "id, name, type, serialization_format"):
+        for number, topic, kind, encoding in rows(
+            "topics", "id, name, type, serialization_format"
+        ):
             language, text = definitions.get(kind, (b"", b""))
             channels[number] = Channel(
                 topic=printable(_text(topic)),

@@ -151,7 +151,9 @@ class MessageLayout:
         return count
 
     def _text(self, path: str) -> str:
-        return self._take_fixed(self._count(), path).removesuffix(b"\0").decode("utf-8", "replace")
+        return (
+            self._take_fixed(self._count(), path).removesuffix(b"\0").decode("utf-8", "replace")
+        )
 
 
 @lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
@@ -163,7 +165,14 @@ def types_of(definition: str, name: str, *, idl: bool) -> Types:
         raise LayoutError(f"a definition of more than {MAX_DEFINITION >> 10} KiB")
     try:
         parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
-    except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:
+    except (
+        TypesysError,
+        ValueError,
+        KeyError,
+        TypeError,
+        RecursionError,
+        AssertionError,
+    ) as error:
         raise LayoutError(f"no message definition: {reason_of(error)[:60]}") from None
     return parsed
 

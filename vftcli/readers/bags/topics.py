@@ -142,7 +142,9 @@ class Gathering:
         if signal in EFFORTS and lead.kind.names:
             for other in set(EFFORTS) & set(self.signals):
                 if all(map(np.array_equal, pieces(self.signals[other]), pieces(value))):
-                    del self.signals[other]  # /joint_states' effort said the same without its kind
+                    del self.signals[
+                        other
+                    ]  # /joint_states' effort said the same without its kind
         self.signals[signal] = value
 
     def take_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
@@ -209,7 +211,10 @@ class Gathering:
         """Remark which messages and topics were left out, those with forces first."""
         lead, topic = self.lead, self.lead.topic
         for stream in streams:
-            if (stream.channel, stream.names) == (lead.channel, lead.names) and stream is not lead:
+            if (stream.channel, stream.names) == (
+                lead.channel,
+                lead.names,
+            ) and stream is not lead:
                 there, count = tuple(stream.signals) or ("names",), stream.messages
                 self.remarks.append(
                     caution("messages-left-out", messages=count, topic=topic, signals=there)
@@ -221,7 +226,11 @@ class Gathering:
             self.remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
 
 
-FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}  #: Field of a JointState → signal.
+FIELDS = {
+    "position": "q",
+    "velocity": "dq",
+    "effort": "effort",
+}  #: Field of a JointState → signal.
 
 
 def same_arm(stream: Stream, lead: Stream) -> bool:

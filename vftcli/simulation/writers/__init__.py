@@ -176,7 +176,10 @@ class VendorTable(NamedTuple):
             several = len(columns) > 1
             names += [name + self.element.format(i) * several for i in range(len(columns))]
             texts += [
-                [str(value) if isinstance(value, int) else self.number % value for value in column]
+                [
+                    str(value) if isinstance(value, int) else self.number % value
+                    for value in column
+                ]
                 for column in columns
             ]
         lines = [self.separator.join(names), *map(self.separator.join, zip(*texts, strict=True))]
@@ -203,7 +206,9 @@ def write_truth(path: Path, truth: Truth, start: float) -> None:
     """Write the truth beside a log that begins at `start` [s]: the same clock."""
     columns = truth.columns()
     touched = {name.rpartition("/")[0] for name in columns if name.startswith("contact/")}
-    frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(touched, StatedFrame(AT_CONTACT))
+    frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(
+        touched, StatedFrame(AT_CONTACT)
+    )
     write_columns(path, columns | {"t": columns["t"] + start}, frames)
 
 

@@ -77,7 +77,11 @@ def joint_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
 
 def wrenches(readings: Array, stamps: Nanoseconds) -> Topic:
     """`/force_torque_sensor_broadcaster/wrench` in the sensor's frame, force ON the robot."""
-    values = {**stamped(stamps), "header.frame_id": "ft_sensor", **six("wrench", WRENCH, readings)}
+    values = {
+        **stamped(stamps),
+        "header.frame_id": "ft_sensor",
+        **six("wrench", WRENCH, readings),
+    }
     messages = serialised(WRENCH_STAMPED, values, len(readings))
     return "/force_torque_sensor_broadcaster/wrench", WRENCH_STAMPED, messages
 
@@ -88,7 +92,9 @@ def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
     names = [f"{simulation.robot.name}_joint{j}" for j in range(1, 8)]
     measured, desired = "measured_joint_state", "desired_joint_state"
     motor, external = "measured_joint_motor_state", "tau_ext_hat_filtered"
-    q, dq, target_q, target_dq = (seen[name][rows] for name in ("q", "dq", "target_q", "target_dq"))
+    q, dq, target_q, target_dq = (
+        seen[name][rows] for name in ("q", "dq", "target_q", "target_dq")
+    )
     actual, target = (
         FlangeMotion(*(part[rows] for part in flange)) for flange in simulation.flanges()
     )
