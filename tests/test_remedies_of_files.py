@@ -318,7 +318,6 @@ CLUSTER = "needs a cluster, its certificates or an installation without Dask"
 NAMED = "only names the option that is wrong, and what it may be"
 WITHOUT_ROW = {
     NAMED: (
-        ": too large: TOML may have", "--config …: …",
         "--columns is empty", "has no column name while others have one",
         "is given twice. Skip the other", "--columns: no q; a log needs",
         "must be one whole number, from 1", "--columns: cannot understand", "--columns: no signal",
@@ -362,7 +361,7 @@ def texts() -> dict[str, str]:
     """Every text of a raise that names an option or a command; a value in it is `…`."""
     found = {f"formats: {name}": form.remedy for name, form in FORMATS.items() if form.remedy}
     files = [path for room in ROOMS for path in sorted((PACKAGE / room).rglob("*.py"))]
-    for path in (*files, PACKAGE / "answering.py"):
+    for path in (*files, PACKAGE / "answering.py", PACKAGE / "admittance/closed_loop.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Raise) and node.exc is not None:
                 text = "".join(spoken(node.exc))
