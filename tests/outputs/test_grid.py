@@ -7,6 +7,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from vftcli.outputs.grid import (
@@ -193,7 +194,7 @@ def test_html_escapes_every_text_and_marks_best_floor_and_observers(grid: Grid) 
 
 
 def test_rows_for_machines_read_back() -> None:
-    rows = [{"a": 1.5e-7, "b": "x,y", "c": True}, {"a": float("nan"), "b": None, "c": False}]
+    rows = [{"a": 1.5e-7, "b": "x,y", "c": True}, {"a": float("nan"), "b": None, "c": np.False_}]
     assert json.loads(to_json(rows)) == [
         {"a": 1.5e-7, "b": "x,y", "c": True},
         {"a": None, "b": None, "c": False},

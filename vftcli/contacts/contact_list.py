@@ -160,7 +160,7 @@ class Contact(Shown):
     def size_known(self) -> bool:
         """Whether its force is larger than its band, and does not hang on an unknown place."""
         size, band = self.peak_force, self.peak_band
-        return size is not None and band is not None and not self.place_unknown and size > band
+        return not (size is None or band is None or self.place_unknown or size <= band)
 
     @property
     def place_unknown(self) -> bool:

@@ -299,7 +299,7 @@ def csv_rows(rows: Sequence[Record], keys: Iterable[str]) -> str:
 
     def cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
         """A value as a cell of CSV holds it."""
-        if isinstance(value, bool):
+        if isinstance(value, bool | np.bool):
             return str(value).lower()
         if isinstance(value, str):
             text = value.replace("\r", r"\r")  # unquoted before Python 3.13: it would end the row
