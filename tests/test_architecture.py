@@ -273,7 +273,7 @@ MOST = {
     "files": 239,
     "functions": 2845,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 376_076,
+    "names, operators, numbers": 376_067,
     "characters a line that is not blank": 50.89,
     "noqa": 81,
     "lines of TOML, JavaScript, CSS": 7454,

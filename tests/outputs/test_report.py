@@ -24,6 +24,7 @@ def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
     found.pop("run.json")
     assert files == found
     assert json.loads(text)["command"] == "vftcli report x"
+    assert "rerun-sdk" in json.loads(text)["versions"]  # which wrote the recording
     assert "vftcli report x" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
 
 

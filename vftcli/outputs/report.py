@@ -16,7 +16,7 @@ from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text
 from vftcli.outputs.paper import figure_files, write_figures
-from vftcli.outputs.run_record import envelope, log_entry, run_record, seal, to_json
+from vftcli.outputs.run_record import envelope, log_entry, run_record, seal, to_json, versions
 from vftcli.signals.arrays import trim
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
@@ -117,6 +117,7 @@ def fill(
             from vftcli.outputs.rerun_recording import write_rrd
 
             write_rrd(path, analysis, choice.detail)
+            record["versions"] = versions()  # Rerun's too
         else:
             sizes = {file.name: file.stat().st_size for file in path.parent.iterdir()}
             put_text(path, render(analysis, {**sizes, SEAL: None}))
@@ -141,8 +142,7 @@ def contacts_envelope(
     analyses: Sequence[Analysis], command: str, failed: Mapping[str, str] = MappingProxyType({})
 ) -> Record:
     """What touched the arm along logs, for machines; what `failed` is left out."""
-    listed = [(a.recording, a.contacts) for a in analyses if a.contacts is not None]
-    logs = [log_entry(recording, contacts_record(found)) for recording, found in listed]
+    logs = [log_entry(a.recording, contacts_record(a.contacts)) for a in analyses if a.contacts]
     return envelope(command, logs, found={"left_out": dict(failed)} if failed else {})
 
 
