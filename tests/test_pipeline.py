@@ -198,20 +198,20 @@ def test_a_free_run_as_long_as_the_log_is_distinct_from_it(runs: list[Path]) -> 
 
 def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
     """Seven tenths of it, after which its files are written."""
-    told: list[tuple[str, float]] = []
+    heard: list[tuple[str, float]] = []
     asked = AnalysisChoice(
         robot=RobotChoice(name="ur5"),
         read=ReadChoice(interval=(0.0, 6.0)),
         observers=ObserverChoice(names=("gmo",)),
     )
-    with heard_by(lambda *step: told.append(step)):
+    with heard_by(lambda *step: heard.append(step)):
         assert analyse_log(FIXTURE, asked).contacts is not None
-    words, begins = zip(*[step for step in told if step[0]], strict=True)
+    words, begins = zip(*[step for step in heard if step[0]], strict=True)
     assert [each.rpartition(": ")[2].split()[0] for each in words] == [
         *("reading", "examining", "looking", "listing", "running", "comparing")
     ]
     assert begins == (0.0, 0.05, 0.15, 0.25, 0.4, 0.5)
-    shares = [share for _, share in told]
+    shares = [share for _, share in heard]
     assert sorted(shares) == shares
     assert shares[-1] < pipeline.WRITING == 0.7
 

@@ -95,19 +95,19 @@ def test_an_episode_that_lacks_frames_is_refused_by_its_file(record: Any, said: 
 
 
 def test_episodes_are_gathered_in_the_order_of_their_files() -> None:
-    told, arms = [], ({"name": "one"}, {"name": "two"})
+    heard, arms = [], ({"name": "one"}, {"name": "two"})
     results = [
         {"episodes": [DONE | {"episode": 2}, DONE], "robot": None, "observer": "gmo"},
         {"episodes": [DONE | {"file": "a/t.h5"}], "robot": arms[0], "observer": "fdo"},
         {"episodes": [], "robot": arms[1], "observer": None},
     ]
     ended = [Outcome(None, result) for result in results]
-    with heard_by(lambda *step: told.append(step)):
+    with heard_by(lambda *step: heard.append(step)):
         made = gathered(ended, ForceChoice())
     found = [(one["file"], one["episode"]) for one in made["episodes"]]
     assert found == [("a/t.h5", 0), ("b/t.h5", 0), ("b/t.h5", 2)]
     assert (made["robot"], made["observer"]) == (arms[0], "gmo")
-    assert told == [(f"{count} episodes estimated", 0.0) for count in (2, 3, 3)]
+    assert heard == [(f"{count} episodes estimated", 0.0) for count in (2, 3, 3)]
 
 
 def test_joints_are_named_by_the_first_episode_that_is_done() -> None:
@@ -125,12 +125,12 @@ def test_joints_are_named_by_the_first_episode_that_is_done() -> None:
 
 def test_the_whole_copy(tmp_path: Path) -> None:
     asked = ForceChoice(wrench=WrenchChoice(frame="base"), sd=True)
-    told: list[tuple[str, float]] = []
-    with heard_by(lambda *step: told.append(step)):
+    heard: list[tuple[str, float]] = []
+    with heard_by(lambda *step: heard.append(step)):
         record = made(FIXTURE, tmp_path / "copy", asked)
-    begins = [begin for _, begin in told]
+    begins = [begin for _, begin in heard]
     assert list(dict.fromkeys(begins)) == [0.0, 0.8, 0.9]
-    assert all(words for words, _ in told)  # an episode's own steps are not heard
+    assert all(words for words, _ in heard)  # an episode's own steps are not heard
     assert sorted(p.relative_to(tmp_path / "copy") for p in (tmp_path / "copy").rglob("*.*")) == (
         sorted([
             *(p.relative_to(FIXTURE) for p in FIXTURE.rglob("*.*")),

@@ -215,11 +215,11 @@ def test_a_run_has_as_many_steps_as_fit_and_tells_of_them(duration: float, steps
 
 
 def test_every_step_says_how_far_the_run_is() -> None:
-    told: list[tuple[str, float]] = []
+    heard: list[tuple[str, float]] = []
     scenario = load_scenario("ur5-circle", ["duration=0.06", "contacts=[]"])
-    with heard_by(lambda *words: told.append(words)):
+    with heard_by(lambda *words: heard.append(words)):
         simulate(scenario, 1)
-    assert told == [("simulating", 0.0), *(("", k / 60) for k in range(60))]
+    assert heard == [("simulating", 0.0), *(("", k / 60) for k in range(60))]
 
 
 def test_pair_is_one_motion_with_and_without_the_payload() -> None:

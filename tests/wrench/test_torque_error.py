@@ -101,7 +101,7 @@ def test_a_free_part_measures_the_spread_about_its_mean(moves: bool) -> None:
 def test_two_observers_of_one_response_have_one_band() -> None:
     """FE and ZOH read nearly the same and get nearly the same error, whatever P₂₂ each has."""
     found = reading_of("kfo-fe", "kfo-zoh")
-    one, other = (wrench.known_sd for wrench in found.wrenches)
+    one, other = (wrench.sd[~wrench.hidden] for wrench in found.wrenches)
     np.testing.assert_allclose(one, other, rtol=0.02)
 
 

@@ -50,6 +50,7 @@ def batch(
     from vftcli.batch.run import BatchRun
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
+    from vftcli.outputs.quantity import counted
     from vftcli.readers.library import Library, LogCollection, absolute
     from vftcli.signals.errors import LogError, ParameterError
 
@@ -85,20 +86,19 @@ def batch(
     )
     failures, count = run.run(force=force)
     STAGES.end()
-    for name, reason in failures.select("log", "line").head(MOST_TOLD).iter_rows():
+    for name, reason in failures.select("log", "line").head(MOST_NAMED).iter_rows():
         say(f"error: {name}: {reason}")
-    if failures.height > MOST_TOLD:
-        say(f"… {failures.height - MOST_TOLD} more in failures.parquet")
-    logs_told = f"{count.logs} log{'s' * (count.logs != 1)}"
+    if failures.height > MOST_NAMED:
+        say(f"… {failures.height - MOST_NAMED} more in failures.parquet")
     say(
-        f"{logs_told}: {count.done} done now, {count.before} before, {count.failed} failed; "
-        f"{output / 'index.html'}, {output / 'batch.parquet'}"
+        f"{counted(count.logs, 'log')}: {count.done} done now, {count.before} before, "
+        f"{count.failed} failed; {output / 'index.html'}, {output / 'batch.parquet'}"
     )
     if count.failed:
         raise typer.Exit(SOME_FAILED if count.done + count.before else 1)
 
 
-MOST_TOLD = 10  #: Failures that are printed.
+MOST_NAMED = 10  #: Failures that are printed.
 
 
 def say_passed(names: list[str]) -> None:

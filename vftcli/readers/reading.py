@@ -189,7 +189,7 @@ def _reader(file: LogFile, choice: ReadChoice) -> LogFormat:
     if not reader.takes_columns:
         takers = ", ".join(r.name for r in FORMATS.values() if r.takes_columns)
         raise LogError(
-            f"{file.path}: --columns does not apply to {reader.name}, whose signals are known. "
+            f"{file.path}: --columns does not apply to {reader.name}: its signals are known. "
             f"It applies to {takers}."
         )
     whole = reader.general or reader.describes or not file.lines

@@ -306,4 +306,4 @@ def _stamps(
     if clock.unit is not None:
         return stamps, clock.factor, f"{words} [{clock.unit}]"
     tick, unit = tick_of(stamps, name)
-    return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
+    return stamps, tick, words if unit == "s" else f"{words}, read as {unit}"

@@ -164,11 +164,6 @@ class Wrench(TimeSeries):
         return np.where(self.hidden[:, None], np.nan, self.values)
 
     @property
-    def known_sd(self) -> Array | None:
-        """The standard deviation, NaN where the pose cannot tell the wrench. (T, 6)"""
-        return None if self.sd is None else np.where(self.hidden[:, None], np.nan, self.sd)
-
-    @property
     def force(self) -> Array:
         """The force, NaN where the pose cannot tell it. (T, 3) [N]"""
         return self.known[:, :3]
