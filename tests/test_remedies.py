@@ -301,7 +301,7 @@ ROWS = [
     Row("effort-sign-by-work", unnamed(turned_and_unknown), "columns"),
     Row("effort-is-current", lambda _: ["inspect", shared(
         "samples/reach/ros2_ur_effort_full_torque")], "columns"),
-    Row("arm-side-taken", lambda _: ["inspect", shared(
+    Row("arm-side-chosen", lambda _: ["inspect", shared(
         "samples/reach/aloha_episode_0.hdf5")], "arm", "right"),
     Row("no-profile", unnamed(lambda t: replace(
         t, q=t.q[:, :5], dq=t.dq[:, :5], effort=t.effort[:, :5])), "robot",
@@ -316,7 +316,7 @@ ROWS = [
     Row("controller-point-open", lambda f: [*controlled(f), *TOOL], "columns"),
     Row("controller-point-without-currents", lambda f: [
         *controlled(f, "target_current"), *TOOL], "columns"),
-    Row("episode-taken", lambda _: ["inspect", FIXTURES / "panda_episodes"], "episode", "1"),
+    Row("episode-chosen", lambda _: ["inspect", FIXTURES / "panda_episodes"], "episode", "1"),
 ]  # fmt: skip
 
 
@@ -416,9 +416,9 @@ WITHOUT_ROW = {
     "apparent-load": "names a command; tried below",
     "current-without-gravity": "asks for a log with other numbers",
     "effort-offset": "a command; tried below",
-    "episode-taken-first": "says how an episode is chosen; tried as episode-taken",
-    "field-taken": NAMED,
-    "field-taken-turned": NAMED,
+    "episode-chosen-first": "says how an episode is chosen; tried as episode-chosen",
+    "field-used": NAMED,
+    "field-used-turned": NAMED,
     "free-part-not-quiet": "its options are those of no-free-part",
     "gain-from-kalman-delay": NAMED,
     "gains-without-free-part": "no-free-part stands beside it and has the remedy",

@@ -307,7 +307,7 @@ def find_contacts(
         found = list_contacts(unloaded_motion(motion, choice), bias, referenced=referenced)
         return found.weighed(health.load, health.doubts), ()
     except VftError as error:
-        return None, (caution("contacts-not-told", reason=str(error)),)
+        return None, (caution("contacts-not-listed", reason=str(error)),)
 
 
 def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:

@@ -130,7 +130,7 @@ def test_an_open_effort_heals_the_log(turned: str, run: Run, tmp_path: Path) -> 
     assert code == 0, err
     record = json.loads(out)
     assert record["examination"][0]["overridden"] == []
-    assert "effort-taken" in [repair["code"] for repair in record["repairs"]]
+    assert "effort-used" in [repair["code"] for repair in record["repairs"]]
     healed = pl.read_parquet(tmp_path / "out" / "estimates.parquet")
     run("estimate", FIXTURE, *UR5, "--observer", "gmo", "-o", "plain")
     plain = pl.read_parquet(tmp_path / "plain" / "estimates.parquet")

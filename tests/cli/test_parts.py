@@ -51,7 +51,7 @@ def test_the_first_is_said_on_the_terminal_and_in_the_record(
     assert run(monkeypatch, *words) == 0
     assert capsys.readouterr().err.count(SAID) == 1
     record = json.loads((out / "run.json").read_text("utf-8"))
-    assert "episode-taken" in {reported["code"] for reported in record["warnings"]}
+    assert "episode-chosen" in {reported["code"] for reported in record["warnings"]}
 
 
 def test_contacts_and_convert_say_it_too(

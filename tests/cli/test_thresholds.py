@@ -72,7 +72,7 @@ def test_the_robots_own_estimate_may_be_the_reference(free: Path, pushed: Path, 
     (check,) = json.loads(out)["checks"]
     assert check["reference"] == "vendor"
     assert [c["by"] for c in check["contacts"] if c["by"]] == ["J2"]
-    assert check["smallest_caught_N"] is None
+    assert check["smallest_detected_N"] is None
 
 
 def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, run: Run) -> None:

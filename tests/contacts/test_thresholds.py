@@ -123,7 +123,7 @@ def test_a_wrench_that_is_hardly_known_gives_no_axes_and_is_said() -> None:
     wrench = np.where(log.t[:, None] < 5.0, log.wrench, np.nan)
     found = find_thresholds([compared("a", log.t, log.torque, wrench)], 1.0)
     assert (found.axes, found.force) == ((), ())
-    assert {"axes-untold", "wrench-seldom-known"} <= set(codes(found))
+    assert {"axes-unknown", "wrench-seldom-known"} <= set(codes(found))
 
 
 def test_an_axis_wider_than_its_value_is_no_threshold_and_says_how_much_more() -> None:

@@ -100,7 +100,7 @@ def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
     assert examiner.read_as(log, UR5E, auto) is log
     healed = examiner.read_as(turned(log), UR5E, auto)
     assert healed.torque == pytest.approx(log.torque)
-    assert [remark.code for remark in healed.source.remarks] == ["effort-taken"]
+    assert [remark.code for remark in healed.source.remarks] == ["effort-used"]
     assert examiner.read_as(turned(log), UR5E, ReadChoice()).source.remarks == ()
     assert not Examiner().examine(healed, UR5E).refusals()
 

@@ -200,7 +200,7 @@ def test_friction_is_measured_from_the_free_log_with_its_columns(
 def test_what_limits_the_list_is_reported_with_its_subject(without_reference: Analysis) -> None:
     (stop,) = of(replace(without_reference, contacts=contact_list(contact())), "stop")
     assert stop.standing == "caution"
-    reason = caution("contacts-not-told", reason="no samples")
+    reason = caution("contacts-not-listed", reason="no samples")
     untold = replace(without_reference, contacts=None, remarks=(reason,))
     (ground,) = of(untold, "contacts")
     assert ground.standing == "unknown"

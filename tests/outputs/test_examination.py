@@ -44,9 +44,9 @@ def test_the_line_counts_warnings_and_says_the_first_whole() -> None:
 
 def test_a_reader_s_warning_is_one_of_the_log() -> None:
     """It has no consequence and no remedy of its own in the catalogue: its words are enough."""
-    cut = warning("effort-taken", effort="a", kind="b", factor=1.0)
+    cut = warning("effort-used", effort="a", kind="b", factor=1.0)
     line = health_line(examination(NONE, read=(cut, fact("short", duration_s=1.0))))
-    assert line.startswith("log health: 2 warnings: effort-taken: the a of the log")
+    assert line.startswith("log health: 2 warnings: effort-used: the a of the log")
     assert "also no-velocity" in line
 
 

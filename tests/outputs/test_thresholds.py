@@ -146,7 +146,10 @@ def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
     assert record["force"]["threshold_N"] == pytest.approx(30.001)
     # k = 30 of 900 readings of a second: 120 an hour, a quarter of one.
     assert (record["joints"][0]["tail_maxima"], record["joints"][0]["hours"]) == (30, 0.25)
-    assert (record["checks"][0]["caught"], record["checks"][0]["smallest_caught_N"]) == (2, 20.0)
+    assert (record["checks"][0]["detected"], record["checks"][0]["smallest_detected_N"]) == (
+        2,
+        20.0,
+    )
     assert record["checks"][0]["contacts"][1]["delay_s"] is None
     assert record["left_out"][0]["any_axis"] == 1
 

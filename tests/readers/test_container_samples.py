@@ -15,7 +15,7 @@ from vftcli.robots import load_robot
 def test_of_two_arms_the_first_is_described(samples: Path) -> None:
     pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
     recording = read_first_recording(samples / "reach" / "aloha_episode_0.hdf5")
-    assert "arm-side-taken" in {remark.code for remark in recording.source.remarks}
+    assert "arm-side-chosen" in {remark.code for remark in recording.source.remarks}
 
 
 EPISODES = (700, 600, 650)

@@ -217,7 +217,7 @@ class TestHdf5:
 
     def test_an_examination_takes_the_left_arm_and_says_so(self, tmp_path: Path) -> None:
         seen = read_first_recording(seeds.aloha(tmp_path / "x"))
-        assert "arm-side-taken" in {remark.code for remark in seen.source.remarks}
+        assert "arm-side-chosen" in {remark.code for remark in seen.source.remarks}
         np.testing.assert_array_equal(seen.q, motion()["q"])
 
     def test_a_text_of_columns_goes_before_the_layout(self, tmp_path: Path) -> None:
@@ -236,7 +236,7 @@ class TestHdf5:
         labels = first.source.label, last.source.label
         assert labels == ("x episode 0 left arm", "x episode 10 left arm")
         np.testing.assert_allclose(last.q - first.q, 0.1, atol=1e-15)
-        assert [r.code for r in first.source.remarks] == ["episode-taken", "episode-place"]
+        assert [r.code for r in first.source.remarks] == ["episode-chosen", "episode-place"]
         assert str(first.source.remarks[0]) == "episode 0 of 3: --episode K|all"
 
     def test_an_episode_beyond_the_last_is_refused_with_their_number(

@@ -37,7 +37,7 @@ def test_one_arm_of_two_has_to_be_named_but_to_look_at() -> None:
     assert arm_of(PATH, ReadChoice(arm="right"), arms) == ("right", ())
     assert arm_of(PATH, ReadChoice(), arms[:1]) == ("left", ())
     seen, remarks = arm_of(PATH, ReadChoice(examining=True), arms)
-    assert (seen, [remark.code for remark in remarks]) == ("left", ["arm-side-taken"])
+    assert (seen, [remark.code for remark in remarks]) == ("left", ["arm-side-chosen"])
     with pytest.raises(LogError, match="--arm left or --arm right"):
         arm_of(PATH, ReadChoice(), arms)
     with pytest.raises(LogError, match="holds the left arm alone"):

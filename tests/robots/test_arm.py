@@ -46,7 +46,7 @@ def test_hands_and_bases_are_no_joints_of_the_arm(shape: str, count: int, tmp_pa
 
 def test_what_was_taken_and_locked_is_one_line(tmp_path: Path) -> None:
     found = loaded(tmp_path, fingered())
-    values = said(found, "arm-and-locked-taken")
+    values = said(found, "arm-and-locked-used")
     assert values["flange"] == "link8"
     assert values["locked"] == {"finger_joint1": 0.0, "finger_joint2": 0.0}
     assert values["lumped_kg"] == {"joint7": pytest.approx(0.76)}
@@ -59,7 +59,7 @@ def test_what_was_taken_and_locked_is_one_line(tmp_path: Path) -> None:
 def test_a_side_branch_of_the_arm_is_locked_and_said(tmp_path: Path) -> None:
     found = loaded(tmp_path, mobile())
     assert said(found, "side-branch-locked")["locked"] == ["piston_joint"]
-    locked = said(found, "arm-and-locked-taken")["locked"]
+    locked = said(found, "arm-and-locked-used")["locked"]
     assert isinstance(locked, dict)
     assert set(locked) == {
         "x_joint", "y_joint", "yaw_joint", "lift_joint", "head_joint", "piston_joint"
@@ -76,7 +76,7 @@ def test_two_equal_arms_are_refused_with_their_tips_and_each_is_taken(tmp_path: 
         for tip in (f"{side}_link7", f"{side}_joint7", f"{side}_tool0", f"{side}_tool0_mount"):
             found = loaded(tmp_path, two_armed(), tip)
             assert found.chain.names == names
-            assert said(found, "arm-and-locked-taken")["flange"] == f"{side}_tool0"
+            assert said(found, "arm-and-locked-used")["flange"] == f"{side}_tool0"
 
 
 def test_a_longer_arm_goes_before_a_shorter_one(tmp_path: Path) -> None:
@@ -91,11 +91,11 @@ def test_a_tip_behind_the_hand_takes_the_finger_too(tmp_path: Path) -> None:
 
 
 def test_a_tip_on_the_hand_moves_the_flange(tmp_path: Path) -> None:
-    assert said(loaded(tmp_path, fingered(), "hand_tcp"), "arm-and-locked-taken")["flange"] == (
+    assert said(loaded(tmp_path, fingered(), "hand_tcp"), "arm-and-locked-used")["flange"] == (
         "hand_tcp"
     )
     finger = loaded(tmp_path, fingered(), "finger1")  # a locked joint between
-    assert said(finger, "arm-and-locked-taken")["flange"] == "finger1"
+    assert said(finger, "arm-and-locked-used")["flange"] == "finger1"
     assert finger.joints == 7
 
 
@@ -158,10 +158,10 @@ def test_of_two_runs_on_one_way_the_longer_is_the_arm(tmp_path: Path) -> None:
 def test_the_flange_is_a_frame_of_a_usual_name_or_the_farthest(tmp_path: Path) -> None:
     far = fixed("far", "link5", xyz="0 0 0.5")
     plain = robot(link("base"), arm(5), far)
-    assert said(loaded(tmp_path, plain), "arm-taken")["flange"] == "far"
+    assert said(loaded(tmp_path, plain), "arm-used")["flange"] == "far"
     named = robot(link("base"), arm(5), far, fixed("my_attachment_site", "link5"))
-    assert said(loaded(tmp_path, named), "arm-taken")["flange"] == "my_attachment_site"
-    assert said(loaded(tmp_path, barred()), "arm-and-locked-taken")["flange"] == "bar"
+    assert said(loaded(tmp_path, named), "arm-used")["flange"] == "my_attachment_site"
+    assert said(loaded(tmp_path, barred()), "arm-and-locked-used")["flange"] == "bar"
 
 
 def test_a_locked_point_mass_is_added_by_the_parallel_axes(tmp_path: Path) -> None:

@@ -197,7 +197,7 @@ def test_the_base_s_place_is_in_the_chain_and_gravity_is_said(tmp_path: Path) ->
                    link("base"), arm(5))  # fmt: skip
     agrees_with_pinocchio(tilted, load_robot(written(tmp_path, tilted)))
     wall = beside(tmp_path, robot(link("base"), arm(5)), "gravity = [0, -9.81, 0]\n")
-    assert said(load_robot(wall), "arm-taken").values["gravity_m_s2"] == [0.0, -9.81, 0.0]
+    assert said(load_robot(wall), "arm-used").values["gravity_m_s2"] == [0.0, -9.81, 0.0]
 
 
 def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:

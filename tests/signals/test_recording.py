@@ -23,7 +23,7 @@ def test_the_only_effort_is_taken_for_what_is_said() -> None:
     assert log.torque_without_gravity is not None
     assert np.array_equal(log.torque_without_gravity, -EFFORT)
     (remark,) = log.source.remarks
-    assert (remark.code, remark.level) == ("effort-taken", "fact")
+    assert (remark.code, remark.level) == ("effort-used", "fact")
     assert str(remark) == (
         "the motor currents of the log are read as joint torques without gravity's, times -1"
     )

@@ -119,7 +119,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
             check_signals(recording, anyway=choice.anyway)
             analysis = analyse(prepared(recording, asked), asked)
             if choice.contact and analysis.contacts is None:
-                reason = next(str(r) for r in analysis.remarks if r.code == "contacts-not-told")
+                reason = next(str(r) for r in analysis.remarks if r.code == "contacts-not-listed")
                 raise LogError(f"{recording.name}: {reason}")
             columns = columns_of(analysis, choice)
         except ParameterError:

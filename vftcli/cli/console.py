@@ -48,7 +48,7 @@ def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
 
 
 #: Remarks that only a part of a file is read, unasked.
-PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
+PARTS = frozenset({"episode-chosen", "episode-chosen-first", "arm-side-chosen"})
 
 
 def command_line() -> str:

@@ -278,7 +278,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
         )
     remarks = remarks_on(free, len(joints), rate)
     if free[0].wrench.shape[1] and not axes:
-        remarks.append(caution("axes-untold"))
+        remarks.append(caution("axes-unknown"))
     named = (*zip(AXES, axes, strict=False), *(("|F|", one) for one in force))
     if wide := {name: one for name, one in named if one.is_wide}:
         lengths = {signals.recording.name: signals.recording.duration for signals in free}

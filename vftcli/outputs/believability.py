@@ -240,7 +240,7 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
     found, subject = analysis.contacts, "free motion"
     if found is None:
         for remark in analysis.remarks:
-            if remark.code == "contacts-not-told":
+            if remark.code == "contacts-not-listed":
                 yield Ground("unknown", "contacts", sentence(remark))
                 break
         return

@@ -119,10 +119,10 @@ def thresholds_record(
             {
                 "log": check.log,
                 "reference": check.reference,
-                "caught": None if check.reference is None else len(check.detected),
+                "detected": None if check.reference is None else len(check.detected),
                 "median_delay_s": check.median_delay,
                 "longest_delay_s": check.longest_delay,
-                "smallest_caught_N": check.smallest_detected,
+                "smallest_detected_N": check.smallest_detected,
                 "largest_missed_N": check.largest_missed,
                 "false_alarms": check.false_alarms,
                 "untouched_h": check.untouched_h,

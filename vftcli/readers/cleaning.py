@@ -329,7 +329,7 @@ def _segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
         )
     first, last = edges[number - 1], edges[number]
     count, row = len(edges) - 1, first + 1
-    said = fact("segment-taken", number=number, recordings=count, first_row=row, last_row=last)
+    said = fact("segment-chosen", number=number, recordings=count, first_row=row, last_row=last)
     return kept(raw, slice(first, last), said)
 
 

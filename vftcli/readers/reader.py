@@ -208,7 +208,7 @@ def episode_of(
     part = f"episode {number}" if count > 1 else ""
     if request.episode is not None or count == 1:
         return number, part, ()
-    code = "episode-taken" if number == 0 else "episode-taken-first"
+    code = "episode-chosen" if number == 0 else "episode-chosen-first"
     return number, part, (caution(code, episode=number, episodes=count),)
 
 
@@ -228,4 +228,4 @@ def arm_of(
             f"{path}: holds two arms{where}; say which with --arm {' or --arm '.join(arms)}."
         )
     there = places or "by name"
-    return arms[0], (caution("arm-side-taken", arm=arms[0], other=arms[1], places=there),)
+    return arms[0], (caution("arm-side-chosen", arm=arms[0], other=arms[1], places=there),)

@@ -167,7 +167,7 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         "root": lumped.tree.root,
     }
     if not locked:
-        yield fact("arm-taken", **values)
+        yield fact("arm-used", **values)
     else:
         # Joint of the arm that carries locked ones → mass that its own link carries. [kg]
         lumps = {
@@ -182,7 +182,7 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         values["lumped_shown"] = (
             ", ".join(f"{mass:.3g} kg into {joint}" for joint, mass in lumps.items()) or "none"
         )
-        yield fact("arm-and-locked-taken", **values)
+        yield fact("arm-and-locked-used", **values)
     last = chain.joints - 1
     beside = [joint.name for joint, group in lumped.locked.items() if BASE < group < last]
     if beside:
@@ -217,7 +217,7 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
             yield caution("mass-matrix-singular")
     rotors = [joint.rotor_inertia for joint in lumped.joints]
     if any(rotors):
-        yield caution("armature-taken", armature_kg_m2=rotors)
+        yield caution("armature-used", armature_kg_m2=rotors)
 
 
 #: Elements within one another: a URDF has four, an MJCF one more than its arm has links.

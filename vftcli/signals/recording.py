@@ -290,7 +290,7 @@ class Recording(TimeSeries):
             )
         source = source or there[0]
         value = getattr(self, source)
-        remark = fact("effort-taken", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
+        remark = fact("effort-used", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
         # 0 + x: no zero of the other sign.
         return self.changed(remark, **{**dict.fromkeys(there), kind: 0.0 + factor * value})
 

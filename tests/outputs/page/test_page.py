@@ -125,7 +125,7 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
 def test_without_contacts_the_page_says_why(
     pushed: Analysis, without_reference: Analysis
 ) -> None:
-    reason = caution("contacts-not-told", reason="a hostile <b>")
+    reason = caution("contacts-not-listed", reason="a hostile <b>")
     bare = replace(pushed, contacts=None, remarks=(*pushed.remarks, reason))
     page = Page(render(bare))
     assert "External torque of 6 joints by " in page.text
@@ -133,7 +133,7 @@ def test_without_contacts_the_page_says_why(
     ids = [attributes.get("id") for _, attributes in page.elements]
     assert "arm" in ids
     assert not {"contacts", "force"} & set(ids)
-    assert "contacts-not-told" not in {r.code for r in without_reference.remarks}
+    assert "contacts-not-listed" not in {r.code for r in without_reference.remarks}
 
 
 @pytest.mark.slow

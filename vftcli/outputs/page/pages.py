@@ -139,7 +139,7 @@ def lead_sentences(analysis: Analysis) -> list[str]:
     """Where it was touched, which rows are uncertain, and what would not show."""
     found = analysis.contacts
     if found is None:
-        unlisted = [r for r in analysis.remarks if r.code == "contacts-not-told"]
+        unlisted = [r for r in analysis.remarks if r.code == "contacts-not-listed"]
         return [f"What touched the arm is unknown: {sentence(r)}." for r in unlisted]
     said, rows = list[str](), [c for c in found.contacts if not c.is_load]
     places = Counter(
