@@ -269,11 +269,11 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 53_092,
+    "lines of Python": 53_087,
     "files": 239,
-    "functions": 2845,
+    "functions": 2844,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 376_067,
+    "names, operators, numbers": 376_031,
     "characters a line that is not blank": 50.89,
     "noqa": 81,
     "lines of TOML, JavaScript, CSS": 7454,
