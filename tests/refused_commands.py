@@ -197,4 +197,4 @@ def two_copies(folder: Path) -> list[Any]:
 GMO = ("--robot", "ur5", "--observer", "gmo")
 RELEASE = ("admit", "--release", "x=0.3", "--robot", "ur5")
 PULL = renamed({"current": "pull"})
-LISTS = pl.concat_list(["t", "t"])
+LISTS = pl.concat_list(["t"] * 3)

@@ -100,6 +100,9 @@ def test_missing_positions_or_clock_say_what_to_record(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="t@125Hz"):
         read(path)
     path.write_text(text.replace("actual_q_5", "target_q_0"))
+    with pytest.raises(LogError, match="dq has 6 columns, q has 5"):
+        read(path)
+    path.write_text(text.replace("actual_q_", "target_q_"))
     with pytest.raises(LogError, match="Add timestamp and actual_q to the recipe"):
         read(path)
 
@@ -280,7 +283,6 @@ def test_a_format_that_nobody_has_yet_is_one_entry(
         module = "tables"
         line = 'tick;ang_1;'
         columns = "t[ms]=tick,q[deg]=ang_{i},-tau=trq_{i}"
-        joints = 6
         payload = "load"
         clock = "controller clock"
         """

@@ -5,16 +5,17 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 
-from vftcli.readers.columns import Cell, Cells, Item
+from vftcli.readers.columns import Cell, Cells, Item, parse_columns
+from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import (
     OWN_STAMPS,
     Names,
+    NoColumnError,
     Picks,
     Signals,
     Table,
     cells_of,
     listed,
-    missing_column,
     named_cells,
     pick_of,
 )
@@ -23,6 +24,7 @@ from vftcli.signals.parsing import tables_beside
 from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
+TABLE = FORMATS["table"]  #: The layout of no program: its columns are known by their names.
 #: Names of the clock; a unit may follow, as in time_ms.
 CLOCKS = (
     "t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds",
@@ -74,7 +76,7 @@ EFFORT_IS_CURRENT = fact("effort-is-current")
 
 
 class NamedColumns:
-    """The columns of a headed table by what their names say, or by `usual` ones alone.
+    """The columns of a headed table by what their names say, or by those of a layout alone.
 
     Attributes:
         usual: Signal → the item that says its columns where it has any.
@@ -83,8 +85,9 @@ class NamedColumns:
         joints: Name of a group → the joints' names, if it has any.
     """
 
-    def __init__(self, table: Table, usual: Sequence[Item] = ()) -> None:
-        self.table = table
+    def __init__(self, table: Table, layout: LogFormat = TABLE) -> None:
+        self.table, self.remedy = table, layout.remedy
+        usual = parse_columns(layout.columns).items if layout.columns else ()
         self.usual = {item.field: item for item in usual}
         self.twice: dict[str, str] = {}
         self.joints: dict[str, Names] = {}
@@ -149,11 +152,16 @@ class NamedColumns:
     def _usual(self, signal: str) -> Item | None:
         if (item := self.usual.get(signal)) is None:
             return None
-        columns = {column.partition("[")[0] for column in (item.pattern or "").split("|")}
-        # The clock and the positions are always looked for.
-        if signal not in {"t", "q"} and columns.isdisjoint(self.table.names):
-            return None
-        return pick_of(item, named_cells(self.table, item))
+        try:
+            pick = pick_of(item, named_cells(self.table, item))
+        except LogError as error:
+            if signal in {"t", "q"}:
+                raise LogError(f"{error} {self.remedy}".strip()) from None
+            if isinstance(error, NoColumnError):
+                return None
+            raise
+        # Of the vendors' signals libfranka's residual alone is turned.
+        return pick._replace(remark=pick.remark and RESIDUAL_TURNED)
 
     def stated(self, item: Item) -> Item:
         """The columns that an item of --columns means, by their names or by its own."""
@@ -166,7 +174,7 @@ class NamedColumns:
         if found is None and item.signal == "wrench" and "actual_tcp_force" in self.groups:
             found = Item("wrench", cells=self.cells("actual_tcp_force"))  # UR's
         if found is None:
-            raise missing_column(self.table, item.signal, item.signal)
+            raise NoColumnError(self.table, item.signal, item.signal)
         pick = pick_of(item, found.cells)
         # A stated unit is in place of the usual one; a sign is turned again.
         scale = found.factor if item.unit is None else math.copysign(1.0, found.factor)
@@ -203,10 +211,10 @@ class NamedColumns:
 
 
 def picks_by_alias(
-    table: Table, stated: Sequence[Item], usual: Sequence[Item], names: Names
+    table: Table, stated: Sequence[Item], layout: LogFormat, names: Names
 ) -> tuple[Picks, Names]:
     """Find the signals of a headed table by the names of its columns, and the joints' names."""
-    columns = NamedColumns(table, usual)
+    columns = NamedColumns(table, layout)
     own = {pick.field: pick for pick in map(columns.stated, stated)}
     picks = own | {pick.field: pick for pick in columns.others(own)}
     q = picks["q"].cells if "q" in picks else ()
@@ -292,18 +300,11 @@ def clock_pick(table: Table) -> Item | None:
             f"{table.path}: {clocks} could each be the clock. Say which with --columns, as in "
             f"t={'|'.join(table.names[c] for c in found[0])},q=…"
         )
-    return Item("t", cells=tuple(table_clock(table, c) for c in found[0])) if found else None
-
-
-def table_clock(table: Table, column: int) -> Cell:
-    """The cell of a clock's column, which may hold lists of one number."""
-    length = table.lists.get(column, 1)
-    if length != 1:
-        raise LogError(
-            f"{table.path}: the clock {table.names[column]!r} holds {length} numbers a "
-            "row, but a sample has one time. Name another column with --columns, as in t=…,q=…"
-        )
-    return Cell(column, 0 if column in table.lists else None)
+    return (
+        Item("t", cells=tuple(cell for c in found[0] for cell in cells_of(table, c)))
+        if found
+        else None
+    )
 
 
 #: The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are

@@ -31,7 +31,7 @@ from vftcli.readers.opening import LogFile, check_unpacked, naming_damage, unpac
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import Column, Columns, Notes, listed
-from vftcli.readers.tables import UR, ArrayTable, from_table, read_layout
+from vftcli.readers.tables import UR, ArrayTable, from_table
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import fact
 
@@ -44,7 +44,7 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if layout.name == "mat":
         return _read_matlab(file, request)
     if layout.name == "ur-binary":
-        return read_layout(binary_table(file), UR, request)
+        return from_table(binary_table(file), request, UR)
     if layout.name == "npz":
         return _read_arrays(file, _npz_arrays(file), request)
     if layout.name == "npy":
@@ -57,7 +57,7 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if skipped := len(lines) - len(states):
         remarks = (fact("lines-skipped", lines=skipped), *remarks)
     table = ArrayTable(path=file.path, columns=columns, remarks=remarks)
-    return read_layout(table, layout, request)
+    return from_table(table, request, layout)
 
 
 @contextmanager
@@ -113,9 +113,8 @@ def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes =
             "name them, as in t[ms]=time,q=q,tau=tau_J."
         )
     panda = {"q", "time"} <= set(shaped) and {"tau_J", "O_T_EE", "dq"} & set(shaped)
-    if panda and request.columns is None:
-        return read_layout(table, FORMATS["npz"], request)
-    return from_table(table, request)
+    known = panda and request.columns is None
+    return from_table(table, request, FORMATS["npz" if known else "table"])
 
 
 def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:

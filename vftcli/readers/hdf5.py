@@ -18,7 +18,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from vftcli.readers.aliases import ALIASES
+from vftcli.readers.aliases import ALIASES, TABLE
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.opening import (
     LogFile,
@@ -154,11 +154,6 @@ ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positi
 DROID_STATE = "observation/robot_state/"
 #: What DROID's controller commands, without gravity; what it measures includes it.
 DROID_COMPUTED = "joint_torques_computed"
-DROID_TIME = "observation/timestamp/robot_state/robot_timestamp_"
-DROID_USUAL = (
-    f"t={DROID_TIME}seconds|{DROID_TIME}nanos,q[rad]={DROID_STATE}joint_positions,"
-    f"dq={DROID_STATE}joint_velocities,tau={DROID_STATE}motor_torques_measured"
-)
 #: Where projects that record no torque keep their positions → the project.
 TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
 #: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
@@ -184,8 +179,9 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
         usual += f",q[rad]={ALOHA}{span},dq=observations/qvel{span},current[mA]={DYNAMIXEL}{span}"
     if DYNAMIXEL in names and not stated:
         remarks = (*remarks, fact("effort-of-dynamixel"))
-    clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention" if not request.spec.item("t") else ""
-    raw = from_table(table, request, usual=usual, remarks=remarks, clock_name=clock)
+    clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
+    layout = TABLE._replace(columns=usual, clock=clock)
+    raw = from_table(table, request, layout, remarks=remarks)
     return replace(raw, part="" if stated else f"{arm} arm")
 
 
@@ -195,8 +191,7 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
         return from_table(table, request)
     computed = DROID_STATE + DROID_COMPUTED in table.names
     remarks = (fact("computed-torque-left-out"),) if computed else ()
-    clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
-    raw = from_table(table, request, usual=DROID_USUAL, remarks=remarks, clock_name=clock)
+    raw = from_table(table, request, FORMATS["droid"], remarks=remarks)
     # The serial number in the episode's metadata begins with the robot's name.
     serial = ""
     for path in sorted(Path(table.path).parent.glob("metadata_*.json"))[:1]:

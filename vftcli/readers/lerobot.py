@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.readers.aliases import ALIASES, AXES
+from vftcli.readers.aliases import ALIASES, AXES, TABLE
 from vftcli.readers.columns import SIGNALS
 from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
@@ -83,14 +83,9 @@ def read_episode(
     """Read an episode of a dataset, of which meta/info.json says this."""
     path = data_file(file.path, episode)
     table = _rows_of(open_log(path), episode)
-    known: dict[str, Any] = {"usual": "t=timestamp,q=observation.state"}
-    side = ""
-    if not request.spec.item("q"):
-        each_of = info.get("features")
-        each_of = each_of.items() if isinstance(each_of, dict) else ()
-        features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
-        known, side = _columns_of(file.path, table, features, request)
-    raw = from_table(table, request, **known)
+    usual, names, remarks, side = _columns_of(file.path, table, info.get("features"), request)
+    layout = TABLE._replace(columns=usual)
+    raw = from_table(table, request, layout, names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
     return replace(
         _by_frames(raw, table, info.get("fps")),
@@ -101,9 +96,13 @@ def read_episode(
 
 
 def _columns_of(
-    path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
-) -> tuple[dict[str, Any], str]:
-    """What `from_table` has to know of the columns, and the arm of two or ""."""
+    path: Path, table: ParquetTable, described: Json, request: ReadChoice
+) -> tuple[str, Names, Notes, str]:
+    """The columns of an observation, the joints' names, what is to be said, and the arm of two."""
+    if request.spec.item("q"):
+        return "t=timestamp,q=observation.state", (), (), ""
+    each_of = described.items() if isinstance(described, dict) else ()
+    features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
     # What is commanded is no measurement.
     observed = [name for name in table.names if name.startswith("observation.")]
     there = [e for name in observed for e in _elements_of(name, table, features.get(name))]
@@ -132,8 +131,7 @@ def _columns_of(
         for signal, found in by_signal.items()
         if found
     ]
-    usual = ",".join(["t=timestamp", *items])
-    return {"usual": usual, "names": names, "remarks": remarks}, side
+    return ",".join(["t=timestamp", *items]), names, remarks, side
 
 
 def _in_order(path: Path, signal: str, elements: list[Element], names: Names) -> list[Element]:

@@ -50,7 +50,6 @@ class LogFormat(NamedTuple):
     describes: bool = False  #: Whether it reads ``--columns`` itself where its files are text.
     episodes: bool = False  #: Whether a file may hold several recordings.
     columns: str = ""  #: The columns that its program writes, in the grammar of ``--columns``.
-    joints: int = 0  #: How many joints such a log has, 0 for any number.
     #: Columns of which the last values are the payload's mass and, if there, its centre
     #: of mass.
     payload: str = ""

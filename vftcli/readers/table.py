@@ -75,6 +75,15 @@ class JacobianError(LogError):
         self.table, self.picks = table, picks
 
 
+class NoColumnError(LogError):
+    """A column that is not there."""
+
+    def __init__(self, table: Table, signal: str, name: str) -> None:
+        super().__init__(
+            f"{table.path}: no column {name!r} for {signal}; the table has {listed(table.names)}."
+        )
+
+
 def picks_of(table: Table, spec: ColumnSpec) -> Picks:
     """The columns that a --columns text means, whatever signals they are."""
     if spec.named:
@@ -128,7 +137,7 @@ def named_cells(table: Table, item: Item) -> Cells:
         if column not in table.lists and (match := template.fullmatch(name)):
             found.setdefault(int(match[1]), Cell(column))  # of two of one name the first
     if not found:
-        raise missing_column(table, item.signal, pattern)
+        raise NoColumnError(table, item.signal, pattern)
     indices = range(min(found), min(found) + len(found))  # from 0 or from 1, but without holes
     if missing := [index for index in indices if index not in found]:
         raise LogError(
@@ -150,7 +159,7 @@ def _exact(table: Table, item: Item, name: str) -> Cells:
         stop = last if colon else int(first) + 1
         elements = slice(int(first or 0), int(stop) if stop else None)
     if bare not in names:
-        raise missing_column(table, item.signal, bare)
+        raise NoColumnError(table, item.signal, bare)
     if names.count(bare) > 1:
         raise LogError(
             f"{table.path}: {names.count(bare)} columns are called {bare!r}. Count the "
@@ -163,13 +172,6 @@ def _exact(table: Table, item: Item, name: str) -> Cells:
     if length is not None and (not cells or (elements.stop or 0) > length):
         raise LogError(f"{table.path}: {bare!r} holds lists of {length}; there is no {name!r}.")
     return cells
-
-
-def missing_column(table: Table, signal: str, name: str) -> LogError:
-    """The error for a column that is not there, listing what is."""
-    return LogError(
-        f"{table.path}: no column {name!r} for {signal}; the table has {listed(table.names)}."
-    )
 
 
 def listed(names: Sequence[str], most: int = 24) -> str:
@@ -213,8 +215,8 @@ def require_positions(table: Table, picks: Picks) -> None:
     clock = picks.get("t")
     if clock is not None and clock.rate is None and not 1 <= len(clock.cells) <= 2:
         raise LogError(
-            f"{table.path}: t must be one column, or one of seconds and one of nanoseconds, not "
-            f"{len(clock.cells)}."
+            f"{table.path}: the clock holds {len(clock.cells)} numbers a row, but a sample has one "
+            "time, or seconds and nanoseconds. Name another column with --columns, as in t=…,q=…"
         )
 
 

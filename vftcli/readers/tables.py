@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.aliases import (
-    RESIDUAL_TURNED,
+    TABLE,
     along_arm,
     picks_by_alias,
     robot_of,
-    table_clock,
 )
-from vftcli.readers.columns import Cell, Cells, Item, guess_columns, parse_columns, tick_of
+from vftcli.readers.columns import Cell, Item, guess_columns, parse_columns, tick_of
 from vftcli.readers.delimited import EchoTable, TextTable, joint_names
 from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
@@ -35,8 +34,6 @@ from vftcli.readers.table import (
     Signals,
     Table,
     joined,
-    named_cells,
-    pick_of,
     picks_of,
     require_positions,
 )
@@ -49,15 +46,19 @@ UR = FORMATS["ur-csv"]  #: The columns of UR's real-time data exchange, whoever 
 #: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
 CB3_CYCLE = 8e-3
 E_SERIES_FIELD = "ft_raw_wrench_0"  #: What only a controller with a sensor on the flange sends.
-RawField = Any  #: A further field of a RawLog.
 BLOCK_ROWS = 1 << 16  #: Rows of arrays that are read at a time.
 WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
 
 
 def from_table(
-    table: Table, request: ReadChoice, *, usual: str = "", names: Names = (), **more: RawField
+    table: Table,
+    request: ReadChoice,
+    layout: LogFormat = TABLE,
+    *,
+    names: Names = (),
+    remarks: Notes = (),
 ) -> RawLog:
-    """Read a table by its --columns text, else by the usual columns or by aliases of their names.
+    """Read a table by its --columns text, else by the columns of its layout or by aliases.
 
     A text that names signals says something of these; what it leaves out is found by name.
     `names` are the joints' where they are known.
@@ -69,48 +70,27 @@ def from_table(
         table, found = _by_values(table)
         spec = parse_columns(found)._replace(segment=spec.segment)
     if table.names and (spec.named or not spec.items):
-        known = parse_columns(usual).items if usual else ()
-        picks, names = picks_by_alias(table, spec.items, known, names)
+        picks, names = picks_by_alias(table, spec.items, layout, names)
     else:
         picks = picks_of(table, spec)
+    payload = layout.payload.split()
+    if payload and set(payload) <= set(table.names):
+        cells = (Cell(table.names.index(name)) for name in payload)
+        picks[PAYLOAD] = Item(PAYLOAD, cells=tuple(cells))
     require_positions(table, picks)
-    more = {"segment": spec.segment, "degrees_possible": picks["q"].unit is None, **more}
-    raw = load_signals(table, picks, request, **more)
+    raw = load_signals(table, picks, request, "" if spec.item("t") else layout.clock)
+    raw = replace(
+        raw,
+        segment=spec.segment,
+        degrees_possible=picks["q"].unit is None,
+        remarks=(*raw.remarks, *remarks),
+    )
+    if layout is UR:
+        raw = replace(raw, wrench_frame=force_frame(table.names, raw.stamps * raw.tick))
     if not names or len(names) != len(picks["q"].cells):
         return raw
     names, signals = along_arm(names, dict(raw.signals))
     return replace(raw, signals=signals, joint_names=names, robot_hint=robot_of(names))
-
-
-def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
-    """Read a table by the columns of its format; what it has not of them is left out."""
-    spec, names = parse_columns(layout.columns), table.names
-    picks = {} if spec.named else picks_of(table, spec)
-    for item in spec.items if spec.named else ():
-        cells: Cells = ()
-        with suppress(LogError):
-            cells = named_cells(table, item)
-        if item.signal == "t" and cells:
-            table_clock(table, cells[0].column)
-        wanted = {"t": 1, "wrench": layout.joints and 6}.get(item.signal, layout.joints)
-        if len(cells) == wanted if wanted else len(cells) > 1:
-            picks[item.field] = pick_of(item, cells)
-        elif item.signal in {"t", "q"}:
-            raise LogError(
-                f"{table.path}: no {item.pattern} among its {table.width} columns. {layout.remedy}"
-            )
-    # Of the vendors' signals libfranka's residual alone is turned.
-    picks = {
-        s: p._replace(remark=RESIDUAL_TURNED if p.remark else None) for s, p in picks.items()
-    }
-    payload = layout.payload.split()
-    if payload and set(payload) <= set(names):
-        picks[PAYLOAD] = Item(PAYLOAD, cells=tuple(Cell(names.index(n)) for n in payload))
-    require_positions(table, picks)
-    raw = load_signals(table, picks, request, clock_name=layout.clock)
-    if layout is not UR:
-        return raw
-    return replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
 
 
 def _by_values(table: Table) -> tuple[Table, str]:
@@ -213,19 +193,10 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if layout.name in {"bagpy", "rostopic", "ros2-echo"}:
         printed = (EchoTable if layout.name == "ros2-echo" else TextTable)(file)
         return from_table(printed, request, names=joint_names(printed))
-    if layout.columns or layout.name == "ur-rtde":
-        return read_layout(TextTable(file), layout if layout.columns else UR, request)
-    return from_table(TextTable(file), request)
+    return from_table(TextTable(file), request, UR if layout.name == "ur-rtde" else layout)
 
 
-def load_signals(
-    table: Table,
-    picks: Picks,
-    request: ReadChoice,
-    *,
-    clock_name: str = "",
-    **more: RawField,
-) -> RawLog:
+def load_signals(table: Table, picks: Picks, request: ReadChoice, clock_name: str = "") -> RawLog:
     """Load the picked columns of a table and scale them."""
     signals = [p for s, p in picks.items() if s not in BESIDE and request.wants(s)]
     beside = {s: [cell.column for cell in picks[s].cells] for s in BESIDE & picks.keys()}
@@ -241,6 +212,7 @@ def load_signals(
     arrays = joined(stacked())
     loaded = {c: np.concatenate(parts) for c, parts in whole.items()}
     rows = len(next(iter(arrays.values())))
+    more: dict[str, Any] = {}
     stamps, tick, words = _stamps(table, picks.get("t"), loaded, rows, clock_name)
     if OWN_STAMPS in beside and rows:
         start = float(loaded[beside[OWN_STAMPS][0]][0]) * 1e-9
@@ -249,10 +221,9 @@ def load_signals(
     if constants and np.isfinite(constants).all():
         more |= {"payload_mass": constants[0], "payload_com": constants[1:] or None}
     if (wrench := next((p for p in signals if p.signal == "wrench"), None)) and wrench.unit:
-        more.setdefault("wrench_frame", WrenchFrame.parsed(wrench.unit))
-    remarks = (pick.remark for pick in signals if pick.remark)
-    more["remarks"] = (*table.remarks, *remarks, *more.get("remarks", ()))
-    return RawLog(stamps=stamps, tick=tick, clock=words, signals=arrays, **more)
+        more["wrench_frame"] = WrenchFrame.parsed(wrench.unit)
+    remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
+    return RawLog(stamps=stamps, tick=tick, clock=words, signals=arrays, remarks=remarks, **more)
 
 
 def _stacked(pick: Item, loaded: Block) -> Array:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.readers.aliases import TABLE
 from vftcli.readers.bags.container import Batch, Channel, Integers
 from vftcli.readers.bags.decode import Decoder
 from vftcli.readers.bags.ros_messages import VECTORS, parts_at
@@ -107,7 +108,7 @@ class Documents:
             columns["timestamp_ns"] = np.array(times, dtype=np.int64)
         table = ArrayTable(path=f"{self.path}: topic {channel.topic}", columns=columns)
         names = names_of(rows[0])
-        return from_table(table, self.request, names=names, clock_name=clock)
+        return from_table(table, self.request, TABLE._replace(clock=clock), names=names)
 
 
 def numbers_of(rows: Sequence[Document], paths: Sequence[str]) -> Array:
