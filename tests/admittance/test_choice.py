@@ -35,7 +35,6 @@ def test_xi_and_threshold_mode_are_settings() -> None:
         .controllers(UR5)[0]
         .parameters
     )
-    assert parameters.xi is not None
     np.testing.assert_array_equal(parameters.xi, np.full(6, 0.8))
     assert parameters.threshold_mode == "soft"
 

@@ -34,8 +34,8 @@ def test_table_iii_and_iv() -> None:
     np.testing.assert_array_equal(panda.threshold, [4, 4, 15, 2, 2, 2])
     assert (ur.period, panda.period) == (0.008, 0.0025)
     # B_d/(2√(M_d K_d)) as the science prints it
-    np.testing.assert_allclose(ur.damping_ratio[[0, 3]], [0.510, 0.671], atol=5e-4)
-    np.testing.assert_allclose(panda.damping_ratio[[0, 3]], [2.74, 1.06], atol=5e-3)
+    np.testing.assert_allclose(ur.xi[[0, 3]], [0.510, 0.671], atol=5e-4)
+    np.testing.assert_allclose(panda.xi[[0, 3]], [2.74, 1.06], atol=5e-3)
 
 
 def test_assignments_reach_their_axes() -> None:
@@ -45,7 +45,7 @@ def test_assignments_reach_their_axes() -> None:
     np.testing.assert_array_equal(p.mass, [3, 3, 3, 0.1, 0.2, 0.3])
     np.testing.assert_array_equal(p.xi, np.ones(6))
     part = read("ur5", "position.xi=1")
-    np.testing.assert_allclose(part.damping_ratio, np.r_[[1.0] * 3, [0.6708204] * 3], rtol=1e-7)
+    np.testing.assert_allclose(part.xi, np.r_[[1.0] * 3, [0.6708204] * 3], rtol=1e-7)
     assert np.isinf(read("ur5", "rotation.speed_limit=none").speed_limit[3])
 
 
@@ -97,9 +97,9 @@ def test_controllers_of_a_comparison() -> None:
     p = read("panda")
     names = [c.name for c in controllers(p)]
     assert names == ["traditional", "α = 6 / 3"]
-    assert [c.name for c in controllers(p, ["variable"], [1.0, 1.9])] == ["α = 1", "α = 1.9"]
+    assert [c.name for c in controllers(p, "variable", [1.0, 1.9])] == ["α = 1", "α = 1.9"]
     with pytest.raises(ParameterError, match="there is traditional, variable"):
-        ControlChoice(kinds=("adaptive",))
+        ControlChoice(kind="adaptive")
     with pytest.raises(ParameterError, match="alpha of axis x is 0"):
         controllers(p, alphas=[0.0])
 

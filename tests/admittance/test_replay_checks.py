@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import Admittance, controllers, from_table
-from vftcli.admittance.motion import AxisMotion, Drag, Phases
+from vftcli.admittance.motion import AxisMotion, Drag
 from vftcli.admittance.replay import Replay, drag_remarks, replay, trouble
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
@@ -19,11 +19,12 @@ SLOW = replace(PARAMETERS, period=0.1)
 ROWS = 51
 
 
-def motion(x: np.ndarray | None = None, clipped: np.ndarray | None = None) -> AxisMotion:
+REST = np.zeros((ROWS, 2, 6))
+
+
+def motion(x: np.ndarray = REST, v: np.ndarray = REST) -> AxisMotion:
     """Five seconds of two controllers, at rest unless something is given."""
-    zero = np.zeros((ROWS, 2, 6))
-    flags = np.zeros(zero.shape, dtype=bool) if clipped is None else clipped
-    return AxisMotion(t=np.arange(ROWS) * 0.1, x=zero if x is None else x, v=zero, clipped=flags)
+    return AxisMotion(t=np.arange(ROWS) * 0.1, x=x, v=v)
 
 
 def path(reached: np.ndarray | None = None, speed: float = 0.5) -> JointPath:
@@ -44,7 +45,6 @@ def replayed(
     found = Replay(
         robot=load_robot("ur5"),
         controllers=controllers(parameters),
-        phases=Phases(zero > 0.0, zero),
         motion=made or motion(),
         **given,
     )
@@ -58,15 +58,12 @@ def test_nothing_is_said_of_a_replay_without_trouble() -> None:
 
 
 def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
-    x, clipped, reached = (
-        np.zeros((ROWS, 2, 6)),
-        np.zeros((ROWS, 2, 6), bool),
-        np.ones((ROWS, 2), bool),
-    )
-    x[20:, 1, 0] = np.inf
-    clipped[3:6, 0, 2] = clipped[5, 0, 3] = True
+    (x, v), reached = np.zeros((2, ROWS, 2, 6)), np.ones((ROWS, 2), bool)
+    x[20:, 1, 0] = v[20:, 1, 0] = np.inf
+    limit = PARAMETERS.speed_limit
+    v[3:6, 0, 2], v[5, 0, 3], v[7, 0, 3] = limit[2], -limit[3], 0.99 * limit[3]
     reached[30:40, 1] = False
-    found = [*trouble(replayed(motion(x, clipped), path(reached, 1.5)))]
+    found = [*trouble(replayed(motion(x, v), path(reached, 1.5)))]
     assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
     reported = {(r.code, r.where.about): dict(r.values) for r in found}
     first, second = (controller.name for controller in TWO)

@@ -43,16 +43,11 @@ class ControlChoice(Choice):
             lambda text: listed(text, "--alpha"),
         ),
     ] = ()
-    #: Keys of `vftcli.admittance.law.KINDS`; all if empty.
-    kinds: Annotated[
-        tuple[str, ...],
-        setting(
-            "admittance.controller",
-            "variable|traditional",
-            "By default both.",
-            lambda text: (text,),
-        ),
-    ] = ()
+    #: One of `vftcli.admittance.law.KINDS`, None for both.
+    kind: Annotated[
+        str | None,
+        setting("admittance.controller", "variable|traditional", "By default both."),
+    ] = None
     #: What drives the replay: the log's ``sensor`` or ``file:PATH``; None for an
     #: observer's wrench.
     force: Annotated[
@@ -99,8 +94,8 @@ class ControlChoice(Choice):
     def __post_init__(self) -> None:
         from vftcli.admittance.law import KINDS
 
-        for kind in self.kinds:
-            check_known(kind, KINDS, f"no controller {kind!r}")
+        if self.kind is not None:
+            check_known(self.kind, KINDS, f"no controller {self.kind!r}")
         if self.force is not None and self.force != "sensor" and not self.force.startswith(FILE):
             raise ParameterError(
                 f"admittance.force={self.force} is neither sensor nor {FILE}PATH"
@@ -145,7 +140,7 @@ class ControlChoice(Choice):
         from vftcli.admittance.law import controllers, from_table
 
         parameters = from_table(robot.admittance, robot.name, self.settings)
-        return controllers(parameters, self.kinds, self.alphas)
+        return controllers(parameters, self.kind, self.alphas)
 
 
 def released_robot(choice: RobotChoice) -> "Robot":

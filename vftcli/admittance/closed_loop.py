@@ -88,7 +88,7 @@ class OnlineKalman:
         import pinocchio as pin
 
         n = robot.joints
-        self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step
+        self.pin, self.model, self.step = pin, robot.model, step
         self.averaged, self.friction = averaged, RunningFriction(robot.friction)
         self.data: Any = self.model.createData()
         self.system, self.gains = observer.model(step, n), observer.steady(step, n)
@@ -101,9 +101,8 @@ class OnlineKalman:
         C = pin.computeCoriolisMatrix(model, data, q, dq)
         p = pin.crba(model, data, q) @ dq
         gravity = pin.computeGeneralizedGravity(model, data, q)
-        mu = C.T @ dq - gravity
-        if self.robot.friction:  # presliding friction goes on from the sample before
-            mu -= self.friction.torque(q[None], dq[None], gravity[None])[0]
+        # Presliding friction goes on from the sample before.
+        mu = C.T @ dq - gravity - self.friction.torque(q[None], dq[None], gravity[None])[0]
         mean = torque if self.averaged else 0.0
         mu += torque - mean
         if self.p is None:

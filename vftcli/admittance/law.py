@@ -66,9 +66,9 @@ class Admittance:
     stiffness: Array  #: K_d.
     alpha: Array  #: α of (47).
     threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
-    #: ξ of (47), which the paper does not print; None, and NaN for an axis, is
-    #: B_d/(2√(M_d K_d)), the damping ratio of the drag phase.
-    xi: Array | None = None
+    #: ξ of (47), which the paper does not print; given as NaN it becomes B_d/(2√(M_d K_d)),
+    #: the damping ratio of the drag phase.
+    xi: Array | float = np.nan
     #: Share of the threshold by which the force has to fall below it before an axis that
     #: is dragged recovers; 0 is the paper's.
     hysteresis: Array | float = 0.0
@@ -80,11 +80,10 @@ class Admittance:
 
     def __post_init__(self) -> None:
         for name in PER_AXIS:
-            if getattr(self, name) is None:
-                continue
             array = one_each(getattr(self, name), 6, f"admittance.{name}", "axes")
             if name == "xi":
-                array = np.where(np.isnan(array), self.drag_ratio, array)
+                ratio = self.damping / (2.0 * np.sqrt(self.mass * self.stiffness))
+                array = np.where(np.isnan(array), ratio, array)
             object.__setattr__(self, name, frozen(array))
             zero, endless = name in MAY_BE_ZERO, name in MAY_BE_ENDLESS
             fits = ((array > 0.0) | (zero & (array == 0.0))) & (np.isfinite(array) | endless)
@@ -108,19 +107,9 @@ class Admittance:
         )
 
     @property
-    def drag_ratio(self) -> Array:
-        """Damping ratio of the drag phase, B_d/(2√(M_d K_d)). (6,)"""
-        return self.damping / (2.0 * np.sqrt(self.mass * self.stiffness))
-
-    @property
     def release_threshold(self) -> Array:
         """Force from which down an axis that is dragged recovers. (6,) [N, N·m]"""
         return self.threshold * (1.0 - self.hysteresis)
-
-    @property
-    def damping_ratio(self) -> Array:
-        """ξ as it is used. (6,)"""
-        return self.drag_ratio if self.xi is None else self.xi
 
 
 def from_table(
@@ -136,10 +125,9 @@ def from_table(
         ParameterError: If a parameter is missing for an axis, unknown or out of range.
     """
     groups = [(name, table.get(name, {})) for name in ("position", "rotation")]
-    # What has a default begins with it; ξ, which has none of its own, and all else with
-    # NaN.
+    # What has a default begins with it, all else with NaN.
     values: dict[str, Any] = {
-        name: np.full(6, getattr(Admittance, name, None), float) for name in PER_AXIS
+        name: np.full(6, getattr(Admittance, name, np.nan)) for name in PER_AXIS
     }
     for section, entries in (*groups, *settings.items()):
         axes = list(GROUPS[section])
@@ -165,8 +153,6 @@ def from_table(
         )
     NUMBER.check("admittance.period", plain["period"])
     words = {name: plain[name] for name in ("threshold_mode", "source") if name in plain}
-    if np.isnan(values["xi"]).all():
-        values["xi"] = None
     return Admittance(**values, period=float(plain["period"]), **words)
 
 
@@ -273,21 +259,18 @@ def traditional(parameters: Admittance) -> Controller:
 def variable(parameters: Admittance, alpha: float | None = None) -> Controller:
     """The variable law (47) in the recovery phase, with another α than its parameters'."""
     # B_dva = 2ξ√(M_dva K_dva) = 2ξ√(M_d K_d): the same at every speed and every α.
-    damping = 2.0 * parameters.damping_ratio * np.sqrt(parameters.mass * parameters.stiffness)
+    damping = 2.0 * parameters.xi * np.sqrt(parameters.mass * parameters.stiffness)
     rate = 1.0 / np.asarray(parameters.speed_scale)
     given = parameters if alpha is None else replace(parameters, alpha=np.full(6, alpha))
     return Controller("variable", given.alpha, rate, damping, parameters)
 
 
 def controllers(
-    parameters: Admittance, kinds: Sequence[str] = (), alphas: Sequence[float] = ()
+    parameters: Admittance, kind: str | None = None, alphas: Sequence[float] = ()
 ) -> tuple[Controller, ...]:
-    """The controllers of a comparison, the traditional one first."""
-    wanted = kinds or KINDS
-    found = [traditional(parameters)] if "traditional" in wanted else []
-    if "variable" in wanted:
-        found += [variable(parameters, alpha) for alpha in dict.fromkeys(alphas) or (None,)]
-    return tuple(found)
+    """The controllers of a comparison, the traditional one first; only those of one kind."""
+    every = [variable(parameters, alpha) for alpha in dict.fromkeys(alphas) or (None,)]
+    return tuple(c for c in (traditional(parameters), *every) if kind in {None, c.kind})
 
 
 def kinetic_shape(u: Array) -> Array:

@@ -59,7 +59,6 @@ class AxisMotion(NamedTuple):
     t: Array  #: Time; T control periods after the start come T + 1 rows. (T+1,) [s]
     x: Array  #: Deviations X̃ from the target pose. (T+1, N, 6) [m, rad]
     v: Array  #: Velocities. (T+1, N, 6) [m/s, rad/s]
-    clipped: Mask  #: Whether the speed limit acted in the step before. (T+1, N, 6)
 
     @property
     def escaped(self) -> Mask:
@@ -70,14 +69,13 @@ class AxisMotion(NamedTuple):
 class Recursion:
     """The state of N controllers and one step of their motion, semi-implicit Euler (49)–(51).
 
-    Deviations x [m, rad], velocities v [m/s, rad/s] and where the speed limit acted are
-    (N, 6).
+    Deviations x [m, rad] and velocities v [m/s, rad/s] are (N, 6).
     """
 
     def __init__(
-        self, controllers: Sequence[Controller], x: Array | None = None, v: Array | None = None
+        self, controllers: Sequence[Controller], x: Array | float = 0.0, v: Array | float = 0.0
     ) -> None:
-        """Start at deviations `x` with velocities `v`, (N, 6) or (6,), zero if not given."""
+        """Start at deviations `x` with velocities `v`, (N, 6), (6,) or one number."""
         if not controllers:
             raise ParameterError("no controller to run; choose traditional, variable, or both")
         all_parameters, shape = [c.parameters for c in controllers], (len(controllers), 6)
@@ -92,9 +90,7 @@ class Recursion:
             np.array([getattr(c, name) for c in controllers])
             for name in ("alpha", "rate", "damping")
         )
-        start = (np.zeros(6) if given is None else given for given in (x, v))
-        self.x, self.v = (np.array(np.broadcast_to(given, shape)) for given in start)
-        self.clipped = np.zeros(shape, bool)
+        self.x, self.v = np.full(shape, x), np.full(shape, v)
         self.turn = exp_quaternion(self.x[:, 3:])
         self.turns = self.x[:, 3:].any() or self.v[:, 3:].any()
 
@@ -105,9 +101,7 @@ class Recursion:
         swell[:, dragged] = 1.0
         damping = np.where(dragged, self.damping, self.recovery)
         acceleration = swell / self.mass * (force - damping * v - self.stiffness * swell * x)
-        wanted = v + acceleration * period
-        self.v = np.minimum(np.maximum(wanted, -self.limit), self.limit)
-        self.clipped = self.v != wanted
+        self.v = np.minimum(np.maximum(v + acceleration * period, -self.limit), self.limit)
         self.x = x.copy()
         self.x[:, :3] += self.v[:, :3] * period
         self.turns = self.turns or self.v[:, 3:].any()
@@ -121,8 +115,8 @@ def run(
     controllers: Sequence[Controller],
     force: Array,
     dragged: Mask,
-    x: Array | None = None,
-    v: Array | None = None,
+    x: Array | float = 0.0,
+    v: Array | float = 0.0,
 ) -> AxisMotion:
     """The motion under one force record, each axis in the phase the record puts it in.
 
@@ -131,19 +125,17 @@ def run(
     `AxisMotion.escaped` tells.
     """
     state = Recursion(controllers, x, v)
-    shape = (len(force) + 1, len(controllers), 6)
-    xs, vs, clips = np.empty(shape), np.empty(shape), np.zeros(shape, bool)
-    xs[0], vs[0] = state.x, state.v
+    rows = [(state.x, state.v)]
     with np.errstate(over="ignore", invalid="ignore"):
-        for k in range(len(force)):
-            state.step(force[k], dragged[k])
-            xs[k + 1], vs[k + 1], clips[k + 1] = state.x, state.v, state.clipped
-    t = np.arange(len(xs), dtype=float) * state.period
-    return AxisMotion(t=t, x=xs, v=vs, clipped=clips)
+        for step in zip(force, dragged, strict=True):
+            state.step(*step)
+            rows.append((state.x, state.v))
+    t = np.arange(len(rows), dtype=float) * state.period
+    return AxisMotion(t, *map(np.array, zip(*rows, strict=True)))
 
 
 def release(
-    controllers: Sequence[Controller], x: Array, duration: float, v: Array | None = None
+    controllers: Sequence[Controller], x: Array, duration: float, v: Array | float = 0.0
 ) -> AxisMotion:
     """Let go at deviation `x`, at rest unless `v` is given, and watch for `duration` [s]."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))

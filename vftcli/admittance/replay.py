@@ -33,7 +33,7 @@ from vftcli.admittance.motion import (
 )
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import refuse_mostly_gap
@@ -57,15 +57,6 @@ RESTING = (2.0, 0.01)
 STILL = 0.01
 
 
-class Lyapunov(NamedTuple):
-    """Energies of the recovery phases along a run. All (T+1, N, 6), NaN in a drag phase."""
-
-    corrected: (
-        Array  #: W, which must not rise in a recovery phase into which no force enters. [J]
-    )
-    printed: Array  #: V of (52). [J]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Replay:
     """Motions of all controllers under one force record, or one release."""
@@ -78,7 +69,6 @@ class Replay:
     #: Force and moment on the robot at each control period, base axes.
     #: (T, 6) [N, N·m]
     wrench: Array
-    phases: Phases  #: Algorithm 1's phases, the same for all controllers.
     motion: AxisMotion  #: Deviations and velocities, row 0 before the first force.
     drags: tuple[Drag, ...]  #: The drags of every axis.
     #: Flange deviation of the log's own arm from X_d, None for a
@@ -92,6 +82,11 @@ class Replay:
         return self.controllers[0].parameters
 
     @cached_property
+    def phases(self) -> Phases:
+        """Algorithm 1's phases, the same for all controllers."""
+        return phases(self.wrench, self.parameters)
+
+    @cached_property
     def path(self) -> JointPath:
         """Joint positions along the motion."""
         return follow(FlangeSolver(self.robot), self.start, self.motion.x, self.parameters.period)
@@ -103,22 +98,21 @@ class Replay:
         return tuple(rows_of(self.controllers, self.motion, self.drags, force))
 
     @cached_property
-    def lyapunov(self) -> Lyapunov:
-        """Energies along the run."""
-        dragged, motion, each = (
-            self.phases.dragged,
-            self.motion,
-            list(enumerate(self.controllers)),
-        )
-        # Row k + 1 is in the phase of the force before it, row 0 in
-        # that of the first.
-        hidden = np.concatenate([dragged[:1], dragged])[:, None] if len(dragged) else False
+    def lyapunov(self) -> tuple[Array, Array]:
+        """Energies along the run, NaN in a drag phase. (T+1, N, 6) each [J]
+
+        W must not rise in a recovery phase into which no force enters; V is that of (52).
+        """
+        dragged, motion = self.phases.dragged, self.motion
+        # Row k + 1 is in the phase of the force before it, row 0 in that of the first.
+        hidden = np.concatenate([dragged[:1], dragged])
+        W, V = np.full((2, *motion.x.shape), np.nan)
         with np.errstate(over="ignore", invalid="ignore"):
-            energies = (
-                np.stack([of(one, motion.x[:, n], motion.v[:, n]) for n, one in each], 1)
-                for of in (energy, printed_energy)
-            )
-            return Lyapunov(*(np.where(hidden, np.nan, W) for W in energies))
+            for n, one in enumerate(self.controllers):
+                state = one, motion.x[:, n], motion.v[:, n]
+                W[:, n] = np.where(hidden, np.nan, energy(*state))
+                V[:, n] = np.where(hidden, np.nan, printed_energy(*state))
+        return W, V
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -144,7 +138,8 @@ def replay(
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
     complaints, parameters = check_stable(controllers, anyway=anyway), controllers[0].parameters
     solver = FlangeSolver(robot)
-    clock, (force, q) = on_control_clock(wrench.t, (wrench.known, q), parameters.period)
+    clock, newest = on_control_clock(wrench.t, parameters.period)
+    force, q = wrench.known[newest], q[newest]
     start = solver.check_start(q[0])
     split = phases(force, parameters)
     motion = run(controllers, split.force, split.dragged)
@@ -156,7 +151,6 @@ def replay(
         source=source,
         start=start,
         wrench=force,
-        phases=split,
         motion=motion._replace(t=motion.t + clock[0]),
         drags=drags_of(split, parameters.period),
         logged=deviation_of(solver, start, q),
@@ -189,7 +183,6 @@ def replay_release(
         controllers=tuple(controllers),
         start=FlangeSolver(robot).check_start(start),
         wrench=force,
-        phases=phases(force, controllers[0].parameters),
         motion=motion,
         drags=releases_of(x, len(motion.t)),
         force_remarks=complaints,
@@ -223,15 +216,13 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
     return float(np.clip(6.0 / np.min(rates, axis=0)[x != 0.0].min(), 1.0, LONGEST))
 
 
-def on_control_clock(
-    t: Array, values: Sequence[Array], period: float
-) -> tuple[Array, list[Array]]:
-    """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
+def on_control_clock(t: Array, period: float) -> tuple[Array, Indices]:
+    """Times a period [s] apart (S,) [s] and the number of the newest sample then. (S,)"""
     clock = t[0] + np.arange(np.floor((t[-1] - t[0]) / period + 1e-6) + 1) * period
     # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay
     # in step.
-    newest = np.clip(t.searchsorted(clock + 5e-7 + 1e-3 * period, side="right") - 1, 0, None)
-    return clock, [column[newest] for column in values]
+    newest = t.searchsorted(clock + 5e-7 + 1e-3 * period, side="right") - 1
+    return clock, np.maximum(newest, 0)
 
 
 def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
@@ -279,7 +270,9 @@ def trouble(found: Replay) -> Iterator[Remark]:
         if motion.escaped[n]:
             k = np.isfinite(motion.x[:, n]).all(axis=1).argmin()
             yield warning("motion-escaped", where, time_s=motion.t[k])
-        if acted := np.count_nonzero(motion.clipped[:, n].any(axis=1)):
+        v = motion.v[1:, n]
+        at_limit = np.isfinite(v) & (abs(v) == controller.parameters.speed_limit)
+        if acted := np.count_nonzero(at_limit.any(axis=1)):
             yield fact("speed-limit-acted", where, periods=acted)
         reached = path.reached[:, n]
         if lost := np.count_nonzero(~reached):

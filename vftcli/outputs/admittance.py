@@ -146,7 +146,6 @@ def admittance_record(made: Replayed, command: str) -> Record:
         "parameters": {
             "axes": AXES,
             **{name: getattr(p, name) for name in PER_AXIS},
-            "xi_used": p.damping_ratio,
             "period_s": p.period,
             "threshold_mode": p.threshold_mode,
             "source": p.source,
@@ -229,7 +228,7 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
         deviation += (ChartLine("closed loop", padded(run.moved), GREY, "5 3"),)
         force.insert(0, ChartLine("true force", padded(run.truth), dash="2 2"))
     limit = np.where(np.isfinite(p.speed_limit), p.speed_limit, np.nan)
-    w, v = replay.lyapunov.corrected, replay.lyapunov.printed
+    w, v = replay.lyapunov
     force_band, speed_band = (x if np.isfinite(x).any() else None for x in (p.threshold, limit))
     return [
         Chart(

@@ -117,7 +117,7 @@ def latency_text(run: ClosedLoop) -> str:
 def parameter_text(replay: Replay) -> str:
     """Mass, damping, stiffness, threshold and control period in use, on one line."""
     p, words = replay.parameters, []
-    values = (p.mass, p.damping, p.stiffness, p.damping_ratio, p.threshold, p.speed_limit)
+    values = (p.mass, p.damping, p.stiffness, p.xi, p.threshold, p.speed_limit)
     for label, each in zip(("M", "B", "K", "ξ", "F_tsd", "limit"), values, strict=True):
         # Six numbers as position / rotation, three equal ones once.
         texts = [f"{value:.3g}" for value in np.broadcast_to(each, 6)]
@@ -133,7 +133,7 @@ def parameter_grid(replay: Replay) -> Grid:
     for k, (axis, limit) in enumerate(zip(AXES, np.broadcast_to(p.speed_limit, 6), strict=True)):
         force, speed = ("N", "m/s") if k < 3 else ("N·m", "rad/s")
         numbers = (float(v[k]) for v in (p.mass, p.damping, p.stiffness, p.alpha))
-        ratio, threshold = f"{p.damping_ratio[k]:.3g}", f"{p.threshold[k]:g} {force}"
+        ratio, threshold = f"{np.asarray(p.xi)[k]:.3g}", f"{p.threshold[k]:g} {force}"
         bound = f"{limit:g} {speed}" if np.isfinite(limit) else "none"
         rows.append((axis, *numbers, ratio, threshold, bound))
     heads = {

@@ -160,7 +160,7 @@ def released(
             parameters = laws[0].parameters
             keys = "mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"
             table = {key: getattr(parameters, key) for key in keys}
-            for key, values in {**table, "xi": parameters.damping_ratio}.items():
+            for key, values in {**table, "xi": parameters.xi}.items():
                 for axis, value in zip(AXES, values, strict=True):
                     yield variant, f"{key}/{axis}", value
 

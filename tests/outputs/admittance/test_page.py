@@ -75,7 +75,7 @@ def parameters(name: str):
 )
 def test_damping_ratios(name: str, figures: tuple[str, str], release: Replay) -> None:
     reason = why("ξ is stated.", release)
-    ratio = parameters(name).damping_ratio
+    ratio = parameters(name).xi
     for value, figure in zip((ratio[0], ratio[3]), figures, strict=True):
         assert figure in reason
         assert value == pytest.approx(float(figure), abs=0.5 * 10.0 ** -len(figure.split(".")[1]))
