@@ -85,15 +85,6 @@ def renamed(table: Table, old: str, new: str, folder: Path) -> list[Any]:
     return ["inspect", folder / "log.csv", "--robot", table.given]
 
 
-def holding(table: Table, kg: float) -> Table:
-    """Four seconds in which the arm stands and carries so much more than it did in the first."""
-    table = table.between(0.0, 4.0)
-    still = replace(table, q=np.tile(table.q[0], (len(table.t), 1)), dq=0.0 * table.dq)
-    bare = replace(still, effort=gravity_torque(still, still.arm) / still.constant)
-    late = (still.t - still.t[0] > 1.0)[:, None]
-    return replace(bare, effort=np.where(late, payload(bare, kg).effort, bare.effort))
-
-
 def touched(table: Table) -> Table:
     """Four seconds with a push of a second, 200 N·m on the shoulder."""
     table = table.between(0.0, 4.0)
@@ -160,11 +151,6 @@ def controlled(folder: Path, left_out: str = "") -> list[Any]:
     """A comparison with the controller's own wrench."""
     return ["compare", rtde(folder, left_out), "--robot", "ur5", "--observer", "gmo",
             "--reference", "sensor", "--details", "--anyway"]  # fmt: skip
-
-
-def sensed(folder: Path) -> list[Any]:
-    """The wrench of a log that says its payload."""
-    return ["estimate", rtde(folder), "--robot", "ur5", *PUSHED[1:], "--wrench", *NO_LIST]
 
 
 def checked_thresholds(folder: Path) -> list[Any]:
@@ -285,8 +271,6 @@ ROWS = [
         "virtual-sensor.torque-sd", "1"),
     Row("reference-zero-touched", of(lambda t: t, "compare", "--reference", "zero", "--observer",
                                      "gmo", "--details"), "interval"),
-    Row("drag-at-rest", of(partial(holding, kg=3.0), "admit", "--anyway", "--details"), "zero",
-        "1.5:2.5"),
     Row("travel-implausible-hard", of(touched, "admit", "--anyway", "--details"),
         "admittance.threshold_mode"),
     Row("wrench-frame-unstated", with_wrench, "columns", "wrench[base]=fx|fy|fz|mx|my|mz"),
@@ -310,8 +294,6 @@ ROWS = [
                               *NO_LIST), "free", free_log),
     Row("check-without-truth", checked_thresholds, "reference", "zero"),
     Row("payload-not-mounted", lambda f: ["inspect", rtde(f), "--robot", "ur5"], "payload"),
-    Row("payload-differs", sensed, "zero", "0:1"),
-    Row("payload-differs", lambda f: [*sensed(f), "--anyway"], "payload", "log"),
     Row("controller-point-without-tool", controlled, "virtual-sensor.tool", "0,0,0.1"),
     Row("controller-point-open", lambda f: [*controlled(f), *TOOL], "columns"),
     Row("controller-point-without-currents", lambda f: [

@@ -281,10 +281,8 @@ def refine(analysis: Analysis, baselines: "Baselines | None", choice: AnalysisCh
         return analysis
     from vftcli.bias import refine as room
 
-    bias, of_file = choice.refinement.bias, choice.observers.of_robot_file
-    made = room.refine(
-        baselines, analysis.observers, analysis.estimates, bias, gains_of_file=of_file
-    )
+    bias = choice.refinement.bias
+    made = room.refine(baselines, analysis.observers, analysis.estimates, bias)
     remarks = (*analysis.remarks, *made.remarks)
     return replace(analysis, estimates=made.estimates, refinement=made, remarks=remarks)
 
@@ -383,5 +381,5 @@ def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
         analysis = replace(analysis, virtual_sensor=sensed)
     if not choice.observers.of_robot_file:
         return analysis
-    remarks = references.with_measured_gap(analysis.remarks, errors, analysis.tunings)
-    return replace(analysis, remarks=remarks)
+    gap = references.paper_gap(errors, analysis.tunings)
+    return replace(analysis, remarks=(*analysis.remarks, *gap))

@@ -166,14 +166,6 @@ def test_quiet_log_moves_nothing_and_says_so() -> None:
     assert remark.values["share"] == pytest.approx(19.0 / 20.0)
 
 
-def test_force_at_rest_for_long_is_reported() -> None:
-    record, q = push(length=10.0)
-    wrench = record.values.copy()
-    wrench[record.t > 4.0, 0] = 21.0
-    found = run((replace(record, values=wrench), q))
-    assert "drag-at-rest" in codes(found)
-
-
 def test_w_never_rises_in_a_replay() -> None:
     record, q = push(30.0)
     wrench = record.values.copy()

@@ -15,7 +15,6 @@ from vftcli.signals.wrench import Wrench
 
 PARAMETERS = from_table(load_robot("ur5").admittance, "ur5", {})
 TWO = controllers(PARAMETERS)
-SLOW = replace(PARAMETERS, period=0.1)
 ROWS = 51
 
 
@@ -107,25 +106,6 @@ def test_the_axis_nearest_to_its_threshold_is_named() -> None:
 
 def drag(begin: int, release: int, axis: int = 2) -> Drag:
     return Drag(axis=axis, number=1, begin=begin, release=release, end=release)
-
-
-def test_a_long_drag_of_an_arm_at_rest_is_reported_once_an_axis() -> None:
-    logged = np.zeros((100, 6))
-    drags = [drag(0, 30), drag(40, 90), drag(10, 25, axis=0)]
-    found = drag_remarks(replayed(parameters=SLOW, drags=drags, logged=logged))
-    assert [(r.values["axis"], r.values["duration_s"]) for r in found] == [
-        ("z", pytest.approx(5.0))
-    ]
-
-
-def test_a_moving_arm_is_dragged_as_it_should_be() -> None:
-    t = np.arange(100) * 0.1
-    there = np.zeros((100, 6))
-    there[:, 0] = 0.3 * np.sin(2 * np.pi * t / 2.0)  # back where it was after every 2 s
-    still = replayed(parameters=SLOW, drags=[drag(0, 90)], logged=there)
-    assert len([*drag_remarks(still)]) == 1  # each sample meets itself
-    there[:, 0] = 0.1 * t
-    assert not [*drag_remarks(still)]
 
 
 def test_unknown_samples_are_counted() -> None:

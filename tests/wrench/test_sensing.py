@@ -14,9 +14,8 @@ from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.recording import Recording
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
-from vftcli.wrench.sensing import mask_remark, payload_remark
+from vftcli.wrench.sensing import mask_remark
 from vftcli.wrench.sensor_reading import SensorReading
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -122,24 +121,6 @@ def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed() -> None:
     (unknown,) = [remark for remark in found.remarks if remark.code == "no-wrench-band"]
     assert unknown.where.about == "gmo, fdo"
     assert found.wrenches[0].sd is not None
-
-
-def recording(mass: float | None) -> Recording:
-    return Recording(t=np.arange(3.0), q=np.zeros((3, 6)), payload_mass=mass)
-
-
-def test_a_payload_that_is_not_mounted_is_reported_in_the_arms_own_gravity() -> None:
-    ur5 = load_robot("ur5")
-    (remark,) = payload_remark(recording(0.5), ur5)
-    assert remark.values == {
-        "told_kg": 0.5,
-        "mounted_kg": 0.0,
-        "weight_N": pytest.approx(0.5 * np.linalg.norm(ur5.chain.gravity)),
-    }
-    moon = replace(ur5, chain=replace(ur5.chain, gravity=np.array([0.0, 0.0, -1.62])))
-    assert payload_remark(recording(0.5), moon)[0].values["weight_N"] == pytest.approx(0.81)
-    assert payload_remark(recording(0.04), ur5) == ()
-    assert payload_remark(recording(None), ur5) == ()
 
 
 @pytest.mark.slow

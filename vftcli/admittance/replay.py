@@ -49,9 +49,6 @@ from vftcli.wrench.sensor_reading import SensorReading, without_zero
 from vftcli.wrench.solvers import VirtualSensor
 
 LONGEST = 600.0  #: Longest release that is computed. [s]
-#: A drag in which the log's arm stays within this distance for so long has a remark.
-#: [s, m]
-RESTING = (2.0, 0.01)
 #: Where the flange stays this near to its first pose a log replays as it was: no remark.
 #: [m]
 STILL = 0.01
@@ -234,29 +231,12 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
 
 
 def drag_remarks(found: Replay) -> Iterator[Remark]:
-    """The axis nearest to its threshold where none was dragged; drags in which the log rests."""
-    if (logged := found.logged) is None:
-        return
-    if not found.drags and len(found.wrench):
+    """The axis of a log nearest to its threshold, where none was dragged."""
+    if found.logged is not None and not found.drags and len(found.wrench):
         threshold = found.parameters.threshold
         share = abs(np.nan_to_num(found.wrench)).max(axis=0) / np.maximum(threshold, 1e-12)
         k = share.argmax()
         yield caution("no-drag", axis=AXES[k], share=share[k], threshold=threshold[k])
-    longest, period, (seconds, near) = dict[str, int](), found.parameters.period, RESTING
-    long = round(seconds / period)
-    for drag in found.drags:
-        part = logged[drag.begin : drag.release, :3]
-        if len(part) <= long:
-            continue
-        apart = np.linalg.norm(part[long:] - part[:-long], axis=1)
-        # Round trips bring a moving arm back to where it was, so one coincidence is not
-        # rest.
-        held = np.linalg.norm(part - part.mean(axis=0), axis=1).max()
-        if np.any(apart < near) and (held < near or np.median(apart) < near):
-            axis = AXES[drag.axis]
-            longest[axis] = max(longest.get(axis, 0), len(part))
-    for axis, count in longest.items():
-        yield caution("drag-at-rest", axis=axis, duration_s=count * period)
 
 
 def trouble(found: Replay) -> Iterator[Remark]:

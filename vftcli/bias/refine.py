@@ -1,4 +1,4 @@
-"""From a log's baseline to finished estimates: bands, limits, the paper's gains against the best.
+"""From a log's baseline to finished estimates: bands, and what limits them.
 
 Bands come from the log's own free samples and spectra, and say what an estimate's error
 is expected to be without a reference: the root mean square of their standard deviation
@@ -15,13 +15,12 @@ from vftcli.bias.baseline import Baseline, Baselines, FreeReading, free_reading
 from vftcli.bias.choice import AUTOMATIC
 from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.bias.whole_log import stride_of
-from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, Spectra, error_band, free_error
-from vftcli.observers.table import BEST, PAPER
+from vftcli.observers.table import BEST
 from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
 from vftcli.robots.friction import HELD, ONE_STOP
-from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares
+from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
@@ -32,12 +31,6 @@ from vftcli.signals.shown import Shown, record
 #: joint may hide.
 STICTION = "stiction at rest"
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
-#: Codes of the remark that holds what the bands let expect: the gains are off the best,
-#: or not.
-EXPECTED = ("paper-gains-expected", "paper-gains-expected-level")
-#: The same of the remark that holds what a reference says.
-MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
-AHEAD = 1.05  #: The best is ahead where the paper's gains make this many times its error.
 
 
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
@@ -195,49 +188,6 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
     return fact("limits", where, causes=named, size_Nm=size, total_Nm=total)
 
 
-def expected_gap(
-    found: Baseline, estimates: Sequence[ExternalTorque], *, gains_of_file: bool
-) -> Remark | None:
-    """Expected error of the paper's gains over `best`'s; None if unknown."""
-    known = {estimate.name: estimate for estimate in estimates}
-    if BEST not in known or known[BEST].error_sd is None:
-        return None
-    log = found.motion.log
-    step, n = log.step, log.robot.joints
-    observers, _ = ObserverChoice(names=PAPER).build(log.robot, step)
-    paper = [o for o in observers if gains_of_file and o.name in known]
-    if not paper:
-        paper = [*observers]
-        readings = [free_reading(found, o, o.estimate(found.log.terms)) for o in paper]
-        known |= {r.observer.name: with_band(found, r) for r in readings}
-    errors = {}
-    for name in (BEST, *(o.name for o in paper)):
-        sd = known[name].error_sd
-        errors[name] = np.nan if sd is None else root_mean_squares(sd).mean()
-    return gap_remark(EXPECTED, errors, {o.name: o.tuning(step, n).delay for o in paper})
-
-
-def gap_remark(
-    codes: tuple[str, str], errors: Mapping[str, float], delays: Mapping[str, Array]
-) -> Remark | None:
-    """Distance of the paper's gains from the best by `MEASURED` or `EXPECTED` errors, or None.
-
-    Of observer → error [N·m], `best` among them, and observer of the paper → delay (n,) [s].
-    """
-    ratios = {name: errors[name] / errors[BEST] for name in delays} if errors[BEST] > 0.0 else {}
-    ratio = float(np.mean([*ratios.values()])) if ratios else float("nan")
-    if not np.isfinite(ratio):
-        return None
-    spread = np.concatenate([*delays.values()])
-    return fact(
-        codes[0] if ratio >= AHEAD else codes[1],
-        ratio=ratio,
-        ratios=ratios,
-        least_delay_ms=1e3 * spread.min(),
-        most_delay_ms=1e3 * spread.max(),
-    )
-
-
 @record
 class Refinement(Shown):
     """What the complete log makes of its estimates."""
@@ -256,8 +206,6 @@ def refine(
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     removed: str = AUTOMATIC,
-    *,
-    gains_of_file: bool = False,
 ) -> Refinement:
     """The observers' estimates, in this order, with their bands and what limits them."""
     remarks, budgets, shown, plain = [*found.remarks], list[Budget](), [], found.plain
@@ -278,12 +226,11 @@ def refine(
     # Of the most accurate estimate: of `best` if it ran, else of the last.
     leading = [one for one in budgets if one.name == BEST] or budgets[-1:]
     remarks += [limits_remark(one, plain.stuck) for one in leading]
-    gap = expected_gap(plain, shown, gains_of_file=gains_of_file)
     return Refinement(
         estimates=tuple(shown),
         baselines=found,
         curves=curves,
         budgets=tuple(budgets),
         removed=removed,
-        remarks=tuple(remarks) if gap is None else (*remarks, gap),
+        remarks=tuple(remarks),
     )

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.bias.refine import EXPECTED, MEASURED, gap_remark
 from vftcli.evaluation.errors import evaluate, joint_means
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.wrenches import evaluate_wrenches, with_contacts
@@ -27,7 +26,7 @@ from vftcli.signals.errors import ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, warning
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import resample_columns, runs_of
 from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.wrench.detection import KnownContacts, judge_contacts
@@ -35,6 +34,7 @@ from vftcli.wrench.frames import NOTHING, Mounting, from_base, in_base_axes, log
 from vftcli.wrench.sensor_reading import SensorReading, with_reference
 from vftcli.wrench.solvers import VirtualSensor
 
+AHEAD = 1.05  #: The best is ahead where the paper's gains make this many times its error.
 #: Cutoff of the open torque's low-pass: a hand's push lasts longer, reversals do not.
 #: [Hz]
 CUTOFF = 2.0
@@ -256,16 +256,23 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
     return np.where(inside[:, None], there, np.nan)
 
 
-def with_measured_gap(
-    remarks: Sequence[Remark], errors: pl.DataFrame, tunings: Mapping[str, Tuning]
-) -> tuple[Remark, ...]:
-    """Remarks on the measured cost of the paper's gains, where both sides ran."""
+def paper_gap(errors: pl.DataFrame, tunings: Mapping[str, Tuning]) -> tuple[Remark, ...]:
+    """The measured cost of the paper's gains, none unless they and `best` ran."""
     means = joint_means(errors).errors
-    delays = {name: tunings[name].delay for name in PAPER if name in means}
-    gap = gap_remark(MEASURED, means, delays) if delays and BEST in means else None
-    if gap is None:
-        return tuple(remarks)
-    return (*(remark for remark in remarks if remark.code not in EXPECTED), gap)
+    least, paper = means.get(BEST, 0.0), [name for name in PAPER if name in means]
+    ratios = {name: means[name] / least for name in paper if least > 0.0}
+    ratio = float(np.mean([*ratios.values()])) if ratios else np.nan
+    if not np.isfinite(ratio):
+        return ()
+    delays = np.concatenate([tunings[name].delay for name in paper])
+    said = fact(
+        "paper-gains-measured" if ratio >= AHEAD else "paper-gains-measured-level",
+        ratio=ratio,
+        ratios=ratios,
+        least_delay_ms=1e3 * delays.min(),
+        most_delay_ms=1e3 * delays.max(),
+    )
+    return (said,)
 
 
 def judge(

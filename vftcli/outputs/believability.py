@@ -28,7 +28,7 @@ from vftcli.signals.rest import slower
 #: Subject → the findings that are about it; any other is about the drives' effort.
 SUBJECTS = {
     "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-mismatch-untold",
-             "payload-not-mounted", "payload-differs", "load-changes"),
+             "payload-not-mounted", "load-changes"),
     "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest",
               "no-profile"),
     "time stamps": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps",

@@ -20,14 +20,12 @@ from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, within, without
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import error_band, free_error, spectra_of
 from vftcli.robots.chain import link_poses
-from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import disturbance_impulse
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.option import numbers
-from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
@@ -53,7 +51,6 @@ from vftcli.wrench.smoother import (
 from vftcli.wrench.solvers import CHUNK, VirtualSensor
 
 HALF = 0.05  #: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
-PAYLOAD_SLACK = 0.05  #: Difference of payloads that is not worth a remark. [kg]
 
 
 class Gate(NamedTuple):
@@ -155,7 +152,6 @@ def sense(
         remarks=(
             *warnings,
             *fitted,
-            *(() if drifts else payload_remark(log.recording, log.robot)),
             *(mask_remark(hidden, sigma) if any(w.hidden.any() for w in wrenches) else ()),
             *moved,
             *bands,
@@ -242,16 +238,6 @@ def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     mean = resample_columns(after, t, total) - resample_columns(before, t, total)
     mean /= (after - before)[:, None]
     return ExternalTorque(name="disturbance", t=t, tau=handed_over(mean))
-
-
-def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:
-    """A remark where the controller has another load than the robot's file mounts."""
-    stated = recording.payload_mass
-    mounted = robot.payload.mass if robot.payload is not None else 0.0
-    if stated is None or abs(stated - mounted) < PAYLOAD_SLACK:
-        return ()
-    weight = np.linalg.norm(robot.chain.gravity) * (stated - mounted)
-    return (caution("payload-differs", told_kg=stated, mounted_kg=mounted, weight_N=weight),)
 
 
 def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
