@@ -1,5 +1,7 @@
 """A paper whose experiments take no time: one that measures, and one that fails."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -10,23 +12,23 @@ from vftcli.reproduction.paper import (
     CORRECTED,
     FLOOR,
     Experiment,
+    Given,
     Paper,
     PaperItem,
     PrintedLine,
-    RunResult,
 )
 from vftcli.signals.errors import ParameterError
 
 
-def measure(seed: int) -> RunResult:
+def measure(seed: int) -> Iterator[Given]:
     t = np.linspace(0.0, 1.0, 50)
     line = ChartLine("ours", np.column_stack([np.sin(t), np.cos(t)]))
-    chart = Chart("any", "", ("N", "N"), ("x", "y"), t, (line,))
-    known = {AS_PRINTED: 3.0, CORRECTED: 2.0 + seed, FLOOR: 0.5}
-    return RunResult({"a": known, "b": {CORRECTED: None if seed > 1 else -1.0}}, {"fig1": chart})
+    yield from ((AS_PRINTED, "a", 3.0), (CORRECTED, "a", 2.0 + seed), (FLOOR, "a", 0.5))
+    yield CORRECTED, "b", None if seed > 1 else -1.0
+    yield "", "fig1", Chart("any", "", ("N", "N"), ("x", "y"), t, (line,))
 
 
-def fail(seed: int, *, what: str) -> RunResult:
+def fail(seed: int, *, what: str) -> Iterator[Given]:
     raise ParameterError(f"{what} moved with {seed}")
 
 

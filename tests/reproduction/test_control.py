@@ -8,7 +8,7 @@ import pytest
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.replay import Replay, replay
 from vftcli.reproduction.control import latest_turns, released, turn_after, ungated
-from vftcli.reproduction.paper import CORRECTED
+from vftcli.reproduction.paper import CORRECTED, gathered
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import Wrench
@@ -18,7 +18,7 @@ ALPHAS = (1.0, 1.3, 1.6, 1.9)
 
 def test_releases_of_the_ur5_are_those_of_the_law() -> None:
     """docs/admittance.md: 0.3 m at rest, ξ .51 and 1; two decimals are what it prints."""
-    values = released(0, robot="ur5", deviation=0.3, alphas=ALPHAS).values
+    values = gathered(released(0, robot="ur5", deviation=0.3, alphas=ALPHAS)).values
     found = [values[f"return_2_s/{a:g}"] for a in ALPHAS]
     assert [x[CORRECTED] for x in found] == pytest.approx([4.66, 3.53, 2.80, 2.31], abs=5e-3)
     assert [x["ξ = 1"] for x in found] == pytest.approx([3.14, 2.30, 1.74, 1.35], abs=6e-3)
@@ -44,9 +44,7 @@ def test_the_traditional_law_turns_within_arccos_zeta_over_omega_d() -> None:
 
     How much earlier the variable law can be is an independent run's: .43–.47 and .29–.31 s.
     """
-    values = {
-        key: found[CORRECTED] for key, found in latest_turns(0, alphas=ALPHAS).values.items()
-    }
+    values = {key: value for _, key, value in latest_turns(0, alphas=ALPHAS)}
     assert values["latest/x"] == pytest.approx(0.737, abs=5e-4)
     assert values["latest/rx"] == pytest.approx(0.504, abs=5e-4)
     assert 0.43 <= values["most/x/1.9"] <= 0.47

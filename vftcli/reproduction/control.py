@@ -14,7 +14,7 @@ from vftcli.admittance.replay import Replay, replay, settling
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance import charts as replay_charts
 from vftcli.outputs.charts import Chart, ChartLine
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, Given, gathered_results
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, Given
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
 
@@ -30,7 +30,6 @@ HOLD = 2.5  #: A drag of a contact begins within this time of its force. [s]
 FARTHEST_RELEASE = 0.5
 
 
-@gathered_results
 def closed_loop(
     seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
 ) -> Iterator[Given]:
@@ -112,7 +111,6 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
     return float(t[start + np.argmax(outward <= 0.0)] - t[start])
 
 
-@gathered_results
 def latest_turns(_seed: int, *, alphas: Sequence[float]) -> Iterator[Given]:
     """Latest turn of the UR5 after a release, and the variable law's lead.
 
@@ -139,7 +137,6 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> Iterator[Given]:
             yield CORRECTED, f"most/{name}/{alpha:g}", advance
 
 
-@gathered_results
 def released(
     _seed: int, *, robot: str, deviation: float, alphas: Sequence[float] = ()
 ) -> Iterator[Given]:

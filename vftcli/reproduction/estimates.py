@@ -22,14 +22,7 @@ from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.reproduction.control import deviation_chart
-from vftcli.reproduction.paper import (
-    AS_PRINTED,
-    CORRECTED,
-    DENSITY,
-    FLOOR,
-    Given,
-    gathered_results,
-)
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, Given
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array, Mask
@@ -61,7 +54,6 @@ REACHED = 0.9  #: Share of a step at which it counts as seen.
 FAST = 5.0
 
 
-@gathered_results
 def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> Iterator[Given]:
     """RMSE of the virtual sensor against the real one, axis by axis, in flange axes."""
     hard = simulate(load_scenario("ur5-sensor", ()), seed)
@@ -123,7 +115,6 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
 
 
-@gathered_results
 def assembled_bearing(
     seed: int,
     *,
@@ -249,7 +240,6 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
     return np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
 
 
-@gathered_results
 def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]:
     """Errors joint by joint, lags, free rms, and what the guidelines go by."""
     recording = simulate(load_scenario(scenario, ()), seed).recording

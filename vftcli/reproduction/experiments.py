@@ -6,7 +6,7 @@ figures.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -26,13 +26,21 @@ from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.run_record import envelope, seal
 from vftcli.reproduction.control import closed_loop, latest_turns, released
 from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle
-from vftcli.reproduction.paper import FLOOR, Paper, RunResult, ShownItem, paper_of
+from vftcli.reproduction.paper import (
+    FLOOR,
+    Given,
+    Paper,
+    RunResult,
+    ShownItem,
+    gathered,
+    paper_of,
+)
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.progress import stage
 
 #: Name of an experiment's `run` → what it gives of a seed and the experiment's own
 #: arguments.
-RUNS: dict[str, Callable[..., RunResult]] = {
+RUNS: dict[str, Callable[..., Iterator[Given]]] = {
     run.__name__: run
     for run in (
         assembled_bearing,
@@ -77,7 +85,7 @@ def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
 def run_job(job: Job) -> RunResult:
     """What a job gives; traces are those of the first seed, the others would only be carried."""
     experiment = paper_of(job.paper).experiments[job.experiment]
-    made = RUNS[experiment.run](job.seed, **experiment.given)
+    made = gathered(RUNS[experiment.run](job.seed, **experiment.given))
     return made if job.seed == experiment.seeds[0] else replace(made, charts={})
 
 

@@ -5,11 +5,10 @@ shown, is the same for all.
 """
 
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import wraps
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec
+from typing import Any, NamedTuple
 
 from vftcli.evaluation.published import TABLES
 from vftcli.outputs.charts import Chart
@@ -33,24 +32,18 @@ class RunResult:
 #: One thing that an experiment gives: a variant, a line's key and its value, or "", the
 #: name of an item, and its traces.
 Given = tuple[str, str, float | Chart | None]
-P = ParamSpec("P")
 
 
-def gathered_results(run: Callable[P, Iterator[Given]]) -> Callable[P, RunResult]:
-    """An experiment of all that it gives, one thing after the other."""
-
-    @wraps(run)
-    def whole(*args: P.args, **given: P.kwargs) -> RunResult:
-        result = RunResult()
-        for variant, key, value in run(*args, **given):
-            if isinstance(value, Chart):
-                result.charts[key] = value
-            else:
-                number = None if value is None else float(value)
-                result.values.setdefault(key, {})[variant] = number
-        return result
-
-    return whole
+def gathered(given: Iterable[Given]) -> RunResult:
+    """The results of all that an experiment gives, one thing after the other."""
+    result = RunResult()
+    for variant, key, value in given:
+        if isinstance(value, Chart):
+            result.charts[key] = value
+        else:
+            number = None if value is None else float(value)
+            result.values.setdefault(key, {})[variant] = number
+    return result
 
 
 @dataclass(frozen=True, kw_only=True)

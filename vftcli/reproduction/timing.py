@@ -19,7 +19,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.observers.tuning import tune_to_spectra
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, Given, gathered_results
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, Given
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
@@ -184,7 +184,6 @@ def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
     tune_to_spectra(name, found).estimate(terms)
 
 
-@gathered_results
 def computing_time(_seed: int) -> Iterator[Given]:
     """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
     robot, timings = load_robot("ur5"), Timings()

@@ -184,24 +184,19 @@ def truth_of(arm: Arm, samples: Samples) -> Truth:
     poses, contacts = link_poses(chain, samples.q), dict[str, Array]()
     for contact, exerted in zip(touching.mounted, wrenches, strict=True):
         joint, wrench = contact.joint, resample_columns(time, middle, exerted)
-        turn = poses.rotation[:, joint - 1]
-        if contact.lever is not None:
-            flange += at_other_point(wrench, turn @ contact.turn @ contact.lever)
-            continue
-        contacts[contact.name] = wrench
-        point = poses.translation[:, joint - 1] + turn @ contact.point
-        for j in range(joint):
-            moved = at_other_point(wrench, point - poses.translation[:, j])
-            tau_ext[:, j] += np.sum(poses.rotation[:, j, :, 2] * moved[:, 3:], axis=1)
-    tau_ext += np.einsum("tkn,tk->tn", flange_jacobian(chain, samples.q), flange)
+        force, moment = np.hsplit(wrench, 2)
+        turn, place = poses.rotation[:, joint - 1], poses.translation[:, joint - 1]
+        # About each joint's origin; a joint turns about z.
+        levers = (place + turn @ contact.point)[:, None] - poses.translation[:, :joint]
+        moved = moment[:, None] + np.cross(levers, force[:, None])
+        tau_ext[:, :joint] += np.sum(poses.rotation[:, :joint, :, 2] * moved, axis=2)
+        if contact.lever is None:
+            contacts[contact.name] = wrench
+        else:
+            lever = turn @ contact.turn @ contact.lever
+            flange += np.hstack([force, moment + np.cross(lever, force)])
     tau_ext += sum(walks.values())
     return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=flange, contacts=contacts, walks=walks)
-
-
-def at_other_point(wrench: Array, lever: Array) -> Array:
-    """Wrenches (…, 6) about a point from which their own lies `lever` (…, 3) [m] away. (…, 6)"""
-    force, moment = np.split(wrench, 2, axis=-1)
-    return np.concatenate([force, moment + np.cross(lever, force)], axis=-1)
 
 
 class FlangeMotion(NamedTuple):

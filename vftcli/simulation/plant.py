@@ -37,8 +37,7 @@ WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")  #: What does: the 
 #: unseen logs. [rad/s]
 CREEP = 3e-3
 LARGEST_STEP = 1e-3  #: Largest inner step. [s]
-GUESSES = 12  #: Active-set guesses before the slower sweeps that always converge take over.
-SWEEPS = 2000
+GUESSES = 12  #: Active-set guesses before the slower way that always converges takes over.
 #: Torque of the contacts (n,) [N·m] from the Pinocchio model and data (joint Jacobians
 #: and placements are current) and the velocities, at the middle of the step.
 External = Callable[[Any, Any, Array], Array]
@@ -297,22 +296,20 @@ def slide_or_stick(
         if np.array_equal(better, signs):
             return after, friction, signs
         signs = better
-    return gauss_seidel(M, impulse, v, limit)
+    return bounded_step(M, impulse, v, limit)
 
 
-def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:
-    """A step by projected Gauss–Seidel, which always converges."""
-    A = np.linalg.inv(M)
-    free = v + A @ impulse
-    friction = np.zeros_like(v)
-    for _ in range(SWEEPS):
-        before = friction.copy()
-        for j in range(len(v)):
-            slip = free[j] - A[j] @ friction
-            friction[j] = np.clip(friction[j] + slip / A[j, j], -limit[j], limit[j])
-        if abs(friction - before).max() <= 1e-14 * (1.0 + abs(friction).max()):
-            break
-    after = free - A @ friction
-    after[abs(friction) < limit] = 0.0
-    signs = np.where(abs(friction) < limit, 0.0, np.where(friction < 0.0, -1.0, 1.0))
-    return after, friction, signs
+def bounded_step(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:
+    """A step by least squares in bounds, which always converges.
+
+    With M̃ = L Lᵀ, λ minimises ‖L⁻¹(g − λ) + Lᵀ v‖, |λ_j| ≤ ℓ_j: the gradient is v⁺.
+    """
+    from scipy.optimize import lsq_linear
+
+    L = np.linalg.cholesky(M)
+    C, rubs, friction = np.linalg.inv(L), limit > 0.0, np.zeros_like(v)
+    bounds = -limit[rubs], limit[rubs]
+    friction[rubs] = lsq_linear(C[:, rubs], C @ impulse + L.T @ v, bounds, "bvls", 1e-14).x
+    sticks = abs(friction) < limit * (1.0 - 1e-12)  # at a bound to rounding
+    after = np.where(sticks, 0.0, v + np.linalg.solve(M, impulse - friction))
+    return after, friction, np.where(sticks, 0.0, np.where(friction < 0.0, -1.0, 1.0))

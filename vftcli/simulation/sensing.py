@@ -15,7 +15,7 @@ from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import rpy_matrix
-from vftcli.signals.series import resample_columns
+from vftcli.signals.series import resample_columns, summed
 from vftcli.signals.steady_filter import steady_filter
 from vftcli.simulation.arm import Arm, JointSignals, rigid_torque
 from vftcli.simulation.scenario import SensingSpec
@@ -84,8 +84,8 @@ def sample_run(arm: Arm) -> Samples:
         signals[name] = resample_columns(time, middle, getattr(history, name)[:-1])
     # The mean over the interval, or the last step: exact, for torque is constant over a
     # step.
-    step, total = grid[1], np.zeros_like(history.tau)
-    np.cumsum(history.tau[:-1] * step, axis=0, out=total[1:])
+    step = grid[1]
+    total = step * summed(history.tau[:-1])
     span = max(interval if spec.torque == "average" else 0.0, step)
     begin, stop = np.maximum(time - span, 0.0), np.maximum(time, step)
     grown = resample_columns(stop, grid, total) - resample_columns(begin, grid, total)
