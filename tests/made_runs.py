@@ -1,7 +1,11 @@
-"""Runs of terms that a test makes itself, without a motion behind them."""
+"""Runs of terms that a test makes itself, without a motion behind them; a log's analysis."""
+
+from pathlib import Path
 
 import numpy as np
 
+from vftcli.analysis import Analysis
+from vftcli.pipeline import AnalysisChoice, analyse_logs
 from vftcli.robots import load_robot
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
@@ -20,3 +24,8 @@ def run_of(terms: DynamicsTerms, q: Array | None = None, robot: Robot | None = N
 def samples_of(terms: DynamicsTerms, inside: Mask, q: Array | None = None) -> RunSamples:
     """Some samples of such a run."""
     return RunSamples(run_of(terms, q), inside)
+
+
+def analyse_log(log: Path, choice: AnalysisChoice) -> Analysis:
+    """The analysis of one log."""
+    return next(analyse_logs([log], choice))

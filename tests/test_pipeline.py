@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from made_runs import analyse_log
 from typer.testing import CliRunner
 
 import vftcli as vft
@@ -25,7 +26,7 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion import free_motion
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.pipeline import AnalysisChoice
 from vftcli.readers import reading
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import run as modelled

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_runs import analyse_log
 
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read

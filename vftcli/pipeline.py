@@ -196,11 +196,6 @@ def check_logged(recording: Recording, why: str) -> None:
         )
 
 
-def analyse_log(path: str | Path, choice: AnalysisChoice) -> Analysis:
-    """Read a log, choose its robot, and analyse it."""
-    return next(analyse_logs([Path(path)], choice))
-
-
 def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
     """Estimates of a log and, if a reference is asked for, their errors."""
     name = log.name

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.batch.log_work import SCHEMA, rows_of, size_of
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.wrench.choice import WrenchChoice

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.bias import baseline
@@ -13,7 +14,7 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.run_record import run_record
-from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.friction import dry_friction

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.bias.choice import RefinementChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice

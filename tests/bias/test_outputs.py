@@ -73,7 +73,9 @@ def test_run_json_records_what_was_chosen(worked_up: Analysis) -> None:
 
 
 def test_a_run_that_asks_for_nothing_shows_nothing() -> None:
-    from vftcli.pipeline import AnalysisChoice, analyse_log
+    from made_runs import analyse_log
+
+    from vftcli.pipeline import AnalysisChoice
 
     fixture = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
     plain = analyse_log(
@@ -92,7 +94,9 @@ def test_a_run_that_asks_for_nothing_shows_nothing() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", ["base", "flange"])
 def test_the_wrench_takes_its_band_from_the_joint_torques(frame: str) -> None:
-    from vftcli.pipeline import AnalysisChoice, analyse_log
+    from made_runs import analyse_log
+
+    from vftcli.pipeline import AnalysisChoice
     from vftcli.wrench.choice import WrenchChoice
 
     fixture = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"

@@ -27,7 +27,7 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_logs, run_of
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import load_wrench
@@ -74,7 +74,7 @@ def compared(
     """A log of a file with the true wrench that its reference holds."""
     read = ReadChoice(columns=columns) if columns else ReadChoice()
     reference = ReferenceChoice(name=truth)
-    analysis = analyse_log(log, asked(free, robot, read=read, reference=reference))
+    analysis = next(analyse_logs([log], asked(free, robot, read=read, reference=reference)))
     assert analysis.virtual_sensor is not None
     assert analysis.virtual_sensor.reference is not None
     return analysis, analysis.virtual_sensor.reference.values
@@ -111,7 +111,7 @@ def planted(free: str | None) -> tuple[Analysis, Array]:
     choice = replace(
         asked(None, "ur10e", read=ReadChoice(columns=UR10E)), free=FreeChoice.parsed(free=other)
     )
-    analysis = analyse_log(folder / "planted_12harm.csv.gz", choice)
+    analysis = next(analyse_logs([folder / "planted_12harm.csv.gz"], choice))
     table = pl.read_csv(folder / "planted_12harm.truth.csv.gz", infer_schema_length=None)
     true = table.select(AXES.split("|")).to_numpy()
     return analysis, resample_columns(analysis.recording.t, table["t"].to_numpy(), true)

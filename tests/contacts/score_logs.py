@@ -24,7 +24,7 @@ from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log, analyse_logs, list_touches
+from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
@@ -107,7 +107,7 @@ def engine(log: Path, folder: Path, read: ReadChoice, span: str, reference: str)
         reference=ReferenceChoice(name=reference),
     )
     begin = process_time()
-    analysis = analyse_log(log, choice)
+    analysis = next(analyse_logs([log], choice))
     took = process_time() - begin
     assert analysis.contacts is not None
     assert analysis.virtual_sensor is not None
@@ -170,7 +170,7 @@ def bullet() -> None:
                 observers=ObserverChoice(names=("best",)),
                 wrench=WrenchChoice(frame="base"),
             )
-            analysis = analyse_log(log, choice)
+            analysis = next(analyse_logs([log], choice))
             assert analysis.contacts is not None
             assert analysis.virtual_sensor is not None
             shown(analysis.contacts)

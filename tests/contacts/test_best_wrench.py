@@ -6,11 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, true_wrench
+from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of, sense
+from vftcli.pipeline import AnalysisChoice, analyse, run_of, sense
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import load_regressor, load_wrench

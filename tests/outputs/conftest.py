@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from contact_rows import contact, contact_list
+from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import evaluate
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs.run_record import run_record
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, run_of
+from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms

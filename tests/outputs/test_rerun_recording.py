@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import rerun.chunk
 from contact_rows import contact, contact_list
+from made_runs import analyse_log
 from rerun_rows import rows_of
 
 from vftcli.analysis import Analysis
@@ -22,7 +23,7 @@ from vftcli.outputs.rerun_recording import (
     tabs_of,
     write_rrd,
 )
-from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.pipeline import AnalysisChoice
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.remarks import Where, caution

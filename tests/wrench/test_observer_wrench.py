@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_runs import analyse_log
 
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log, prepared, read
+from vftcli.pipeline import AnalysisChoice, prepared, read
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot

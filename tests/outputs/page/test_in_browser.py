@@ -169,7 +169,9 @@ def recording_of_a_panda() -> Analysis:
     """Seven joints of the simulated Panda that lifts a bearing."""
     from pathlib import Path
 
-    from vftcli.pipeline import AnalysisChoice, analyse_log
+    from made_runs import analyse_log
+
+    from vftcli.pipeline import AnalysisChoice
     from vftcli.robots.choice import RobotChoice
 
     log = Path(__file__).parents[3] / "fixtures" / "panda_bearing.csv"
