@@ -18,11 +18,13 @@ import typer
 from run_notebook import NOTEBOOK, code_cells, run_cells
 from typer.testing import CliRunner
 
-from vftcli.cli import COMMANDS, app, make_app
+from vftcli.cli import COMMANDS, make_app
 from vftcli.doctor.examination import REFUSING
 from vftcli.observers.table import OBSERVERS
 from vftcli.signals.option import settings_by_name
 from vftcli.signals.version import VERSION
+
+app = make_app()
 
 ROOT = Path(__file__).parent.parent
 AXES = {"admittance", "position", "rotation", "x", "y", "z", "rx", "ry", "rz"}

@@ -17,8 +17,10 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.signals.errors import VftError
+
+app = make_app()
 
 FIXTURES = Path(__file__).parent.parent / "fixtures"
 

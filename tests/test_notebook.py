@@ -104,12 +104,12 @@ def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
 def test_thresholds_are_those_of_the_command(tmp_path: Path) -> None:
     from typer.testing import CliRunner
 
-    from vftcli.cli import app
+    from vftcli.cli import make_app
 
     free = tmp_path / "free.parquet"
     reported = ["simulate", "ur5-circle", "--set", "contacts=[]", "--set", "trajectory.cycles=9"]
-    assert CliRunner().invoke(app, [*reported, "-o", str(free)]).exit_code == 0
-    ran = CliRunner().invoke(app, ["thresholds", str(free), "--robot", "ur5", "--json"])
+    assert CliRunner().invoke(make_app(), [*reported, "-o", str(free)]).exit_code == 0
+    ran = CliRunner().invoke(make_app(), ["thresholds", str(free), "--robot", "ur5", "--json"])
     record = json.loads(ran.stdout)
     found = vft.thresholds(free, "ur5")
     rows = [row["threshold_Nm"] for row in record["joints"]]

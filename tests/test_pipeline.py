@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 import vftcli as vft
 from vftcli import pipeline
 from vftcli.bias.choice import RefinementChoice
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion import free_motion
 from vftcli.free_motion.choice import FreeChoice
@@ -36,6 +36,8 @@ from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
 from vftcli.signals.progress import heard_by
 from vftcli.signals.remarks import Remark
 from vftcli.wrench.choice import WrenchChoice
+
+app = make_app()
 
 FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"

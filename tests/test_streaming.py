@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli import streaming
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.doctor import examination
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
@@ -24,6 +24,8 @@ from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 from vftcli.streaming import comes_in_blocks
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+
+app = make_app()
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 

@@ -67,10 +67,12 @@ OF_ESTIMATE: tuple[type[Choice], ...] = (
 OF_REPORT = (*OF_ESTIMATE, AlsoWrench, ReferenceChoice)
 
 
-def choice_for(asked: Asked, logs: Iterable[Opened], **others: Any) -> AnalysisChoice:  # noqa: ANN401
-    """What is asked of some logs, with others of its choices."""
+def choice_for(
+    asked: Asked, logs: Iterable[Opened], observers: ObserverChoice | None = None
+) -> AnalysisChoice:
+    """What is asked of some logs, by other observers than it names where given."""
     library = Library(log for log in logs if not isinstance(log, Recording))
-    return choice_of(asked, library, Examiner(anyway=asked.anyway), **others)
+    return choice_of(asked, library, Examiner(anyway=asked.anyway), observers)
 
 
 def call(
@@ -215,7 +217,7 @@ def identify(logs: Opened | OpenedLogs, asked: Asked, *, check: OpenedLogs = ())
     """The robot that logs of free motion show; `Robot.save` writes its file."""
     paths, task, goal = several(logs), asked.of(Task), asked.of(GoalChoice)
     if task.method == "gains":
-        found = gains_of(paths[0], choice_for(asked, paths, observers=TUNED), goal)
+        found = gains_of(paths[0], choice_for(asked, paths, TUNED), goal)
         return found.robot.with_gains({line.section: dict(line.gains) for line in found.tuned})
     choice = choice_for(asked, [*paths, *check])
     examiner = Examiner(anyway=asked.anyway, fitting=task.keeps_links)

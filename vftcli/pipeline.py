@@ -21,7 +21,7 @@ from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Run
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
-from vftcli.signals.option import Asked, Choice
+from vftcli.signals.option import Asked
 from vftcli.signals.progress import stage
 from vftcli.signals.recording import Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, caution
@@ -88,78 +88,33 @@ class AnalysisChoice:
         return self.contacts and not self.observers.causal
 
 
-#: Field of `AnalysisChoice` → what it is of what is asked.
-KINDS: dict[str, type[Choice]] = {
-    "read": ReadChoice,
-    "robot": RobotChoice,
-    "observers": ObserverChoice,
-    "free": FreeChoice,
-    "refinement": RefinementChoice,
-}
-
-
 def choice_of(
     asked: Asked,
     library: Library,
     examiner: Examiner,
-    **others: Any,  # noqa: ANN401
+    observers: ObserverChoice | None = None,
 ) -> AnalysisChoice:
-    """What a command or a call asks of logs, with others of the choices."""
+    """What a command or a call asks of logs, by other observers than it names where given."""
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.wrench.choice import WrenchChoice
 
-    own: dict[str, Any] = {
-        name: asked.of(kind) for name, kind in KINDS.items() if name not in others
-    }
-    own |= others
-    if asked.words.get("wrench") or asked.states(WrenchChoice):
-        own["wrench"] = asked.of(WrenchChoice)
+    wrench = asked.words.get("wrench") or asked.states(WrenchChoice)
+    reference, refinement = None, asked.of(RefinementChoice)
     if asked.words.get("reference") is not None:
         judged = bool(asked.words.get("details"))
-        own["reference"] = replace(asked.of(ReferenceChoice), contacts=judged)
-    contacts = own["refinement"].contacts
-    return AnalysisChoice(library=library, examiner=examiner, contacts=contacts, **own)
-
-
-#: What is done with each log of a command.
-Analyser = Callable[[Run, AnalysisChoice], Analysis]
-Failed = Callable[[Any, VftError], None]  #: Who hears which log could not be analysed, and why.
-
-
-def raise_error(_log: object, error: VftError) -> None:
-    """Raise what is wrong with a log."""
-    raise error
-
-
-def analyse_logs(
-    logs: Iterable[Path | Recording],
-    choice: AnalysisChoice,
-    failed: Failed | None = None,
-    work: Analyser | None = None,
-) -> Iterator[Analysis]:
-    """Analyses of the logs of a command one after the other; what they share is made once.
-
-    The work on each is `analyse` if not given. A log that cannot be analysed is left out
-    where somebody hears of it, else it raises a VftError, as two logs of the same run do.
-    """
-    work, tell = work or analyse, failed or raise_error
-    recordings: list[tuple[Path | Recording, Recording]] = []
-    for path in logs:
-        stage(f"reading {path.name}", 0.0, 0.05)
-        try:
-            if choice.read.columns is None and isinstance(path, Path):
-                refuse_estimates(path)
-            recordings += [(path, r) for r in choice.library.open_each([path], choice.read)]
-        except VftError as error:
-            tell(path, error)
-    refuse_repeated_logs([recording for _, recording in recordings])
-    for path, recording in recordings:
-        try:
-            made = work(prepared(recording, choice), choice)
-        except VftError as error:
-            tell(path, error)
-        else:
-            yield made
+        reference = replace(asked.of(ReferenceChoice), contacts=judged)
+    return AnalysisChoice(
+        read=asked.of(ReadChoice),
+        robot=asked.of(RobotChoice),
+        observers=observers or asked.of(ObserverChoice),
+        free=asked.of(FreeChoice),
+        refinement=refinement,
+        wrench=asked.of(WrenchChoice) if wrench else None,
+        reference=reference,
+        contacts=refinement.contacts,
+        library=library,
+        examiner=examiner,
+    )
 
 
 def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
@@ -214,6 +169,45 @@ def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
     stage(f"{name}: comparing", 0.5, WRITING)
     analysis.spare()
     return judge(analysis, choice)
+
+
+#: What is done with each log of a command.
+Analyser = Callable[[Run, AnalysisChoice], Analysis]
+Failed = Callable[[Any, VftError], None]  #: Who hears which log could not be analysed, and why.
+
+
+def analyse_logs(
+    logs: Iterable[Path | Recording],
+    choice: AnalysisChoice,
+    failed: Failed | None = None,
+    work: Analyser = analyse,
+) -> Iterator[Analysis]:
+    """Analyses of the logs of a command one after the other; what they share is made once.
+
+    A log that cannot be analysed is left out where somebody hears of it, else it raises a
+    VftError, as two logs of the same run do.
+    """
+    recordings: list[tuple[Path | Recording, Recording]] = []
+    for path in logs:
+        stage(f"reading {path.name}", 0.0, 0.05)
+        try:
+            if choice.read.columns is None and isinstance(path, Path):
+                refuse_estimates(path)
+            recordings += [(path, r) for r in choice.library.open_each([path], choice.read)]
+        except VftError as error:
+            if failed is None:
+                raise
+            failed(path, error)
+    refuse_repeated_logs([recording for _, recording in recordings])
+    for path, recording in recordings:
+        try:
+            made = work(prepared(recording, choice), choice)
+        except VftError as error:
+            if failed is None:
+                raise
+            failed(path, error)
+        else:
+            yield made
 
 
 def read(log: Run, choice: AnalysisChoice) -> FreeMotion:

@@ -74,11 +74,8 @@ def analysed_in_blocks(
         done += block.samples
         stage("estimating", done / log.samples)
         motion = replace(whole, log=Run(recording=block, robot=robot))
-        every = slice(None)
-        yield (
-            replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed),
-            every,
-        )
+        own = replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed)
+        yield own, slice(None)
     if sensed is not None:
         from vftcli.wrench.sensing import mask_remark
 

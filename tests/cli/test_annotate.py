@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app, main
+from vftcli.cli import main, make_app
+
+app = make_app()
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
 

@@ -200,9 +200,10 @@ def test_the_file_is_an_input_that_nothing_writes_over(run, here: Path) -> None:
 
 
 def test_every_option_kept_otherwise_exists() -> None:
-    known, choices = config.known_options()
+    every = config.every_command()
+    settings = settings_by_name(config.choices_of(*every.values()))
     for command, keys in config.OTHERWISE.items():
-        assert keys <= {*known[command], *settings_by_name(choices)}
+        assert keys <= {*config.options_of(every[command]), *settings}
 
 
 def test_settings_stand_in_a_table_of_their_group_also_where_a_command_is_called_so(

@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+
+app = make_app()
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 RUNNER = CliRunner()

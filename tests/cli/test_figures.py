@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.outputs.files import digests
+
+app = make_app()
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 import typer
 
-from vftcli.cli import COMMANDS, asked_for, make_app
+from vftcli import cli
+from vftcli.cli import COMMANDS, main, make_app
 from vftcli.cli.help import GROUPS, topics, two_columns
 
 Run = Callable[..., tuple[int, str, str]]
@@ -154,9 +155,10 @@ def test_a_shell_completes_commands_and_options(typed: str, offered: set[str]) -
 
 
 def test_only_the_command_that_is_asked_for_is_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.argv", ["vftcli", "help", "report"])
-    assert asked_for() == {"help", "report"}
-    monkeypatch.setattr("sys.argv", ["vftcli", "report", "log.csv"])
-    assert asked_for() == {"report"}
-    monkeypatch.setattr("sys.argv", ["vftcli"])
-    assert asked_for() == set()
+    loaded = []
+    monkeypatch.setattr(cli, "make_app", lambda load: lambda **_: loaded.append({*load}))
+    for words in ("help report", "report log.csv", "./log.csv", ""):
+        monkeypatch.setattr("sys.argv", ["vftcli", *words.split()])
+        main()
+    each = [some & {*COMMANDS} for some in loaded]
+    assert each == [{"help", "report"}, {"report"}, {"contacts"}, set()]

@@ -6,10 +6,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.cli.identify import file_for
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ExaminationError, ParameterError
+
+app = make_app()
 
 RUNNER = CliRunner()
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.readers.reading import FORMATS
 from vftcli.signals.errors import VftError
+
+app = make_app()
 
 KEYS = {"format", "joints", "samples", "duration_s", "rate_hz", "max_gap_s", "duplicates",
         "repairs", "warnings"}  # fmt: skip

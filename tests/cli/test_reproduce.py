@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.reproduction import experiments, paper
 from vftcli.reproduction.paper import Experiment, Paper, PaperItem, PrintedLine
 from vftcli.signals.errors import ParameterError
+
+app = make_app()
 
 
 def invoke(*words: object):

@@ -151,7 +151,7 @@ def bullet() -> None:
     """An injected torque: one row each, and the torque of its wrench."""
     from typer.testing import CliRunner
 
-    from vftcli.cli import app
+    from vftcli.cli import make_app
 
     folder = LOGS / "bullet_ur5"
     columns = "t=t,q=q{i},dq=dq{i},-tau=tau{i}"
@@ -159,7 +159,7 @@ def bullet() -> None:
         model = Path(made) / "arm.toml"
         words = ["identify", *(str(folder / f"free_{k}.csv.gz") for k in (5, 6)), "--robot", "ur5",
                  "--method", "base", "--columns", columns, "-o", str(model)]  # fmt: skip
-        done = CliRunner().invoke(app, words)
+        done = CliRunner().invoke(make_app(), words)
         print(done.output[-300:] if done.exit_code else "identified")
         for kind in ("const", "vary"):
             log = folder / f"pushed_7_{kind}.csv.gz"

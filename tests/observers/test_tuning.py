@@ -10,7 +10,7 @@ import pytest
 from made_runs import samples_of
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.observers.tuning import (
@@ -29,6 +29,8 @@ from vftcli.observers.tuning import (
 from vftcli.robots.run import RunSamples
 from vftcli.signals.errors import ParameterError, VftError
 from vftcli.signals.external_torque import DynamicsTerms
+
+app = make_app()
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 STEP = 0.008

@@ -13,7 +13,9 @@ from typing import NamedTuple
 
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
+
+app = make_app()
 
 ROOT = Path(__file__).parents[2]
 PAGE = Path(__file__).parent / "screens.md"

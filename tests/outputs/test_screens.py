@@ -9,7 +9,9 @@ import pytest
 from screens import OF_STORY, ROOT, SCREENS, printed, shown
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import make_app
+
+app = make_app()
 
 NUMBER = re.compile(r"[−-]?\d+(?:\.\d+)?")
 

@@ -4,7 +4,6 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,8 +40,7 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.progress import stage
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
-#: Episodes, and files to write, for which no processes are started unasked: that takes
-#: seconds.
+#: Files to write for which no processes are started again: that takes seconds.
 FEW = 32
 HERE = WorkersChoice(jobs=0)  #: This process alone.
 Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes that a copy is made of.
@@ -86,10 +84,8 @@ def annotate(
         rows, sources = dict[DataFile, list[Path]](), dict[str, str]()
         run = partial(run_tasks, tell=tell, seen=[str(path), str(work)])
         expected = force_columns(choice, (), derived=False, valid=choice.anyway)
-        few = sum(len(f.episodes) for f in islice(dataset.files(), FEW + 1)) <= FEW
-        place = HERE if few and workers == WorkersChoice() else workers
         groups = planned(dataset, work, key, expected, rows, sources)
-        outcomes = run(groups, partial(estimate_episodes, choice), place)
+        outcomes = run(groups, partial(estimate_episodes, choice), workers)
         made = gathered(outcomes, choice)
         derived, names = any(one.get("derived") for one in made["episodes"]), joint_names(made)
         columns = force_columns(choice, names, derived=derived, valid=choice.anyway)

@@ -157,21 +157,18 @@ JOINED = ("observer", "joint", "axis")  #: By which an estimate and its error be
 
 def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
     """The rows of one log; a single one without an observer where none ran."""
-    sizes = pl.DataFrame(list(estimate_sizes(analysis)), schema=OF_ESTIMATE)
+    rows = pl.DataFrame([*estimate_sizes(analysis)], schema=OF_ESTIMATE)
+    empty = pl.DataFrame(schema=SCHEMA)
     if analysis.errors is not None:
-        others = pl.all().exclude("recording", "samples")
-        errors = analysis.errors.select(others, pl.col("samples").alias(COMPARED))
-        missing = [name for name in (*JOINED, *OF_ERROR) if name not in errors.columns]
-        errors = errors.with_columns(pl.lit(None, SCHEMA[name]).alias(name) for name in missing)
+        errors = analysis.errors.drop("recording").rename({"samples": COMPARED})
+        errors = pl.concat([empty.select(*JOINED, *OF_ERROR), errors], how="diagonal_relaxed")
         order = {"how": "full", "coalesce": True, "nulls_equal": True}
-        sizes = sizes.join(errors, on=JOINED, maintain_order="left_right", **order)  # type: ignore[arg-type]
-    if sizes.is_empty():
-        sizes = pl.DataFrame({"observer": [None]})
+        rows = rows.join(errors, on=JOINED, maintain_order="left_right", **order)  # type: ignore[arg-type]
+    if rows.is_empty():
+        rows = pl.DataFrame({"observer": [None]})
     facts = {"key": key, **log_facts(analysis)}
-    of_log = [pl.lit(facts[n], SCHEMA[n]).alias(n) for n in facts]
-    absent = [pl.lit(None, kind).alias(n) for n, kind in SCHEMA.items() if n not in sizes.columns]
-    whole = sizes.with_columns(absent).with_columns(of_log)
-    return whole.select(pl.col(n).cast(kind) for n, kind in SCHEMA.items())
+    rows = rows.with_columns(pl.lit(facts[n], SCHEMA[n]).alias(n) for n in facts)
+    return pl.concat([empty, rows], how="diagonal_relaxed").select(*SCHEMA)
 
 
 def log_facts(analysis: Analysis) -> dict[str, Any]:

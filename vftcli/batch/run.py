@@ -29,14 +29,9 @@ class BatchCount(NamedTuple):
     """Progress of a batch."""
 
     logs: int  #: How many logs there are.
-    before: int = 0  #: How many of them an earlier run did.
-    done: int = 0  #: How many this run did.
-    failed: int = 0  #: How many failed.
-
-    @property
-    def left(self) -> int:
-        """Number of tasks left."""
-        return self.logs - self.before - self.done - self.failed
+    before: int  #: How many of them an earlier run did.
+    done: int  #: How many this run did.
+    failed: int  #: How many failed.
 
 
 @dataclass(kw_only=True)
@@ -135,9 +130,9 @@ class BatchRun:
         with closing(ended):  # type: ignore[type-var]
             for outcome in ended:
                 self.take(outcome)
-                count = self.count()
-                over = count.logs - count.left
-                stage(f"{over}/{count.logs} logs, {count.failed} failed", over / count.logs)
+                failed, every = len(self.failures), len(self.logs)
+                over = self.before + len(self.done) + failed
+                stage(f"{over}/{every} logs, {failed} failed", over / every)
 
     def take(self, outcome: Outcome[LogTask]) -> None:
         """Keep what a log came to: why it failed, what it took."""
@@ -152,15 +147,6 @@ class BatchRun:
             failure = failure._replace(line=failure.line.removeprefix(name))
         for number in [n for n, key in self.keys.items() if key == task.key]:
             self.failures[number] = failure
-
-    def count(self) -> BatchCount:
-        """Progress so far."""
-        return BatchCount(
-            logs=len(self.logs),
-            before=self.before,
-            done=len(self.done),
-            failed=len(self.failures),
-        )
 
     def gather(self) -> "tuple[pl.DataFrame, BatchCount]":
         """Write the tables, the page and the record of what every log took."""
@@ -180,7 +166,8 @@ class BatchRun:
             schema=dict.fromkeys(("log", "key", "stage", "error", "line"), pl.String),
             orient="row",
         )
-        count = self.count()._replace(done=len(finished) - self.before)
+        done = len(finished) - self.before
+        count = BatchCount(len(self.logs), self.before, done, len(self.failures))
         # A report is a log's own page.
         own = finished if self.job.do == "report" else ()
         pages = {self.labels[n]: f"{self.folder.place(self.keys[n])}/index.html" for n in own}

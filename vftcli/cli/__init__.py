@@ -22,7 +22,7 @@ from vftcli.signals.errors import UnsettledRobotError, VftError
 from vftcli.signals.parsing import printable
 
 
-def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:
+def make_app(load: Collection[str] = COMMANDS) -> typer.Typer:
     """Make the command line; a command that is not to be loaded has its summary only."""
     app = typer.Typer(
         cls=JourneyGroup,
@@ -44,12 +44,6 @@ def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:
 
 
 HELP = {"help_option_names": ["-h", "--help"]}  #: How help is asked for.
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module's attributes are of every kind
-    if name == "app":
-        return make_app()
-    raise AttributeError(f"module 'vftcli.cli' has no attribute {name!r}")
 
 
 def show_version(asked: bool) -> None:
@@ -79,7 +73,9 @@ def main() -> None:
         os.environ[f"{library}_NUM_THREADS"] = "1"
     gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
     try:
-        make_app(asked_for())(prog_name="vftcli")
+        # A shell that completes may ask for any command; `help` is asked for one other.
+        words = with_command(sys.argv[1:])[:2]
+        make_app(COMMANDS if "_VFTCLI_COMPLETE" in os.environ else words)(prog_name="vftcli")
     except VftError as error:
         if isinstance(error, UnsettledRobotError) and not {"--json", "--csv"} & set(sys.argv):
             from vftcli.outputs.examination import holdings
@@ -93,14 +89,6 @@ def main() -> None:
             raise SystemExit(1) from None
         where = f": {error.filename}" if error.filename else ""
         fail(f"{error.strerror or error}{where}")
-
-
-def asked_for() -> set[str]:
-    """The command of this call, the one to explain, or the one that a shell completes."""
-    typed = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS")
-    words = typed.split() if typed and "_VFTCLI_COMPLETE" in os.environ else sys.argv
-    words = with_command(words[1:])
-    return set(words[:2] if words[:1] == ["help"] else words[:1])
 
 
 def launch() -> None:

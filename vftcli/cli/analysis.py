@@ -2,7 +2,7 @@
 
 import os
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from vftcli.bias.choice import RefinementChoice
 from vftcli.cli.console import health_of
@@ -64,7 +64,7 @@ def choice_for(
     library: "Library",
     *,
     on_screen: bool = False,
-    **others: Any,  # noqa: ANN401 - choices
+    observers: ObserverChoice | None = None,
 ) -> "AnalysisChoice":
     """What is asked of a command's logs; their health is said."""
     from vftcli.pipeline import choice_of
@@ -72,7 +72,7 @@ def choice_for(
     if "observer" in asked.words:
         give_back()
     examiner = health_of(library, anyway=asked.anyway, on_screen=on_screen)
-    return choice_of(asked, library, examiner, **others)
+    return choice_of(asked, library, examiner, observers)
 
 
 def outputs_of(asked: Asked) -> OutputChoice:

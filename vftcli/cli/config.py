@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from typer.core import TyperOption
 
 from vftcli.cli.commands import now_of
 from vftcli.cli.progress import echo
@@ -43,17 +42,6 @@ FILE = "file:"  #: What a reference's file begins with.
 WORDS: ContextVar[Sequence[str]] = ContextVar("words", default=())
 #: The file of options that this call reads, None for none.
 READ: ContextVar[Path | None] = ContextVar("read", default=None)
-
-
-def config_option() -> TyperOption:
-    """The option that names the file."""
-    return TyperOption(
-        param_decls=["--config"],
-        metavar="FILE",
-        expose_value=False,
-        help="Read options from FILE; none: from no file.",
-        type=str,
-    )
 
 
 def is_configured(command: Click) -> bool:
@@ -121,7 +109,10 @@ def keys_for(command: Click, path: Path) -> Table:
 
     Settings have their dotted names, and their values are texts.
     """
-    known, choices = known_options()
+    # A key that this command does not have may be another's.
+    reading = {name: each for name, each in every_command().items() if is_configured(each)}
+    known = {name: options_of(each) for name, each in reading.items()}
+    choices = choices_of(*reading.values())
     every = {key for options in known.values() for key in options}
     top, own = Table(), Table()
     if not (path.is_file() or path.is_fifo()):
@@ -187,34 +178,23 @@ def key_now(path: Path, key: str, value: Any) -> tuple[str, Any]:  # noqa: ANN40
     return option, form.replace("VALUE", text) if form else value
 
 
-def known_options() -> tuple[dict[str, dict[str, Any]], tuple[type[Choice], ...]]:
-    """The options that may be kept, by key, of each command that reads them; all choices."""
-    # A key that this command does not have may be another's.
-    reading = {name: each for name, each in every_command().items() if is_configured(each)}
-    choices = dict.fromkeys(kind for each in reading.values() for kind in choices_of(each))
-    return {name: options_of(each) for name, each in reading.items()}, (*choices,)
-
-
 def every_command() -> Mapping[str, Click]:
     """All commands by name, which loads them."""
     app = import_module("vftcli.cli").make_app()
     return dict(vars(typer.main.get_command(app))["commands"])
 
 
-def choices_of(command: Click) -> tuple[type[Choice], ...]:
-    """The choices that have a command's settings."""
-    return tuple(vars(command.callback)["choices"])
+def choices_of(*commands: Click) -> tuple[type[Choice], ...]:
+    """The choices that have the settings of some commands, each once."""
+    each = (kind for command in commands for kind in vars(command.callback)["choices"])
+    return tuple(dict.fromkeys(each))
 
 
 def options_of(command: Click) -> dict[str, Any]:
-    """Key → option of a command."""
+    """Option of a command by its key, its name as it is typed without dashes."""
     options = (p for p in command.params if p.param_type_name == "option")
-    return {key: p for p in options if (key := key_of(p)) not in TYPED}
-
-
-def key_of(option: Click) -> str:
-    """An option's name as it is typed, without its dashes."""
-    return str(max(option.opts, key=len)).lstrip("-")
+    every = {max(p.opts, key=len).lstrip("-"): p for p in options}
+    return {key: p for key, p in every.items() if key not in TYPED}
 
 
 def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> Any:  # noqa: ANN401

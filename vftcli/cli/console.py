@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from vftcli.cli.config import WORDS
-from vftcli.cli.progress import STAGES, is_terminal, is_watched
+from vftcli.cli.progress import STAGES, is_terminal
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import printable
@@ -41,7 +41,7 @@ def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
         raise typer.BadParameter("choose one of --details, --quiet")
     token = _level.set(DETAILS if details else QUIET if quiet else USUAL)
     try:
-        with heard_by(STAGES.hear if is_watched() and not quiet else nobody):
+        with heard_by(STAGES.hear if is_terminal(sys.stderr) and not quiet else nobody):
             yield
     finally:
         _level.reset(token)

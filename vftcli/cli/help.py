@@ -11,7 +11,7 @@ from functools import partial
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS, former, renewed, with_command
@@ -21,7 +21,6 @@ from vftcli.cli.config import (
     WORDS,
     Click,
     choices_of,
-    config_option,
     every_command,
     is_configured,
     kept_words,
@@ -42,7 +41,9 @@ class GroupedCommand(TyperCommand):
     def __init__(self, *words: Any, **more: Any) -> None:  # noqa: ANN401 - typer's own
         super().__init__(*words, **more)
         if is_configured(self):
-            self.params.append(config_option())
+            how: dict[str, Any] = {"metavar": "FILE", "type": str, "expose_value": False}
+            how["help"] = "Read options from FILE; none: from no file."
+            self.params.append(TyperOption(param_decls=["--config"], **how))
 
     def parse_args(self, ctx: Click, args: list[str]) -> Click:
         """Parse the words; of an option that there is not, name the nearest if it is near."""
@@ -66,11 +67,6 @@ class GroupedCommand(TyperCommand):
             echo(printable(words), err=True)
         return rest
 
-    def option(self, param: Click) -> Option:
-        """What a parameter was made of; of those of every command, what is not in their help."""
-        own: Option | None = vars(self.callback).get("options", {}).get(param.name)
-        return own or Option("", "", "", group=OUTPUT)
-
     def format_help(self, ctx: Click, formatter: Click) -> None:
         """Write how it is called, what it does, its options by group."""
         width = columns()
@@ -80,9 +76,11 @@ class GroupedCommand(TyperCommand):
         found: dict[str, list[tuple[str, str]]] = {}
         for param in self.get_params(ctx):
             if (record := row_of(param, ctx)) is not None:
+                # Those of every command were made of no option.
+                own = vars(self.callback).get("options", {}).get(param.name)
+                group = own.group or OWN if own else OUTPUT
                 is_log = param.param_type_name == "argument"
-                group = LOG if is_log else self.option(param).group or OWN
-                found.setdefault(group, []).append(record)
+                found.setdefault(LOG if is_log else group, []).append(record)
         others = [group for group in found if group not in GROUPS]
         for group in (LOG, *others, *GROUPS[1:]):
             if group in found:
@@ -259,9 +257,8 @@ def formats(name: str | None) -> Iterator[str]:
 
 def settings() -> Iterator[str]:
     """Every setting of all commands: name, unit, meaning and default."""
-    commands = every_command().values()
-    every = dict.fromkeys(kind for command in commands for kind in choices_of(command))
-    rows = sorted(row for kind in every for row in settings_of(kind))
+    choices = choices_of(*every_command().values())
+    rows = sorted(row for kind in choices for row in settings_of(kind))
     yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
     yield from two_columns(rows)
     yield "simulate has a scenario's keys: --set servo.stiffness=soft, --set duration=8."

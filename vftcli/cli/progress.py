@@ -124,11 +124,6 @@ def is_terminal(stream: TextIO | None) -> bool:
     return seen and os.environ.get("TERM") != "dumb"
 
 
-def is_watched() -> bool:
-    """Whether somebody looks at stderr."""
-    return is_terminal(sys.stderr)
-
-
 #: What has no width, as colours, and what is copied whole.
 COLOUR, COMMAND = re.compile(r"\x1b\[[0-9;]*m"), "vftcli "
 

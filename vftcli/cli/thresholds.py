@@ -10,10 +10,7 @@ from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
 from vftcli.signals.option import Anyway, Asked, Option
 
 if TYPE_CHECKING:
-    from vftcli.robots.run import Run
-    from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
-    from vftcli.signals.wrench import Wrench
 
 
 @opt.command(*OF_LOG, ReferenceChoice, Anyway, opt.Talk)
@@ -38,6 +35,8 @@ def contact_thresholds(
     from vftcli.answering import free_thresholds, modelled
     from vftcli.contacts.threshold_check import check_contacts, compared_signals, left_out
     from vftcli.contacts.thresholds import check_alike
+    from vftcli.evaluation.references import make_reference
+    from vftcli.free_motion.free_motion import FreeMotion
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
     from vftcli.readers.library import Library
@@ -55,7 +54,8 @@ def contact_thresholds(
     for log in check or ():
         pushed = modelled(library.open(log, choice.read.whole), choice)
         check_alike((signals[0], compared := compared_signals(pushed)))
-        truth = truth_of(pushed, reference or settled_reference(pushed.recording))
+        named = reference or settled_reference(pushed.recording)
+        truth = make_reference(FreeMotion(log=pushed), named) if named else (None, None)
         checks.append(check_contacts(compared, thresholds, *truth))
     if json:
         record = thresholds_record(thresholds, counted, checks)
@@ -70,19 +70,6 @@ def contact_thresholds(
     for remark in (*thresholds.remarks, *(remark for one in checks for remark in one.remarks)):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
     echo(thresholds_text(thresholds, counted, checks), nl=False)
-
-
-def truth_of(
-    run: "Run", asked: "ReferenceChoice | None"
-) -> "tuple[ExternalTorque | None, Wrench | None]":
-    """The true torque and wrench along a log, None where nothing says."""
-    from vftcli.evaluation.references import make_reference
-    from vftcli.free_motion.free_motion import FreeMotion
-
-    if asked is None:
-        return None, None
-    made = make_reference(FreeMotion(log=run), asked)
-    return made.torque, made.wrench
 
 
 def settled_reference(recording: "Recording") -> "ReferenceChoice | None":

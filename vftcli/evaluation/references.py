@@ -1,6 +1,6 @@
 """Reference torques, their sources, and estimates beside them: one table of errors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -137,46 +137,25 @@ def load_of(
     return ReferenceLoad(torque=torque, wrench=wrench)
 
 
-def zero_reference(motion: FreeMotion, _mounting: Mounting) -> ReferenceLoad:
-    """No contact at all: the reference of a free motion, of unknown error, with its contacts."""
-    log = motion.log
-    zero, remarks = np.zeros(log.q.shape), (caution("reference-zero"), *touched_remarks(log))
-    return ReferenceLoad(torque=ExternalTorque(name="zero", t=log.t, tau=zero, remarks=remarks))
-
-
-def vendor_reference(motion: FreeMotion, _mounting: Mounting) -> ReferenceLoad:
-    """The vendor's estimate in the log, torque on the robot, of unknown error."""
-    log, remarks = motion.log.recording, (caution("reference-vendor"),)
-    tau = log.require("tau_ext")
-    return ReferenceLoad(torque=ExternalTorque(name="vendor", t=log.t, tau=tau, remarks=remarks))
-
-
-def sensor_reference(motion: FreeMotion, mounting: Mounting) -> ReferenceLoad:
-    """τ_ext = J_Fᵀ w of the wrench that the log holds."""
-    log, robot = motion.log.recording, motion.log.robot
-    check_joints(log, robot)
-    wrench = logged_wrench(log, robot.chain, mounting)
-    return load_of(wrench, log, robot, "sensor", caution("reference-sensor"))
-
-
-#: One of `NAMES` of a choice → what makes it of a log, its free motion, and where tool
-#: and sensor sit.
-REFERENCES: dict[str, Callable[[FreeMotion, Mounting], ReferenceLoad]] = {
-    "zero": zero_reference,
-    "vendor": vendor_reference,
-    "two-cycle": lambda motion, _: ReferenceLoad(torque=two_cycle_reference(motion)),
-    "sensor": sensor_reference,
-}
-
-
 def make_reference(
     motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
 ) -> ReferenceLoad:
-    """The reference that is asked for, on the clock of the log that is compared."""
+    """The reference that is asked for, on the clock of the log that is compared.
+
+    That of no contact, and the vendor's estimate in the log, are of unknown error.
+    """
+    name, log, robot = choice.name, motion.log.recording, motion.log.robot
     if choice.path is not None:
-        log = motion.log
-        return file_reference(choice.path, log.recording, log.robot, mounting, choice.columns)
-    return REFERENCES[choice.name](motion, mounting)
+        return file_reference(choice.path, log, robot, mounting, choice.columns)
+    if name == "two-cycle":
+        return ReferenceLoad(two_cycle_reference(motion))
+    remark = caution(f"reference-{name}")
+    if name == "sensor":
+        check_joints(log, robot)
+        return load_of(logged_wrench(log, robot.chain, mounting), log, robot, name, remark)
+    touched = touched_remarks(motion.log) if name == "zero" else ()
+    tau = np.zeros(log.q.shape) if name == "zero" else log.require("tau_ext")
+    return ReferenceLoad(ExternalTorque(name=name, t=log.t, tau=tau, remarks=(remark, *touched)))
 
 
 def file_reference(
