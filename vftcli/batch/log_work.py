@@ -160,7 +160,8 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
     rows = pl.DataFrame([*estimate_sizes(analysis)], schema=OF_ESTIMATE)
     empty = pl.DataFrame(schema=SCHEMA)
     if analysis.errors is not None:
-        errors = analysis.errors.drop("recording").rename({"samples": COMPARED})
+        others = pl.all().exclude("recording", "samples")
+        errors = analysis.errors.select(others, pl.col("samples").alias(COMPARED))
         errors = pl.concat([empty.select(*JOINED, *OF_ERROR), errors], how="diagonal_relaxed")
         order = {"how": "full", "coalesce": True, "nulls_equal": True}
         rows = rows.join(errors, on=JOINED, maintain_order="left_right", **order)  # type: ignore[arg-type]
