@@ -101,7 +101,7 @@ class Replay:
         W must not rise in a recovery phase into which no force enters; V is that of (52).
         """
         dragged, motion = self.phases.dragged, self.motion
-        # Row k + 1 is in the phase of the force before it, row 0 in that of the first.
+        # Row k + 1 is in the phase of the force before it, row 0 in the first one's.
         hidden = np.concatenate([dragged[:1], dragged])
         W, V = np.full((2, *motion.x.shape), np.nan)
         with np.errstate(over="ignore", invalid="ignore"):

@@ -279,16 +279,16 @@ class Problem(NamedTuple):
 
     def step(self, x: Array) -> tuple[Array, float]:
         """Newton's step and the square of its decrement."""
+        from scipy.linalg import block_diag
+
         n, places = self.layout.inertial, self.layout.rotor_places
         gradient = self.R.T @ (self.R @ x - self.z)
         hessian = self.R.T @ self.R
-        inverse = np.linalg.inv(pseudo_inertias(x[:n]))
-        before = np.linalg.inv(pseudo_inertias(self.start[:n]))
-        for j, (now, then) in enumerate(zip(inverse, before, strict=True)):
-            place = slice(LINK * j, LINK * (j + 1))
-            gradient[place] += self.weight * np.einsum("rc,kcr->k", then - now, BASIS)
-            turned = now @ BASIS
-            hessian[place, place] += self.weight * np.einsum("krc,lcr->kl", turned, turned)
+        now, then = (np.linalg.inv(pseudo_inertias(y[:n])) for y in (x, self.start))
+        turned = now[:, None] @ BASIS
+        gradient[:n] += self.weight * np.einsum("jrc,kcr->jk", then - now, BASIS).ravel()
+        blocks = np.einsum("jkrc,jlcr->jkl", turned, turned)
+        hessian[:n, :n] += self.weight * block_diag(*blocks)
         J, J0 = x[places], self.start[places]
         gradient[places] += self.weight * (1.0 / J0 - 1.0 / J)
         hessian[places, places] += np.diag(self.weight / J**2)

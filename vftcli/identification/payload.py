@@ -194,15 +194,12 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
     """Columns sign(q̇)·(|g with load| − |g without|) per joint. (N, n, n)"""
-    n = robot.joints
     Y = torque_regressor(robot.chain, q, np.zeros_like(q), np.zeros_like(q))
     phi = chain_parameters(robot.loaded_chain)
     heavier = phi.copy()
     heavier[-LINK : -LINK + STATIC] += x
     growth = abs(Y @ heavier) - abs(Y @ phi)
-    out = np.zeros((len(q), n, n))
-    out[:, range(n), range(n)] = growth * sign
-    return out
+    return (growth * sign)[:, :, None] * np.eye(robot.joints)
 
 
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from vftcli.evaluation.published import TABLES
 from vftcli.outputs.charts import Chart
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 
 #: Variants of a value: by the printed formulas; by the corrected ones; these with R and Q
 #: read as densities; the reference's own error.
@@ -112,10 +113,10 @@ class Paper:
         if only is None:
             return tuple(self.items)
         names = [name.strip() for name in only.split(",") if name.strip()]
-        unknown = [name for name in names if name not in self.items]
-        if unknown or not names:
-            what = f"no {unknown[0]!r} in {self.name}" if unknown else "--only names nothing"
-            raise ParameterError(f"{what}; there is {', '.join(self.items)}")
+        if not names:
+            raise ParameterError(f"--only names nothing; there is {', '.join(self.items)}")
+        for name in names:
+            check_known(name, self.items, f"no {name!r} in {self.name}")
         return tuple(name for name in self.items if name in names)
 
 
@@ -175,6 +176,5 @@ PAPERS = {name: load_paper(name) for name in ("huang2025",)}
 
 def paper_of(name: str) -> Paper:
     """The paper of this name."""
-    if name not in PAPERS:
-        raise ParameterError(f"no paper {name!r}; there is {', '.join(PAPERS)}")
+    check_known(name, PAPERS, f"no paper {name!r}")
     return PAPERS[name]

@@ -106,36 +106,37 @@ def drawn(spec: PushesSpec, rng: np.random.Generator, duration: float) -> Iterat
         t += length
 
 
-class Hand:
-    """A hand during a run: it remembers where it took hold."""
+def hand_of(spec: HandSpec) -> SimulatedContact:
+    """A hand: spring and damper between the handle and where the hand moves."""
+    for name, rows in (("moves", spec.moves), ("turns", spec.turns)):
+        if rows and len(rows) != len(spec.spans):
+            raise ParameterError(
+                f"contacts.{spec.name}.{name} has {len(rows)} rows; it must have one for each of "
+                f"the {len(spec.spans)} spans"
+            )
+    grips = dict[int, Place]()
 
-    def __init__(self, spec: HandSpec) -> None:
-        self.spec = spec
-        self.grip: int | None = None
-        self.held_at, self.held_as = np.zeros(3), np.eye(3)
-
-    def wrench(self, k: int, t: float, place: Place) -> Array:
-        """Spring and damper between the handle and the hand. (6,) [N, N·m]"""
-        if k != self.grip:
-            # A hand takes hold where the handle is at that moment, wherever that may be.
-            self.grip, self.held_at, self.held_as = k, place.position, place.rotation
-        spec = self.spec
+    def wrench(k: int, t: float, place: Place) -> Array:
+        # A hand takes hold where the handle is at that moment, wherever that may be.
+        held = grips.setdefault(k, place)
         u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0
         way = minimum_jerk(u)
         move, turn = (
             np.array(rows[k]) if rows else np.zeros(3) for rows in (spec.moves, spec.turns)
         )
-        gap = self.held_at + way * move - place.position
+        gap = held.position + way * move - place.position
         force = spec.stiffness * gap - spec.damping * place.velocity
         torque = -spec.twist_damping * place.spin
         if spec.twist_stiffness:
             import pinocchio as pin
 
-            goal = pin.exp3(way * turn) @ self.held_as
+            goal = pin.exp3(way * turn) @ held.rotation
             torque += spec.twist_stiffness * pin.log3(goal @ place.rotation.T)
         left = spec.spans[k][1] - t
         hold = min(left / spec.release, 1.0) if spec.release > 0 else 1.0
         return hold * np.concatenate([force, torque])
+
+    return SimulatedContact(spec.spans, wrench)
 
 
 def stop_of(spec: StopSpec) -> SimulatedContact:
@@ -166,22 +167,15 @@ def pushes_of(pushes: Sequence[Push], *, in_link: bool = False) -> SimulatedCont
 
 def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> SimulatedContact:
     """A contact ready to act in a run of `duration` [s]; only pushes are drawn."""
-    where = f"contacts.{spec.name}"
     if isinstance(spec, PushesSpec):
         return pushes_of(list(drawn(spec, rng, duration)))
     if isinstance(spec, StopSpec):
         return stop_of(spec)
     if isinstance(spec, HandSpec):
-        for name, rows in (("moves", spec.moves), ("turns", spec.turns)):
-            if rows and len(rows) != len(spec.spans):
-                raise ParameterError(
-                    f"{where}.{name} has {len(rows)} rows; it must have one for each of the "
-                    f"{len(spec.spans)} spans"
-                )
-        return SimulatedContact(spec.spans, Hand(spec).wrench)
+        return hand_of(spec)
     if isinstance(spec, LoadSpec):
         if spec.weight < 0:
-            raise ParameterError(f"{where}.weight is negative")
+            raise ParameterError(f"contacts.{spec.name}.weight is negative")
         wrench, axes = np.array([0.0, 0.0, -spec.weight, 0.0, 0.0, 0.0]), "base"
     else:
         wrench, axes = np.concatenate([spec.force, spec.torque]), spec.axes
