@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots.robot_file import NUMBER
-from vftcli.signals.arrays import Array, frozen, one_each, seal
+from vftcli.signals.arrays import Array, frozen, one_each
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known
@@ -189,9 +189,6 @@ class Controller:
     rate: Array  #: 1/v₀; 0 for the traditional one. [s/m, s/rad]
     damping: Array  #: Damping of the recovery phase. [N·s/m, N·m·s/rad]
     parameters: Admittance  #: What it was built from.
-
-    def __post_init__(self) -> None:
-        seal(self, "alpha", "rate", "damping", shape=(6,), called="the controller")
 
     @property
     def name(self) -> str:

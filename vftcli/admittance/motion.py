@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.admittance.law import AXES, Admittance, Controller
+from vftcli.admittance.law import AXES, UNITS, Admittance, Controller
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_quaternion, log_quaternion, quaternion_product
 from vftcli.signals.series import intervals
 
@@ -69,19 +68,15 @@ class AxisMotion(NamedTuple):
 class Recursion:
     """The state of N controllers and one step of their motion, semi-implicit Euler (49)–(51).
 
-    Deviations x [m, rad] and velocities v [m/s, rad/s] are (N, 6).
+    Deviations x [m, rad] and velocities v [m/s, rad/s] are (N, 6); all have one period.
     """
 
     def __init__(
         self, controllers: Sequence[Controller], x: Array | float = 0.0, v: Array | float = 0.0
     ) -> None:
         """Start at deviations `x` with velocities `v`, (N, 6), (6,) or one number."""
-        if not controllers:
-            raise ParameterError("no controller to run; choose traditional, variable, or both")
         all_parameters, shape = [c.parameters for c in controllers], (len(controllers), 6)
-        self.period, *others = {parameters.period for parameters in all_parameters}
-        if others:
-            raise ParameterError("controllers that run side by side need the same control period")
+        self.period = all_parameters[0].period
         self.mass, self.damping, self.stiffness, self.limit = (
             np.array([getattr(p, name) for p in all_parameters])
             for name in ("mass", "damping", "stiffness", "speed_limit")
@@ -207,7 +202,7 @@ def row_of(
         "alpha": None if controller.kind == "traditional" else controller.alpha[axis],
         "xi": controller.xi[axis],
         "axis": AXES[axis],
-        "unit": "m" if axis < 3 else "rad",
+        "unit": UNITS[axis],
         "drag": drag.number,
         "start_s": start,
         "release_s": released,

@@ -1,6 +1,6 @@
 """The simulated arm with its servo and its contacts, one inner step at a time."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,8 @@ CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still move
 RUNAWAY = 200.0  #: Joint velocity no arm reaches. [rad/s]
 #: Largest relative deviation: drawn twice as large, it leaves nothing negative.
 LARGEST_SHARE = 0.45
+#: Signals of the joints that a run keeps: `vftcli.simulation.sensing.Samples` explains them.
+KEPT = ("q", "v", "a", "tau", "friction", "target_q", "target_dq", "target_ddq")
 #: Deviations that are not relative, and their largest. [m, N·m]
 ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
 
@@ -96,20 +98,6 @@ class TrueArm(NamedTuple):
     nominal: Robot  #: The controller's robot: the profile with the payload it knows of.
 
 
-@dataclass(frozen=True, kw_only=True)
-class JointSignals:
-    """True signals of the joints, one row an instant."""
-
-    q: Array  #: Positions, velocities, accelerations. (N, n) [rad, rad/s, rad/s²]
-    v: Array
-    a: Array
-    tau: Array  #: Drive torque. (N, n) [N·m]
-    friction: Array  #: Friction torque. (N, n) [N·m]
-    target_q: Array  #: The reference. (N, n)
-    target_dq: Array
-    target_ddq: Array
-
-
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
@@ -146,9 +134,7 @@ class Arm:
         #: and one more is for the state after the last. State and reference are those at
         #: the start of a step, all else holds over it.
         rows = self.steps + 1
-        self.history = JointSignals(
-            **{f.name: np.zeros((rows, len(q))) for f in fields(JointSignals)}
-        )
+        self.history = {name: np.zeros((rows, len(q))) for name in KEPT}
         #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
         self.wrenches = np.zeros((rows, *self.touching.wrenches.shape))
 
@@ -193,8 +179,9 @@ class Arm:
         if k >= self.steps:
             raise ParameterError(f"the run was prepared for {self.steps} steps and has made them")
         tau = self.servo.torque(forward, q_d, dq_d, plant.q, plant.v)
-        history.q[k], history.v[k], history.tau[k] = plant.q, plant.v, tau
-        history.target_q[k], history.target_dq[k], history.target_ddq[k] = q_d, dq_d, ddq_d
+        history["q"][k], history["v"][k], history["tau"][k] = plant.q, plant.v, tau
+        for name, target in zip(KEPT[-3:], (q_d, dq_d, ddq_d), strict=True):
+            history[name][k] = target
         t = (k + 0.5) * plant.step
         if k % WARMING_STEPS == 0:
             temperature = self.temperature(np.array([t]))
@@ -206,7 +193,7 @@ class Arm:
             self.wrenches[k] = self.touching.wrenches
         else:
             plant.advance(tau)
-        history.a[k], history.friction[k] = plant.a, plant.friction
+        history["a"][k], history["friction"][k] = plant.a, plant.friction
         self.made = k + 1
         if k % CHECK_STEPS == 0:
             self.check_motion()
@@ -231,20 +218,20 @@ class Arm:
         share = (t / (self.steps * self.scenario.step))[:, None]
         return np.asarray(begin + (end - begin) * share)
 
-    def close(self) -> JointSignals:
+    def close(self) -> dict[str, Array]:
         """The history so far; what has no value after the last step keeps its last."""
         self.check_motion()
         history, k = self.history, self.made
-        history.q[k], history.v[k] = self.plant.q, self.plant.v
-        for name in ("target_q", "target_dq", "target_ddq", "tau", "friction", "a"):
-            array = getattr(history, name)
+        for array in history.values():
             array[k] = array[k - 1]
-        return JointSignals(**{name: x[: k + 1] for name, x in vars(history).items()})
+        history["q"][k], history["v"][k] = self.plant.q, self.plant.v
+        return {name: array[: k + 1] for name, array in history.items()}
 
     def mean_torque(self, interval: float) -> Array:
         """Mean drive torque over the last `interval` [s], as the log measures it. (n,) [N·m]"""
         rows = max(round(interval / self.scenario.step), 1)
-        mean: Array = self.history.tau[max(self.made - rows, 0) : max(self.made, 1)].mean(axis=0)
+        tau = self.history["tau"][max(self.made - rows, 0) : max(self.made, 1)]
+        mean: Array = tau.mean(axis=0)
         return mean / self.true.gain + self.true.offset
 
 

@@ -4,7 +4,6 @@ Its estimate of contact: measured torque less the nominal model's, low-passed.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import rpy_matrix
 from vftcli.signals.series import resample_columns, summed
 from vftcli.signals.steady_filter import steady_filter
-from vftcli.simulation.arm import Arm, JointSignals, rigid_torque
+from vftcli.simulation.arm import Arm, rigid_torque
 from vftcli.simulation.scenario import SensingSpec
 from vftcli.simulation.trajectories import Reference
 
@@ -25,12 +24,19 @@ from vftcli.simulation.trajectories import Reference
 USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Samples(JointSignals):
+class Samples(NamedTuple):
     """The true signals at sampling instants; torque averaged or not."""
 
     time: Array  #: True time of each sample. (M,) [s]
     stamp: Array  #: The same on the log's clock, before jitter. (M,) [s]
+    q: Array  #: Positions, velocities, accelerations. (M, n) [rad, rad/s, rad/s²]
+    v: Array
+    a: Array
+    tau: Array  #: Drive torque. (M, n) [N·m]
+    friction: Array  #: Friction torque. (M, n) [N·m]
+    target_q: Array  #: The reference. (M, n) [rad, rad/s, rad/s²]
+    target_dq: Array
+    target_ddq: Array
 
 
 class Measured(NamedTuple):
@@ -71,21 +77,21 @@ def sample_run(arm: Arm) -> Samples:
     """The true signals of a finished run on the log's drifting clock."""
     spec, history = arm.scenario.sensing, arm.close()
     rate = log_rate(spec, arm.robot)
-    grid = np.arange(len(history.q), dtype=float) * arm.scenario.step
+    grid = np.arange(arm.made + 1, dtype=float) * arm.scenario.step
     end = grid[-1]
     count = int(np.floor(end * (1.0 + spec.clock_drift) * rate + 1e-6)) + 1
     stamp = np.arange(count, dtype=float) / rate
     time = np.minimum(stamp / (1.0 + spec.clock_drift), end)
     interval = 1.0 / rate / (1.0 + spec.clock_drift)
     names = ("q", "v", "target_q", "target_dq", "target_ddq")
-    signals = {name: resample_columns(time, grid, getattr(history, name)) for name in names}
+    signals = {name: resample_columns(time, grid, history[name]) for name in names}
     for name in ("a", "friction"):
         middle = grid[:-1] + 0.5 * arm.scenario.step
-        signals[name] = resample_columns(time, middle, getattr(history, name)[:-1])
+        signals[name] = resample_columns(time, middle, history[name][:-1])
     # The mean over the interval, or the last step: exact, for torque is constant over a
     # step.
     step = grid[1]
-    total = step * summed(history.tau[:-1])
+    total = step * summed(history["tau"][:-1])
     span = max(interval if spec.torque == "average" else 0.0, step)
     begin, stop = np.maximum(time - span, 0.0), np.maximum(time, step)
     grown = resample_columns(stop, grid, total) - resample_columns(begin, grid, total)
@@ -152,22 +158,21 @@ def controller_signals(
     nominal, K = arm.true.nominal, drive_constants(arm.robot)
     target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
     load, warm = gravity_torque(nominal, samples.target_q), arm.temperature(samples.time)
-    target_torque = rigid_torque(nominal.model, target)
-    signals = dict[str, Array]()
+
+    def modelled(motion: Reference) -> tuple[Array, Array]:
+        """Rigid-body and friction torque. (M, n) [N·m] each"""
+        losses = friction_torque(nominal.friction, motion.dq, load, temperature=warm)
+        return rigid_torque(nominal.model, motion), losses
+
+    signals, (target_torque, losses) = dict[str, Array](), modelled(target)
     if nominal.torque_constant is not None:
-        rubs = friction_torque(nominal.friction, samples.target_dq, load, temperature=warm)
-        signals["target_current"] = (target_torque + rubs) / nominal.torque_constant
-    q, dq = measured["q"], measured["dq"]
-    model_torque = rigid_torque(nominal.model, Reference(q, dq, samples.target_ddq))
-    model_torque += friction_torque(nominal.friction, dq, load, temperature=warm)
+        signals["target_current"] = (target_torque + losses) / nominal.torque_constant
+    model_torque = sum(modelled(Reference(measured["q"], measured["dq"], target.ddq)))
     torque = measured["torque"] if K is None else measured["current"] * K
     spec = arm.scenario.sensing
     step = 1.0 / log_rate(spec, arm.robot)
     # A first-order low-pass, exact for an input held over the step.
-    share, residual = (
-        1.0 - np.exp(-2.0 * np.pi * spec.vendor_cutoff * step),
-        torque - model_torque,
-    )
+    share, residual = -np.expm1(-2.0 * np.pi * spec.vendor_cutoff * step), torque - model_torque
     one = np.ones((1, residual.shape[1]))
     slow = (1.0 - share) * one[None], share * one
     residual, _ = steady_filter(*slow, residual, residual[:1], one)
@@ -194,25 +199,21 @@ def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None
     # Its own generator: mounting a sensor leaves the noise of all other signals as it
     # was.
     rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
-    model, data = arm.plant.model, arm.plant.model.createData()
-    frame, axes = model.getFrameId("flange"), pin.LOCAL_WORLD_ALIGNED
-    clean, turn = np.zeros((len(samples.time), 6)), rpy_matrix(spec.rpy)
-    position, tool = np.array(spec.position), np.array(spec.tool_com)
+    turn, tool = rpy_matrix(spec.rpy), np.array(spec.tool_com)
+    model, clean = arm.true.chain.to_pinocchio(), np.zeros((len(samples.time), 6))
+    flange = model.frames[model.getFrameId("flange")]
+    # A frame in sensor axes at the centre of mass of what is beyond it.
+    place = flange.placement * pin.SE3(turn, spec.position + turn @ tool)
+    frame = model.addFrame(pin.Frame("tool", flange.parentJoint, place, pin.OP_FRAME))
+    data = model.createData()
     for k, motion in enumerate(zip(samples.q, samples.v, samples.a, strict=True)):
         pin.forwardKinematics(model, data, *motion)
-        flange = pin.updateFramePlacement(model, data, frame).rotation
-        moving = pin.getFrameClassicalAcceleration(model, data, frame, axes)
-        spin = pin.getFrameVelocity(model, data, frame, axes).angular
-        R = flange @ turn  # of the sensor in the base
-        arm_of_tool = flange @ position + R @ tool
-        swing = np.cross(moving.angular, arm_of_tool) + np.cross(
-            spin, np.cross(spin, arm_of_tool)
-        )
-        weight = spec.tool_mass * (R.T @ (model.gravity.linear - (moving.linear + swing)))
-        force = R.T @ wrench[k, :3]
-        moment = R.T @ wrench[k, 3:] - np.cross(turn.T @ position, force)
+        back = pin.updateFramePlacement(model, data, frame).rotation.T
+        moving = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL).linear
+        weight = spec.tool_mass * (back @ model.gravity.linear - moving)
+        force, moment = back @ wrench[k, :3], back @ wrench[k, 3:]
         clean[k, :3] = force + weight
-        clean[k, 3:] = moment + np.cross(tool, weight)
+        clean[k, 3:] = moment - np.cross(spec.position @ turn, force) + np.cross(tool, weight)
     noise = np.repeat([spec.noise_force, spec.noise_torque], 3)
     drift = np.repeat([spec.drift_force, spec.drift_torque], 3)
     reading: Array = clean + np.array(spec.bias) + np.outer(samples.time, drift)

@@ -13,7 +13,7 @@ from vftcli.readers.bags.ros_messages import (
     stamped,
     type_store,
 )
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.simulation.experiment import FlangeMotion, Simulation
 from vftcli.wrench.solvers import wrench_of
 
@@ -26,9 +26,6 @@ ROBOT_STATE = "franka_msgs/FrankaRobotState"
 
 WRENCH, TWIST = ("force", "torque"), ("linear", "angular")  #: Names of a message's two vectors.
 UPRIGHT = np.array([[0.0, 0.0, 0.0, 1.0]])  #: The quaternion of no rotation, x, y, z, w.
-
-Rows = NDArray[np.int64]
-Nanoseconds = NDArray[np.int64]
 
 
 #: Messages of one topic: its name, their type as package/Name, one serialised a row
@@ -61,7 +58,7 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
                 bag.write(connection, stamp + RECEIVED_LATER_NS, messages[k].tobytes())
 
 
-def joint_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Topic:
+def joint_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topic:
     """`/joint_states`, effort in ampere for a current-driven arm, in N·m for the others."""
     names = [f"{name.removesuffix('_joint')}_joint" for name in simulation.robot.chain.names]
     seen = simulation.measured.signals
@@ -75,7 +72,7 @@ def joint_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
     return "/joint_states", JOINT_STATE, serialised(JOINT_STATE, values, len(rows))
 
 
-def wrenches(readings: Array, stamps: Nanoseconds) -> Topic:
+def wrenches(readings: Array, stamps: Indices) -> Topic:
     """`/force_torque_sensor_broadcaster/wrench` in the sensor's frame, force ON the robot."""
     values = {
         **stamped(stamps),
@@ -86,7 +83,7 @@ def wrenches(readings: Array, stamps: Nanoseconds) -> Topic:
     return "/force_torque_sensor_broadcaster/wrench", WRENCH_STAMPED, messages
 
 
-def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Topic:
+def robot_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topic:
     """Franka's state topic, signs as libfranka's; other fields are zero."""
     samples, seen = simulation.samples, simulation.measured.signals
     names = [f"{simulation.robot.name}_joint{j}" for j in range(1, 8)]
