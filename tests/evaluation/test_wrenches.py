@@ -67,8 +67,6 @@ def test_contacts_stand_below_the_errors() -> None:
         contacts=3,
         listed=5,
         missed=1,
-        merged=1,
-        split=1,
         false_alarms=2,
         false_alarms_per_h=7.5,
         delay=(0.1, 0.3, np.nan),
@@ -79,7 +77,7 @@ def test_contacts_stand_below_the_errors() -> None:
     assert row["contacts"] == 3
     assert row["listed_contacts"] == 5
     assert row["found_contacts"] == 2
-    assert row["missed_contacts"] == row["merged_contacts"] == row["split_contacts"] == 1
+    assert row["missed_contacts"] == 1
     assert row["false_alarms"] == 2
     assert row["false_alarms_per_h"] == 7.5
     assert row["detection_delay_s"] == pytest.approx(0.2)  # the mean of those that were found

@@ -337,14 +337,14 @@ def test_the_paper_s_bounds_are_of_a_sensor(
 
 
 def test_contacts_are_counted_in_whole_numbers() -> None:
-    counts = {"contacts": 3, "listed": 4, "found": 3, "missed": 0, "merged": 0, "split": 1}
+    counts = {"contacts": 3, "listed": 4, "found": 3, "missed": 0}
     row: dict[str, object] = {"recording": "run.csv", "observer": "gmo", "signal": "torque"}
     row |= {k if k == "contacts" else f"{k}_contacts": count for k, count in counts.items()}
     row |= {"false_alarms": 0, "false_alarms_per_h": 0.0, "detection_delay_s": 0.04}
     row |= {"longest_delay_s": None}
     (grid,) = contact_grids(pl.DataFrame([row, row | {"contacts": None}]))
     assert terminal(grid, width=200).splitlines()[2].split() == [
-        "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "1", "0", "0", "0.0400", "–",
+        "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "0", "0.0400", "–",
     ]  # fmt: skip
     assert list(contact_grids(pl.DataFrame({"recording": ["a"]}))) == []
 

@@ -70,11 +70,6 @@ class FreeStatistics(NamedTuple):
     remarks: tuple[Remark, ...]  #: What it is and how it was found, and a load that it carries.
     basis: Basis = "free motion"  #: What tells a contact from an error of the model.
 
-    def in_blocks(self, seconds: float) -> "FreeStatistics | None":
-        """The statistics by blocks of another length [s]; None if no stretch holds enough."""
-        found = noise_of(self.log, self.free, seconds, known=self.basis == "free motion")
-        return None if found is None else self._replace(noise=found[0], pieces=found[1])
-
 
 def block_length(t: Array) -> float:
     """Length of a block for a clock. [s]"""

@@ -26,6 +26,7 @@ from vftcli.contacts.free_statistics import (
     free_part,
     free_statistics,
     inferred_statistics,
+    noise_of,
     observed,
 )
 from vftcli.contacts.rows import (
@@ -211,25 +212,29 @@ def fine_rows(
     free: FreeStatistics, brief: Sequence[int], measurement: ContactMeasurement
 ) -> list[Contact]:
     """Rows of short contacts by blocks that cut their peaks less, none where there are no such."""
-    found = measurement.found
-    seconds, usual = max(FINE, free.log.step), block_length(free.log.t)
+    run, found = free.log, measurement.found
+    seconds, usual = max(FINE, run.step), block_length(run.t)
     # On a clock that jitters blocks are as short as they may be.
-    fine = free.in_blocks(seconds) if seconds < 0.7 * usual <= 0.7 * BLOCK else None
+    if not seconds < 0.7 * usual <= 0.7 * BLOCK:
+        return []
+    fine = noise_of(run, free.free, seconds, known=free.basis == "free motion")
     if fine is None:
         return []
-    blocks = disturbance_blocks(fine.log.terms, fine.log.q, seconds)
+    noise, _ = fine
+    blocks = disturbance_blocks(run.terms, run.q, seconds)
     ends = [times_of(found.log.blocks, run) for run in found.runs]
     spans = [(a, b) for a, b in blocks.t.searchsorted(ends).tolist()]
     others = [span for k, span in enumerate(spans) if k not in brief]
-    process = error_process(fine.noise, blocks).hiding(covered(others, len(blocks.t), 1))
+    process = error_process(noise, blocks).hiding(covered(others, len(blocks.t), 1))
     some = found.kept(brief)._replace(
         log=BlockLog(blocks, process),
-        places=places(fine.log.robot.loaded_chain, blocks.q),
+        places=places(run.robot.loaded_chain, blocks.q),
         runs=[spans[k] for k in brief],
     )
     # Where it is takes no peak, and is known best from the longer blocks.
     locations = [measurement.locations[k] for k in brief]
-    return ContactMeasurement.of(some, fine, measurement, BENT_SHORT).rows(locations)
+    fine_free = free._replace(noise=noise)
+    return ContactMeasurement.of(some, fine_free, measurement, BENT_SHORT).rows(locations)
 
 
 def is_stop(run: Run, found: Candidates, number: int, seconds: float) -> bool:

@@ -84,12 +84,9 @@ def arm_parts(joints: int) -> dict[int, ArmPart]:
     6 and 7, and 4 and 5. What comes before is the upper arm.
     """
     forearm, wrist = (3, 4) if joints <= 6 else (4, 6)
-    found: dict[int, ArmPart] = {0: "wrist"}
-    for link in range(1, joints + 1):
-        found[link] = "wrist" if link >= wrist else "forearm"
-        if link < forearm:
-            found[link] = "upper arm"
-    return found
+    links = range(1, joints + 1)
+    names: list[ArmPart] = ["upper arm", "forearm", "wrist"]
+    return {0: "wrist", **{k: names[(k >= forearm) + (k >= wrist)] for k in links}}
 
 
 class PointFit(NamedTuple):

@@ -74,8 +74,8 @@ def evaluate_wrenches(
 #: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench"
 #: or "list".
 #:
-#: One to one: of the true contacts some are found; of those missed some are merged, which
-#: run into others. Rows that are neither credited nor false alarms are splits.
+#: One to one: rows that are neither credited to a true contact nor false alarms are pieces
+#: of one, or its echo.
 CONTACT_SCHEMA: Schema = {
     "recording": pl.String,
     "observer": pl.String,
@@ -85,8 +85,6 @@ CONTACT_SCHEMA: Schema = {
     "listed_contacts": pl.Int64,
     "found_contacts": pl.Int64,
     "missed_contacts": pl.Int64,
-    "merged_contacts": pl.Int64,
-    "split_contacts": pl.Int64,
     "false_alarms": pl.Int64,
     "false_alarms_per_h": pl.Float64,
     "detection_delay_s": pl.Float64,
@@ -101,7 +99,7 @@ def with_contacts(
     rows = []
     for score in contacts:
         of, own = score.detection, (recording, score.name, reference, score.signal)
-        counts = of.contacts, of.listed, of.found, of.missed, of.merged, of.split, of.false_alarms
+        counts = of.contacts, of.listed, of.found, of.missed, of.false_alarms
         row = (*own, *counts, of.false_alarms_per_h, of.mean_delay, of.longest_delay)
         rows.append(dict(zip(CONTACT_SCHEMA, row, strict=True)))
     return pl.concat([errors, tidy(rows, CONTACT_SCHEMA)], how="diagonal")

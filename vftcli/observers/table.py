@@ -10,7 +10,7 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots.profile import checked_gains
 from vftcli.robots.robot_file import PER_JOINT, TEXT, RobotFile
-from vftcli.signals.arrays import Array, one_each
+from vftcli.signals.arrays import one_each
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known, shown
@@ -166,43 +166,36 @@ class Entry(NamedTuple):
     online: bool = True  #: Whether it could run while the log is being written.
 
 
-def build_fdo(setup: Setup, name: str) -> Built:
-    """Filtered dynamics observer, cutoff given or from the Kalman filter."""
-    omega, origin = first_order_gain(setup, name, "omega")
-    if not origin and np.any(omega != omega[0]):
-        raise ParameterError("fdo.omega takes one cutoff for all joints; gmo.gain takes one each")
-    # One cutoff for all joints: the one with the joints' mean delay.
-    cutoff = float(1.0 / np.mean(1.0 / omega) if origin else omega[0])
-    observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
-    said = {"parameter": "fdo.omega", "gain": cutoff, "unit": "rad/s"}
-    return observer, tuple(fact(code, **said) for code in origin)
+def build_first_order(setup: Setup, name: str) -> Built:
+    """The fdo, or gmo, its gain (n,) [1/s] given or not, which a remark says.
 
-
-def build_gmo(setup: Setup, name: str) -> Built:
-    """The momentum observer, its gains given or left over from the Kalman filter."""
-    gain, origin = first_order_gain(setup, name, "gain")
-    observer = MomentumObserver(gain=gain, as_printed=setup.as_printed)
-    said = {"parameter": "gmo.gain", "gain": gain, "unit": "1/s"}
-    return observer, tuple(fact(code, **said) for code in origin)
-
-
-def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tuple[str, ...]]:
-    """A first-order observer's gain (n,) [1/s], and a remark's code if not given.
-
-    It is then the inverse of the Kalman filter's delay, a file's R and Q read as
+    If not given it is the inverse of the Kalman filter's delay, a file's R and Q read as
     densities; `FALLBACK_RATE` where no gains are given at all; and on a slow clock at
     most 2/Ts, which takes each sample's raw disturbance as it is: from there on the
-    observer would overshoot.
+    observer would overshoot. Of the fdo all joints have one: the one with their mean delay.
     """
-    given = parameters_given(setup, name, name)
+    (parameter,), given = PARAMETERS[name], parameters_given(setup, name, name)
+    full, origin = f"{name}.{parameter}", ""
     if parameter in given:
-        return one_each(given[parameter], setup.joints, f"{name}.{parameter}"), ()
-    rate, origin = np.full(setup.joints, FALLBACK_RATE), "gain-from-default"
-    if "kfo" in setup.gains or "kfo" in setup.settings:
-        kalman, _ = build_kfo(read_as("density", setup), "kfo-fe")
-        rate = 1.0 / kalman.tuning(setup.step, setup.joints).delay
-        origin = "gain-from-kalman-delay"
-    return np.minimum(rate, 2.0 / setup.step), (origin,)
+        rate = one_each(given[parameter], setup.joints, full)
+    else:
+        rate, origin = np.full(setup.joints, FALLBACK_RATE), "gain-from-default"
+        if "kfo" in setup.gains or "kfo" in setup.settings:
+            kalman, _ = build_kfo(read_as("density", setup), "kfo-fe")
+            rate = 1.0 / kalman.tuning(setup.step, setup.joints).delay
+            origin = "gain-from-kalman-delay"
+        rate = np.minimum(rate, 2.0 / setup.step)
+    observer: Observer = MomentumObserver(gain=rate, as_printed=setup.as_printed)
+    said: dict[str, Any] = {"parameter": full, "gain": rate, "unit": "1/s"}
+    if name == "fdo":
+        if not origin and np.any(rate != rate[0]):
+            raise ParameterError(
+                "fdo.omega takes one cutoff for all joints; gmo.gain takes one each"
+            )
+        cutoff = float(1.0 / np.mean(1.0 / rate) if origin else rate[0])
+        observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
+        said |= {"gain": cutoff, "unit": "rad/s"}
+    return observer, (fact(origin, **said),) if origin else ()
 
 
 def read_as(convention: str, setup: Setup) -> Setup:
@@ -273,14 +266,14 @@ OBSERVERS: dict[str, Entry] = {
         "fdo",
         "(19)–(29)",
         "low-pass filtered equation of motion; one cutoff for all joints",
-        build_fdo,
+        build_first_order,
     ),
     "gmo": Entry(
         "generalised momentum observer",
         "gmo",
         "(30)–(35)",
         "first-order residual of the momentum balance; one gain a joint",
-        build_gmo,
+        build_first_order,
     ),
     "kfo-fe": Entry(
         "disturbance Kalman filter, forward Euler",

@@ -26,8 +26,6 @@ CONTACTS = {
     "listed_contacts": "rows",
     "found_contacts": "found",
     "missed_contacts": "missed",
-    "merged_contacts": "of them merged",
-    "split_contacts": "split",
     "false_alarms": "false",
     "false_alarms_per_h": "false alarms/h",
     "detection_delay_s": "mean delay [s]",

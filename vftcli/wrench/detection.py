@@ -90,9 +90,6 @@ class Detection(NamedTuple):
     contacts: int  #: True contacts.
     listed: int  #: Found contacts, right or wrong.
     missed: int  #: True contacts to which no found one is credited.
-    merged: int  #: Those of them that run into another: what overlaps them is credited elsewhere.
-    #: Found contacts that are neither credited nor false: pieces of a true one, its echo.
-    split: int
     false_alarms: int  #: Found contacts that begin where nothing touches the arm.
     false_alarms_per_h: float  #: Those per hour without contact. [1/h]
     #: Time from each true contact's start to the one found; NaN where missed. [s]
@@ -151,19 +148,15 @@ def match_contacts(
     What begins within `LATE` of a true contact's end is no false alarm, but credited only
     where it overlaps one; what begins too early is one, credited or not.
     """
-    given, shared = assignment(found, true), overlaps(found, true) > 0.0
-    missed = [j for j, i in enumerate(given) if i is None]
-    meant = [(c.start - EARLY, c.stop + LATE) for c in true]
-    false = {i for i, f in enumerate(found) if not any(a <= f.start <= b for a, b in meant)}
+    given, meant = assignment(found, true), [(c.start - EARLY, c.stop + LATE) for c in true]
+    false = sum(not any(a <= f.start <= b for a, b in meant) for f in found)
     free = duration - sum(c.stop - c.start for c in true)
     return Detection(
         contacts=len(true),
         listed=len(found),
-        missed=len(missed),
-        merged=int(np.count_nonzero(shared[:, missed].any(axis=0))),
-        split=len(found) - len({i for i in given if i is not None} | false),
-        false_alarms=len(false),
-        false_alarms_per_h=len(false) * 3600.0 / free if free > 0 else float("nan"),
+        missed=given.count(None),
+        false_alarms=false,
+        false_alarms_per_h=false * 3600.0 / free if free > 0 else float("nan"),
         delay=tuple(
             float("nan") if i is None else max(found[i].start - c.start, 0.0)
             for i, c in zip(given, true, strict=True)

@@ -140,8 +140,8 @@ def sense(
     moved = [zero_moved(*pair) for row in drifts[1:] for pair in zip(drifts[0], row, strict=True)]
     # Only now: the band and the warnings are about the wrench as it was read.
     if drifts:
-        drifts[0] = [drift._replace(removed=True) for drift in drifts[0]]
         wrenches = [*map(without_drift, wrenches, drifts[0])]
+        drifts[0] = [drift._replace(removed=True) for drift in drifts[0]]
     return SensorReading(
         sensor=sensor,
         wrenches=tuple(wrenches),

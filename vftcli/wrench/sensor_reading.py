@@ -102,12 +102,6 @@ class SensorReading(Shown):
         return float(self.masked.mean())
 
     @property
-    def null_space_limit(self) -> float | None:
-        """Limit of the null-space torque, None of six joints or without a free part. [N·m]"""
-        limits = (null_space_limit(wrench, self.free) for wrench in self.wrenches)
-        return next((limit for limit in limits if limit is not None), None)
-
-    @property
     def hides(self) -> bool:
         """Whether there are samples in which the pose hides a part of the wrench."""
         return any(wrench.hidden.any() for wrench in self.wrenches)
@@ -136,9 +130,8 @@ def with_reference(
         return replace(reading, reference=reference)
     remarks = list(reading.remarks)
     if reading.zero_span is not None:
-        drift = zero_drift(reference, reading.zero_span)._replace(removed=True)
-        reference = without_drift(reference, drift)
-        remarks.append(drift.remark)
+        reference = without_drift(reference, zero_drift(reference, reading.zero_span))
+        remarks.append(reference.remarks[-1])
     for wrench in reading.wrenches:
         offset = time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
         where, values = Where(wrench.name), {"correlation": offset.correlation}
