@@ -315,7 +315,12 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
 
     def explains(cause: Cause) -> bool:
         limit = SLIGHT if cause.code == "effort-offset" else EXPLAINED
-        little = cause.misfit < limit * case.misfit and is_evident(case, cause)
+        little = cause.misfit < limit * case.misfit and (
+            case.misfit > OPEN
+            or cause.code in ON_JOINTS
+            # No errors of a rough description explain as much.
+            or cause.misfit < EVIDENT * case.rough.size / case.size
+        )
         return cause.misfit <= OPEN and (little or is_plain(case, cause))
 
     found = sorted(filter(explains, found), key=lambda cause: cause.misfit)
@@ -331,13 +336,6 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
     implied = {best.code, "joint-sign" if best.code == "effort-sign" else ""}
     near = (c for c in found if c.misfit < AMBIGUOUS * best.misfit and c.code not in implied)
     return Diagnosis(case, best, next(near, None))
-
-
-def is_evident(case: Case, cause: Cause) -> bool:
-    """Whether no errors of a rough description explain as much as a cause does."""
-    if case.misfit > OPEN or cause.code in ON_JOINTS:
-        return True
-    return cause.misfit < EVIDENT * case.rough.size / case.size
 
 
 def is_plain(case: Case, cause: Cause) -> bool:

@@ -62,13 +62,6 @@ def decompose(jacobian: Array) -> Decomposition:
     return Decomposition(scaled, U, squares)
 
 
-class Solution(NamedTuple):
-    """A linear estimate w = A τ and the square root B of its covariance, cov = B Bᵀ."""
-
-    gain: Array  #: A, from joint torque to wrench. (T, 6, n)
-    root: Array  #: B. (T, 6, k)
-
-
 def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
     """S U diag(1/λ) Uᵀ J_s; no gain in singular values of at most `left_out` [m]. (T, 6, n)"""
     # λ is a difference of larger numbers: below its rounding it may even be negative.
@@ -80,8 +73,9 @@ def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
     return SCALE[:, None] * ((U * inverse[:, None, :]) @ (U.swapaxes(1, 2) @ parts.scaled))
 
 
-#: Standard deviations of joint torques (T, n) [N·m] → the estimate for them.
-Solver = Callable[[Array], Solution]
+#: Standard deviations of joint torques (T, n) [N·m] → A (T, 6, n) of the estimate w = Aτ for
+#: them, and B (T, 6, k) of its covariance BBᵀ.
+Solver = Callable[[Array], tuple[Array, Array]]
 
 
 def pinv(parts: Decomposition, X: Array) -> Solver:
@@ -90,7 +84,7 @@ def pinv(parts: Decomposition, X: Array) -> Solver:
     Its covariance is that of the torque, seen through it.
     """
     gain = X @ least_squares_gain(parts)
-    return lambda sd: Solution(gain, gain * sd[:, None, :])
+    return lambda sd: (gain, gain * sd[:, None, :])
 
 
 def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
@@ -100,13 +94,13 @@ def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
     where the pose is good, and next to the prior where the pose cannot tell.
     """
 
-    def solve(sd: Array) -> Solution:
+    def solve(sd: Array) -> tuple[Array, Array]:
         weighted = parts.scaled / sd[:, None, :]
         information = weighted @ weighted.swapaxes(1, 2) + np.diag(PRIOR**-2)
         root = np.linalg.inv(np.linalg.cholesky(information))  # C = rootᵀ root
         C = root.swapaxes(1, 2) @ root
         scaled = X * SCALE
-        return Solution(scaled @ (C @ (weighted / sd[:, None, :])), scaled @ root.swapaxes(1, 2))
+        return scaled @ (C @ (weighted / sd[:, None, :])), scaled @ root.swapaxes(1, 2)
 
     return solve
 
