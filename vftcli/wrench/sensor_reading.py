@@ -130,8 +130,9 @@ def with_reference(
         return replace(reading, reference=reference)
     remarks = list(reading.remarks)
     if reading.zero_span is not None:
-        reference = without_drift(reference, zero_drift(reference, reading.zero_span))
-        remarks.append(reference.remarks[-1])
+        drift = zero_drift(reference, reading.zero_span)._replace(removed=True)
+        reference = without_drift(reference, drift)
+        remarks.append(drift.remark)
     for wrench in reading.wrenches:
         offset = time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
         where, values = Where(wrench.name), {"correlation": offset.correlation}
