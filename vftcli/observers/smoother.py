@@ -67,8 +67,10 @@ class KalmanSmoother(Shown):
             (tau, late), _ = filtered(of_error, g, d, start, wanted)
             nu = d.copy(order="K")
             nu[1:] += late[:-1]
-            later, first = from_the_end(F.swapaxes(0, 1), b, nu / S, np.array([p12, p22]))
-            return tau - later, first
+            del late  # a long log's series are large
+            nu /= S
+            later, first = from_the_end(F.swapaxes(0, 1), b, nu, np.array([p12, p22]))
+            return np.subtract(tau, later, out=tau), first
 
         tau, score = smoothed(d, np.zeros((2, n)))
         # Λ̃ᵗ = Fᵀ(Λ̃ᵗ⁺¹)F + AᵀCᵀCA/S of its entries 11, 12, 22; P₂₂ less [P₁₂ P₂₂] Λ̃
@@ -83,8 +85,8 @@ class KalmanSmoother(Shown):
         )
         shown = np.array([np.ones_like(a12), a12, a12**2]) / S
         weights = np.array([p12**2, 2.0 * p12 * p22, p22**2])
-        gained, known = from_the_end(information, shown, np.ones_like(tau), weights)
-        variance = p22 - gained
+        variance, known = from_the_end(information, shown, np.ones_like(tau), weights)
+        np.subtract(p22, variance, out=variance)
         if len(d) > 1 and model.a22.all():
             # Whatever was before the log: x⁰ is x̂⁰ − M⁻¹λ̃⁰ ± M⁻¹, M = Λ̃⁰ + S/R² of p⁰
             # alone.
@@ -95,7 +97,7 @@ class KalmanSmoother(Shown):
             start = np.linalg.inv(of_error[first].T).T * np.array([[[-1.0], [1.0]]])
             units = np.array([smoothed(np.zeros_like(d), start[:, k])[0] for k in range(2)])
             tau -= np.einsum("itn,nij,jn->tn", units, spread, score)
-            variance = variance + np.einsum("itn,nij,jtn->tn", units, spread, units)
+            variance += np.einsum("itn,nij,jtn->tn", units, spread, units)
         sd = handed_over(np.sqrt(variance))
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=sd)
 

@@ -127,7 +127,8 @@ class ExternalTorque(TimeSeries):
         check_shape(self.tau, ("T", "n"), "tau", self.name)
         check_clock(self.t, self.name)
         shape = len(self.t), self.joints
-        seal(self, "tau", "sd", "error_sd", shape=shape, called=self.name)
+        seal(self, "tau", "sd", shape=shape, called=self.name)
+        seal(self, "error_sd", shape=shape, called=self.name, kind=np.float32)
         seal(self, "floor", shape=shape[1:], called=self.name)
         seal(self, "moving", shape=shape, called=self.name, kind=bool)
 
