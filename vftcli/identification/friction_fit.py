@@ -167,10 +167,9 @@ def fit_frictions(data: Training) -> dict[int, JointFit]:
 
 def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: bool) -> JointFit:
     """Fit of joint j (from 0), with its drive constant or without."""
-    given = data_of_joint(data, j, constant)
-    if not data.rubs:
-        return JointFit(Shape(()), given.fit(Shape(())), {}, constant, presliding)
-    shape, scores = choose_shape(given, presliding.length)
+    given, shape, scores = data_of_joint(data, j, constant), Shape(()), dict[Shape, float]()
+    if data.rubs:
+        shape, scores = choose_shape(given, presliding.length)
     fit, errors = given.fit(shape), (np.nan, np.nan)
     if given.profile is not None and scores:
         miss = np.sum(fit.weights * (given.y - given.profile) ** 2) / fit.weights.sum()

@@ -197,7 +197,7 @@ def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
 
 def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
     """Torque of mass and first moments in the last link's frame. (N, n, 4)"""
-    return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
+    return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK : STATIC - LINK]
 
 
 def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:

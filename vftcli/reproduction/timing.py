@@ -227,11 +227,12 @@ def first_order_loops(
 ) -> tuple[Array, Array]:
     """FDO and GMO, one sample after another."""
     a = 0.5 * rate * step
+    keep, share = (1 - a) / (1 + a), a / (1 + a)
     y1, y2, r = np.zeros(p.shape[1]), -rate * p[0], np.zeros(p.shape[1])
     for k in range(1, len(p)):
-        y1 = (1 - a) / (1 + a) * y1 - a / (1 + a) * (mu[k] + mu[k - 1])
-        y2 = (1 - a) / (1 + a) * y2 - rate * a / (1 + a) * (p[k] + p[k - 1])
-        r = ((1 - a) * r + rate * (p[k] - p[k - 1]) - a * (mu[k] + mu[k - 1])) / (1 + a)
+        y1 = keep * y1 - share * (mu[k] + mu[k - 1])
+        y2 = keep * y2 - rate * share * (p[k] + p[k - 1])
+        r = keep * r + rate / (1 + a) * (p[k] - p[k - 1]) - share * (mu[k] + mu[k - 1])
     return y1 + y2 + rate * p[-1], r
 
 

@@ -205,7 +205,7 @@ class Plant:
         self.true_friction, self.step = friction, step
         self.q, self.v = np.array(q, float), np.array(v, float)
         self.q_mid, self.v_mid, self.centre = self.q.copy(), self.v.copy(), self.q.copy()
-        self.a, self.friction, self.external = np.zeros((3, len(self.q)))
+        self.a, self.friction = np.zeros((2, len(self.q)))
         self.moved = False
         sticks = (friction.coulomb > 0.0) & (friction.presliding == 0.0)
         self.signs = np.where(sticks, np.sign(self.v), 1.0)
@@ -249,8 +249,7 @@ class Plant:
         torque = tau - bias - smooth
         if external is not None:
             pin.computeJointJacobians(model, data, q_mid)
-            self.external = external(model, data, v_mid)
-            torque += self.external
+            torque += external(model, data, v_mid)
         M.flat[:: len(slope) + 1] += 0.5 * h * slope
         after, impulse, self.signs = slide_or_stick(M, h * torque, self.v, h * dry, self.signs)
         self.friction = smooth + 0.5 * slope * (after - self.v) + impulse / h
