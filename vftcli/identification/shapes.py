@@ -81,11 +81,9 @@ class Shape(NamedTuple):
         parameters = {k: round_digits(v) for k, v in zip(self.terms, values, strict=True)}
         torques = tuple(parameters.pop(term) for term in self.points)
         parameters["smoothing"] = self.smoothing
-        for term in ("stribeck", "logarithmic"):
-            if term in self.terms:
-                parameters[f"{term}_velocity"] = getattr(self, f"{term}_velocity")
-        if "presliding" in self.terms:
-            parameters["presliding_length"] = self.presliding_length
+        for name in ("stribeck_velocity", "logarithmic_velocity", "presliding_length"):
+            if name.partition("_")[0] in self.terms:
+                parameters[name] = getattr(self, name)
         # A dry torque that is all presliding's leaves none to what slides.
         required = FRICTION_MODELS[self.model].required
         parameters = {**dict.fromkeys(required, 0.0), **parameters}

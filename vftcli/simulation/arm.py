@@ -65,11 +65,10 @@ class Servo:
 
     def feed_forward(self, reference: Reference) -> Array:
         """Nominal torque along a reference; gravity only if so asked. (T, n) [N·m]"""
-        rest = np.zeros_like(reference.q)
-        full = self.spec.feed_forward
-        dq, ddq = (reference.dq, reference.ddq) if full else (rest, rest)
-        rigid = rigid_torque(self.model, Reference(reference.q, dq, ddq))
-        return rigid + friction_torque(self.robot.friction, dq)
+        if not self.spec.feed_forward:
+            reference = Reference(reference.q, *np.zeros((2, *reference.q.shape)))
+        rubs = friction_torque(self.robot.friction, reference.dq)
+        return rigid_torque(self.model, reference) + rubs
 
     def torque(self, forward: Array, q_d: Array, dq_d: Array, q: Array, dq: Array) -> Array:
         """The commanded torque at a state (q, dq) for a target, within the limits. (n,) [N·m]"""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import islice, pairwise, product
 from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
 
 import numpy as np
@@ -77,7 +77,7 @@ class Stretches:
         t = np.asarray(t, float)
         which = np.clip(self.times[:, 0].searchsorted(t, side="right") - 1, 0, None)
         n = self.paths[0].shape[1]
-        out = Reference(*(np.zeros((len(t), n)) for _ in range(3)))
+        out = Reference(*np.zeros((3, len(t), n)))
         for k, path in enumerate(self.paths):
             rows = np.flatnonzero(which == k)
             length = self.times[k, 1] - self.times[k, 0]
@@ -232,14 +232,11 @@ class PosesSpec(Spec, kind="poses"):
         rng, home = np.random.default_rng(1), check_start(robot, ())
         low = np.nan_to_num(robot.limits.q_min + 0.05, nan=-np.pi)
         high = np.nan_to_num(robot.limits.q_max - 0.05, nan=np.pi)
-        points = list[Array]()
-        for _ in range(100 * self.count):
-            pose = np.clip(home + rng.uniform(-self.spread, self.spread, robot.joints), low, high)
-            if flange_pose(robot.model, pose).translation[2] > TABLE:
-                points.append(pose)
-            if len(points) == self.count:
-                break
-        else:
+        tries, size = range(100 * self.count), (-self.spread, self.spread, robot.joints)
+        poses = (np.clip(home + rng.uniform(*size), low, high) for _ in tries)
+        above = (q for q in poses if flange_pose(robot.model, q).translation[2] > TABLE)
+        points = list(islice(above, self.count))
+        if len(points) < self.count:
             raise ParameterError(
                 f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} "
                 "poses above the table; make it smaller"
