@@ -42,8 +42,6 @@ def test_the_names_of_alignments_are_those_of_the_ladder() -> None:
         ({"two-cycle.alignment": "commanded"}, "add --set two-cycle.period=S"),
         ({"two-cycle.period": "0"}, "two-cycle.period=0 is not a positive time"),
         ({"two-cycle.period": "nan"}, "is not a positive time"),
-        ({"free": ["a.csv"], "two-cycle.period": "4"}, "leave them away with --free"),
-        ({"free": ["a.csv"], "two-cycle.free-cycles": "1"}, "leave them away with --free"),
         ({"two-cycle.low-pass": "-3"}, "not a positive cutoff"),
         ({"two-cycle.low-pass": "nan"}, "not a positive cutoff"),
         ({"two-cycle.low-pass": "all"}, "not a positive cutoff"),

@@ -123,5 +123,5 @@ def test_the_covered_time_is_in_seconds(part_of: Make, circle: Run) -> None:
 
 def test_the_log_itself_is_no_free_run(circle: Run) -> None:
     run = FreeRun(run=Run(recording=circle.recording, robot=ROBOT), log=circle)
-    with pytest.raises(ReferenceTorqueError, match="is the log itself"):
+    with pytest.raises(ParameterError, match="given as the log or as --free, are the same run"):
         FreeMotion(log=circle, runs=(run,))

@@ -33,7 +33,6 @@ def test_alignment_and_pairing_are_made_once(
     monkeypatch.setattr(room, "align", lambda *logs: made.append(logs) or whole(*logs))
     log, free = part_of(circle, 5.0, 11.0), part_of(circle, 0.0, 4.0)
     run = FreeRun(run=Run(recording=free, robot=ROBOT), log=Run(recording=log, robot=ROBOT))
-    assert run.is_same_motion
     assert run.pairing is run.pairing
     assert run.alignment.overlap.any()
     assert len(made) == 1
@@ -49,7 +48,6 @@ def test_another_motion_has_no_pairing_and_says_so_each_time(
     log = part_of(circle, 4.0, 8.0)
     other = replace(log, q=log.q[:, ::-1] + 0.5, source=replace(log.source, t0=99.0))
     run = FreeRun(run=Run(recording=other, robot=ROBOT), log=Run(recording=log, robot=ROBOT))
-    assert not run.is_same_motion
     for _ in range(2):
         with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
             _ = run.pairing

@@ -133,11 +133,6 @@ def test_filters_and_cycles_that_do_not_exist(circle: Circle, ur5: Robot) -> Non
         two_cycle_difference(circle.recording, (), ur5, FreeChoice(cycles=(7,)))
 
 
-def test_a_log_is_not_its_own_free_run(circle: Circle, ur5: Robot) -> None:
-    with pytest.raises(ReferenceTorqueError, match="is the log itself"):
-        two_cycle_difference(circle.recording, circle.recording, ur5)
-
-
 def test_options_of_one_log_do_not_go_with_two(circle: Circle, ur5: Robot) -> None:
     source = replace(circle.recording.source, path=Path("other.csv"), t0=1.0)  # another run
     other = replace(circle.recording, source=source)

@@ -22,7 +22,6 @@ from vftcli.signals.option import (
     is_yes,
     numbers,
     set_value,
-    setting,
     settings_as_typed,
     settings_by_name,
 )
@@ -172,7 +171,7 @@ def test_an_integer_beyond_every_float_is_no_number() -> None:
     assert PER_JOINT.broken("gain", []) == "gain is []; it must be a number or one a joint"
 
 
-RATE = setting("a.rate", "HZ", "How fast.", least=2.0)
+RATE = Option("a.rate", "HZ", "How fast.", least=2.0)
 DETAILS = Option("-v/--details", "", "All of it.")
 FORM = Option("--form-of-it", "svg|PDF|png", "Its form.", reads=str.upper)
 NAMES = Option("--name", "NAME", "A name.", several=True, completes=lambda: ("one", "two"))
@@ -247,9 +246,9 @@ class Chosen(Choice):
     """Two settings, an option that may be repeated, and numbers with names of their own."""
 
     rate: Annotated[float | None, RATE] = None
-    count: Annotated[int, setting("b.count", "N", "How many.")] = 3
+    count: Annotated[int, Option("b.count", "N", "How many.")] = 3
     names: Annotated[tuple[str, ...], NAMES] = ()
-    numbers: Annotated[tuple[str, ...], setting("numbers", "N", "Any.", several=True)] = ()
+    numbers: Annotated[tuple[str, ...], Option("numbers", "N", "Any.", several=True)] = ()
 
 
 @pytest.mark.parametrize(

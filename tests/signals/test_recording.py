@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
+from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.recording import (
     Recording,
     Source,
     refuse_repeated_logs,
-    refuse_repeated_runs,
     same_run,
 )
 
@@ -75,12 +74,5 @@ def test_a_log_given_twice_is_refused_by_both_names():
     with pytest.raises(ParameterError, match=r"a\.csv and c\.csv, each given as LOG"):
         refuse_repeated_logs(logs)
     refuse_repeated_logs(logs[:2])
-
-
-def test_a_free_run_is_neither_the_log_nor_another_free_run():
-    log, free = recording("f00", "log.csv"), recording("f01", "free.csv")
-    refuse_repeated_runs(log, [free, recording("f02")])
-    with pytest.raises(ReferenceTorqueError, match=r"copy\.csv is the log itself"):
-        refuse_repeated_runs(log, [free, recording("f00", "copy.csv")])
-    with pytest.raises(ReferenceTorqueError, match=r"free\.csv and again\.csv are the same run"):
-        refuse_repeated_runs(log, [free, recording("f01", "again.csv")])
+    with pytest.raises(ParameterError, match=r"given as --free, are .* second time; do that"):
+        refuse_repeated_logs(logs[::2], "--free", "do that")

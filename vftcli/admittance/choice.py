@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from vftcli.robots import PROFILES
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.option import NUMBERS, Choice, Option, names_at, numbers, setting
+from vftcli.signals.option import NUMBERS, Choice, Option, names_at, numbers
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
@@ -46,21 +46,19 @@ class ControlChoice(Choice):
     #: One of `vftcli.admittance.law.KINDS`, None for both.
     kind: Annotated[
         str | None,
-        setting("admittance.controller", "variable|traditional", "By default both."),
+        Option("admittance.controller", "variable|traditional", "By default both."),
     ] = None
     #: What drives the replay: the log's ``sensor`` or ``file:PATH``; None for an
     #: observer's wrench.
     force: Annotated[
         str | None,
-        setting(
-            "admittance.force", "sensor|file:PATH", "What drives the replay, if no observer."
-        ),
+        Option("admittance.force", "sensor|file:PATH", "What drives the replay, if no observer."),
     ] = None
     #: Joint positions at which a release starts; None for the robot
     #: file's. (n,) [rad]
     start: Annotated[
         tuple[float, ...] | None,
-        setting(
+        Option(
             "admittance.start",
             "Q1,Q2,…",
             "Joint positions at which a release starts [rad].",
@@ -70,17 +68,17 @@ class ControlChoice(Choice):
     #: Length of a release, None until it is over. [s]
     duration: Annotated[
         float | None,
-        setting("admittance.duration", "S", "Length of a release."),
+        Option("admittance.duration", "S", "Length of a release."),
     ] = None
     loop_torque: Annotated[
         str,
-        setting("admittance.loop-torque", "average|instant", "What closed-loop sensors report."),
+        Option("admittance.loop-torque", "average|instant", "What closed-loop sensors report."),
     ] = "average"
     #: Parameters the user sets, which go before the robot file's, each
     #: ``AXIS.PARAMETER=VALUE``.
     assignments: Annotated[
         tuple[str, ...],
-        setting(
+        Option(
             NUMBERS,
             "AXIS.NUMBER",
             "As position.stiffness=12, rz.threshold=4, admittance.xi=1, "

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, Option, setting
+from vftcli.signals.option import Choice, Option
 
 ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")  #: tcp://host:8786
 MEMORY = 1.5e9  #: What a worker needs of the machine's memory at least. [B]
@@ -34,13 +34,13 @@ class WorkersChoice(Choice):
     #: Address of a running Dask scheduler, or None.
     address: Annotated[
         str | None,
-        setting("cluster.address", "ADDRESS", "A running Dask cluster, as tls://host:8786."),
+        Option("cluster.address", "ADDRESS", "A running Dask cluster, as tls://host:8786."),
     ] = None
     #: What a worker of this machine may take before it is ended, None
     #: for its share. [GB]
     memory_gb: Annotated[
         float | None,
-        setting(
+        Option(
             "cluster.memory-gb",
             "GB",
             "Memory of a process of this machine; default: its share.",
@@ -49,10 +49,10 @@ class WorkersChoice(Choice):
     ] = None
     ca: Annotated[
         Path | None,
-        setting("cluster.ca", "FILE", "Certificate of the cluster's authority.", Path),
+        Option("cluster.ca", "FILE", "Certificate of the cluster's authority.", Path),
     ] = None
-    cert: Annotated[Path | None, setting("cluster.cert", "FILE", "Own certificate.", Path)] = None
-    key: Annotated[Path | None, setting("cluster.key", "FILE", "Its key.", Path)] = None
+    cert: Annotated[Path | None, Option("cluster.cert", "FILE", "Own certificate.", Path)] = None
+    key: Annotated[Path | None, Option("cluster.key", "FILE", "Its key.", Path)] = None
 
     def __post_init__(self) -> None:
         if len(self.tls) in {1, 2}:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from vftcli.signals.option import ESTIMATE, Choice, is_yes, setting
+from vftcli.signals.option import ESTIMATE, Choice, Option, is_yes
 from vftcli.signals.parsing import check_known
 
 #: The word for what the log allows: the whole log's bias for `best`,
@@ -22,14 +22,14 @@ class RefinementChoice(Choice):
 
     bias: Annotated[
         str,
-        setting(
+        Option(
             "bias.method",
             "|".join(REMOVALS),
             "Whether the bias fitted to the whole log comes off; auto: for best alone.",
         ),
     ] = AUTOMATIC
     contacts: Annotated[
-        bool, setting("contacts.list", "yes|no", "Whether contacts are listed.", is_yes)
+        bool, Option("contacts.list", "yes|no", "Whether contacts are listed.", is_yes)
     ] = True
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from vftcli.cli.batch import SOME_FAILED
 from vftcli.cli.console import echo, echo_data, open_made, say, say_json, show
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import LOG, Anyway, Asked, Choice, Option, setting
+from vftcli.signals.option import LOG, Anyway, Asked, Choice, Option
 from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ SPEED = "speed"  #: The benchmark of times.
 class BenchChoice(Choice):
     """How much is timed."""
 
-    samples: Annotated[int, setting("bench.samples", "N", "Log length.", least=100)] = 30_060
-    rounds: Annotated[int, setting("bench.rounds", "N", "Interleaved runs.", least=1)] = 7
+    samples: Annotated[int, Option("bench.samples", "N", "Log length.", least=100)] = 30_060
+    rounds: Annotated[int, Option("bench.rounds", "N", "Interleaved runs.", least=1)] = 7
 
 
 @opt.command(BenchChoice, opt.TableForm, WorkersChoice, Anyway, opt.Talk)

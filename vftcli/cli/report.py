@@ -9,7 +9,7 @@ from vftcli.cli.analysis import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_written, show
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs import OutputChoice
-from vftcli.signals.option import WRITE, Asked, Choice, Option, setting
+from vftcli.signals.option import WRITE, Asked, Choice, Option
 from vftcli.signals.progress import stage
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ class PrintChoice(Choice):
     """A printed table beside the errors."""
 
     table: Annotated[
-        str | None, setting("report.published", "table1", "The paper's table beside the errors.")
+        str | None, Option("report.published", "table1", "The paper's table beside the errors.")
     ] = None
 
 

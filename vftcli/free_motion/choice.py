@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.option import LOG, Choice, Option, interval, setting
+from vftcli.signals.option import LOG, Choice, Option, interval
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
 #: Rungs of the alignment ladder, from the lowest; `vftcli.free_motion.difference.RUNGS`
@@ -64,12 +64,12 @@ class FreeChoice(Choice):
     #: The commanded period of a repeated motion, None to go by the positions alone. [s]
     period: Annotated[
         float | None,
-        setting("two-cycle.period", "S", "Commanded period of a repeated motion; else found."),
+        Option("two-cycle.period", "S", "Commanded period of a repeated motion; else found."),
     ] = None
     #: Its free cycles, counted from 1; none to find them.
     cycles: Annotated[
         tuple[int, ...],
-        setting(
+        Option(
             "two-cycle.free-cycles",
             "1|1,2|1-3",
             "Cycles free of contact; else found.",
@@ -78,7 +78,7 @@ class FreeChoice(Choice):
     ] = ()
     alignment: Annotated[
         str,
-        setting(
+        Option(
             "two-cycle.alignment",
             "auto|commanded|period|phase|model",
             "How the free motion is brought under the other; auto: with the smallest error.",
@@ -87,7 +87,7 @@ class FreeChoice(Choice):
     #: Cutoff of the two-cycle difference [Hz], None for none, or "auto".
     low_pass: Annotated[
         float | str | None,
-        setting(
+        Option(
             "two-cycle.low-pass",
             "auto|none|HZ",
             "Zero-phase low-pass of the difference.",
@@ -99,11 +99,6 @@ class FreeChoice(Choice):
         if self.alignment not in {AUTOMATIC, *ALIGNMENTS}:
             raise ReferenceTorqueError(
                 f"no alignment {self.alignment!r}; there is auto, {', '.join(ALIGNMENTS)}"
-            )
-        if self.logs and (self.cycles or self.period is not None):
-            raise ReferenceTorqueError(
-                "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
-                "away with --free"
             )
         if self.period is not None and not self.period > 0.0:
             raise ReferenceTorqueError(

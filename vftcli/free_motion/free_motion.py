@@ -43,11 +43,13 @@ from vftcli.signals.arrays import (
 from vftcli.signals.errors import ClockError, ParameterError, ReferenceTorqueError
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.option import interval_text
-from vftcli.signals.recording import Recording, refuse_repeated_runs
+from vftcli.signals.recording import Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown
 
+#: What to do where the log, or a free run, is given as a free run too.
+REPEATED = "give another log of the same motion; for free cycles within one log leave --free away"
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
 
@@ -90,11 +92,6 @@ class FreeRun:
         return self.run.recording
 
     @property
-    def is_same_motion(self) -> bool:
-        """Whether it follows the log's trajectory, or a part of it."""
-        return not isinstance(self._alignment, ReferenceTorqueError)
-
-    @property
     def alignment(self) -> Alignment:
         """Its alignment with the log."""
         if isinstance(self._alignment, ReferenceTorqueError):
@@ -118,7 +115,13 @@ class FreeMotion(Shown):
     runs: tuple[FreeRun, ...] = ()  #: Free runs in other recordings.
 
     def __post_init__(self) -> None:
-        refuse_repeated_runs(self.log.recording, [run.recording for run in self.runs])
+        each = [self.log.recording, *(run.recording for run in self.runs)]
+        refuse_repeated_logs(each, "the log or as --free", REPEATED)
+        if self.runs and (self.choice.cycles or self.choice.period is not None):
+            raise ReferenceTorqueError(
+                "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
+                "away with --free"
+            )
 
     @property
     def steadied(self) -> "FreeMotion":
@@ -195,9 +198,9 @@ class FreeMotion(Shown):
         paired = []
         for run in self.runs:
             about = Where(about=run.recording.name)
-            if run.is_same_motion:
+            try:
                 paired.append(fact("free-run", about, shift_s=run.alignment.shift))
-            else:
+            except ReferenceTorqueError:
                 paired.append(fact("free-run-of-another-motion", about))
         return self.known._replace(remarks=(*self.known.remarks, *paired))
 

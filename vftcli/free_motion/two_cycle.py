@@ -136,11 +136,6 @@ def partners_in_log(motion: FreeMotion) -> Partners:
 
 def partners_in_logs(motion: FreeMotion) -> Partners:
     """Free runs in other logs, paired with a log."""
-    if motion.choice.cycles or motion.choice.period is not None:
-        raise ReferenceTorqueError(
-            "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
-            "away with --free"
-        )
     remarks = []
     for run in motion.runs:
         found, code = run.alignment, "free-run-aligned"

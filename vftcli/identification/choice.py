@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, Option, interval, is_yes, setting
+from vftcli.signals.option import Choice, Option, interval, is_yes
 from vftcli.signals.parsing import check_known
 
 #: What ``--method`` takes; the gains of observers are `vftcli.observers.tuning`'s.
@@ -27,21 +27,19 @@ class Task(Choice):
     ] = None
     #: Where the band ends that is used. [Hz]
     cutoff: Annotated[
-        float, setting("identify.cutoff", "HZ", "Cutoff of the zero-phase filter.")
+        float, Option("identify.cutoff", "HZ", "Cutoff of the zero-phase filter.")
     ] = 8.0
     #: Whether the friction method also fits drive constants.
     constants: Annotated[
         bool,
-        setting(
+        Option(
             "identify.constants", "yes|no", "Whether friction fits drive constants K.", is_yes
         ),
     ] = False
     #: The span of the logs that the result is tried on, None for all. [s]
     check_interval: Annotated[
         tuple[float, float] | None,
-        setting(
-            "identify.check-interval", "A:B", "Seconds A to B of the --check logs.", interval
-        ),
+        Option("identify.check-interval", "A:B", "Seconds A to B of the --check logs.", interval),
     ] = None
     name: str = ""  #: Name of the new robot.
     #: Whether the joints have friction to be fitted; a simulator's may have none.

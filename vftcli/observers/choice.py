@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import ESTIMATE, NUMBERS, Choice, Option, names_at, setting
+from vftcli.signals.option import ESTIMATE, NUMBERS, Choice, Option, names_at
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class ObserverChoice(Choice):
     #: Parameters the user sets, which go before every file's.
     settings: Annotated[
         "Settings",
-        setting(
+        Option(
             NUMBERS,
             "OBSERVER.NUMBER",
             "A number, or one a joint: gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
@@ -259,5 +259,5 @@ class GoalChoice(Choice):
     gains: Annotated[str, ObserverChoice.option("gains", reads=None)] = LOG_GAINS
     threshold: Annotated[
         str | None,
-        setting("alarm.threshold", "NUMBER(S)", "Torque of an alarm [N·m], one or one a joint."),
+        Option("alarm.threshold", "NUMBER(S)", "Torque of an alarm [N·m], one or one a joint."),
     ] = None

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import WRITE, Choice, setting
+from vftcli.signals.option import WRITE, Choice, Option
 
 #: What machines read: key, with its unit → value.
 Record = dict[str, Any]
@@ -26,7 +26,7 @@ class OutputChoice(Choice):
     #: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.
     detail: Annotated[
         str,
-        setting(
+        Option(
             "recording.detail",
             f"{FULL}|{LEVELS}|{NONE}",
             "How much of a long log recording.rrd holds; levels: the lowest and highest samples of "

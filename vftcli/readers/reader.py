@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import LogError, ParameterError
-from vftcli.signals.option import LOG, Choice, Option, setting
+from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.option import interval as read_interval
 from vftcli.signals.parsing import check_known
 
@@ -84,7 +84,7 @@ class ReadChoice(Choice):
     #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
     format: Annotated[
         str | None,
-        setting("log.format", "NAME", "Read it as this format; by default its content decides."),
+        Option("log.format", "NAME", "Read it as this format; by default its content decides."),
     ] = None
     columns: Annotated[
         str | None,
@@ -99,7 +99,7 @@ class ReadChoice(Choice):
     #: robot; None to take what it is called.
     effort: Annotated[
         str | None,
-        setting(
+        Option(
             "log.effort",
             "auto|current|torque|torque-without-gravity",
             "What the log's effort is, whatever its name; auto: what the robot's model explains.",
@@ -124,7 +124,7 @@ class ReadChoice(Choice):
     #: do so where it has none and is fast enough.
     derive: Annotated[
         str | None,
-        setting(
+        Option(
             "log.derive",
             "dq|none",
             "Velocities from the positions; by default where the log has none, from 50 Hz on.",

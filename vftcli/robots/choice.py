@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import RobotError
-from vftcli.signals.option import LOG, Choice, Option, setting
+from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class RobotChoice(Choice):
     ] = None
     friction: Annotated[
         str,
-        setting(
+        Option(
             "model.friction",
             "profile|none|model",
             "Friction of the robot file, none, or what an MJCF gives for simulation.",

@@ -4,7 +4,7 @@ The fields of a room's choice, a dataclass, say how a user gives them, once for 
 the file of options and notebooks. What few users need is a setting, given by ``--set NAME=VALUE``::
 
     frame: Annotated[str, Option("--frame", "FRAME", "Give the wrench in this frame.")] = "flange"
-    period: Annotated[float | None, setting("two-cycle.period", "S", "Commanded period.")] = None
+    period: Annotated[float | None, Option("two-cycle.period", "S", "Commanded period.")] = None
 """
 
 import re
@@ -118,17 +118,6 @@ def names_at(place: str) -> Callable[[], Iterable[str]]:
     """A function that lists the names of ``module:TABLE``, which is loaded only then."""
     module, _, table = place.partition(":")
     return lambda: getattr(import_module(f"vftcli.{module}"), table)
-
-
-def setting(
-    name: str,
-    unit: str,
-    help: str,
-    reads: Callable[[Any], Any] | None = None,
-    **more: Any,  # noqa: ANN401 - an option's fields
-) -> Option:
-    """A setting: an option that few need, given by ``--set NAME=VALUE``."""
-    return Option(name, unit, help, reads, **more)
 
 
 def is_yes(text: str) -> bool:

@@ -13,7 +13,6 @@ from vftcli.signals.errors import (
     ClockError,
     MissingSignalError,
     ParameterError,
-    ReferenceTorqueError,
     ShapeError,
 )
 from vftcli.signals.option import interval_text
@@ -328,31 +327,13 @@ def same_run(one: Recording, other: Recording) -> bool:
     return bool(mine.sha256) and mine.sha256 == theirs.sha256
 
 
-def repeated(logs: Sequence[Recording]) -> tuple[str, str] | None:
-    """The names of the first two logs that are the same run, if any."""
-    pairs = ((a.name, b.name) for a, b in combinations(logs, 2) if same_run(a, b))
-    return next(pairs, None)
-
-
-def refuse_repeated_logs(logs: Sequence[Recording], option: str = "LOG") -> None:
+def refuse_repeated_logs(
+    logs: Sequence[Recording], option: str = "LOG", remedy: str = "give each run once"
+) -> None:
     """Refuse logs that are the same run: their agreement would be evidence."""
-    if twice := repeated(logs):
-        raise ParameterError(
-            f"{twice[0]} and {twice[1]}, each given as {option}, are the same run (equal sha256), "
-            "which says nothing new the second time; give each run once"
-        )
-
-
-def refuse_repeated_runs(recording: Recording, free: Sequence[Recording]) -> None:
-    """Refuse free runs that are the log itself, or one another."""
-    for run in free:
-        if same_run(recording, run):
-            raise ReferenceTorqueError(
-                f"{run.name} is the log itself (equal sha256): a free run is another log of the "
-                "same motion; for free cycles within one log leave --free away"
+    for a, b in combinations(logs, 2):
+        if same_run(a, b):
+            raise ParameterError(
+                f"{a.name} and {b.name}, each given as {option}, are the same run (equal sha256), "
+                f"which says nothing new the second time; {remedy}"
             )
-    if twice := repeated(free):
-        raise ReferenceTorqueError(
-            f"{twice[0]} and {twice[1]} are the same run (equal sha256), so they agree whatever "
-            "their error; give each free run once"
-        )

@@ -16,7 +16,7 @@ import string
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
@@ -105,19 +105,14 @@ def on_joints(joints: "Iterable[int] | Mask", about: str = "") -> Where:
     return Where(about, tuple((numbers + 1).tolist()))
 
 
-def fact(code: str, where: Where = Where(), /, **values: object) -> Remark:  # noqa: B008 - immutable
-    """A remark that informs."""
-    return Remark(code, "fact", values, where)
+def made(level: Level, code: str, where: Where = Where(), /, **values: object) -> Remark:  # noqa: B008 - immutable
+    """A remark of some level, code and place, with its values."""
+    return Remark(code, level, values, where)
 
 
-def caution(code: str, where: Where = Where(), /, **values: object) -> Remark:  # noqa: B008
-    """A remark on what limits the result."""
-    return Remark(code, "caution", values, where)
-
-
-def warning(code: str, where: Where = Where(), /, **values: object) -> Remark:  # noqa: B008
-    """A remark on what can make the result wrong."""
-    return Remark(code, "warning", values, where)
+fact = partial(made, "fact")  #: A remark that informs.
+caution = partial(made, "caution")  #: A remark on what limits the result.
+warning = partial(made, "warning")  #: A remark on what can make the result wrong.
 
 
 def sentence(remark: Remark, length: str = "short") -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import WRENCH, Choice, Option, interval, names_at, setting
+from vftcli.signals.option import WRENCH, Choice, Option, interval, names_at
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class WrenchChoice(Choice):
     #: smoother where it is the observer's own, and least squares for the others.
     solver: Annotated[
         str | None,
-        setting(
+        Option(
             "virtual-sensor.solver",
             "smoother|pinv|map",
             "How torques become a wrench: smoothed over the whole log (best), least squares (the "
@@ -87,7 +87,7 @@ class WrenchChoice(Choice):
     #: The tool's pose as text or a name in the robot file, None for the file's own.
     tool: Annotated[
         str | None,
-        setting(
+        Option(
             "virtual-sensor.tool",
             "POSE|NAME",
             "Tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or its [tool.NAME].",
@@ -97,7 +97,7 @@ class WrenchChoice(Choice):
     #: file's own.
     sensor_pose: Annotated[
         str | None,
-        setting(
+        Option(
             "virtual-sensor.sensor",
             "POSE|NAME|fit",
             "Force/torque sensor on the flange, written alike; fit: estimated from the log.",
@@ -118,7 +118,7 @@ class WrenchChoice(Choice):
     #: None for the best that is known. [N·m]
     torque_sd: Annotated[
         str | None,
-        setting(
+        Option(
             "virtual-sensor.torque-sd",
             "own|NUMBER(S)",
             "Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
