@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from vftcli.robots import PROFILES
+from vftcli.robots import PROFILES, load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.option import NUMBERS, Choice, Option, names_at, numbers
@@ -145,4 +145,4 @@ def released_robot(choice: RobotChoice) -> "Robot":
     """The arm of a release, which no log settles."""
     if choice.name is None:
         raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
-    return choice.named()
+    return load_robot(choice.name, tip=choice.tip)

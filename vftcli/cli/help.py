@@ -221,7 +221,7 @@ def robots(name: str | None, tip: str | None) -> str:
     from vftcli.robots import MAKERS, load_robot
 
     if name is not None:
-        return robot_text(RobotChoice.parsed(robot=name, tip=tip).named())
+        return robot_text(load_robot(name, tip=tip or ""))
     grids = {maker: robots_grid(map(load_robot, names), maker) for maker, names in MAKERS.items()}
     return "".join(f"{maker}\n{terminal(grid)}" for maker, grid in grids.items()).rstrip("\n")
 

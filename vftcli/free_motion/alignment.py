@@ -228,8 +228,7 @@ def refined(
 ) -> tuple[float, float]:
     """Shift [s] and clock rate, refined on the logs' own clocks.
 
-    Gauss–Newton on q_free(rate·t + shift) = q(t), each joint weighted by its spread,
-    samples by Cauchy's weight against contacts; as they are without information.
+    Gauss–Newton on q_free(rate·t + shift) = q(t); as they are without information.
     """
     slope = np.gradient(free.q, free.t, axis=0)
     for _ in range(15):
@@ -241,18 +240,29 @@ def refined(
         own, distance = recording.t[inside], distance[inside]
         middle = own.mean()
         speed = resample_columns(t[inside], free.t, slope)
-        scale = robust_sd(distance) + 1e-7
         slopes = np.array([speed, speed * (own - middle)[:, None]])
-        weighted = slopes / (scale**2 + distance**2)
-        gram = np.einsum("atn,btn->ab", weighted, slopes)
+        gram, right = robust_equations(slopes, distance)
         if not np.linalg.det(gram) > 1e-12 * max(gram[0, 0] * gram[1, 1], 1e-300):
             break
-        later, more = np.linalg.solve(gram, np.einsum("atn,tn->a", weighted, distance))
+        later, more = np.linalg.solve(gram, right)
         later -= more * middle
         shift, rate = shift - later, rate - more
         if abs(later) < 1e-9 and abs(more) < 1e-12:
             break
     return shift, rate
+
+
+def robust_equations(slopes: Array, distance: Array) -> tuple[Array, Array]:
+    """Matrix (k, k) and right side (k,) of a Gauss–Newton step on distances (T, n).
+
+    The slopes are those by k unknowns (k, T, n). Each joint is weighted by its spread,
+    samples by Cauchy's weight, so that pushes do not pull.
+    """
+    weighted = slopes / ((robust_sd(distance) + 1e-7) ** 2 + distance**2)
+    return (
+        np.einsum("atn,btn->ab", weighted, slopes),
+        np.einsum("atn,tn->a", weighted, distance),
+    )
 
 
 def aligned_at(

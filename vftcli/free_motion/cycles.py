@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.free_motion.alignment import robust_equations
 from vftcli.free_motion.difference import difference
 from vftcli.free_motion.paired_runs import PairedRuns, Pairing, in_gap
 from vftcli.robots.run import Run, signal_edge
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
-from vftcli.signals.lag import overlap_energy, parabola, sliding
-from vftcli.signals.least_squares import robust_sd
+from vftcli.signals.lag import overlapping, parabola
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import standing
@@ -138,10 +138,8 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
 def distances(x: Array) -> Array:
     """Mean squared distance of x and x so many samples later, for every lag. (N,)"""
     x, lags, samples = x - x.mean(axis=0), np.arange(len(x)), len(x)
-    energy = overlap_energy(x, lags, samples) + overlap_energy(x, -lags, samples)
-    for column in x.T[:, None]:
-        energy -= 2.0 * sliding(column, column, lags)[0]
-    return np.maximum(energy, 0.0) / (samples - lags)
+    cross, behind, ahead = overlapping(x, x, lags)
+    return np.maximum(behind + ahead - 2.0 * cross, 0.0) / (samples - lags)
 
 
 def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
@@ -173,8 +171,7 @@ def refined_period(t: Array, q: Array, period: float) -> float:
     """Refine a period below the sample time, on the log's own clock. [s]
 
     Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES`
-    multiples the log holds, each joint weighted by its own spread, samples by Cauchy's
-    weight, so that pushes do not pull the period.
+    multiples the log holds.
     """
     # Interpolation goes along time, column by column.
     q = np.asfortranarray(q)
@@ -185,17 +182,15 @@ def refined_period(t: Array, q: Array, period: float) -> float:
     here, path = t[::every], q[::every]
     for multiples in (several[:1], several):
         for _ in range(20):
-            move = weight = 0.0
+            gram, right = np.zeros((1, 1)), np.zeros(1)
             for m in multiples:
                 there = here + m * period
                 inside = there <= t[-1]
                 distance = resample_columns(there[inside], t, q) - path[inside]
                 slope = m * resample_columns(there[inside], t, dq)
-                scale = robust_sd(distance) + 1e-7
-                share = 1.0 / (scale**2 + distance**2)
-                move += np.sum(share * slope * distance)
-                weight += np.sum(share * slope**2)
-            step = move / weight if weight > 0 else 0.0
+                own, move = robust_equations(slope[None], distance)
+                gram, right = gram + own, right + move
+            step = right.item() / (gram.item() or np.inf)
             change = np.clip(step, -0.1 * period, 0.1 * period)
             period -= change
             if abs(change) < 1e-9 * period:

@@ -58,7 +58,7 @@ class ErrorModel(NamedTuple):
     @property
     def floor(self) -> Array:
         """Root mean square of `sd` over samples with a reference. (n,) [N·m]"""
-        return rms(self.sd[self.known], np.ones_like(self.standing[self.known]))
+        return rms(self.sd, np.isfinite(self.sd))
 
     @property
     def floor_moving(self) -> Array:
@@ -74,8 +74,8 @@ class ErrorModel(NamedTuple):
     @property
     def floor_standing(self) -> Array:
         """Root mean square of `sd` at rest, NaN if never at rest. (n,) [N·m]"""
-        standing = self.standing[self.known]
-        return np.where(standing.any(axis=0), rms(self.sd[self.known], standing), np.nan)
+        standing = self.standing & self.known[:, None]
+        return np.where(standing.any(axis=0), rms(self.sd, standing), np.nan)
 
 
 class Rung(NamedTuple):

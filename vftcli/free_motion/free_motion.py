@@ -278,7 +278,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     if not parts:
         return None
     robot = pieces[0].run.robot
-    d, A = (np.concatenate(each) for each in zip(*parts, strict=True))
+    _, d, A = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(d) < 2 * A.shape[2] or not d.any():
         return None
     friction = pieces[0].run.dry_friction
@@ -300,25 +300,24 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     )
 
 
-def weighed(piece: RunSamples) -> Indices:
-    """The samples of a piece that are weighed. (S,)"""
-    step = median_step(piece.run.t)
-    return np.flatnonzero(piece.inside)[:: max(1, int(1.0 / (RATE * step)))]
+def columns(piece: RunSamples) -> tuple[Indices, Array, Array] | None:
+    """The samples that are weighed, their disturbance and its columns, None of a short piece.
 
-
-def columns(piece: RunSamples) -> tuple[Array, Array] | None:
-    """Disturbance and its columns, None of a short piece. (S, n) [N·m], (S, n, 4 + 2n)"""
+    (S,), (S, n) [N·m], (S, n, 4 + 2n)
+    """
     run, inside = piece.run, np.flatnonzero(piece.inside)
     if inside.size == 0:
         return None
     n, j = run.robot.joints, np.arange(run.robot.joints)
     # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
-    near = round(HEARD / median_step(run.t))
+    step = median_step(run.t)
+    near = round(HEARD / step)
     first, stop = max(0, int(inside[0]) - near), int(inside[-1]) + near + 1
     series = (run.t, run.terms.p, run.terms.mu, run.q, run.dq)
     t, p, mu, q, dq = (values[first:stop] for values in series)
+    at = inside[:: max(1, int(1.0 / (RATE * step)))]
+    used = at - first
     try:
-        used = weighed(piece) - first
         d, speed = (zero_phase(t, x, CUTOFF)[used] for x in (derivative(t, p) - mu, dq))
     except (ClockError, ValueError):
         return None
@@ -326,7 +325,7 @@ def columns(piece: RunSamples) -> tuple[Array, Array] | None:
     A[:, :, :4] = load_regressor(run.robot.chain, q[used])
     A[:, j, 4 + j] = np.tanh(speed / SIGN_SPEED)
     A[:, j, 4 + n + j] = 1.0
-    return d, A
+    return at, d, A
 
 
 def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:

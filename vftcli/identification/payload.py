@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns, weighed
+from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns
 from vftcli.identification.shapes import round_digits
 from vftcli.identification.training import (
     STATIC,
@@ -331,9 +331,9 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
     robot, signals = runs[0].robot, []
     for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
         piece = RunSamples(run, np.ones(run.recording.samples, bool))
-        at, own = weighed(piece), columns(piece)
-        if own is not None:
-            signals.append((*own, run.recording.q[at], run.recording.require("dq")[at]))
+        if (own := columns(piece)) is not None:
+            at = own[0]
+            signals.append((*own[1:], run.recording.q[at], run.recording.require("dq")[at]))
     if not signals:
         names = names_of([run.recording for run in runs])
         raise IdentificationError(f"{names}: no log is long enough to be filtered")

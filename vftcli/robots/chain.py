@@ -215,20 +215,19 @@ def kinematics(
     out = Pose(np.eye(3), np.array([0.0, 0.0, document.get("flange_d", 0.0)]))
     turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
     tip = out @ Pose(turn, np.array(document.get("ee_xyz", (0.0, 0.0, 0.0)), float))
-    placements, inertial_frames = [], [IDENTITY] * len(joints)
-    for k, joint in enumerate(joints):
+    # What a joint turns has a pose before its angle, and one from there to the inertia.
+    before, after = [], [IDENTITY]
+    for joint in joints:
         if convention == "xyz-rpy":
-            placements.append(Pose(rpy_matrix(joint["rpy"]), np.array(joint["xyz"], float)))
+            before.append(Pose(rpy_matrix(joint["rpy"]), np.array(joint["xyz"], float)))
+            after.append(IDENTITY)
             continue
-        R, about = rotation_about("x", joint["alpha"]), rotation_about("z", joint["theta"])
-        if convention == "modified-dh":
-            along = Pose(R, np.array([joint["a"], 0.0, 0.0]))
-            placements.append(along @ Pose(about, np.array([0.0, 0.0, joint["d"]])))
-        else:  # the table's frame is at the far end of its link
-            before = inertial_frames[k - 1] if k else IDENTITY
-            placements.append(before @ Pose(about))
-            inertial_frames[k] = Pose(R, np.array([joint["a"], 0.0, joint["d"]]))
-    return [*placements, inertial_frames[-1] @ tip], inertial_frames
+        R, turned = rotation_about("x", joint["alpha"]), rotation_about("z", joint["theta"])
+        a, d = np.array([joint["a"], 0.0, 0.0]), np.array([0.0, 0.0, joint["d"]])
+        distal = convention == "standard-dh"  # the table's frame is at the far end of its link
+        before.append(Pose(turned) if distal else Pose(R, a) @ Pose(turned, d))
+        after.append(Pose(R, a + d) if distal else IDENTITY)
+    return [end @ start for end, start in zip(after, [*before, tip], strict=True)], after[1:]
 
 
 def along(R: Array, vector: Array) -> Array:

@@ -59,7 +59,7 @@ class RobotChoice(Choice):
             raise RobotError(
                 f"{recording.name} does not say which arm it is; {choices_for(recording)}"
             )
-        robot = replace(self, name=name).named()
+        robot = load_robot(name, tip=self.tip)
         if self.payload == DECLARED:
             robot = robot.with_payload(declared_payload(recording))
         elif self.payload is not None:
@@ -76,11 +76,8 @@ class RobotChoice(Choice):
     def check(self) -> None:
         """Load the robot that is named, if one is, with its payload."""
         if self.name is not None:
-            self.named().with_payload(None if self.payload == DECLARED else self.payload)
-
-    def named(self) -> "Robot":
-        """The robot of the name, as it is described; it must have one."""
-        return load_robot(self.name or "", tip=self.tip)
+            named = load_robot(self.name, tip=self.tip)
+            named.with_payload(None if self.payload == DECLARED else self.payload)
 
 
 def choices_for(recording: "Recording") -> str:

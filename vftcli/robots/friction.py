@@ -148,29 +148,25 @@ class FrictionModel(NamedTuple):
 
 
 PLAIN = ("coulomb", "viscous")
+FADING = ("stribeck", "stribeck_velocity")
+ALWAYS = ("offset", "smoothing")  #: Keys that most models may have.
 #: Name in a robot file → friction model.
 FRICTION_MODELS = {
-    "coulomb-viscous": FrictionModel(coulomb_viscous, PLAIN, ("smoothing",)),
-    "coulomb-viscous-offset": FrictionModel(coulomb_viscous, PLAIN, ("offset", "smoothing")),
-    "coulomb-viscous-quadratic": FrictionModel(
-        coulomb_viscous, PLAIN, ("quadratic", "offset", "smoothing")
-    ),
+    "coulomb-viscous": FrictionModel(coulomb_viscous, PLAIN, ALWAYS[1:]),
+    "coulomb-viscous-offset": FrictionModel(coulomb_viscous, PLAIN, ALWAYS),
+    "coulomb-viscous-quadratic": FrictionModel(coulomb_viscous, PLAIN, ("quadratic", *ALWAYS)),
     "coulomb-viscous-load": FrictionModel(
-        coulomb_viscous, (*PLAIN, "load_coulomb"), ("quadratic", "offset", "smoothing")
+        coulomb_viscous, (*PLAIN, "load_coulomb"), ("quadratic", *ALWAYS)
     ),
     "coulomb-viscous-stribeck": FrictionModel(
-        coulomb_viscous,
-        (*PLAIN, "stribeck", "stribeck_velocity"),
-        ("load_coulomb", "quadratic", "offset", "smoothing"),
+        coulomb_viscous, (*PLAIN, *FADING), ("load_coulomb", "quadratic", *ALWAYS)
     ),
     "coulomb-logarithmic": FrictionModel(
         coulomb_logarithmic,
         ("coulomb", "logarithmic", "logarithmic_velocity"),
-        ("viscous", "load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing"),
+        ("viscous", "load_coulomb", *FADING, *ALWAYS),
     ),
-    "points": FrictionModel(
-        bent_line, (), ("load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing")
-    ),
+    "points": FrictionModel(bent_line, (), ("load_coulomb", *FADING, *ALWAYS)),
     "sigmoid": FrictionModel(sigmoid, ("amplitude", "slope", "shift"), ()),
 }
 

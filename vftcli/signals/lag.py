@@ -136,9 +136,8 @@ def time_offset(t: Array, late: Array, early: Array) -> Offset:
     x, y, count = x - x.mean(axis=0), y - y.mean(axis=0), len(even)
     reach = min(int(FARTHEST / step), count - 2)
     at = np.arange(-reach, reach + 1)
-    cross = sliding(x.T, y.T, at).sum(axis=0)
-    energy = overlap_energy(x, at, count) * overlap_energy(y, -at, count)
-    value = cross / np.sqrt(np.maximum(energy, np.finfo(np.float64).tiny))
+    cross, behind, ahead = overlapping(x, y, at)
+    value = cross / np.sqrt(np.maximum(behind * ahead, np.finfo(np.float64).tiny))
     best = int(value.argmax())
     inside = 0 < best < len(at) - 1
     shift = parabola(*value[best - 1 : best + 2]) if inside else 0.0
@@ -180,11 +179,16 @@ def lag_fit(late: Array, early: Array, least: float) -> LagFit:
     x, y = late - middle, early - middle
     at = np.arange(-(len(y) - 1), len(x))
     overlap = np.minimum(len(y), len(x) - at) - np.maximum(0, -at)
-    cross = sliding(x.T, y.T, at).sum(axis=0)
-    energy = overlap_energy(x, at, len(y)) + overlap_energy(y, -at, len(x))
+    cross, behind, ahead = overlapping(x, y, at)
     enough = overlap >= max(2, int(least * min(len(x), len(y))))
-    mean = np.where(enough, (energy - 2.0 * cross) / np.maximum(overlap, 1), np.inf)
+    mean = np.where(enough, (behind + ahead - 2.0 * cross) / np.maximum(overlap, 1), np.inf)
     return LagFit(at, mean, overlap)
+
+
+def overlapping(late: Array, early: Array, at: Indices) -> tuple[Array, Array, Array]:
+    """Sums over what overlaps, all columns together: of products, of either's squares. (L,)"""
+    cross = sliding(late.T, early.T, at).sum(axis=0)
+    return cross, overlap_energy(late, at, len(early)), overlap_energy(early, -at, len(late))
 
 
 def overlap_energy(series: Array, lags: Indices, other: int) -> Array:

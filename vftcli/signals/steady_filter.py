@@ -125,15 +125,9 @@ class Fold(NamedTuple):
 
     def fold(self, x: Array) -> Array:
         """Samples in blocks: (…, N, k) → (…, length, k, blocks)."""
-        *entries, _, k = x.shape
-        whole, left = divmod(self.samples, self.length)
-        out = np.empty((*entries, self.length, k, whole + (left > 0)))
-        inside = x[..., : self.samples - left, :].reshape(*entries, whole, self.length, k)
-        out[..., :whole] = np.moveaxis(inside, -3, -1)
-        if left:
-            out[..., -1] = x[..., -1:, :]
-            out[..., :left, :, -1] = x[..., self.samples - left :, :]
-        return out
+        filled = np.concatenate([x, x[..., -1:, :].repeat(-self.samples % self.length, -2)], -2)
+        blocks = filled.reshape(*x.shape[:-2], -1, self.length, x.shape[-1])
+        return np.moveaxis(blocks, -3, -1).copy()
 
     def unfold(self, y: Array) -> Array:
         """Samples in their order: (…, length, k, blocks) → (…, N, k), columns whole."""
