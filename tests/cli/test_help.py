@@ -12,6 +12,7 @@ import typer
 
 from vftcli import cli
 from vftcli.cli import COMMANDS, main, make_app
+from vftcli.cli.commands import JOURNEYS
 from vftcli.cli.help import GROUPS, topics, two_columns
 
 Run = Callable[..., tuple[int, str, str]]
@@ -67,7 +68,7 @@ def test_the_commands_are_listed_by_what_one_sets_out_to_do(run: Run) -> None:
     for name, command in COMMANDS.items():
         # On one line, not cut.
         assert re.search(rf"^  {name} +{re.escape(command.summary)}$", text, re.MULTILINE)
-    order = [text.index(head) for head in dict.fromkeys(c.journey for c in COMMANDS.values())]
+    order = [text.index(head) for head in JOURNEYS]
     assert order == sorted(order)
     assert "--install-completion" in text
 

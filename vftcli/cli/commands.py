@@ -14,7 +14,6 @@ from vftcli.signals.parsing import tables_beside
 class ListedCommand(NamedTuple):
     """One command: where it is, so that --help need not load it."""
 
-    journey: str  #: Heading under which `--help` lists it.
     file: str  #: File of this package.
     function: str  #: The function in it.
 
@@ -54,8 +53,8 @@ JOURNEYS = {
 }
 #: Name → the command.
 COMMANDS = {
-    name: ListedCommand(journey, *place.split(":"))
-    for journey, places in JOURNEYS.items()
+    name: ListedCommand(*place.split(":"))
+    for places in JOURNEYS.values()
     for name, place in places.items()
 }
 

@@ -64,10 +64,7 @@ def kept_words(ctx: Click, args: Sequence[str]) -> tuple[Path, list[str]] | None
         return None
     path = Path(named or NAME)
     given = [opts[param.name] for param in params if param.param_type_name == "argument"]
-    each_log = (
-        log for one in given for log in (one if isinstance(one, list | tuple) else (one,))
-    )
-    logs = [Path(log) for log in each_log if isinstance(log, str)]
+    logs = [Path(log) for one in given for log in words_in(one)]
     keys, typed = keys_for(command, path), [param.name for param in params]
     asked = [word.partition("=")[0].strip() for word in opts.get("set") or ()]
     choices = choices_of(command)
@@ -223,8 +220,8 @@ def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> 
 
 
 def words_in(value: object) -> Iterator[str]:
-    """The words that a value of TOML would be typed as; none where it is of another kind."""
-    for word in value if isinstance(value, list) else [value]:
+    """The words that a value would be typed as; none where it is of another kind."""
+    for word in value if isinstance(value, list | tuple) else [value]:
         if isinstance(word, bool) or not isinstance(word, str | int | float):
             return
         yield str(word)

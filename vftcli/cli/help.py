@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from vftcli.cli import options as opt
-from vftcli.cli.commands import COMMANDS, former, renewed, with_command
+from vftcli.cli.commands import COMMANDS, JOURNEYS, former, renewed, with_command
 from vftcli.cli.config import (
     NONE,
     READ,
@@ -96,12 +96,11 @@ class JourneyGroup(TyperGroup):
         width, usage = columns(), "Usage: vftcli [COMMAND] LOG… [OPTIONS]"
         lines = [usage, "", *textwrap.wrap(self.help or "", width)]
         left = max(map(len, self.commands))
-        for journey in dict.fromkeys(command.journey for command in COMMANDS.values()):
+        for journey, names in JOURNEYS.items():
             lines += ["", journey]
-            for name, command in COMMANDS.items():
-                if command.journey == journey:
-                    text = f"  {name:<{left}}  {command.summary}"
-                    lines += textwrap.wrap(text, width, subsequent_indent=" " * (left + 4))
+            for name in names:
+                text = f"  {name:<{left}}  {COMMANDS[name].summary}"
+                lines += textwrap.wrap(text, width, subsequent_indent=" " * (left + 4))
         shown = (p for p in self.get_params(ctx) if p.name != "show_completion")
         rows = [row for p in shown if (row := row_of(p, ctx)) is not None]
         formatter.write("\n".join([*lines, "", *two_columns(rows)]) + "\n")

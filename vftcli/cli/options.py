@@ -150,7 +150,8 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
         def called(**values: Any) -> None:  # noqa: ANN401
             from vftcli.outputs.files import protected
 
-            settings = settings_of(values.get("set") or (), choices)
+            each = (assignment(w, "--set", "NAME=VALUE") for w in values.get("set") or ())
+            settings = settings_as_typed(dict(each), choices, "--set ")
             inputs = [*inputs_of(values), *filter(None, [READ.get()])]
             # How much it says: what its -v and -q ask, as usual where it has none.
             loud = speaking(details=bool(values.get("details")), quiet=bool(values.get("quiet")))
@@ -193,16 +194,6 @@ def parameters_of(
 
 
 EMPTY = inspect.Parameter.empty
-
-
-def settings_of(words: Iterable[str], choices: Sequence[type[Choice]]) -> dict[str, str]:
-    """Name → value of ``NAME=VALUE`` words, each a setting of one of the choices.
-
-    Raises:
-        ParameterError: If a word is malformed or there is no such setting.
-    """
-    given = dict(assignment(word, "--set", "NAME=VALUE") for word in words)
-    return settings_as_typed(given, choices, "--set ")
 
 
 def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:
