@@ -11,6 +11,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.parsing import counted
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks
 from vftcli.signals.shown import Shown, joined, record
@@ -64,7 +65,7 @@ class Analysis(Shown):
         names = ", ".join(estimate.name for estimate in self.estimates) or "no observer"
         listed = "no list of contacts"
         if self.contacts is not None:
-            listed = f"{len(self.contacts)} contact{'s' * (len(self.contacts) != 1)}"
+            listed = counted(len(self.contacts), "contact")
         return f"of {self.recording.name} on {self.robot.name}: {names}; {listed}"
 
     def _rows(self) -> Iterator[Sequence[object]]:

@@ -34,7 +34,7 @@ def grid() -> Grid:
         title="a_b.csv",
         quantity="RMSE",
         unit="N·m",
-        columns=(Column("observer", words=True), *joint_columns(2)),
+        given=(Column("observer", words=True), *joint_columns(2)),
         rows=(
             ("fdo", GridCell("0.550", best=True, mark="*", html="0.550<i>!</i>"), 12.346),
             (HOSTILE, 2.0, float("nan")),
@@ -60,13 +60,13 @@ def test_the_terminal_keeps_digits_below_digits(grid: Grid) -> None:
 
 def test_a_table_without_headings_has_no_line_for_them() -> None:
     columns = (Column("", words=True, width=4), Column("", form=".2f", width=6))
-    assert terminal(Grid(columns=columns, rows=(("a", 1.0), ("b", 22)))) == (
+    assert terminal(Grid(given=columns, rows=(("a", 1.0), ("b", 22)))) == (
         "a       1.00\nb         22\n"
     )
 
 
 def test_units_stand_behind_headings_and_below_them_in_latex() -> None:
-    grid = Grid(columns=(Column("who", words=True), Column("fx", "N·m")), rows=(("a", 1.0),))
+    grid = Grid(given=(Column("who", words=True), Column("fx", "N·m")), rows=(("a", 1.0),))
     assert terminal(grid).startswith("who  fx [N·m]\n")
     lines = latex(grid).splitlines()
     above = lines.index(r"\toprule") + 1
@@ -102,13 +102,13 @@ def test_a_bound_is_one_number_in_latex() -> None:
 
 
 def test_a_title_is_no_command_of_latex() -> None:
-    grid = Grid(title="a\n\\input{b}", columns=(Column("c"),), rows=())
+    grid = Grid(title="a\n\\input{b}", given=(Column("c"),), rows=())
     assert r"\input" not in latex(grid)
 
 
 def test_decimal_points_of_latex_stand_below_one_another() -> None:
     numbers = ("5.66", "12.3", "110", "−0.5", "< 6", "–", "1 N")
-    grid = Grid(columns=(Column("c"),), rows=tuple((text,) for text in numbers))
+    grid = Grid(given=(Column("c"),), rows=tuple((text,) for text in numbers))
     body = latex(grid).split("\\midrule\n")[1].splitlines()[: len(numbers)]
     assert body == [
         r"5.66 \\",
@@ -123,7 +123,7 @@ def test_decimal_points_of_latex_stand_below_one_another() -> None:
 
 def test_a_table_too_wide_for_a_column_takes_both(grid: Grid) -> None:
     """24 columns of five letters are 9.6 inches, two of them less than one."""
-    wide = Grid(columns=joint_columns(24), rows=(("1.234",) * 24,))
+    wide = Grid(given=joint_columns(24), rows=(("1.234",) * 24,))
     assert r"\begin{table*}" in latex(wide)
     assert r"\begin{table}" in latex(grid)
 
@@ -143,7 +143,7 @@ def test_latex_takes_its_tables(grid: Grid, tmp_path: Path) -> None:
     found = shutil.which("kpsewhich")
     if not compiler or not found or not run([found, "booktabs.sty"]).stdout:
         pytest.skip("no LaTeX with booktabs is installed: tables are not compiled")
-    joints = replace(grid, columns=(Column("observer", words=True), *joint_columns(7)))
+    joints = replace(grid, given=(Column("observer", words=True), *joint_columns(7)))
     row = ("kfo-zoh", *(GridCell("12.34", best=True, mark="*"),) * 7)
     tables = [
         latex(grid, grid),
@@ -221,7 +221,7 @@ def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom
         Column("time to the peak", "m, rad", ".1f"),
         Column("work of all", "J", ".1f", seldom=True),
     )
-    grid = Grid(columns=columns, rows=(("a", 1.0, 2.0), ("b", 10.0, 20.0)))
+    grid = Grid(given=columns, rows=(("a", 1.0, 2.0), ("b", 10.0, 20.0)))
     wide, narrow, least = (
         terminal(grid, width=80),
         terminal(grid, width=31),
@@ -238,6 +238,6 @@ def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom
 
 
 def test_a_table_without_rows_is_its_headings() -> None:
-    grid = Grid(columns=(Column("name", words=True), Column("", unit="")), rows=())
+    grid = Grid(given=(Column("name", words=True), Column("", unit="")), rows=())
     assert terminal(grid) == "name\n"
     assert terminal(grid, width=3) == "name\n"

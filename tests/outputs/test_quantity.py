@@ -2,15 +2,8 @@
 
 import pytest
 
-from vftcli.outputs.quantity import (
-    at_least_shown,
-    banded,
-    counted,
-    percent,
-    signed,
-    significant,
-    vector,
-)
+from vftcli.outputs.quantity import at_least_shown, banded, percent, signed, significant, vector
+from vftcli.signals.parsing import counted
 
 
 @pytest.mark.parametrize(

@@ -240,7 +240,7 @@ def test_colours_are_there_only_where_the_terminal_has_them() -> None:
 
 
 def test_every_letter_has_one_of_ascii() -> None:
-    text = "".join(PLAIN)
+    text = "".join(map(chr, PLAIN))
     assert Canvas(unicode=True).shown(text) == text
     assert Canvas(unicode=False).shown(text + "ß").isascii()
     assert Canvas(unicode=False).shown("34 ± 16 N · −y") == "34 +/- 16 N - -y"

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from vftcli.batch.choice import EXTRA, MEMORY, MOST_WORKERS, WorkersChoice
 from vftcli.signals.errors import VftError
+from vftcli.signals.parsing import counted
 from vftcli.signals.progress import heard_by, nobody
 from vftcli.signals.version import VERSION
 
@@ -190,7 +191,7 @@ def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
             f"workers need a certificate, which cannot be made here ({error}); --jobs 0 does "
             "one log after the other"
         ) from None
-    tell(f"{workers} worker{'s' * (workers > 1)} of {memory / 1e9:.1f} GB")
+    tell(f"{counted(workers, 'worker')} of {memory / 1e9:.1f} GB")
     with (
         closed_cluster(workers, memory, security, logging.CRITICAL + 1) as cluster,
         Client(cluster, security=security) as client,

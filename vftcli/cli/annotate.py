@@ -87,7 +87,7 @@ def annotate_dataset(
 def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
     """Lines on what was written, and on what a user of it should know."""
     from vftcli.doctor.examination import doubt
-    from vftcli.outputs.quantity import counted
+    from vftcli.signals.parsing import counted
 
     done, frames = record["status"], sum(one.get("frames", 0) for one in record["episodes"])
     count = ", ".join(f"{n} {status}" for status, n in done.items())

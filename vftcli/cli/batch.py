@@ -50,9 +50,9 @@ def batch(
     from vftcli.batch.run import BatchRun
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
-    from vftcli.outputs.quantity import counted
     from vftcli.readers.library import Library, LogCollection, absolute
     from vftcli.signals.errors import LogError, ParameterError
+    from vftcli.signals.parsing import counted
 
     choice, anyway = choice_for(asked, Library()), asked.anyway
     choice.robot.check()

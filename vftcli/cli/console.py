@@ -176,7 +176,7 @@ class LeftOut:
 
 def say_recording(recording: "Recording") -> None:
     """In details: one line on what was read, then what was repaired or looks odd."""
-    from vftcli.outputs.quantity import counted
+    from vftcli.signals.parsing import counted
 
     source = recording.source
     rate = f", {1.0 / recording.median_step:.4g} Hz" if recording.samples > 1 else ""

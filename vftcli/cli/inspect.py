@@ -14,6 +14,7 @@ from vftcli.cli.console import echo, say, say_json, say_robots
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import Asked, Option
+from vftcli.signals.parsing import counted
 
 if TYPE_CHECKING:
     from vftcli.proposal import ProposedOption
@@ -66,7 +67,7 @@ def inspect_log(
         say_json(entries, [remark for one in examinations for remark in one.remarks], **written)
     warnings = sum(len(examination.warnings) for examination in examinations)
     if strict and warnings:
-        echo(f"{warnings} warning{'s' if warnings > 1 else ''} (--strict)", err=True)
+        echo(f"{counted(warnings, 'warning')} (--strict)", err=True)
         raise typer.Exit(1)
 
 

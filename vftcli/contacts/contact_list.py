@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, seal
+from vftcli.signals.parsing import counted
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.rest import faster
 from vftcli.signals.shown import UNKNOWN, Shown, joined, record, value_text
@@ -285,9 +286,8 @@ class ContactList(Shown):
 
     def _headline(self) -> str:
         count, hardest = len(self), self.hardest
-        every = (
-            f"of {self.recording}: {count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
-        )
+        listed = counted(count, "contact")
+        every = f"of {self.recording}: {listed} in {self.duration:.4g} s"
         if hardest is None:
             return every
         return f"{every}, the hardest {hardest._size} at {hardest.peak:.2f} s"

@@ -35,7 +35,6 @@ from vftcli.outputs.paper import (
     plots_of,
     write_figures,
 )
-from vftcli.outputs.quantity import counted
 from vftcli.outputs.run_record import (
     envelope,
     input_record,
@@ -46,9 +45,10 @@ from vftcli.outputs.run_record import (
     to_json,
 )
 from vftcli.signals.arrays import Array
+from vftcli.signals.parsing import counted
 from vftcli.signals.remarks import sentence
 from vftcli.signals.shown import frame_of, per_joint
-from vftcli.signals.wrench import AXES as FORCES
+from vftcli.signals.wrench import per_axis
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -107,7 +107,7 @@ def motion_table(replay: Replay) -> pl.DataFrame:
     ``logged/x``… [m, rad].
     """
     motion, columns = replay.motion, {"t": replay.motion.t}
-    columns |= {f"force/{a}": padded(replay.wrench[:, k]) for k, a in enumerate(FORCES)}
+    columns |= per_axis("force", padded(replay.wrench))
     for n, controller in enumerate(replay.controllers):
         # A slash would make one more level of the column's name.
         label = controller.name.replace(" ", "").replace("/", "-")
@@ -231,33 +231,16 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
     w, v = replay.lyapunov
     force_band, speed_band = (x if np.isfinite(x).any() else None for x in (p.threshold, limit))
     return [
-        Chart(
-            key,
-            title,
-            (unit,) * 3 + (turning,) * 3,
-            AXES,
-            replay.motion.t,
-            tuple(shown),
-            (1, 1, 1, 2, 2, 2),
-            band,
-            label,
-        )
+        Chart(key, title, (unit,) * 3 + (turning,) * 3, AXES, replay.motion.t, tuple(shown),
+              (1, 1, 1, 2, 2, 2), band, label)
         for key, title, unit, turning, shown, band, label in (
             ("x", "Deviation", "m", "rad", deviation, None, ""),
             ("force", "Force on the robot", "N", "N·m", force, force_band, "± threshold"),
-            (
-                "v",
-                "Velocity",
-                "m/s",
-                "rad/s",
-                lines(replay.motion.v),
-                speed_band,
-                "± speed limit",
-            ),
+            ("v", "Velocity", "m/s", "rad/s", lines(replay.motion.v), speed_band, "± speed limit"),
             ("energy-w", "Lyapunov function W (recovery phases)", "J", "J", lines(w), None, ""),
             ("energy-v", "The printed V (52): it rises", "J", "J", lines(v), None, ""),
         )
-    ]
+    ]  # fmt: skip
 
 
 def padded(values: Array) -> Array:

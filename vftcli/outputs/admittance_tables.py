@@ -9,7 +9,7 @@ from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.law import AXES
 from vftcli.admittance.replay import Replay
 from vftcli.outputs import Record
-from vftcli.outputs.grid import Column, Grid, Rows, keyed_grid, latex, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, keyed_grid, latex, terminal
 from vftcli.outputs.quantity import minus
 
 TITLE = "The same force through every controller"  #: Of the comparison.
@@ -24,7 +24,7 @@ THIRD = number_form(".3f")
 
 #: Key of a row → its column.
 COLUMNS = {
-    "controller": Column("controller", words=True),
+    "controller": "controller",
     "alpha": Column("α", form=number_form("g")),
     "xi": Column("ξ", form=number_form(".3g")),
     "axis": Column("axis"),
@@ -82,7 +82,7 @@ def latency_rows(run: ClosedLoop) -> list[Record]:
 def latency_grid(run: ClosedLoop) -> Grid:
     """The latencies of a closed loop, from the true force and as the paper times them."""
     columns = {
-        "axis": Column("axis", words=True),
+        "axis": "axis",
         **{f"{name}_s": Column(head, form=".3f") for name, head in LATENCIES.items()},
         "at_rest_before": Column("at rest before"),
     }
@@ -143,7 +143,7 @@ def parameter_grid(replay: Replay) -> Grid:
         "F_tsd": r"$F_\mathrm{tsd}$",
         "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
     }
-    columns = *words("coordinates"), *(Column(h, form="g", symbol=s) for h, s in heads.items())
+    columns = "coordinates", *(Column(h, form="g", symbol=s) for h, s in heads.items())
     return Grid(columns, rows, f"Values used; {p.source or 'the command line'}")
 
 
@@ -159,7 +159,7 @@ def stability_grid(replay: Replay) -> Grid:
             escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
             rows.append((controller.name, axes, *numbers, escape))
     phases = (Column(head, form=".3g") for head in ("drag phase", "recovery, at the limit"))
-    columns = *words("controller", "axes"), *phases, Column("escape bound")
+    columns = "controller", "axes", *phases, Column("escape bound")
     return Grid(columns, rows, "2TsB/M + Ts²K/M, stable below 4", swatches=True)
 
 

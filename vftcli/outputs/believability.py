@@ -17,10 +17,11 @@ from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
 from vftcli.outputs.contacts import answer, free_words, hardest_words
 from vftcli.outputs.examination import command, path_of
-from vftcli.outputs.quantity import DASH, counted, percent
+from vftcli.outputs.quantity import DASH, percent
 from vftcli.robots import PROFILES
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Mask
+from vftcli.signals.parsing import counted
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, sentence
 from vftcli.signals.rest import slower
@@ -350,13 +351,8 @@ def missed_words(contacts: Sequence[Contact]) -> str:
         # A sensor at the flange does not feel a push on a link before it.
         if row.is_load or not row.size_known or (row.places and 0 not in row.places):
             continue
-        if (
-            force is not None
-            and band is not None
-            and read is not None
-            and abs(force - read) > band
-        ):
-            off.append(f"row {row.number} by {abs(force - read):.2g} N")
+        if read is not None and (miss := abs((force or 0.0) - read)) > (band or 0.0):
+            off.append(f"row {row.number} by {miss:.2g} N")
     more = f" and {len(off) - MOST_OFF} more" if len(off) > MOST_OFF else ""
     return f"; off by more than the band: {', '.join(off[:MOST_OFF])}{more}" if off else ""
 

@@ -1,9 +1,8 @@
 """What a benchmark says, of its table of rows: the headline, each arm, the lists, the page."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -11,9 +10,9 @@ import polars as pl
 from vftcli.evaluation.detection import rate_interval, share_interval
 from vftcli.evaluation.scores import LAGS, Score
 from vftcli.observers.table import BEST
-from vftcli.outputs import grid
+from vftcli.outputs import Record, grid
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine, Span, colours_of_names, paint
-from vftcli.outputs.grid import Column, Grid, GridCell, Rows, keyed_grid, words
+from vftcli.outputs.grid import Column, Grid, GridCell, Rows, keyed_grid
 from vftcli.outputs.page.shell import Box, Scales, page
 from vftcli.outputs.quantity import DASH, percent, significant
 
@@ -29,9 +28,9 @@ POOLED = (
 )
 #: Key of a row → its column, for every table of rows below the headline.
 ARM_COLUMNS = {
-    "method": Column("method", words=True),
+    "method": "method",
     "rmse": Column("RMSE", "N·m"),
-    "interval": Column("95 %", words=True),
+    "interval": "95 %",
     "l1_Nm": Column("L1", "N·m"),
     "skill": Column("skill", form=".2f"),
     "coverage_95": Column("band holds", form=".2f"),
@@ -43,10 +42,10 @@ ARM_COLUMNS = {
     "over_best": Column("over best, 95 %", words=True, seldom=True),
 }
 LIST_COLUMNS = {
-    "arm": Column("arm", words=True),
-    "rows": Column("rows", words=True),
-    "share": Column("found", words=True),
-    "rate": Column("false/h", words=True),
+    "arm": "arm",
+    "rows": "rows",
+    "share": "found",
+    "rate": "false/h",
     "onset": Column("onset", "s", words=True),
     "split": Column("split", seldom=True),
     "found_as_load": Column("as load", seldom=True),
@@ -54,7 +53,7 @@ LIST_COLUMNS = {
     "hardest": Column("hardest false", "N", ".0f", seldom=True),
 }
 WRENCH_COLUMNS = {
-    **dict(zip(BY, words(*BY), strict=True)),
+    **dict(zip(BY, BY, strict=True)),
     "force_squares": Column("force", "N", ".2f"),
     "true_force_squares": Column("truth's rms", "N", ".2f"),
     "moment_squares": Column("moment", "N·m", ".2f"),
@@ -62,7 +61,8 @@ WRENCH_COLUMNS = {
     "wrench_missing_s": Column("no answer", form=".2f"),
 }
 WEIGHT_COLUMNS = {
-    **dict(zip(("log", *BY[1:]), words("log", *BY[1:]), strict=True)),
+    "log": "log",
+    **dict(zip(BY[1:], BY[1:], strict=True)),
     "weight_N": Column("true weight", "N", ".1f"),
     "mean_N": Column("mean found", "N", ".1f"),
     "rms_error_N": Column("rms error", "N", ".1f"),
@@ -91,7 +91,7 @@ class Results:
         return self.table.filter(*rows)[key].unique(maintain_order=True).to_list()
 
     @cached_property
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Record]:
         """One row an arm, protocol, method and part, for machines and tables."""
         joints, shifts = (
             self.table.drop_nulls(key).partition_by(
@@ -124,7 +124,7 @@ class Results:
             found.append(row)
         return found
 
-    def of(self, protocol: str, part: str, *, headline: bool = False) -> list[dict[str, Any]]:
+    def of(self, protocol: str, part: str, *, headline: bool = False) -> list[Record]:
         """The rows of a protocol and part; in the `headline` of an exact model only if all are."""
         own = [row for row in self.rows if (row["protocol"], row["part"]) == (protocol, part)]
         return [row for row in own if headline and not row["exact_model"]] or own
@@ -135,7 +135,7 @@ class Results:
 
     def headline(self) -> Grid:
         """Methods down; skill in contact and L1 in free motion of each protocol across."""
-        columns = [*words("method")]
+        columns: list[Column | str] = ["method"]
         means: list[dict[str, float]] = []
         for part, (key, column) in HEADLINE.items():
             for protocol in self.protocols:
@@ -226,24 +226,20 @@ class Results:
                 yield keyed_grid(columns, table.iter_rows(named=True), title)
 
 
-def arm_texts(rows: Sequence[dict[str, Any]], error: float) -> list[dict[str, Any]]:
+def arm_texts(rows: Sequence[Record], error: float) -> list[Record]:
     """Rows of one table with texts; marked where the truth's own error hides a difference."""
     least = min((row["rmse_Nm"] for row in rows if row["method"] != "zero"), default=0.0)
     found = []
     for row in rows:
-        text, lag = (
-            significant(row["rmse_Nm"]),
-            f"{row['lag_s']:+.2f} (× {row['rmse_at_lag']:.2f})",
-        )
+        text, lag = significant(row["rmse_Nm"]), row["lag_s"]
         near = 0.0 < row["rmse_Nm"] - least < error
         soft = f'<span class="soft">{text}</span>'
-        over = between(row["over_best_low_Nm"], row["over_best_high_Nm"], "+.3g", " to ")
         found.append({
             **row,
             "rmse": GridCell(text, mark="~" * near, html=soft * near),
             "interval": between(row["rmse_low_Nm"], row["rmse_high_Nm"]),
-            "over_best": over,
-            "lag": lag if np.isfinite(row["lag_s"]) else DASH,
+            "over_best": between(row["over_best_low_Nm"], row["over_best_high_Nm"], "+.3g", " to "),
+            "lag": f"{lag:+.2f} (× {row['rmse_at_lag']:.2f})" if np.isfinite(lag) else DASH,
         })  # fmt: skip
     return found
 
@@ -253,7 +249,7 @@ def between(low: float, high: float, form: str = ".3g", to: str = "–") -> str:
     return f"{low:{form}}{to}{high:{form}}" if np.isfinite(low) else DASH
 
 
-def list_texts(row: dict[str, Any]) -> dict[str, Any]:
+def list_texts(row: Record) -> Record:
     """Counts of one arm's lists with texts, with their intervals."""
     found, true, false, hours = (row[k] for k in COUNTS)
     texts = dict.fromkeys(("share", "rate", "onset", "peaks"), DASH)
@@ -272,7 +268,7 @@ def list_texts(row: dict[str, Any]) -> dict[str, Any]:
     return {**row, **texts, "rows": LISTS[row["part"]], "hardest": hardest}
 
 
-def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[dict[str, Any]]]:
+def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[Record]]:
     """Skill in contact of every arm, with its interval: scales, names from above, dots.
 
     A dot has the places of the skill and of its interval's ends, NaN without one.
@@ -328,7 +324,7 @@ def text_of(results: Results, form: str, *, every: bool) -> str:
     return "\n".join(map(write, [replace(headline, notes=lines), *results.grids()]))
 
 
-def render_benchmark(results: Results, title: str, record: Mapping[str, Any]) -> str:
+def render_benchmark(results: Results, title: str, record: Record) -> str:
     """The page of a benchmark."""
     keys = ("recording", "arm", "truth", "truth_error", "licence", "source")
     return page(
@@ -338,6 +334,6 @@ def render_benchmark(results: Results, title: str, record: Mapping[str, Any]) ->
         results=results,
         plots=[(p, *dots(results, p)) for p in results.protocols if results.arms(p, "contact")],
         worst=list(worst_charts(results)),
-        logs=keyed_grid(dict(zip(keys, words(*keys), strict=True)), record["logs"]),
+        logs=keyed_grid(dict(zip(keys, keys, strict=True)), record["logs"]),
         record=record,
     )

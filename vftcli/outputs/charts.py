@@ -175,13 +175,14 @@ def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tu
     clock.
     """
     gaps = np.empty(0, dtype=np.intp) if log else gaps_of(t, GAP_STEPS)
-    x, y, kept = t, values, np.zeros(len(t), dtype=bool)
+    x, y = t, values
     if len(t) > 2 * stretches:
         starts = even_starts(len(t), stretches)
         if log:
             starts = np.unique(np.searchsorted(t, np.geomspace(t[0], t[-1], stretches)))
         # Samples beside a gap stay, or a line would be drawn up to the wrong place.
-        kept[np.concatenate([[0, -1], extremes(values[:, None], starts), gaps, gaps + 1])] = True
+        ends = extremes(values[:, None], starts)
+        kept = np.unique(np.concatenate([[0, len(t) - 1], ends, gaps, gaps + 1]))
         x, y = t[kept], values[kept]
     after = np.searchsorted(x, t[gaps], side="right")
     return np.insert(x, after, 0.5 * (t[gaps] + t[gaps + 1])), np.insert(y, after, np.nan)

@@ -22,10 +22,11 @@ from vftcli.contacts.contact_list import (
 )
 from vftcli.outputs import Record
 from vftcli.outputs.files import SEAL
-from vftcli.outputs.grid import Column, Grid, csv_rows, latex, words
-from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, ranged
+from vftcli.outputs.grid import Column, Grid, csv_rows, latex
+from vftcli.outputs.quantity import DASH, at_least_shown, banded, ranged
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.parsing import counted
 from vftcli.signals.remarks import Remark, Where, sentence
 from vftcli.wrench.smoother import WrenchPrior
 
@@ -130,11 +131,11 @@ def none_words(found: ContactList) -> str:
     known = found.basis == "free motion"
     if known and not found.candidates:
         return "Nothing touched the arm, as far as this log shows."
-    felt = {c.peak_force: c for c in found.candidates[::-1] if c.peak_force is not None}
+    felt = [c for c in found.candidates if c.peak_force is not None]
     if not felt:
         return "No contact stands out."
-    hardest = felt[max(felt)]
-    most = max(felt) + (hardest.place_band or 0.0)
+    hardest = max(felt, key=lambda c: c.peak_force or 0.0)
+    most = (hardest.peak_force or 0.0) + (hardest.place_band or 0.0)
     return (
         f"No contact stands out. Up to {most:.0f} N near {hardest.peak:.1f} s this model cannot "
         f"explain: {'' if known else 'name free motion (--free) or '}measure your friction (vftcli "
@@ -270,12 +271,13 @@ def by_force(contact: Contact) -> tuple[bool, float, float]:
 def contact_grid(contacts: Sequence[Contact]) -> Grid:
     """The table of contacts; the joints' torques where no force is known."""
     known = any(contact.peak_force is not None for contact in contacts)
-    size = (Column("|F|", "N", symbol="$|F|$"), Column("range"), *words("direction"))
+    size = (Column("|F|", "N", symbol="$|F|$"), Column("range"), "direction")
     columns = (
         Column("#"),
         Column("from – to", "s", words=True),
         *(size if known else (Column("joint torque", "N·m", words=True),)),
-        *words("where", "trust"),
+        "where",
+        "trust",
     )
     rows = []
     for contact in contacts:
@@ -295,7 +297,7 @@ def contacts_latex(found: ContactList) -> str:
     grid = contact_grid(found.contacts)
     columns = [c._replace(unit="N") if c.head == "range" else c for c in grid.columns]
     title = f"Contacts in {found.recording}"
-    return latex(replace(grid, columns=columns, title=title, notes=(LEGEND,)))
+    return latex(replace(grid, given=columns, title=title, notes=(LEGEND,)))
 
 
 def stored_record(estimates: Path) -> Record:

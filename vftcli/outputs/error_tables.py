@@ -27,7 +27,6 @@ from vftcli.outputs.grid import (
     latex,
     markdown,
     terminal,
-    words,
 )
 from vftcli.outputs.grids import contact_grids
 from vftcli.outputs.quantity import DASH, minus, significant
@@ -172,7 +171,7 @@ def rmse_grid(table: Block) -> Grid:
         for j, head in zip(table.joints, table.joint_heads, strict=True)
     )
     return Grid(
-        (*words("observer"), *joints, Column("mean"), *beside),
+        ("observer", *joints, Column("mean"), *beside),
         rows,
         table.title,
         "RMSE",
@@ -208,7 +207,7 @@ def details(row: Record) -> tuple[str, ...]:
 def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
     """Every further table of the RMSE table's shape that has something to say."""
     for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
-        columns = *words("observer"), *joint_columns(group["joint"].unique().sort().to_list())
+        columns = "observer", *joint_columns(group["joint"].unique().sort().to_list())
         found = {
             name: list(zip(*map(details, own.iter_rows(named=True)), strict=True))
             for (name,), own in group.group_by("observer", maintain_order=True)
@@ -264,7 +263,7 @@ def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Ite
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
         axes = (Column(a, unit_of(a), symbol=f"${a[0].upper()}_{a[1]}$") for a in AXES)
         title = f"{recording} against {reference}, wrench, {samples} unmasked samples"
-        yield Grid((*words("observer"), *axes), rows, title, quantity="RMSE", swatches=True)
+        yield Grid(("observer", *axes), rows, title, quantity="RMSE", swatches=True)
 
 
 def compared_samples(rows: pl.DataFrame) -> int:
@@ -326,13 +325,11 @@ def to_terminal(
 def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
     """All tables of the errors as GitHub Markdown, best value of each joint bold."""
     found = blocks(errors)
-    lines = [*marks_in_words(found), *nothing_to_compare(errors)]
-    marks = [f"{escape_markdown(line)}\n" for line in lines]
-    below = [*detail_grids(errors), *axis_grids(errors, analyses)]
-    doubts = [f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors)]
-    return "\n".join(
-        [*doubts, *map(markdown, map(rmse_grid, found)), *marks, *map(markdown, below)]
-    )
+    doubts = (f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors))
+    marks = map(escape_markdown, [*marks_in_words(found), *nothing_to_compare(errors)])
+    tables = map(markdown, map(rmse_grid, found))
+    below = map(markdown, [*detail_grids(errors), *axis_grids(errors, analyses)])
+    return "\n".join([*doubts, *tables, *(f"{line}\n" for line in marks), *below])
 
 
 def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
@@ -360,7 +357,7 @@ def alike(grids: Sequence[Grid]) -> Sequence[Grid]:
             c._replace(head=c.head.replace(DAGGER, ""), symbol=c.symbol.replace(LATEX_DAGGER, ""))
             for c in grid.columns
         ]
-        found.append(replace(grid, title=", ".join([grid.title, *doubtful]), columns=plain))
+        found.append(replace(grid, title=", ".join([grid.title, *doubtful]), given=plain))
     return found
 
 

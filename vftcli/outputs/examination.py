@@ -8,8 +8,7 @@ import numpy as np
 from vftcli.doctor import Examination, finding_record, in_words
 from vftcli.doctor.examination import doubt
 from vftcli.outputs import Record
-from vftcli.outputs.quantity import counted
-from vftcli.signals.parsing import printable
+from vftcli.signals.parsing import counted, printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 

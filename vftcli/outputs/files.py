@@ -331,17 +331,14 @@ def check_letters(path: Path) -> None:
 
 def left_out(names: Iterable[str]) -> list[str]:
     """Files not written for want of a package, a line each."""
-    lacks = {
-        ".rrd": ("rerun", "not written"),
-        ".parquet": ("pyarrow", "without units beside its columns"),
-    }
-    each = (
-        (name, *lacks[end])
-        for name in dict.fromkeys(names)
-        if (end := Path(name).suffix) in lacks
-    )
     return [
-        f"{name} {what}: {remedy(module)}" for name, module, what in each if not installed(module)
+        f"{name} {what}: {remedy(module)}"
+        for name in dict.fromkeys(names)
+        for end, module, what in (
+            (".rrd", "rerun", "not written"),
+            (".parquet", "pyarrow", "without units beside its columns"),
+        )
+        if name.endswith(end) and not installed(module)
     ]
 
 

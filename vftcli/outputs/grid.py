@@ -13,6 +13,7 @@ import shutil
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,7 +81,7 @@ class Column(NamedTuple):
 class Grid:
     """A table."""
 
-    columns: Sequence[Column]  #: The columns.
+    given: Sequence[Any]  #: The columns; a text alone heads a column of words.
     rows: Sequence[Sequence[Entry]]  #: One entry a column.
     title: str = ""  #: What the table is about, "" for none.
     quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
@@ -91,6 +92,11 @@ class Grid:
     marked: bool = False
     notes: tuple[str, ...] = ()  #: Lines on what the marks mean, footnotes in LaTeX.
     swatches: bool = False  #: Whether the page shows the colour of the observer that heads a row.
+
+    @cached_property
+    def columns(self) -> list[Column]:
+        """Every column."""
+        return [Column(c, words=True) if isinstance(c, str) else c for c in self.given]
 
     @property
     def caption(self) -> str:
@@ -107,7 +113,7 @@ class Grid:
 
 
 def keyed_grid(
-    columns: Mapping[str, Column],
+    columns: Mapping[str, Any],
     rows: Iterable[Record],
     title: str = "",
     *,
@@ -116,11 +122,6 @@ def keyed_grid(
     """A table of rows for machines: of each the values of these keys, in their columns."""
     entries = [[*map(row.get, columns)] for row in rows]
     return Grid([*columns.values()], entries, title, swatches=swatches)
-
-
-def words(*heads: str) -> tuple[Column, ...]:
-    """Columns of words."""
-    return tuple(Column(head, words=True) for head in heads)
 
 
 def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ...]:  # noqa: ANN401
@@ -145,7 +146,7 @@ def terminal(grid: Grid, letters: Callable[[str], str] = str, width: int | None 
         left_out.insert(0, grid.columns[k].head)
         rows = tuple([*row[:k], *row[k + 1 :]] for row in grid.rows)
         columns = [*grid.columns[:k], *grid.columns[k + 1 :]]
-        grid = replace(grid, columns=columns, rows=rows)
+        grid = replace(grid, given=columns, rows=rows)
         lines = table_lines(grid, letters, broken=True)
     above = [grid.caption] if grid.caption else []
     below = [f"No room for: {', '.join(left_out)}."] if left_out else []

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from vftcli.outputs import Record
-from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal
 from vftcli.outputs.quantity import significant
 from vftcli.signals.wrench import AXES, unit_of
 
@@ -87,15 +87,15 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
         for k, (what, numbers) in enumerate(values.items()):
             rows.append(("" if k else line.observer, what, *map(float, numbers)))
     joints = joint_columns(len(tuned[0].rate), form=".3g", width=7)
-    return Grid((*words("observer"), Column("", words=True, width=22), *joints), rows)
+    return Grid(("observer", Column("", words=True, width=22), *joints), rows)
 
 
 def robot_text(robot: "Robot") -> str:
     """One robot in full: joints, drives, friction, gains, sources."""
-    head = (
-        f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}"
-    )
-    lines = [head, "", *terminal(joints_grid(robot)).splitlines()]
+    lines = [
+        f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}",
+        *("", *terminal(joints_grid(robot)).splitlines()),
+    ]
     for observer, gains in robot.gains.items():
         lines += ["", *(f"{observer}.{key} = {value}" for key, value in gains.items())]
     lines += ["", *(f"note: {note}" for note in robot.remarks)]
@@ -125,15 +125,14 @@ def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
     if errors is None or "contacts" not in errors.columns:
         return
     if len(rows := errors.drop_nulls("contacts")):
-        columns = dict(zip(CONTACTS, words(*CONTACTS.values()), strict=True))
-        yield keyed_grid(columns, rows.iter_rows(named=True), "contacts against the reference")
+        yield keyed_grid(CONTACTS, rows.iter_rows(named=True), "contacts against the reference")
 
 
 def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
     """Zero drift per observer and axis, with five decimals as the paper prints it."""
     title, width = ("Zero drift; the first span's is removed", 0) if spans else ("", 9)
     axes = (Column(axis, unit_of(axis) if spans else "", ".5f", width=width) for axis in AXES)
-    columns = *words("observer"), *[Column("span [s]")] * spans, *axes
+    columns = "observer", *[Column("span [s]")] * spans, *axes
     rows: Rows = [
         (d.name, *[f"{d.span[0]:g}–{d.span[1]:g}"] * spans, *map(float, d.mean)) for d in drifts
     ]
@@ -156,7 +155,7 @@ def pairs_text(table: "pl.DataFrame") -> str:
         sure = f"{row['p']:.3f}{'*' if row['p'] < SURE else ' '}"
         rows.append((row["recording"], f"J{row['joint']}", *names, by, interval, sure))
     heads = ("joint", "better", "than", "by [N·m]", "95 % interval", "p")
-    grid = Grid((*words("recording"), *map(Column, heads)), rows)
+    grid = Grid(("recording", *map(Column, heads)), rows)
     return f"{terminal(grid)}*: p below {SURE:g}\n"
 
 
@@ -167,6 +166,6 @@ def print_text(found: "Comparison") -> str:
         rows.append((f"{name}, printed", *(f"{v:.4f}" for v in found.printed(name))))
         rows.append((f"{name}, here", *map(float, found.ours[name])))
     rows.append(("floor, here", *map(float, found.floor)))
-    columns = *words("observer"), *joint_columns(len(found.floor))
+    columns = "observer", *joint_columns(len(found.floor))
     table = Grid(columns, rows, f"{found.recording} beside {found.published.title}, N·m")
     return "\n".join([terminal(table), *(f"- {text}" for text in found.remarks), ""])

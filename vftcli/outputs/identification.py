@@ -14,7 +14,7 @@ from vftcli.outputs import Record
 from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal
 from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.page.shell import Box, Scales, page, polyline
 from vftcli.outputs.paper import (
@@ -26,7 +26,7 @@ from vftcli.outputs.paper import (
     plots_of,
     write_figures,
 )
-from vftcli.outputs.quantity import counted, signed
+from vftcli.outputs.quantity import signed
 from vftcli.outputs.run_record import (
     CONVENTIONS,
     envelope,
@@ -39,20 +39,21 @@ from vftcli.outputs.run_record import (
 )
 from vftcli.robots.profile import robot_toml
 from vftcli.signals.errors import OutputError
+from vftcli.signals.parsing import counted
 
 IDENTIFICATION_FIGURES = ("torque", "residuals")  #: Names of its figures.
 #: Key of an identified number → its column.
 COLUMNS = {
-    "parameter": Column("number", words=True),
+    "parameter": "number",
     "joint": Column("joint"),
     "value": Column("value", form=".5g"),
     "sd": Column("sd", form=".2g"),
     "profile": Column("profile", form=".5g"),
-    "unit": Column("unit", words=True),
+    "unit": "unit",
 }
 #: Key of a base parameter → its column.
 BASE_COLUMNS = {
-    "parameter": Column("parameter", words=True),
+    "parameter": "parameter",
     "value": Column("value (SI)", form=signed),
     "sd": Column("sd", form=signed),
     "determined": Column("determined"),
@@ -229,9 +230,8 @@ def residual_grid(found: Identification) -> Grid:
         values = part["rms_Nm"].to_list()
         label = ", ".join(str(name) for name in names if name != "train")
         rows.append((label, *values, sum(values) / len(values)))
-    first = Column("residual rms [N·m]", words=True)
     joints = joint_columns(found.robot.joints, form=".3f")
-    return Grid((first, *joints, Column("mean", form=".3f")), rows)
+    return Grid(("residual rms [N·m]", *joints, Column("mean", form=".3f")), rows)
 
 
 def parameter_grid(found: Identification) -> Grid:
@@ -250,5 +250,5 @@ def shape_choice_grid(choices: pl.DataFrame) -> Grid:
         for r in choices.iter_rows(named=True)
     ]
     title = "RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen"
-    columns = *words("friction"), *map(Column, ("joint", "RMS [N·m]", ""))
+    columns = "friction", *map(Column, ("joint", "RMS [N·m]", ""))
     return Grid(columns, rows, title)

@@ -189,8 +189,8 @@ def line_figure(
     width: float,
     plots: Sequence[Plot],
     *,
-    numbers: Mapping[int, float] | None = None,
-    marks: Mapping[str, tuple[Array, Array]] | None = None,
+    numbers: Mapping[int, float] = {},
+    marks: Mapping[str, tuple[Array, Array]] = {},
     columns: int | None = None,
     below: str | None = None,
 ) -> "Figure":
@@ -216,14 +216,14 @@ def line_figure(
         else:
             axes.tick_params(labelbottom=False)
         (start, stop), end = axes.get_xlim(), -np.inf
-        for number, at in (numbers or {}).items() if k < columns else ():
+        for number, at in numbers.items() if k < columns else ():
             # As far as they have room.
             inch = (stop - start) * columns / (PLOTTED * width)
             half = 0.5 * DIGIT * len(str(number)) * inch
             if at - half >= end:
                 axes.annotate(str(number), (at, 1.0), **ABOVE)
                 end = at + half + BETWEEN * inch
-        for n, (name, (x, y)) in enumerate((marks or {}).items()):
+        for n, (name, (x, y)) in enumerate(marks.items()):
             axes.plot(x[plot.panel], y[plot.panel], label=f"{name}, chosen", **dot_look(n))
     # A place without a plot has the numbers and the label of the axis above it.
     for axes, plot in zip(grid[len(plots) :], plots[len(plots) - columns :], strict=False):

@@ -45,11 +45,6 @@ def ranged(low: float, high: float, unit: str = " N") -> str:
     return f"{low:.0f}–{high:.0f}{unit}"
 
 
-def counted(count: int, noun: str) -> str:
-    """How many of a thing: ``1 contact``, ``2 contacts``."""
-    return f"{count} {noun}{'s' * (count != 1)}"
-
-
 def vector(values: Iterable[float]) -> str:
     """Numbers with one digit behind the point, none of them a negative nought."""
     return ", ".join(minus(f"{x + 0.0:.1f}") for x in np.round(list(values), 1))

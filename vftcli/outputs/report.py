@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 
 import polars as pl
 
@@ -59,7 +58,7 @@ def write_report(
     force: bool = False,
     choice: OutputChoice = PLAIN,
     form: str | None = None,
-    failed: Mapping[str, str] = MappingProxyType({}),
+    failed: Mapping[str, str] = {},
 ) -> str:
     """Write the report of one log, or a sub-folder a log and above them an index and all errors.
 
@@ -139,7 +138,7 @@ def put_contacts(
 
 
 def contacts_envelope(
-    analyses: Sequence[Analysis], command: str, failed: Mapping[str, str] = MappingProxyType({})
+    analyses: Sequence[Analysis], command: str, failed: Mapping[str, str] = {}
 ) -> Record:
     """What touched the arm along logs, for machines; what `failed` is left out."""
     logs = [log_entry(a.recording, contacts_record(a.contacts)) for a in analyses if a.contacts]

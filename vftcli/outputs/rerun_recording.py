@@ -102,10 +102,8 @@ def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
 
 def newton_per_metre(analysis: Analysis) -> float:
     """Length of arrows, by the hardest contact. [N/m]"""
-    found = analysis.contacts
-    if found is None or found.hardest is None:
-        return NEWTON_PER_METRE
-    return arrow_scale(found.hardest.peak_force or NEWTON_PER_METRE)
+    hardest = analysis.contacts and analysis.contacts.hardest
+    return arrow_scale(hardest.peak_force or NEWTON_PER_METRE) if hardest else NEWTON_PER_METRE
 
 
 def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:

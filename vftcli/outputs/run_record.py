@@ -188,10 +188,11 @@ def input_record(recording: Recording) -> Record:
 
 def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
     """What was dropped, turned or derived in reading the logs, and what looks suspicious."""
-    found: dict[str, list[Remark]] = {"repairs": [], "warnings": []}
-    for remark in (remark for log in logs for remark in log.source.remarks):
-        found["repairs" if remark.level == "fact" else "warnings"].append(remark)
-    return found
+    found = [remark for log in logs for remark in log.source.remarks]
+    return {
+        "repairs": [remark for remark in found if remark.level == "fact"],
+        "warnings": [remark for remark in found if remark.level != "fact"],
+    }
 
 
 def robot_record(robot: Robot) -> Record:

@@ -65,11 +65,11 @@ LABELS = 9  #: Seconds that are written below the bars, about.
 #: Style → ANSI code.
 STYLES = {"good": "32", "caution": "33", "bad": "31", "unknown": "2", "bold": "1", "bar": "36"}
 #: ASCII for a letter on a terminal without it.
-PLAIN = {
+PLAIN = str.maketrans({
     "·": "-", "–": "-", "−": "-", "…": "...", "±": "+/-", "≤": "<=", "→": "->", "°": " deg",
     "✓": "+", "△": "!", "✗": "x", "┤": "|", "ω": "w", "τ": "tau", "×": "x", "≥": ">=", "√": "sqrt",
     "₃": "3", "²": "2", "≈": "~", "’": "'",
-}  # fmt: skip
+})  # fmt: skip
 
 
 class Canvas(NamedTuple):
@@ -92,8 +92,7 @@ class Canvas(NamedTuple):
         """A text in letters that the terminal has."""
         if self.unicode:
             return text
-        plain = "".join(PLAIN.get(letter, letter) for letter in text)
-        return plain.encode("ascii", "replace").decode()
+        return text.translate(PLAIN).encode("ascii", "replace").decode()
 
     def wrapped(self, text: str, indent: int, lines: int | None = None) -> list[str]:
         """A text in lines behind an indent, cut behind so many of them; the first has none."""
@@ -303,13 +302,7 @@ def log_table(
     """One line a log: what touched the arm, and whether the log is sound."""
     judged = any(analysis.errors is not None for analysis, _ in found)
     heads = ("log", "span", "contacts", "hardest", "else", *["error"] * judged)
-
-    def healthy(standing: Standing, text: str) -> GridCell:
-        """The last entry of a line, in its colour."""
-        said = canvas.shown(f"{MARKS[standing]} {text}")
-        return GridCell("", mark=canvas.painted(said, standing))
-
-    rows: Rows = []
+    lines: list[tuple[Sequence[str], Standing, str]] = []
     for analysis, all_grounds in found:
         line, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
         if line.least is not None and listed is not None and listed.tells_untouched:
@@ -318,10 +311,15 @@ def log_table(
         error = f"{significant(errors[0], 2)} N·m" if errors else DASH
         row = (line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, rest, error)
         state = "sound" if line.standing == "good" else health(all_grounds).subject
-        rows.append((*row[: len(heads)], healthy(line.standing, state)))
-    rows += [(name, *[""] * (len(heads) - 1), healthy("bad", "left out")) for name in failed]
-    columns = (Column(h, words=h in {"log", "hardest", "health"}) for h in (*heads, "health"))
-    return terminal(Grid(tuple(columns), rows), canvas.shown).splitlines()
+        lines.append((row[: len(heads)], line.standing, state))
+    lines += [((name, *[""] * (len(heads) - 1)), "bad", "left out") for name in failed]
+    # The last entry of a line is in its colour.
+    rows: Rows = [
+        (*row, GridCell("", mark=canvas.painted(canvas.shown(f"{MARKS[how]} {state}"), how)))
+        for row, how, state in lines
+    ]
+    columns = [Column(h, words=h in {"log", "hardest", "health"}) for h in (*heads, "health")]
+    return terminal(Grid(columns, rows), canvas.shown).splitlines()
 
 
 def forces_of_list(found: ContactList, t: Array) -> Array:

@@ -1,14 +1,16 @@
 """Thresholds as tables, as rows for machines, and as the calls of the robots' own interfaces."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import ceil, isnan
 
 from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
 from vftcli.outputs import Record
-from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
-from vftcli.outputs.quantity import DASH, counted, significant
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal
+from vftcli.outputs.quantity import DASH, significant
 from vftcli.robots.robot_file import lines_of
+from vftcli.signals.parsing import counted
 
 #: A threshold in a call is a multiple of a hundredth: no robot tells less of a
 #: newton-metre.
@@ -17,7 +19,7 @@ BLANK = Column("", words=True, width=3)
 #: Columns of every threshold with its interval, and the tail it comes from.
 COLUMNS = (
     BLANK, Column("threshold"), BLANK, Column("95 %"), Column("tail from"),
-    Column("λ", "1/h", ".0f"), Column("k"), Column("log", "h"), *words("needed by"),
+    Column("λ", "1/h", ".0f"), Column("k"), Column("log", "h"), "needed by",
 )  # fmt: skip
 #: Key of a contact in a check → its column.
 CONTACTS = {
@@ -26,7 +28,7 @@ CONTACTS = {
     "stop_s": Column("to", "s", ".2f"),
     "peak_force_N": Column("|F|", "N"),
     "delay_s": Column("delay", "ms", lambda seconds: f"{1e3 * seconds:.0f}"),
-    "by": Column("by", words=True),
+    "by": "by",
 }
 
 
@@ -43,7 +45,7 @@ def thresholds_text(
             for one in counted
         ]
         title = "each log at the thresholds of the others: false alarms"
-        columns = *words("log"), Column("", "h"), Column("due"), *any_of
+        columns = "log", Column("", "h"), Column("due"), *any_of
         parts.append(terminal(Grid(columns, rows, title)))
     for check in checks:
         contacts = [
@@ -171,32 +173,19 @@ def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
     return lower([one if isnan(end) else one._replace(value=end) for one, end in ends])
 
 
-def doubt(thresholds: Thresholds) -> str:
-    """A comment where the robot compares another estimate than the thresholds are learned from."""
+def franka_text(
+    thresholds: Thresholds, frame: str, line: str, phases: Sequence[str] = ("",)
+) -> str:
+    """A text of Franka's interfaces: a frame about a line for each list of numbers."""
     own = thresholds.of_vendor
-    return "" if own else "# learned from gmo, not from the robot's own tau_ext: record that\n"
-
-
-def franka_lists(thresholds: Thresholds, line: str, *phases: str) -> str:
-    """A line for each list of numbers of Franka's interfaces."""
-    return "".join(
+    head = "" if own else "# learned from gmo, not from the robot's own tau_ext: record that\n"
+    lists = "".join(
         line.format(f"{side}_{quantity}_thresholds{phase}", rounded(ones))
         for quantity, ones in (("torque", thresholds.joints), ("force", thresholds.axes))
         for phase in phases
         for side, rounded in (("lower", lower), ("upper", upper))
     )
-
-
-def libfranka_call(thresholds: Thresholds) -> str:
-    """`set_collision_behavior` of pylibfranka; the C++ call has these four lists too."""
-    lists = franka_lists(thresholds, "    {1},  # {0}\n", "")
-    return f"{doubt(thresholds)}robot.set_collision_behavior(\n{lists})\n"
-
-
-def franka_ros_parameters(thresholds: Thresholds) -> str:
-    """`collision_config` of franka_control_node.yaml."""
-    lists = franka_lists(thresholds, "  {}: {}\n", "_acceleration", "_nominal")
-    return f"{doubt(thresholds)}collision_config:\n{lists}"
+    return head + frame.format(lists)
 
 
 def ur_script(thresholds: Thresholds) -> str:
@@ -235,8 +224,15 @@ def toml_text(thresholds: Thresholds) -> str:
 #: Interface of a robot → how many joint torques it takes, None for any number; which
 #: thresholds must be known, "" for none; and its text.
 INTERFACES: dict[str, tuple[int | None, str, Callable[[Thresholds], str]]] = {
-    "libfranka": (7, "axes", libfranka_call),
-    "franka_ros": (7, "axes", franka_ros_parameters),
+    # `set_collision_behavior` of pylibfranka; the C++ call has these four lists too.
+    "libfranka": (7, "axes", partial(
+        franka_text, frame="robot.set_collision_behavior(\n{})\n", line="    {1},  # {0}\n"
+    )),
+    # `collision_config` of franka_control_node.yaml.
+    "franka_ros": (7, "axes", partial(
+        franka_text, frame="collision_config:\n{}", line="  {}: {}\n",
+        phases=("_acceleration", "_nominal"),
+    )),
     "ur_script": (6, "force", ur_script),
     "toml": (None, "", toml_text),
-}
+}  # fmt: skip

@@ -23,7 +23,6 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.benchmark import Results, render_benchmark
 from vftcli.outputs.conversion import companions, convert, save
 from vftcli.outputs.files import put_table
-from vftcli.outputs.quantity import counted
 from vftcli.outputs.run_record import envelope
 from vftcli.pipeline import prepared
 from vftcli.readers.library import Library, absolute
@@ -32,6 +31,7 @@ from vftcli.reproduction.manifest import PUSHED, BenchmarkLog, Manifest, Rival, 
 from vftcli.reproduction.scoring import SCHEMA, ScoreTask, planted, score_log
 from vftcli.signals.option import interval
 from vftcli.signals.packages import check_installed
+from vftcli.signals.parsing import counted
 from vftcli.signals.progress import stage
 from vftcli.signals.shown import frame_of, per_joint
 from vftcli.signals.wrench import per_axis

@@ -165,7 +165,7 @@ def item_grid(shown: ShownItem) -> Grid:
         for line in item.lines
     ]
     words = {"what", "unit"}
-    return Grid(columns=tuple(Column(h, words=h in words) for h in heads), rows=tuple(rows))
+    return Grid(tuple(Column(h, words=h in words) for h in heads), rows=tuple(rows))
 
 
 def beside_print(shown: ShownItem) -> str:
@@ -198,13 +198,13 @@ def overview(found: Mapping[str, ShownItem]) -> Grid:
         for name, shown in found.items()
     ]
     columns = tuple(Column(head, words=head != "ours / print") for head in heads)
-    return Grid(columns=columns, rows=tuple(rows))
+    return Grid(columns, rows=tuple(rows))
 
 
 def short_overview(found: Mapping[str, ShownItem]) -> Grid:
     """The overview for a terminal: item, ours over the print, verdict."""
     grid = overview(found)
-    return replace(grid, columns=grid.columns[::2], rows=tuple(row[::2] for row in grid.rows))
+    return replace(grid, given=grid.given[::2], rows=tuple(row[::2] for row in grid.rows))
 
 
 def wrapped(text: str) -> GridCell:

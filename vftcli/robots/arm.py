@@ -16,7 +16,7 @@ import numpy as np
 from vftcli.robots.chain import NO_BODY, Body, Chain, merge_bodies, nearest_tensor, unphysical
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
-from vftcli.signals.parsing import did_you_mean
+from vftcli.signals.parsing import counted, did_you_mean
 from vftcli.signals.pose import IDENTITY, Pose, exp_matrix, rotation_onto
 
 MOST = 1000  #: Links and joints of a description: a humanoid with two hands has a fifth of it.
@@ -189,7 +189,7 @@ class LumpedArm:
             few = len(tips) <= LISTED
             ends = f"{', '.join(tips[:-1])} or {tips[-1]}" if few else shortened(tips)
             count = {2: "two"}.get(len(alike), str(len(alike)))
-            joints = f"{longest} joint{'s' if longest > 1 else ''}"
+            joints = counted(longest, "joint")
             raise RobotError(f"{self.tree.path}: {count} arms of {joints}: {ends}")
         return alike[0]
 

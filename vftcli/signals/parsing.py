@@ -18,6 +18,11 @@ HALVES = re.compile(r"[\ud800-\udfff]")
 HIDDEN = {"Cc", "Cf", "Co", "Zl", "Zp"}
 
 
+def counted(count: int, noun: str) -> str:
+    """How many of a thing: ``1 contact``, ``2 contacts``."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def whole(text: str) -> str:
     r"""A text that UTF-8 can hold: a file name's byte that is no letter becomes ``\xff``."""
     return text if text.isascii() else HALVES.sub(half, text)

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from vftcli.signals.parsing import counted
 from vftcli.signals.shown import Shown
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ class Remarks(Shown, tuple[Remark, ...]):
 
     def _headline(self) -> str:
         counts = {level: sum(r.level == level for r in self) for level in get_args(Level)}
-        parts = [f"{n} {level}{'s' * (n != 1)}" for level, n in counts.items() if n]
+        parts = [counted(n, level) for level, n in counts.items() if n]
         return ", ".join(parts) or "none"
 
     def _rows(self) -> Iterator[Sequence[object]]:

@@ -134,8 +134,7 @@ def over_frequency(
 ) -> Chart:
     """A chart over frequency, a panel a joint. (T,) [Hz]"""
     panels = joint_panels(lines[0].values)
-    units = (unit,) * len(panels)
-    return Chart(key, title, units, panels, x, tuple(lines), unit="Hz", log=True)
+    return Chart(key, title, (unit,) * len(panels), panels, x, tuple(lines), unit="Hz", log=True)
 
 
 def joint_panels(values: Array) -> tuple[str, ...]:
@@ -145,25 +144,26 @@ def joint_panels(values: Array) -> tuple[str, ...]:
 
 def wrench_chart(analysis: Analysis) -> Chart | None:
     """Force and moment axis by axis: the first wrench with its band, the reference below it."""
-    found = [wrench for wrench in analysis.wrenches if wrench.name != "reference"]
-    if not found:
+    given = {wrench.name: wrench for wrench in analysis.wrenches}
+    reference = given.pop("reference", None)
+    if not given:
         return None
-    each = [(wrench.name, wrench.known, wrench.sd) for wrench in found]
+    each = [(wrench.name, wrench.known, wrench.sd) for wrench in given.values()]
     lines = lines_of(analysis, each, alike=False)
     smoothed = {} if analysis.virtual_sensor is None else analysis.virtual_sensor.smoothed
     for k, line in enumerate(lines):
         if line.name in smoothed and smoothed[line.name].gate:
             # Samples outside of every listed contact.
             lines[k] = line._replace(quiet=smoothed[line.name].unlisted(analysis.t))
-    reference = [w for w in analysis.wrenches if w.name == "reference"]
-    below = [ChartLine(reference_name(analysis), w.known, REFERENCE) for w in reference]
+    if reference is not None:
+        lines.insert(0, ChartLine(reference_name(analysis), reference.known, REFERENCE))
     return Chart(
         "wrench",
-        f"Wrench in {found[0].frame} axes",
+        f"Wrench in {next(iter(given.values())).frame} axes",
         tuple(map(unit_of, AXES)),
         AXES,
         analysis.t,
-        (*below, *lines),
+        tuple(lines),
         families=(1, 1, 1, 2, 2, 2),
         spans=contact_spans(analysis.listed),
     )

@@ -40,8 +40,7 @@ class Blob:
 
     def add(self, values: Array, step: float) -> int:
         """Number of a new row; its step grows where the values would not fit."""
-        most = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
-        step = max(step, most / MOST) or 1.0
+        step = max(step, largest(values) / MOST) or 1.0
         steps = np.where(np.isfinite(values), np.rint(values / step), UNKNOWN)
         self.rows.append(steps.astype(np.int16))
         self.steps.append(step)
@@ -135,8 +134,12 @@ class PageClock:
 
 def step_of(values: Array, unit: str) -> float:
     """Step of a series: that of its unit, a smaller one for small values, 0 without a unit's."""
-    most = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
-    return min(LARGEST.get(unit, 0.0), most / FEWEST)
+    return min(LARGEST.get(unit, 0.0), largest(values) / FEWEST)
+
+
+def largest(values: Array) -> float:
+    """The largest size of a known value."""
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
 def page_data(

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import groupby, repeat
 from operator import itemgetter
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -27,24 +26,16 @@ from vftcli.outputs.error_tables import (
     rmse_grid,
 )
 from vftcli.outputs.examination import rate_of
-from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, words
+from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns
 from vftcli.outputs.grids import contact_grids, drift_grid
 from vftcli.outputs.page import log_charts
 from vftcli.outputs.page.shell import Box, page, part, scales_of
 from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, still_arm, view_of
-from vftcli.outputs.quantity import (
-    DASH,
-    at_least_shown,
-    banded,
-    counted,
-    ranged,
-    significant,
-    vector,
-)
+from vftcli.outputs.quantity import DASH, at_least_shown, banded, ranged, significant, vector
 from vftcli.outputs.run_record import observer_record, run_record
 from vftcli.outputs.shapes import link_surfaces
 from vftcli.signals.arrays import Array
-from vftcli.signals.parsing import printable
+from vftcli.signals.parsing import counted, printable
 from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.frames import FRAMES
 
@@ -64,7 +55,7 @@ VECTORS = ("force_N", "force_sd_N", "moment_Nm", "moment_sd_Nm", "mean_force_N",
 #: Columns of the table of contacts.
 WRENCHES = (
     *map(Column, ("#", "from – to [s]", "range [N]")),
-    *words("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]"),
+    *("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]"),
     *map(Column, ("log-likelihood ratio [nats]", "margin of the place [nats]")),
     *map(Column, ("vendor |F| [N]", "sensor |F| [N]")),
 )
@@ -72,7 +63,7 @@ WRENCHES = (
 HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean RMSE", "Health")
 
 
-def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyType({})) -> str:
+def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
     """The report of one log: self-contained, nothing is loaded from anywhere.
 
     `sizes` are the bytes of the files beside it, None for one that is not written yet.
@@ -97,10 +88,11 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         grids += contact_grids(analysis.errors)
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
     if (refined := analysis.refinement) is not None and refined.budgets:
-        view["budget"] = budget_grid(refined.budgets[:1])
+        view["budget"] = budget_grid(refined.budgets[0])
     if analysis.published is not None:
         view["printed"] = beside_print(analysis.published)
     answer, (surfaces, lacking) = headline(analysis), link_surfaces(analysis.robot)
+    span = f"{log.duration:.1f} s" + (f" at {rate:.0f} Hz" if (rate := rate_of(log)) else "")
     if lacking:
         view["drawing"] = fact("meshes-not-found", count=len(lacking), first=lacking[0])
     return page(
@@ -115,7 +107,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         found=found,
         contact_words=contact_words,
         headline=answer,
-        eyebrow=eyebrow(analysis),
+        eyebrow=(log.name, analysis.robot.title or analysis.robot.name, span),
         sentences=lead_sentences(analysis),
         arm=still_arm(analysis, camera, found.hardest if found is not None else None),
         torque=torque,
@@ -126,13 +118,6 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = MappingProxyTyp
         remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["remarks"]],
         **view,
     )
-
-
-def eyebrow(analysis: Analysis) -> tuple[str, str, str]:
-    """The log, the robot, and the span at its rate."""
-    log, robot, rate = analysis.recording, analysis.robot, rate_of(analysis.recording)
-    span = f"{log.duration:.1f} s" + (f" at {rate:.0f} Hz" if rate else "")
-    return log.name, robot.title or robot.name, span
 
 
 def lead_sentences(analysis: Analysis) -> list[str]:
@@ -232,7 +217,9 @@ def model_pairs(found: ContactList) -> dict[str, str]:
 def observers_view(analysis: Analysis) -> Record:
     """What each observer's parameters are and mean."""
     rows: Rows = []
-    for name in (observer.name for observer in analysis.observers):
+    # Parameters as JSON can hold them, also those of a wrapped observer.
+    used = {o.name: observer_record(o, None)["parameters"] for o in analysis.observers}
+    for name in used:
         what, meant = OBSERVERS[name].title if name in OBSERVERS else "", list[Any]([None] * 5)
         if (tuning := analysis.tunings.get(name)) is not None:
             columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
@@ -240,11 +227,10 @@ def observers_view(analysis: Analysis) -> Record:
             meant.append(tuning.parameter_count)
         rows.append((name, what, *meant))
     heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
-    title = "What the parameters mean at this log's sample time; one value a joint where they "
-    title += "differ"
-    # Parameters as JSON can hold them, also those of a wrapped observer.
-    used = {o.name: observer_record(o, None)["parameters"] for o in analysis.observers}
-    grid = Grid((*words("observer", "What"), *map(Column, heads)), rows, title, swatches=True)
+    title = (
+        "What the parameters mean at this log's sample time; one value a joint where they differ"
+    )
+    grid = Grid(("observer", "What", *map(Column, heads)), rows, title, swatches=True)
     return {"grid": grid, "names": ", ".join(used), "parameters": used}
 
 
@@ -258,7 +244,7 @@ def joint_values(values: Array) -> str:
 
 def beside_print(comparison: Comparison) -> Grid:
     """Printed and computed errors side by side."""
-    columns = list(words("observer"))
+    columns: list[Column | str] = ["observer"]
     for j in range(1, len(comparison.floor) + 1):
         columns += (Column(f"J{j} print", form=".2f"), Column("here"))
     rows: Rows = []
@@ -268,20 +254,15 @@ def beside_print(comparison: Comparison) -> Grid:
     return Grid(columns, rows, f"RMSE in N·m: {comparison.published.title}", swatches=True)
 
 
-def budget_grid(budgets: Sequence[Budget]) -> Grid:
-    """Where every observer's error comes from, cause by cause. [N·m]"""
-    rows: Rows = [
-        (budget.name, cause, *map(float, values))
-        for budget in budgets
-        # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
-        for cause, values in (*budget.parts.items(), ("all but stiction at rest", budget.total))
-    ]
-    return Grid((*words("observer", "cause"), *joint_columns(len(budgets[0].total))), rows)
+def budget_grid(budget: Budget) -> Grid:
+    """Where an observer's error comes from, cause by cause. [N·m]"""
+    # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
+    parts = {**budget.parts, "all but stiction at rest": budget.total}
+    rows: Rows = [(budget.name, cause, *map(float, values)) for cause, values in parts.items()]
+    return Grid(("observer", "cause", *joint_columns(len(budget.total))), rows)
 
 
-def render_index(
-    analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = MappingProxyType({})
-) -> str:
+def render_index(analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = {}) -> str:
     """The page over several reports, each with its folder."""
     lines = [(index_line(*each), each[1].errors) for each in analyses]
     lines.sort(key=lambda line: line[0].rank)
@@ -318,9 +299,7 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
     title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
     if not touched:
         title = "Nothing pushed the arm, as far as these logs can tell."
-    if hard := [
-        (by_force(found.hardest), found) for found in pushed if found.hardest is not None
-    ]:
+    if hard := [(by_force(each.hardest), each) for each in pushed if each.hardest is not None]:
         most = max(hard, key=itemgetter(0))[1]
         lead = f"Hardest in {most.recording}: {hardest_words(most)}."
     if loads:
@@ -331,7 +310,7 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
 def overview(lines: Sequence[LogSummary]) -> Grid:
     """The table of all logs, the worst first; a click on a head sorts by it."""
     ordered = sorted(lines, key=lambda line: line.rank)
-    return Grid(words(*HEADS), list(map(overview_row, ordered)))
+    return Grid(HEADS, list(map(overview_row, ordered)))
 
 
 def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
@@ -362,7 +341,7 @@ def render_batch(lines: Sequence[LogSummary], failures: pl.DataFrame) -> str:
         f"{len(lines)} logs" + (f", {touched} of {listed} touched." if listed else "."),
         eyebrow=(f"{len(lines) + count} logs", ", ".join(sorted({line.robot for line in lines}))),
         words=f"{counted(count, 'log')} could not be analysed." if count else "",
-        failures=Grid(words("Log", "Stage", "Error", "Why"), rows),
+        failures=Grid(("Log", "Stage", "Error", "Why"), rows),
         count=count,
         overview=overview(lines),
     )

@@ -20,9 +20,9 @@ from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, draw
 from vftcli.outputs.contacts import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.page.packing import PageClock, page_data
-from vftcli.outputs.quantity import at_least_shown, counted, minus, ranged
+from vftcli.outputs.quantity import at_least_shown, minus, ranged
 from vftcli.signals.arrays import Array
-from vftcli.signals.parsing import printable
+from vftcli.signals.parsing import counted, printable
 from vftcli.signals.remarks import Remark, sentence
 from vftcli.signals.series import runs_of
 
@@ -72,6 +72,7 @@ def templates() -> "Environment":
         finalize=shown,
         trim_blocks=True,
         lstrip_blocks=True,
+        optimized=False,  # each template is compiled for one page: folding costs more
     )
     drawing = (ticks, label, scales_of, stripes, strokes, paint)
     words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
