@@ -18,8 +18,8 @@ from vftcli.outputs.files import (
     check_letters,
     digest,
     table_file,
-    unwritable,
     write_text,
+    writing,
 )
 from vftcli.outputs.partial import check_writable, held
 from vftcli.outputs.run_record import to_json
@@ -59,21 +59,20 @@ class BatchFolder:
     @contextmanager
     def opened(self, options: str, record: Record, *, force: bool) -> Iterator[None]:
         """Make the folder, or take up the batch in it, for a block; nobody else does meanwhile."""
-        try:
+        with writing(self.path):
             check_letters(self.path)
             self._check(options, force=force)
             self.rows.mkdir(parents=True, exist_ok=True)
             check_writable(self.rows)
-            with held(self.rows, wait=False):
-                text = to_json({**record, "options_sha256": options})
-                write_text(self.path / MARKER, text, force=True)
-                yield
-        except BlockingIOError:
-            raise OutputError(
-                f"another batch writes into {self.path}; wait for its end, or give another -o"
-            ) from None
-        except OSError as error:
-            raise unwritable(self.path, error) from None
+            try:
+                with held(self.rows, wait=False):
+                    text = to_json({**record, "options_sha256": options})
+                    write_text(self.path / MARKER, text, force=True)
+                    yield
+            except BlockingIOError:
+                raise OutputError(
+                    f"another batch writes into {self.path}; wait for its end, or give another -o"
+                ) from None
 
     def _check(self, options: str, *, force: bool) -> None:
         """Raise an OutputError where the folder is another's."""

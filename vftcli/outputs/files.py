@@ -56,25 +56,20 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
     check_file(path, force)
     # What a link points to is replaced, not the link.
     target = path.resolve() if path.is_symlink() else path
-    try:
-        with partial_folder(target.parent) as folder:
-            yield folder / target.name
-            to_disk([folder / target.name])
-            refuse_existing(path, force)
-            (folder / target.name).replace(target)
-            to_disk([target.parent])
-    except OSError as error:
-        raise unwritable(path, error) from None
+    with writing(path), partial_folder(target.parent) as folder:
+        yield folder / target.name
+        to_disk([folder / target.name])
+        refuse_existing(path, force)
+        (folder / target.name).replace(target)
+        to_disk([target.parent])
 
 
 def check_file(path: Path, force: bool = False) -> None:
     """See before anything is computed whether a file could be written."""
-    try:
+    with writing(path):
         check_letters(path)
         refuse_existing(path, force)
         check_writable((path.resolve() if path.is_symlink() else path).parent)
-    except OSError as error:
-        raise unwritable(path, error) from None
 
 
 @contextmanager
@@ -151,7 +146,7 @@ class OutputFolder:
 
     def check(self) -> None:
         """Refuse what must not be overwritten, before anything is computed or made."""
-        try:
+        with writing(self.path):
             if self.path.exists() and not self.path.is_dir():
                 raise OutputError(f"{self.path} is a file; -o needs the name of a folder")
             for name in self.names:
@@ -160,8 +155,6 @@ class OutputFolder:
             for path in self._earlier():
                 refuse_input(path)
             check_writable(next(p for p in (self.path, *self.path.parents) if p.exists()))
-        except OSError as error:
-            raise unwritable(self.path, error) from None
 
     def __enter__(self) -> Self:
         """Refuse what must not be overwritten, and make the temporary folder."""
@@ -188,9 +181,8 @@ class OutputFolder:
         """Move the files into place, or leave nothing."""
         try:
             if error is None:
-                self._move()
-        except OSError as failure:
-            raise unwritable(self.path, failure) from None
+                with writing(self.path):
+                    self._move()
         finally:
             self._partial.__exit__(kind, error, trace)
             self._discard()
@@ -351,6 +343,15 @@ def numbered(names: Iterable[str]) -> list[str]:
             free, number = f"{name}-{number}", number + 1
         found.append(free)
     return found
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Raise what the operating system refuses in a block as the one-line error on `path`."""
+    try:
+        yield
+    except OSError as error:
+        raise unwritable(path, error) from None
 
 
 def unwritable(path: Path, error: OSError) -> OutputError:

@@ -188,7 +188,7 @@ def torque_charts(found: Identification) -> tuple[Chart, ...]:
     trace, units = shown_trace(found), ("N·m",) * found.robot.joints
     measured = ChartLine("measured", trace.measured)
     predicted = ChartLine("predicted", trace.predicted, SPARE[1], "5 2")
-    panels, families = joint_panels(trace.measured), families_of(found.robot.limits.tau_max)
+    panels, families = joint_panels(found.robot.joints), families_of(found.robot.limits.tau_max)
     left, lines = ChartLine("measured − predicted", trace.residual), (measured, predicted)
     chart = Chart(
         "torque", "Drive torque, filtered", units, panels, trace.motion.t, lines, families
@@ -207,7 +207,7 @@ def identification_figures(found: Identification) -> dict[str, Drawing]:
     # The last number of a row of the table is the mean.
     rows = [(str(name), np.array(v[:-1]), None) for name, *v in residual_grid(found).rows]
     if rows:
-        joints = [f"J{j}" for j in range(1, found.robot.joints + 1)]
+        joints = joint_panels(found.robot.joints)
         plot = DotPlot(found.robot.name, joints, rows, np.full(len(joints), np.nan))
         paints = dict(zip((name for name, *_ in rows), cycle(SPARE), strict=False))
         draw = partial(dot_figure, plots=[plot], paints=paints, label="Residual rms (N·m)")

@@ -18,7 +18,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from vftcli.outputs.charts import GREY, INK, REFERENCE, Chart, ChartLine, Span, level_rows
-from vftcli.outputs.files import unwritable
+from vftcli.outputs.files import writing
 from vftcli.outputs.rerun_arm import CONTACTS, ROBOT, ArmPoses, Stream, rgba
 
 #: How the names of lines begin that are drawn as bars, and how those end that are a
@@ -118,10 +118,8 @@ def rerun_file(
         stream.log(f"/{name.lower()}", document, static=True)
     stream.log(ROBOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     yield stream
-    try:
+    with writing(Path(path.name)):
         path.write_bytes(made.drain_as_bytes())
-    except OSError as error:
-        raise unwritable(Path(path.name), error) from None
 
 
 def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> UUID:

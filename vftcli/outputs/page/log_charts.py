@@ -45,10 +45,8 @@ def torque_chart(analysis: Analysis) -> Chart:
                 below[0]._replace(values=np.where(moving, tau, np.nan)),
                 ChartLine(name, resting, "#8a94a0", "1.5 3"),
             ]
-    heads = [f"J{j + 1}" for j in range(n)]
-    for found in blocks(analysis.errors)[:1]:
-        # A dagger where the reference is not to be trusted, as in the tables.
-        heads = found.joint_heads
+    # A dagger where the reference is not to be trusted, as in the tables.
+    heads = next((found.joint_heads for found in blocks(analysis.errors)), joint_panels(n))
     return Chart(
         "tau",
         "External torque on the robot",
@@ -133,13 +131,13 @@ def over_frequency(
     key: str, title: str, unit: str, x: Array, lines: Sequence[ChartLine]
 ) -> Chart:
     """A chart over frequency, a panel a joint. (T,) [Hz]"""
-    panels = joint_panels(lines[0].values)
+    panels = joint_panels(lines[0].values.shape[1])
     return Chart(key, title, (unit,) * len(panels), panels, x, tuple(lines), unit="Hz", log=True)
 
 
-def joint_panels(values: Array) -> tuple[str, ...]:
+def joint_panels(joints: int) -> tuple[str, ...]:
     """Names of the panels of a chart with one a joint."""
-    return tuple(f"J{j}" for j in range(1, values.shape[1] + 1))
+    return tuple(f"J{j}" for j in range(1, joints + 1))
 
 
 def wrench_chart(analysis: Analysis) -> Chart | None:
