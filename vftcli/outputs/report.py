@@ -16,9 +16,9 @@ from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, lo
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text
 from vftcli.outputs.paper import figure_files, write_figures
 from vftcli.outputs.run_record import envelope, log_entry, run_record, seal, to_json, versions
-from vftcli.signals.arrays import trim
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
+from vftcli.signals.recording import trim
 
 #: Files of the errors table, in the order of `tables.FORMS`.
 ERROR_TABLES = ("errors.csv", "errors.json", "errors.md", "errors.tex")

@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 
 from vftcli.readers.reader import RawLog
 from vftcli.readers.table import joined
-from vftcli.signals.arrays import (
-    Array,
-    Indices,
-    Mask,
-    handed_over,
-    median,
-    pieces,
-)
+from vftcli.signals.arrays import Array, Indices, Mask, handed_over, median
 from vftcli.signals.errors import ClockError, LogError
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording, Source, pieces
 from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.series import gaps_of, median_step
 

@@ -13,18 +13,18 @@ from vftcli.readers.table import listed
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import check_joints, drive_torque, dynamics_terms
-from vftcli.signals.arrays import Array, Mask, handed_over, trim
+from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
-from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.recording import JOINT_SIGNALS, Recording, trim
 from vftcli.signals.remarks import fact, on_joints
 from vftcli.signals.repairs import without_isolated
 from vftcli.signals.rest import duration, resting, standing
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown
 
-#: RunSamples from which on a recording's series do not stay in memory beside its results.
+#: Samples from which on a recording's series do not stay in memory beside its results.
 LONG = 1 << 17
 #: What has a value for each sample, and stays in a part of a run.
 SERIES = ("standing", "standstill", "drive_torque", "model_torque", "momentum")

@@ -1,8 +1,6 @@
 """Arrays: one alias, read-only copies, and the checks every type makes at its door."""
 
 import mmap
-from collections.abc import Iterator
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -42,24 +40,6 @@ def release(memory: object) -> None:
     mapped = memory.obj if isinstance(memory, memoryview) else None
     if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
         mapped.madvise(mmap.MADV_DONTNEED)
-
-
-def trim() -> None:
-    """Give free memory back to the system, where the C library has a call for it.
-
-    Otherwise it keeps what lies between arrays in use: a long log's report held a tenth more.
-    """
-    import ctypes
-
-    with suppress(AttributeError, OSError, TypeError):
-        ctypes.CDLL(None).malloc_trim(0)
-
-
-def pieces(values: NDArray[Any], size: int = 1 << 16) -> Iterator[NDArray[Any]]:
-    """The rows of an array, so many at a time; of a mapped one no more lie in memory."""
-    for start in range(0, max(len(values), 1), size):
-        yield values[start : start + size]
-        release(values)
 
 
 def handed_over(value: NDArray[Any]) -> NDArray[Any]:

@@ -1,12 +1,14 @@
 """Recording: one log, in SI units, on one strictly increasing clock; Source: where it is from."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array, Indices, Mask, check_clock, check_shape, release, seal
 from vftcli.signals.errors import (
@@ -310,6 +312,24 @@ class Recording(TimeSeries):
                 f"the log runs from {self.t[0]:g} to {self.t[-1]:g} s"
             )
         return self.without(~keep)
+
+
+def trim() -> None:
+    """Give free memory back to the system, where the C library has a call for it.
+
+    Otherwise it keeps what lies between arrays in use: a long log's report held a tenth more.
+    """
+    import ctypes
+
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+def pieces(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """The rows of an array, 65 536 at a time; of a mapped one no more lie in memory."""
+    for start in range(0, max(len(values), 1), size := 1 << 16):
+        yield values[start : start + size]
+        release(values)
 
 
 def same_run(one: Recording, other: Recording) -> bool:

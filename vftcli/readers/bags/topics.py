@@ -17,9 +17,9 @@ from vftcli.readers.columns import SIGNALS
 from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import LogFormat
-from vftcli.signals.arrays import Array, pieces, release
+from vftcli.signals.arrays import Array, release
 from vftcli.signals.errors import LogError
-from vftcli.signals.recording import EFFORTS
+from vftcli.signals.recording import EFFORTS, pieces
 from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
