@@ -292,7 +292,7 @@ class TestHdf5:
         q = motion(7)["q"]
         places = "observations/qpos", "observation/robot_state/joint_positions"
         path = seeds.hdf5(tmp_path / "x", dict.fromkeys(places, q))
-        with pytest.raises(UnknownFormatError, match="as ALOHA and as DROID"):
+        with pytest.raises(LogError, match="could each be the positions"):
             read(path)
 
     def test_an_unknown_file_tells_its_datasets(self, tmp_path: Path) -> None:

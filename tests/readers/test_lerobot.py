@@ -126,20 +126,17 @@ def test_a_file_elsewhere_than_the_table_says_is_found(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(path, episode=2).q, LOG["q"][50:])
 
 
-@pytest.mark.parametrize("column", ["length", "dataset_from_index"])
-def test_a_table_that_the_data_contradict_is_refused(column: str, tmp_path: Path) -> None:
-    import pyarrow.parquet as pq
-
-    path = dataset(tmp_path)
-    table = path / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
-    reported = pq.read_table(table).to_pydict()
-    reported["dataset_to_index" if column == "length" else column][1] += 1
-    reported["length"][1] += 1 if column == "length" else -1
-    import pyarrow as pa
-
-    pq.write_table(pa.table(reported), table)
-    with pytest.raises(LogError, match="are not those that the table of episodes names"):
-        read(path, episode=1)
+def test_rows_count_and_not_what_is_said_of_them_beside(tmp_path: Path) -> None:
+    """Episodes are those of the rows; a file of one that holds another's is refused."""
+    path = dataset(tmp_path, version=2)
+    (path / "meta" / "episodes.jsonl").write_text('{"episode_index": 7}')
+    (first, second, third) = sorted(path.rglob("*.parquet"))
+    third.rename(first)
+    with pytest.raises(LogError, match="no row is of episode 0, which its name promises"):
+        read(path, episode=0)
+    np.testing.assert_array_equal(read(path, episode=1).q, LOG["q"][30:50])
+    second.rename(second.with_name("file-000.parquet"))
+    np.testing.assert_array_equal(read(path, episode=1).q, LOG["q"][30:50])
 
 
 def test_numbers_of_the_state_are_reported_apart_by_their_names(tmp_path: Path) -> None:
@@ -217,8 +214,7 @@ def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:
     ("name", "text", "words"),
     [
         ("info.json", "{", "not a readable description"),
-        ("episodes.jsonl", '{"episode_index": 0}\n', "a line that names no episode"),
-        ("episodes.jsonl", "\xe5", "not text in UTF-8"),
+        ("info.json", "\xe5", "not text in UTF-8"),
     ],
 )
 def test_a_damaged_description_is_refused(

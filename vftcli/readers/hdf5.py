@@ -32,7 +32,7 @@ from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import Blocks, Names, Places, listed
 from vftcli.readers.tables import ArrayTable, from_table
-from vftcli.signals.errors import LogError, UnknownFormatError
+from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
 from vftcli.signals.remarks import fact
 
@@ -60,18 +60,12 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
         )
     if DEFLATE not in filters or DEFLATE_RATIO * dataset.id.get_storage_size() <= limit:
         return
-    suspects: list[tuple[int, ...]] = []
-
-    def look(chunk: Hdf5) -> None:
-        if DEFLATE_RATIO * chunk.size > limit:
-            suspects.append(chunk.chunk_offset)
-
-    dataset.id.chunk_iter(look)
-    for offset in suspects:
-        _, packed = dataset.id.read_direct_chunk(offset)
-        with suppress(
-            zlib.error
-        ):  # no more than this was unpacked; HDF5 says where it breaks off
+    chunks: list[Hdf5] = []
+    dataset.id.chunk_iter(chunks.append)
+    for chunk in (chunk for chunk in chunks if DEFLATE_RATIO * chunk.size > limit):
+        _, packed = dataset.id.read_direct_chunk(chunk.chunk_offset)
+        # No more than this was unpacked; HDF5 says where it breaks off.
+        with suppress(zlib.error):
             if len(zlib.decompressobj().decompress(packed, size + 1)) > size:
                 raise LogError(
                     f"{name}: a chunk unpacks to more than the {size} bytes that it holds."
@@ -209,11 +203,6 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     if request.spec.item("q"):
         return from_table(table, request)
     names = table.names
-    if all(groups_of(names, anchor) for anchor in LAYOUTS):
-        raise UnknownFormatError(
-            f"{table.path}: laid out as ALOHA and as DROID. Say what is what with "
-            "--columns, as in t=…,q=PATH/OF/POSITIONS."
-        )
     for path, project in TORQUELESS.items():
         if any(f"/{name}".endswith(f"/{path}") for name in names):
             raise LogError(
@@ -251,12 +240,12 @@ def groups_of(names: Sequence[str], anchor: str) -> Names:
 
 
 def layout_of(table: Hdf5Table) -> tuple[str, dict[int, str]]:
-    """The layout of a file, and the group of each episode; "" of any other, or of two.
+    """The layout of a file, and the group of each episode; "" of any other.
 
     An episode has the number that its group's name ends with, or is counted from 0.
     """
-    found = [(x, groups) for x in LAYOUTS if (groups := groups_of(table.names, x))]
-    anchor, groups = found[0] if len(found) == 1 else ("", ("",))
+    found = ((x, groups) for x in LAYOUTS if (groups := groups_of(table.names, x)))
+    anchor, groups = next(found, ("", ("",)))
     return anchor, dict(zip(numbers_of(groups), groups, strict=True))
 
 
@@ -267,26 +256,20 @@ def numbers_of(groups: Sequence[str]) -> Sequence[int]:
     return numbers if rising else range(len(groups))
 
 
-def trajectories(folder: Path) -> Iterator[Path | None]:
-    """Every episode below a folder in the order of their names; None for a folder without one."""
-    for place, below, names in os.walk(folder):
-        below.sort()
-        yield Path(place) / TRAJECTORY if TRAJECTORY in names else None
-
-
 def recognises(file: LogFile, _: LogFormat) -> bool:
     """Whether a folder holds DROID's episodes, at any depth."""
     if "metadata.yaml" in file.entries or (file.path / "meta" / "info.json").is_file():
         return False
-    looked_at = zip(range(MOST_LOOKED_AT), trajectories(file.path), strict=False)
-    return any(path is not None for _, path in looked_at)
+    looked_at = itertools.islice(os.walk(file.path), MOST_LOOKED_AT)
+    return any(TRAJECTORY in names for *_, names in looked_at)
 
 
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The logs of an HDF5 file, or of DROID's folder by name, with their places if several."""
     if file.is_folder:
-        paths = [path for path in trajectories(file.path) if path is not None]
+        # By the names of their folders, which is the order in which they are walked.
+        paths = sorted(file.path.rglob(TRAJECTORY), key=lambda path: path.parent.parts)
         if not paths:
             raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
         each = {

@@ -14,7 +14,7 @@ import numpy as np
 from vftcli.readers.aliases import ALIASES, AXES, TABLE
 from vftcli.readers.columns import SIGNALS
 from vftcli.readers.opening import LogFile, open_log
-from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
+from vftcli.readers.parquet import ParquetTable, episodes_of
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import LogFormat
 from vftcli.readers.table import Names, Notes, listed
@@ -44,22 +44,6 @@ SIGNAL_OF = {word: signal for signal in reversed(MEASURED) for word in ALIASES[s
 #: Values of robot_type that are a profile's name.
 ROBOTS = ("panda", "fr3", "ur5", "ur5e", "ur10e")
 
-EPISODES_TABLE = (
-    EPISODE, "length", "dataset_from_index", "dataset_to_index", "data/chunk_index",
-    "data/file_index",
-)  # fmt: skip
-
-
-class Episode(NamedTuple):
-    """Where an episode is."""
-
-    number: int  #: Its index.
-    #: Its data file by the dataset's usual name, None where it is unknown.
-    file: Path | None
-    length: int | None = None  #: Its frames, None where it is unknown.
-    #: Index of its first frame in the dataset, None where it is unknown.
-    start: int | None = None
-
 
 class Element(NamedTuple):
     """One number of an observation: which signal of which joint."""
@@ -74,15 +58,19 @@ class Element(NamedTuple):
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The episodes of a dataset."""
     read = partial(read_episode, file, info_of(file.path))
-    yield {each.number: partial(read, each) for each in dataset_episodes(file.path)}
+    yield {each[0]: partial(read, *each) for each in dataset_episodes(file.path).items()}
 
 
 def read_episode(
-    file: LogFile, info: Mapping[str, Any], episode: Episode, request: ReadChoice
+    file: LogFile, info: Mapping[str, Any], number: int, path: Path, request: ReadChoice
 ) -> RawLog:
     """Read an episode of a dataset, of which meta/info.json says this."""
-    path = data_file(file.path, episode)
-    table = _rows_of(open_log(path), episode)
+    table = ParquetTable(open_log(path))
+    numbers = table.episodes()
+    if numbers.size:
+        table.rows = np.flatnonzero(numbers == number)
+        if not table.rows.size:
+            raise LogError(f"{path}: no row is of episode {number}, which its name promises.")
     usual, names, remarks, side = _columns_of(file.path, table, info.get("features"), request)
     layout = TABLE._replace(columns=usual)
     raw = from_table(table, request, layout, names=names, remarks=remarks)
@@ -202,93 +190,19 @@ def text_of(path: Path) -> str:
         raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
 
 
-def _by_table(folder: Path, path: Path) -> Iterator[Episode]:
-    table = ParquetTable(open_log(path))
-    if missing := [name for name in EPISODES_TABLE if name not in table.names]:
-        raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
-    places = [table.names.index(name) for name in EPISODES_TABLE]
-    loaded = table.load(places)
-    columns = [loaded[place] for place in places]
-    if not all(column.ndim == 1 and np.isfinite(column).all() for column in columns):
-        raise LogError(f"{path}: a row of the table of episodes lacks a number.")
-    for number, length, start, end, chunk, file in np.stack(columns, 1).astype(int).tolist():
-        if end - start != length:
-            raise LogError(
-                f"{path}: episode {number} has {length} frames and spans {end - start}."
-            )
-        place = folder / "data" / f"chunk-{chunk:03d}" / f"file-{file:03d}.parquet"
-        yield Episode(number, place, length, start)
+@lru_cache(maxsize=1024)  # who reads all episodes asks for each again
+def _numbers_in(path: Path, _changed: int) -> tuple[int, ...]:
+    named = re.fullmatch(r"episode_(\d{6,9})", path.stem)  # version 2: an episode a file
+    return (int(named[1]),) if named else episodes_of(ParquetTable(open_log(path)).episodes())
 
 
-def _by_lines(folder: Path, path: Path) -> Iterator[Episode]:
-    files = {file.name: file for file in (folder / "data").rglob("*.parquet")}
-    for line in filter(str.strip, text_of(path).splitlines()):
-        try:
-            row = json.loads(line)
-            number, length = int(row[EPISODE]), int(row["length"])
-        except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
-            raise LogError(f"{path}: a line that names no episode: {line[:60]!r}.") from None
-        yield Episode(number, files.get(f"episode_{number:06d}.parquet"), length)
-
-
-def _by_data(_: Path, path: Path) -> Iterator[Episode]:
-    for number in episodes_of(ParquetTable(open_log(path)).episodes()):
-        yield Episode(number, path)
-
-
-#: Files of a dataset that name its episodes, the best first → what reads one.
-WAYS = {
-    "meta/episodes/**/*.parquet": _by_table, "meta/episodes.jsonl": _by_lines,
-    "data/**/*.parquet": _by_data,
-}  # fmt: skip
-
-
-@lru_cache(maxsize=64)  # who reads all episodes asks for each again
-def _episodes_by(way: str, folder: Path, path: Path, _changed: int) -> tuple[Episode, ...]:
-    return tuple(WAYS[way](folder, path))
-
-
-def dataset_episodes(folder: Path) -> list[Episode]:
-    """The episodes of a dataset, rising."""
-    found: dict[int, Episode] = {}
-    for way in WAYS:
-        for path in sorted(folder.glob(way)):
-            each = _episodes_by(way, folder, path, path.stat().st_mtime_ns)
-            found |= {episode.number: episode for episode in each}
-        if found:
-            return [found[number] for number in sorted(found)]
-    raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
-
-
-def data_file(folder: Path, episode: Episode) -> Path:
-    """The data file of an episode: where the table says, or the one that holds it."""
-    if episode.file is not None and episode.file.is_file():
-        return episode.file
-    for path in sorted((folder / "data").rglob("*.parquet")):
-        if episode.number in episodes_of(ParquetTable(open_log(path)).episodes()):
-            return path
-    raise LogError(f"{folder}: no file of data/**/*.parquet holds episode {episode.number}.")
-
-
-def _rows_of(file: LogFile, episode: Episode) -> ParquetTable:
-    """The rows of an episode in its data file, checked against the table of episodes."""
-    table = ParquetTable(file)
-    numbers = table.episodes()
-    if not numbers.size:
-        return table
-    rows = np.flatnonzero(numbers == episode.number)
-    differs = episode.length not in {None, len(rows)}
-    if "index" in table.names and episode.start is not None and not differs:
-        index = table.names.index("index")
-        usual = episode.start + np.arange(len(rows))
-        differs = not np.array_equal(table.load([index], clock=index)[index][rows], usual)
-    if differs:
-        raise LogError(
-            f"{file.path}: the rows of episode {episode.number} are not those that the table of "
-            "episodes names; the dataset is damaged or was edited."
-        )
-    table.rows = rows if len(rows) != len(numbers) else None
-    return table
+def dataset_episodes(folder: Path) -> dict[int, Path]:
+    """The episodes of a dataset, rising, and the data file that holds each."""
+    paths = sorted((folder / "data").rglob("*.parquet"))
+    each = {number: p for p in paths for number in _numbers_in(p, p.stat().st_mtime_ns)}
+    if not each:
+        raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
+    return dict(sorted(each.items()))
 
 
 def recognises(file: LogFile, _: LogFormat) -> bool:

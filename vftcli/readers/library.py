@@ -146,11 +146,9 @@ class LogCollection:
             from vftcli.readers import lerobot
 
             meta = tuple(files_of(path / "meta"))
-            for episode in lerobot.dataset_episodes(path):
-                if chosen in {None, episode.number}:
-                    yield LogEntry(
-                        path, episode.number, (*meta, lerobot.data_file(path, episode))
-                    )
+            for own, data in lerobot.dataset_episodes(path).items():
+                if chosen in {None, own}:
+                    yield LogEntry(path, own, (*meta, data))
             return
         numbers = reader.numbers(open_log(path)) if chosen is None else ()
         for number in numbers if len(numbers) > 1 else (chosen,):

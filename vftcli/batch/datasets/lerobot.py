@@ -18,7 +18,7 @@ from vftcli.batch.datasets import (
     Single,
     Statistics,
 )
-from vftcli.readers.lerobot import data_file, dataset_episodes, info_of, text_of
+from vftcli.readers.lerobot import dataset_episodes, info_of, text_of
 from vftcli.readers.parquet import EPISODE, guarded
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
@@ -44,9 +44,8 @@ class LeRobotDataset:
     def files(self) -> Iterator[DataFile]:
         """The data files with their episodes, in the order of these."""
         numbers: dict[Path, list[int]] = {}
-        for episode in dataset_episodes(self.folder):
-            place = data_file(self.folder, episode).relative_to(self.folder)
-            numbers.setdefault(place, []).append(episode.number)
+        for number, path in dataset_episodes(self.folder).items():
+            numbers.setdefault(path.relative_to(self.folder), []).append(number)
         for place, own in numbers.items():
             yield DataFile(place, self.folder, tuple(own))
 
@@ -149,8 +148,10 @@ class LeRobotDataset:
         with guarded(path):
             source = pq.ParquetFile(path)
             table = source.read()
+            numbers = table.column(EPISODE).to_pylist()
+        if missing := set(numbers) - statistics.keys():
+            raise LogError(f"{path}: names episode {min(missing)}, of which data/ has no rows")
         kinds = {n.rpartition("/")[2] for n in table.column_names if n.startswith("stats/")}
-        numbers = table.column(EPISODE).to_pylist()
         for column in columns:
             for key in (key for key in KEYS if key in kinds):
                 values = [statistics[number][column.name][key].tolist() for number in numbers]
