@@ -48,7 +48,7 @@ WRENCHES = (
 )
 
 INDEXED = re.compile(
-    r"(?i)(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d{1,9})|\[(?P<b>\d{1,9})\]|(?P<c>\d{1,9}))",
+    r"(?i)(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?|(?P<open>\[))?(?P<index>\d{1,9})(?(open)\])"
 )  # a number of any length would be tried from each of its digits on
 #: What ROS tools put before the fields of a JointState.
 FIELD = re.compile(r"field\.|/?joint_states?[./]")
@@ -98,8 +98,7 @@ class NamedColumns:
             if column in table.lists:
                 found.setdefault(name.lower(), {}).update(enumerate(cells_of(table, column)))
             elif column not in in_joints and (match := INDEXED.fullmatch(name)):
-                index = int(match["a"] or match["b"] or match["c"])
-                stem = FIELD.sub("", match["stem"].lower(), count=1)
+                index, stem = int(match["index"]), FIELD.sub("", match["stem"].lower(), count=1)
                 if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
                     self.twice[stem] = name
         for stem, of_joint in by_joint.items():

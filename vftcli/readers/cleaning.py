@@ -364,10 +364,11 @@ def _refuse_degrees(raw: RawLog, path: Path) -> None:
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS
     beyond = np.concatenate([np.any(np.abs(rows) > limit, axis=1) for rows in pieces(q)])
     # A few bad samples are no unit; the doctor cuts them out.
-    few = np.mean(beyond) < BAD_SHARE
-    parts = (x[~k] if few else x for x, k in zip(pieces(q), pieces(beyond), strict=True))
-    ends = np.array([(x.min(axis=0), x.max(axis=0)) for x in parts if len(x)])
-    low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+    own = (~beyond | (np.mean(beyond) >= BAD_SHARE))[:, None]
+    low, high = (
+        q.min(axis=0, where=own, initial=np.inf),
+        q.max(axis=0, where=own, initial=-np.inf),
+    )
     largest, travel = float(np.max([-low, high])), float(np.max(high - low))
     if largest > limit or travel > TWO_TURNS:
         raise LogError(

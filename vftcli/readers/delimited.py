@@ -255,7 +255,7 @@ def _numbers(series: Series, path: Path) -> Column:
     if series.dtype == pl.Int64 and series.null_count():
         series = series.cast(pl.Float64)
     values: Column = series.to_numpy()
-    return values if series.dtype != pl.Float64 or not series.null_count() else np.array(values)
+    return values
 
 
 STAMP = ("sec", "nanosec", "frame_id")  #: Columns before the names of ros2 topic echo --csv.

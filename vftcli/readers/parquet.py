@@ -8,7 +8,7 @@ import json
 import struct
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from io import BytesIO
@@ -58,7 +58,7 @@ class ColumnarTable(Table):
         self._size = len(file.content)
         with guarded(self.path):
             schema, self._count = self._opened(file)
-            self._about = (schema.metadata or {}).get(b"vftcli", b"{}")
+            about = (schema.metadata or {}).get(b"vftcli", b"{}")
             lists = ("list<", "large_list<", "fixed_size_list<")
             self._lists = [
                 k for k, kind in enumerate(schema.types) if str(kind).startswith(lists)
@@ -67,6 +67,11 @@ class ColumnarTable(Table):
                 raise LogError(
                     f"{file.path}: the table has no rows; nothing was recorded into it."
                 )
+        #: What vftcli convert wrote beside the columns; nothing for files of other programs.
+        self.about: dict[str, Any] = {}
+        with suppress(ValueError, RecursionError, AttributeError):
+            found = json.loads(about)
+            self.about = found if isinstance(found.get("joint_names", []), list) else {}
         self.names = tuple(schema.names)
         self.width = len(self.names)
 
@@ -77,15 +82,6 @@ class ColumnarTable(Table):
     @abstractmethod
     def _batches(self, columns: Places, rows: int) -> Iterator[Arrow]:
         """Some columns of all rows, not many more than so many at a time."""
-
-    def conversion(self) -> dict[str, Any]:
-        """What vftcli convert wrote beside the columns; nothing for files of other programs."""
-        try:
-            about = json.loads(self._about)
-        except (ValueError, RecursionError):
-            return {}
-        good = isinstance(about, dict) and isinstance(about.get("joint_names", []), list)
-        return about if good else {}
 
     @cached_property
     def lists(self) -> Mapping[int, int]:
@@ -99,8 +95,16 @@ class ColumnarTable(Table):
             return found
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
-        """Decode some columns."""
-        self._check(columns)
+        """Decode some columns, where they may be unpacked: a few bytes may claim a billion rows.
+
+        The rows are asked for, not the pages: on a damaged page's description pyarrow
+        ends the whole process.
+        """
+        # Decoders hand over two columns of one name under that name.
+        if any(self.names.count(self.names[c]) > 1 for c in columns):
+            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
+        width = sum(self.lists.get(column, 1) for column in columns)
+        check_unpacked(self.path, 8 * width * self._count, self._size)
         with guarded(self.path):
             start = 0
             for batch in self._batches(columns, BLOCK_ROWS):
@@ -132,22 +136,13 @@ class ColumnarTable(Table):
             raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
         whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
         target = np.int64 if whole else np.float64
-        # Not copied where nothing is to be changed: what is picked of it is copied once
-        # more.
-        numbers = plain(values).astype(target, copy=False)
+        # Pyarrow's own way imports pandas (50 MB, half a second); it has NaN for what is missing.
+        if values.null_count or values.type.bit_width < 8:
+            numbers = np.asarray(values.to_numpy(zero_copy_only=False))
+        else:
+            numbers = np.from_dlpack(values)
+        numbers = numbers.astype(target, copy=False)  # what is picked of it is copied once more
         return numbers if length is None else numbers.reshape(-1, length)
-
-    def _check(self, columns: Places) -> None:
-        """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
-
-        The rows are asked for, not the pages: on a damaged page's description pyarrow
-        ends the whole process.
-        """
-        # Decoders hand over two columns of one name under that name.
-        if any(self.names.count(self.names[c]) > 1 for c in columns):
-            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
-        width = sum(self.lists.get(column, 1) for column in columns)
-        check_unpacked(self.path, 8 * width * self._count, self._size)
 
     def episodes(self) -> Column:
         """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
@@ -158,17 +153,6 @@ class ColumnarTable(Table):
         if numbers.ndim != 1 or not np.isfinite(numbers).all():
             raise LogError(f"{self.path}: {EPISODE} is not a number in every row.")
         return numbers
-
-
-def plain(values: Arrow) -> Column:
-    """Numbers as an array, NaN where there is none.
-
-    Where none is missing without pyarrow's own way, which imports pandas: 50 MB and half
-    a second.
-    """
-    if values.null_count or values.type.bit_width < 8:
-        return np.asarray(values.to_numpy(zero_copy_only=False))
-    return np.from_dlpack(values)
 
 
 class ParquetTable(ColumnarTable):
@@ -260,7 +244,7 @@ def fields_at(data: memoryview, place: int) -> dict[int, int]:
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The logs of a table: ours, a user's, or the episodes of a LeRobot file."""
     table = (ArrowTable if file.head.startswith(ARROW) else ParquetTable)(file)
-    numbers, about = table.episodes(), table.conversion()
+    numbers, about = table.episodes(), table.about
     there = episodes_of(numbers)
 
     def read(number: int, request: ReadChoice) -> RawLog:

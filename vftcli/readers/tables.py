@@ -228,13 +228,10 @@ def load_signals(table: Table, picks: Picks, request: ReadChoice, clock_name: st
 
 def _stacked(pick: Item, loaded: Block) -> Array:
     """One signal's cells side by side, scaled. (T, n)"""
-    out = np.empty((len(loaded[pick.cells[0].column]), len(pick.cells)))
-    for j, cell in enumerate(pick.cells):
-        out[:, j] = _numbers(loaded, cell)
-        if cell.turned:
-            out[:, j] = 0.0 - out[:, j]
-    if pick.factor != 1.0:
-        out *= pick.factor
+    out = np.stack([_numbers(loaded, cell) for cell in pick.cells], axis=1, dtype=np.float64)
+    factors = [-pick.factor if cell.turned else pick.factor for cell in pick.cells]
+    if set(factors) != {1.0}:
+        out *= factors
         out += 0.0  # a turned zero is plain zero
     return out
 
