@@ -223,6 +223,7 @@ class TestHdf5:
     def test_a_text_of_columns_goes_before_the_layout(self, tmp_path: Path) -> None:
         path = seeds.aloha(tmp_path / "x")
         named = read(path, columns="t@25Hz,q=observations/qpos[7:13]")
+        assert named.source.clock == "none: 25 Hz as stated"
         np.testing.assert_array_equal(named.q, motion()["q"] / 2)
         assert named.t[1] == 0.04
         assert read(path, columns="q=observations/qpos[0:6]").t[1] == 0.02  # the layout's rate
