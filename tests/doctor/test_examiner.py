@@ -11,7 +11,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms
-from vftcli.signals.errors import ExaminationError, RobotError
+from vftcli.signals.errors import ExaminationError, MissingSignalError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
 
@@ -82,6 +82,8 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it() ->
         match=r"^Which arm\? Best fits: .* \(\d{2,3} %\), .* \(\d{2,3} %\); none explains",
     ):
         examiner.robot(turned, RobotChoice())
+    with pytest.raises(MissingSignalError, match="positions alone carry no force; it has q, dq"):
+        examiner.robot(replace(log, torque=None), RobotChoice())
 
 
 def test_the_payload_of_one_log_is_not_that_of_another() -> None:

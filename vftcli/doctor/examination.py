@@ -16,7 +16,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Runs, paired, unwound
-from vftcli.robots.terms import effort_name
+from vftcli.robots.terms import check_effort, effort_name
 from vftcli.signals.errors import ExaminationError, UnsettledRobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks, as_record, fact, filled, sentence, words
@@ -249,6 +249,7 @@ NEAREST = 2  #: Profiles that are named where none is settled.
 
 def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
     """The profile that the maker's own model in a log tells, and on what grounds."""
+    check_effort(recording)  # no arm would help
     found, fits = guess_robot(recording)
     if found is None:
         near, words = fits[:NEAREST], choices_for(recording)

@@ -48,6 +48,16 @@ def effort_name(recording: Recording, robot: Robot) -> str:
     return next((name for name in ranked if getattr(recording, name) is not None), ranked[0])
 
 
+def check_effort(recording: Recording) -> None:
+    """Raise unless a log says what its drives do."""
+    if all(getattr(recording, name) is None for name in EFFORTS):
+        raise MissingSignalError(
+            f"{recording.name}: the log has no joint torques and no motor currents, and "
+            f"positions alone carry no force; it has {', '.join(recording.signals)}. Record "
+            "them, or name their columns with --columns"
+        )
+
+
 def uses_current(recording: Recording, robot: Robot) -> bool:
     """Whether the drive torque comes from motor current."""
     return effort_name(recording, robot) == "current"
@@ -70,13 +80,8 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
     gravity get the gravity torque g(q) of the arm with its payload: τ = e + g(q).
     """
     check_joints(recording, robot)
-    effort: Array | None = getattr(recording, name := effort_name(recording, robot))
-    if effort is None:
-        raise MissingSignalError(
-            f"{recording.name}: the log has no joint torques and no motor currents, and "
-            f"positions alone carry no force; it has {', '.join(recording.signals)}. Record "
-            "them, or name their columns with --columns"
-        )
+    check_effort(recording)
+    effort: Array = getattr(recording, name := effort_name(recording, robot))
     if name == "torque_without_gravity":
         return effort + gravity_torque(robot, recording.q)
     if name == "torque":
