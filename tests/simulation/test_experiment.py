@@ -42,11 +42,6 @@ force = [0.0, 9.0, 4.0]
 axes = "link"
 link = 4
 point = [0.05, 0.0, 0.02]
-[[contacts]]
-name = "drift"
-kind = "random-walk"
-intensity = [2.0]
-begin = 0.5
 [sensing]
 torque = "instant"
 """
@@ -80,9 +75,7 @@ def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
         link = pin.computeFrameJacobian(model, data, q, elbow, axes)
         there = tip.T @ truth.wrench[k] + link.T @ truth.contacts["elbow"][k]
         # required 1e-9
-        np.testing.assert_allclose(
-            truth.tau_ext[k], there + truth.walks["drift"][k], rtol=0, atol=1e-9
-        )
+        np.testing.assert_allclose(truth.tau_ext[k], there, rtol=0, atol=1e-9)
     # the force along the profile of the file: half a cosine of .2 s up and down, read off between
     # the middles of steps of 1 ms, (π/.2)²·12 N/8 of them
     up, down = (np.clip(each / 0.2, 0.0, 1.0) for each in (truth.t - 0.2, 1.4 - truth.t))
@@ -90,9 +83,6 @@ def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
     np.testing.assert_allclose(truth.wrench[:, :3], np.outer(size, [5, -3, 8]), atol=5e-4)
     assert np.max(np.abs(truth.wrench)) > 5.0
     assert np.max(np.abs(truth.contacts["elbow"])) > 5.0
-    assert np.max(np.abs(truth.walks["drift"])) > 0.5
-    before = truth.t < 0.49
-    np.testing.assert_array_equal(truth.walks["drift"][before], 0.0)
 
 
 def test_the_flange_is_where_pinocchio_has_it(many: Simulation) -> None:

@@ -8,15 +8,14 @@ import pytest
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.contacts import Place, SimulatedContact, draw_walk, drawn, started
+from vftcli.simulation.contacts import Place, SimulatedContact, drawn, started
 from vftcli.simulation.scenario import (
+    ContactSpec,
     HandSpec,
     LoadSpec,
     ProfileSpec,
     PushesSpec,
-    RandomWalkSpec,
     StopSpec,
-    WrenchSpec,
 )
 
 HERE = Place(np.eye(3), np.array([0.4, 0.1, 0.3]), np.zeros(3), np.zeros(3))
@@ -160,14 +159,6 @@ def test_stop_pushes_and_never_pulls() -> None:
     np.testing.assert_array_equal(wrench(wall, 0.0, coming), 0.0)
 
 
-def test_random_walk_gains_its_intensity() -> None:
-    walk = draw_walk(RandomWalkSpec(name="w", intensity=(4.0,)), 500, 1000, 1e-3, rng())
-    # variance of 500 walks after 1 s: 4 (N·m)², good to 2·4/√1000 = 0.25 (one sigma)
-    assert np.var(walk[-1]) == pytest.approx(4.0, abs=1.0)
-    # from zero: the mean of 500 first steps of √.004 N·m is 0 to √(.004/500) = .003 (one sigma)
-    assert np.mean(walk[0]) == pytest.approx(0.0, abs=0.012)
-
-
 @pytest.mark.parametrize(
     ("spec", "words"),
     [
@@ -180,6 +171,6 @@ def test_random_walk_gains_its_intensity() -> None:
         (ProfileSpec(name="p", spans=(), axes="tool"), "there is base, link"),
     ],
 )
-def test_impossible_contacts_are_refused(spec: WrenchSpec, words: str) -> None:
+def test_impossible_contacts_are_refused(spec: ContactSpec, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         started(spec, rng(), 1.0)

@@ -155,7 +155,6 @@ LoadSpec = {rise = 0.5, fall = 0.3}
 PushesSpec = {style = "slow", vertical = 0.5}
 HandSpec = {reach = 0.6, release = 0.08, stiffness = 200, damping = 15}
 StopSpec = {normal = [0, 0, 1], stiffness = 2e4, damping = 200}
-RandomWalkSpec = {}
 CircleSpec = {radius = 0.2, period = 4, cycles = 5}
 HoldSpec = {length = 10}
 PosesSpec = {move = 2.5, dwell = 2, count = 12, spread = 0.7}

@@ -126,9 +126,8 @@ class Arm:
         self.plant = Plant(self.true.chain.to_pinocchio(), self.true.friction, q, v, h)
         self.servo = Servo(scenario.servo, self.true.nominal, h)
         self.steps, self.made = int(np.ceil(duration / h - 1e-9)), 0
-        self.touching = Touching(
-            scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
-        )
+        contacts, lasts = scenario.contacts, self.steps * h
+        self.touching = Touching(contacts, self.robot.chain, lasts, self.seeds["contacts"])
         #: Course of the run, one row an inner step; row k covers k·step to (k+1)·step,
         #: and one more is for the state after the last. State and reference are those at
         #: the start of a step, all else holds over it.

@@ -19,9 +19,7 @@ from vftcli.simulation.scenario import (
     HandSpec,
     LoadSpec,
     PushesSpec,
-    RandomWalkSpec,
     StopSpec,
-    WrenchSpec,
 )
 from vftcli.simulation.trajectories import minimum_jerk
 
@@ -165,7 +163,7 @@ def pushes_of(pushes: Sequence[Push], *, in_link: bool = False) -> SimulatedCont
     return SimulatedContact([(push.start, push.stop) for push in pushes], wrench)
 
 
-def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> SimulatedContact:
+def started(spec: ContactSpec, rng: np.random.Generator, duration: float) -> SimulatedContact:
     """A contact ready to act in a run of `duration` [s]; only pushes are drawn."""
     if isinstance(spec, PushesSpec):
         return pushes_of(list(drawn(spec, rng, duration)))
@@ -196,23 +194,6 @@ class Mounted(NamedTuple):
     lever: Array | None  #: The point in flange axes of a contact on the flange. (3,) [m]
 
 
-def draw_walk(
-    spec: RandomWalkSpec, joints: int, steps: int, step: float, rng: np.random.Generator
-) -> Array:
-    """A random walk of joint torques over `steps` inner steps of `step` [s]. (N, n) [N·m]"""
-    if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:
-        raise ParameterError(
-            f"contacts.{spec.name}.intensity has {len(spec.intensity)} numbers; it must have one "
-            f"or {joints}, none negative"
-        )
-    sizes = np.sqrt(np.broadcast_to(spec.intensity, joints) * step)
-    walk = np.cumsum(rng.standard_normal((steps, joints)) * sizes, axis=0)
-    walk += spec.initial * rng.standard_normal(joints)
-    late = np.arange(steps) * step >= spec.begin
-    begun = walk - (walk[late.argmax()] if spec.begin > 0 else 0.0)
-    return begun * late[:, None]
-
-
 class Touching:
     """Everything that touches the arm during a run, evaluated at the middle of each step.
 
@@ -223,8 +204,7 @@ class Touching:
         self,
         specs: Sequence[ContactSpec],
         chain: Chain,
-        steps: int,
-        step: float,
+        duration: float,
         seed: np.random.SeedSequence,
     ) -> None:
         names = [spec.name for spec in specs]
@@ -235,35 +215,28 @@ class Touching:
         # A generator a contact: adding one leaves what the others draw as it was.
         rngs = [np.random.default_rng(s) for s in seed.spawn(len(specs))]
         self.mounted: list[Mounted] = []
-        self.walks: dict[str, Array] = {}
         for spec, rng in zip(specs, rngs, strict=True):
-            if isinstance(spec, RandomWalkSpec):
-                self.walks[spec.name] = draw_walk(spec, chain.joints, steps, step, rng)
-                continue
             if not 0 <= spec.link <= chain.joints:
                 raise ParameterError(
                     f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
                 )
-            contact, point = started(spec, rng, steps * step), np.array(spec.point)
+            contact, point = started(spec, rng, duration), np.array(spec.point)
             joint, turn, lever = spec.link, np.eye(3), None
             if joint == 0:
                 joint, turn, lever = chain.joints, chain.flange_rotation, point
                 point = turn @ lever + chain.flange_translation
             self.mounted.append(Mounted(spec.name, contact, joint, turn, point, lever))
         self.wrenches = np.zeros((len(self.mounted), 6))
-        self.step = step
 
     def anything(self, t: float) -> bool:
         """Whether any contact may exert something at `t` [s]."""
-        return bool(self.walks) or any(m.contact.index_at(t) is not None for m in self.mounted)
+        return any(m.contact.index_at(t) is not None for m in self.mounted)
 
     def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
         """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
         import pinocchio as pin
 
         tau = np.zeros_like(v)
-        for walk in self.walks.values():
-            tau += walk[min(int(t / self.step), len(walk) - 1)]
         for k, mounted in enumerate(self.mounted):
             self.wrenches[k] = 0.0
             if (number := mounted.contact.index_at(t)) is None:

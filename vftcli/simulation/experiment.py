@@ -39,7 +39,6 @@ class Truth(NamedTuple):
     wrench: Array  #: Wrench of all contacts on the flange, about its origin, in base axes. (M, 6)
     #: Name → wrench of each contact elsewhere, about its own point, in base axes. (M, 6)
     contacts: dict[str, Array]
-    walks: dict[str, Array]  #: Name → joint torque of each random walk. (M, n) [N·m]
 
     def columns(self) -> dict[str, Array]:
         """The columns of the truth file, flat, in order, t from the first sample. (M,) each"""
@@ -47,8 +46,6 @@ class Truth(NamedTuple):
         table |= [*per_joint("tau_ext", self.tau_ext), *per_axis("wrench", self.wrench)]
         for name, values in self.contacts.items():
             table |= per_axis(f"contact/{name}", values)
-        for name, values in self.walks.items():
-            table |= per_joint(f"contact/{name}", values)
         return table
 
 
@@ -176,13 +173,12 @@ def simulate_pair(scenario: Scenario, seed: int | None = None) -> list[Simulatio
 
 def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
-    touching, made, chain = arm.touching, arm.made, arm.true.chain
+    made, chain = arm.made, arm.true.chain
     middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
     time, wrenches = samples.time, arm.wrenches[:made].swapaxes(0, 1)
-    walks = {k: resample_columns(time, middle, w[:made]) for k, w in touching.walks.items()}
     tau_ext, flange = np.zeros(samples.q.shape), np.zeros((len(samples.time), 6))
     poses, contacts = link_poses(chain, samples.q), dict[str, Array]()
-    for contact, exerted in zip(touching.mounted, wrenches, strict=True):
+    for contact, exerted in zip(arm.touching.mounted, wrenches, strict=True):
         joint, wrench = contact.joint, resample_columns(time, middle, exerted)
         force, moment = np.hsplit(wrench, 2)
         turn, place = poses.rotation[:, joint - 1], poses.translation[:, joint - 1]
@@ -195,8 +191,7 @@ def truth_of(arm: Arm, samples: Samples) -> Truth:
         else:
             lever = turn @ contact.turn @ contact.lever
             flange += np.hstack([force, moment + np.cross(lever, force)])
-    tau_ext += sum(walks.values())
-    return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=flange, contacts=contacts, walks=walks)
+    return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=flange, contacts=contacts)
 
 
 class FlangeMotion(NamedTuple):

@@ -204,19 +204,8 @@ class StopSpec(OnLink, kind="stop"):
     damping: float = 200.0  #: Damping while pressed. [N·s/m]
 
 
-class RandomWalkSpec(Spec, kind="random-walk"):
-    """Joint torques that walk at random, the disturbance model of the Kalman observers."""
-
-    name: str  #: Name of the contact.
-    #: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
-    intensity: tuple[float, ...]
-    initial: float = 0.0  #: Standard deviation at the start. [N·m]
-    begin: float = 0.0  #: The walk is zero before this. [s]
-
-
-#: Contacts that act with a wrench on a link, by their `kind`.
-WrenchSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
-ContactSpec = WrenchSpec | RandomWalkSpec  #: Every kind of ``[[contacts]]`` a scenario can have.
+#: Every kind of ``[[contacts]]`` a scenario can have.
+ContactSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
 
 
 class Scenario(Spec):
