@@ -1,7 +1,6 @@
 """Options once: a choice's fields say how they are typed, commands are handed what was typed."""
 
 import sys
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import pytest
@@ -31,7 +30,6 @@ EVERY = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
 class SizeChoice(Choice):
     GROUP = "Sizes"
 

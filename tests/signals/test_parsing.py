@@ -1,7 +1,6 @@
 """Words of the command line: spans, lists of numbers, assignments."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -241,7 +240,6 @@ def test_a_setting_s_number_is_in_its_range(text: str, kind: type, value: object
     assert RATE._replace(least=None).number("-5", float) == -5.0
 
 
-@dataclass(frozen=True)
 class Chosen(Choice):
     """Two settings, an option that may be repeated, and numbers with names of their own."""
 

@@ -1,7 +1,6 @@
 """What a user may choose of an admittance replay: its controllers, and a release from rest."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.robots import PROFILES, load_robot
@@ -27,7 +26,6 @@ def listed(text: str, option: str) -> tuple[float, ...]:
     return found
 
 
-@dataclass(frozen=True, kw_only=True)
 class ControlChoice(Choice):
     """Which controllers are compared, and with which parameters."""
 

@@ -1,7 +1,6 @@
 """WorkersChoice: where many pieces of work are done."""
 
 import re
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -15,7 +14,6 @@ MOST_WORKERS = 8  #: Workers that are started unasked.
 EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 
 
-@dataclass(frozen=True, kw_only=True)
 class WorkersChoice(Choice):
     """Place of many pieces of work."""
 

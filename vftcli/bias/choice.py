@@ -1,6 +1,5 @@
 """A user's choice for a complete log: the bias to subtract, whether contacts are listed."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
 from vftcli.signals.option import ESTIMATE, Choice, Option, is_yes
@@ -14,7 +13,6 @@ WHOLE_LOG = "whole-log"
 REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``bias.method`` takes.
 
 
-@dataclass(frozen=True, kw_only=True)
 class RefinementChoice(Choice):
     """A user's choice for the estimates of a whole log."""
 

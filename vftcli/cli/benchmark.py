@@ -1,6 +1,6 @@
 """`vftcli benchmark`: methods scored against truth on many logs; the observers' times."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 SPEED = "speed"  #: The benchmark of times.
 
 
-@dataclass(frozen=True, kw_only=True)
 class BenchChoice(Choice):
     """How much is timed."""
 

@@ -1,7 +1,7 @@
 """`vftcli report` and `vftcli estimate`: logs become folders, with all of it or estimates alone."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from vftcli.outputs.estimates import Group
 
 
-@dataclass(frozen=True, kw_only=True)
 class PrintChoice(Choice):
     """A printed table beside the errors."""
 

@@ -1,6 +1,5 @@
 """What a user may choose of the reference that estimates are judged by."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,6 @@ FILE = "file:"  #: Head of the one reference with a path in its name.
 NAMES = ("zero", "vendor", "two-cycle", "sensor")  #: The references that are made from the log.
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReferenceChoice(Choice):
     """The reference a user asks for, checked before any log is read."""
 

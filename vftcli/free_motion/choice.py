@@ -1,7 +1,7 @@
 """A user's choice of free motion, read from the command line, checked once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -46,7 +46,6 @@ def cutoff(text: str) -> float | str | None:
         return text
 
 
-@dataclass(frozen=True, kw_only=True)
 class FreeChoice(Choice):
     """Free motion, and its use in the two-cycle difference."""
 

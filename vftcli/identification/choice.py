@@ -1,6 +1,5 @@
 """Task: what a user may choose of an identification."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
@@ -11,7 +10,6 @@ from vftcli.signals.parsing import check_known
 METHODS = ("friction", "base", "targets", "payload", "gains")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Task(Choice):
     """Method and settings of an identification.
 

@@ -1,7 +1,7 @@
 """A user's choice of observers: their names, gains and form."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -48,7 +48,6 @@ def source_of(source: str | Path) -> "str | Path | Goal":
     return Path(text)
 
 
-@dataclass(frozen=True, kw_only=True)
 class ObserverChoice(Choice):
     """Observers to run, and their gains.
 
@@ -250,7 +249,6 @@ def lead_samples(observer: "Observer", step: float, joints: int) -> int:
     return min(LONGEST, max(1, ceil(LEAD / (slowest * step))))
 
 
-@dataclass(frozen=True, kw_only=True)
 class GoalChoice(Choice):
     """What gains are found for."""
 

@@ -1,6 +1,5 @@
 """Outputs: screens, pages, tables, figures, recordings and files."""
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from vftcli.signals.errors import ParameterError
@@ -16,7 +15,6 @@ Record = dict[str, Any]
 FULL, LEVELS, NONE = "full", "levels", "none"
 
 
-@dataclass(frozen=True, kw_only=True)
 class OutputChoice(Choice):
     """Files of a log beside those always written."""
 

@@ -71,7 +71,6 @@ def episode_number(text: str) -> int:
     return ALL if text == "all" else int(text)
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReadChoice(Choice):
     """How a log is read, and which part of it is used.
 

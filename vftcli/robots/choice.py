@@ -1,6 +1,6 @@
 """What a user may choose of the robot: which arm, its friction model, what it carries."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.robots import PROFILES, load_robot
@@ -18,7 +18,6 @@ FRICTION = ("profile", "none", "model")
 DECLARED = "log"  #: Value of ``--payload``: what the controller knows of, as the log says.
 
 
-@dataclass(frozen=True, kw_only=True)
 class RobotChoice(Choice):
     """Which arm made a log, and how it is modelled."""
 

@@ -8,7 +8,9 @@ the file of options and notebooks. What few users need is a setting, given by ``
 """
 
 import re
+import typing
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from inspect import get_annotations
 from pathlib import Path
@@ -131,10 +133,14 @@ def is_yes(text: str) -> bool:
 NUMBERS = "numbers"
 
 
+@typing.dataclass_transform(frozen_default=True, kw_only_default=True)
 class Choice:
-    """What a user may choose of a room: fields annotated with an `Option` each."""
+    """What a user may choose of a room: a frozen dataclass of fields with an `Option` each."""
 
     GROUP: ClassVar[str] = ""  #: Heading of its options.
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, kw_only=True)(cls)
 
     @classmethod
     def options(cls) -> dict[str, tuple[str, Any, Option]]:

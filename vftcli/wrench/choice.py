@@ -57,7 +57,6 @@ class AlsoWrench(Choice):
     wrench: Annotated[bool, Option("--wrench", "", "Add the wrench of every observer.")]
 
 
-@dataclass(frozen=True, kw_only=True)
 class WrenchChoice(Choice):
     """What a user asks of the virtual sensor."""
 
