@@ -1,6 +1,5 @@
 """Conversion: what is written reads back, equal to the format's own precision."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,7 @@ from rosbags.highlevel import AnyReader
 
 from vftcli.analysis import Analysis
 from vftcli.outputs import conversion
-from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.conversion import WRITERS, convert, ros_name, stamps_of, write_mcap
-from vftcli.outputs.run_record import jsonable
 from vftcli.readers.reading import read
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.errors import OutputError
@@ -135,9 +132,8 @@ def test_every_topic_has_every_sample(messages: dict[str, list]) -> None:
     topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
     topics.append("/vftcli/wrench/best")
     assert {topic: len(messages[topic]) for topic in topics} == dict.fromkeys(topics, 600)
-    few = {"/vftcli/contacts": 1, "/vftcli/contacts/log": 4}
-    assert {topic: len(messages[topic]) for topic in few} == few
-    assert set(messages) == {*topics, *few}
+    assert len(messages["/vftcli/contacts/log"]) == 4
+    assert set(messages) == {*topics, "/vftcli/contacts/log"}
 
 
 def test_mcap_reads_what_rosbags_reads(path: Path, messages: dict[str, list]) -> None:
@@ -146,23 +142,10 @@ def test_mcap_reads_what_rosbags_reads(path: Path, messages: dict[str, list]) ->
         reader = make_reader(file, validate_crcs=True)
         assert reader.get_header().profile == "ros2"
         found = list(reader.iter_messages(log_time_order=False))
-        late = {c.topic for c in reader.get_summary().channels.values() if c.metadata}
     assert len(found) == sum(map(len, messages.values()))
     stamps = [message.log_time for _, _, message in found]
     assert stamps == sorted(stamps)
     assert {schema.encoding for schema, _, _ in found} == {"ros2msg"}
-    assert late == {"/vftcli/contacts"}
-
-
-def test_the_list_of_contacts_is_kept_for_who_comes_late(path: Path) -> None:
-    with AnyReader([path]) as reader:
-        for connection in reader.connections:
-            latched = connection.topic == "/vftcli/contacts"
-            profiles = connection.ext.offered_qos_profiles
-            assert bool(profiles) == latched
-            if latched:
-                assert profiles[0].durability.name == "TRANSIENT_LOCAL"
-                assert profiles[0].depth == 1
 
 
 def test_the_wrench_of_best_stands_in_the_flange(
@@ -188,7 +171,7 @@ def test_wrenches_in_base_axes_say_about_which_point(
     assert frames == {"base@flange"}
 
 
-def test_contacts_are_logged_and_listed(messages: dict[str, list], touched: Analysis) -> None:
+def test_contacts_are_logged(messages: dict[str, list]) -> None:
     logged = [(stamp, message) for stamp, message in messages["/vftcli/contacts/log"]]
     start = messages["/joint_states"][0][0]
     seconds = [(stamp - start) / 1e9 for stamp, _ in logged]
@@ -198,11 +181,6 @@ def test_contacts_are_logged_and_listed(messages: dict[str, list], touched: Anal
     assert texts[1] == "contact 1 ends"
     first = logged[0][1].timestamp
     assert first.sec * 10**9 + first.nanosec == logged[0][0]
-    ((_, listed),) = messages["/vftcli/contacts"]
-    assert touched.contacts is not None
-    assert json.loads(listed.data) == json.loads(
-        json.dumps(jsonable(contacts_record(touched.contacts)))
-    )
 
 
 def test_joint_states_are_the_log(messages: dict[str, list], analysis: Analysis) -> None:

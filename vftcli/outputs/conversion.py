@@ -5,10 +5,9 @@ Topics of `estimates.mcap`: `/joint_states` (positions, velocities, measured dri
 as effort), `/vftcli/external/<observer>` and `/vftcli/external/reference`
 (external torque as effort), all sensor_msgs/JointState; `/vftcli/wrench/<observer>` and
 `/vftcli/wrench/reference` (geometry_msgs/WrenchStamped, NaN where the pose cannot tell
-it); `/vftcli/contacts/log` (foxglove_msgs/Log) where each contact begins and ends;
-`/vftcli/contacts` (std_msgs/String, the JSON of contacts.json) once, kept for who comes
-late. Hyphens, which ROS names may not hold, become underscores. All of it is CDR: a
-channel of JSON messages in a ros2 file ends rosbags' reader.
+it); `/vftcli/contacts/log` (foxglove_msgs/Log) where each contact begins and ends.
+Hyphens, which ROS names may not hold, become underscores. All of it is CDR: a channel of
+JSON messages in a ros2 file ends rosbags' reader.
 """
 
 import json
@@ -23,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.contacts import beginning, contact_name, contacts_record
+from vftcli.outputs.contacts import beginning, contact_name
 from vftcli.outputs.files import SEAL, OutputFolder, atomic, check_file, put_table, table_file
-from vftcli.outputs.run_record import envelope, jsonable, seal
+from vftcli.outputs.run_record import envelope, seal
 from vftcli.readers.bags.ros_messages import (
     Value,
     in_parts,
@@ -46,23 +45,11 @@ if TYPE_CHECKING:
     from vftcli.simulation.experiment import Simulation
 
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
-TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
+LOG = "foxglove_msgs/Log"
 
 INFO, WARNING = 2, 3  #: Levels of a log message.
 BLOCK = 8192  #: Samples with messages in memory at once.
 LAST_STAMP = 2**31 - 1  #: ROS 2 counts seconds in 32 bits with a sign.
-#: What `ros2 bag` writes of a latched topic: who subscribes later gets its message too.
-LATCHED = """\
-- history: keep_last
-  depth: 1
-  reliability: reliable
-  durability: transient_local
-  deadline: {sec: 9223372036, nsec: 854775807}
-  lifespan: {sec: 9223372036, nsec: 854775807}
-  liveliness: automatic
-  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
-  avoid_ros_namespace_conventions: false
-"""
 
 Nanoseconds = NDArray[np.int64]
 
@@ -82,8 +69,7 @@ class OutputTopic(NamedTuple):
         return serialised(self.kind, {**stamped(times), **part}, len(times))
 
 
-#: One message of a topic that has few: its stamp [ns], topic, type and values.
-Event = tuple[int, str, str, Mapping[str, Value]]
+Event = tuple[int, Mapping[str, Value]]  #: A message of the log of contacts: stamp [ns], values.
 
 
 def joint_topic(
@@ -129,19 +115,15 @@ def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
 
 def events(analysis: Analysis, start: int) -> list[Event]:
     """The contacts, and when each begins and ends, of a log with this first stamp. [ns]"""
-    found = analysis.contacts
-    if found is None:
-        return []
-    record = json.dumps(jsonable(contacts_record(found)), ensure_ascii=False, allow_nan=False)
-    made: list[Event] = [(start, "/vftcli/contacts", TEXT, {"data": record})]
-    for contact in found.contacts:
+    made = list[Event]()
+    for contact in analysis.contacts.contacts if analysis.contacts else ():
         level = WARNING if contact.trust == "weak" else INFO
         end = f"{contact_name(contact)} ends"
         for t, words in ((contact.start, beginning(contact)), (contact.stop, end)):
             stamp = start + round(t * 1e9)
             values = stamped(np.array([stamp]), "timestamp")
             values |= {"level": level, "message": words, "name": "vftcli"}
-            made.append((stamp, "/vftcli/contacts/log", LOG, values))
+            made.append((stamp, values))
     return sorted(made, key=itemgetter(0))
 
 
@@ -181,15 +163,14 @@ def write_topics(
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="vftcli")
         waiting = deque(events)
-        of_events = {topic: channel(writer, topic, kind) for _, topic, kind, _ in events}
+        log = channel(writer, "/vftcli/contacts/log", LOG) if events else 0
         channels = [channel(writer, topic.name, topic.kind) for topic in found]
 
         def add_events(until: float) -> None:
             """Write the events up to a time. [ns]"""
             while waiting and waiting[0][0] <= until:
-                stamp, topic, kind, values = waiting.popleft()
-                body = serialised(kind, values, 1).tobytes()
-                writer.add_message(of_events[topic], stamp, body, stamp)
+                stamp, values = waiting.popleft()
+                writer.add_message(log, stamp, serialised(LOG, values, 1).tobytes(), stamp)
 
         # In blocks: all messages of an hour at 1 kHz at once would not fit in memory.
         for start in range(0, len(stamps), BLOCK):
@@ -204,10 +185,9 @@ def write_topics(
 
 
 def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401
-    """Register a topic with its type's definition; return its channel number. Text is latched."""
+    """Register a topic with its type's definition; return its channel number."""
     schema = writer.register_schema(long_name(kind), "ros2msg", schema_text(kind).encode())
-    how = {"offered_qos_profiles": LATCHED} if kind == TEXT else {}
-    return int(writer.register_channel(topic, "cdr", schema, metadata=how))
+    return int(writer.register_channel(topic, "cdr", schema))
 
 
 def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
