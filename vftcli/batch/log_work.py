@@ -130,7 +130,7 @@ OF_LOG: Kinds = {
     "hardest_N": Float64,
     "hardest_band_N": Float64,
     "hardest_s": Float64,
-    "told_N": Float64,
+    "detectable_N": Float64,
 }
 #: Which estimate, and its size: root mean square, and what 99 % of |τ̂| stay below.
 OF_ESTIMATE: Kinds = {
@@ -195,7 +195,7 @@ def log_facts(analysis: Analysis) -> dict[str, Any]:
         "hardest_N": None if hardest is None else hardest.peak_force,
         "hardest_band_N": None if hardest is None else hardest.peak_band,
         "hardest_s": None if hardest is None else hardest.peak,
-        "told_N": found.detectable_force,
+        "detectable_N": found.detectable_force,
     }
 
 

@@ -365,7 +365,7 @@ def batch_lines(table: pl.DataFrame, pages: Mapping[str, str]) -> Iterator[LogSu
             DASH if count is None else "load" if row["load"] else str(count),
             hardest,
             force or 0.0,
-            row["told_N"],
+            row["detectable_N"],
             row["health"],
             row["reason"],
             pages.get(row["log"], ""),
