@@ -39,9 +39,9 @@ def test_when_there_are_no_more_colours_they_come_again() -> None:
 def test_ends_hold_all_values() -> None:
     def ends(*panels: list[float]) -> Span:
         values = np.array(panels).T
-        names = tuple(map(str, range(len(panels))))
+        names, units = tuple(map(str, range(len(panels)))), ("N",) * len(panels)
         line = ChartLine("a", values)
-        return Chart("k", "K", names, names, np.arange(len(values)), (line,)).ends(0)
+        return Chart("k", "K", units, names, np.arange(len(values)), (line,)).ends(0)
 
     found = ends([1.0, np.nan], [-3.0, np.nan])
     assert found.low < -3.0

@@ -97,13 +97,12 @@ def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:
         plot("/a", np.array([[0.0], [high], [5.0]]), family=1) for high in (1.0, 10.0)
     )
     alone = plot("/b", np.array([[0.0], [1.0]]))
-    tab = Tab("torques", [small, large, alone])
-    # A twentieth of what is shown on either side.
-    assert tab.ends(small) == tab.ends(large) == pytest.approx((-0.5, 10.5))
-    assert tab.ends(alone) == pytest.approx((-0.05, 1.05))
     peak = ChartLine("peaks", np.array([[20.0]]), "#102030", x=np.array([1.0]))
-    alone = alone._replace(series=(*alone.series, peak))
-    assert tab.ends(alone) == pytest.approx((-1.0, 21.0))
+    pointed = alone._replace(series=(*alone.series, peak), units=("m",))
+    names = [view.name for view in grid_of(Tab("all", [small, large, alone, pointed])).contents]
+    # A twentieth of what is shown on either side.
+    ends = ["[N], -0.5 to 10.5"] * 2 + ["[N], -0.05 to 1.05", "[m], -1 to 21"]
+    assert names == [f"what {end}" for end in ends]
 
 
 def test_the_time_panel_marks_a_span_in_nanoseconds() -> None:

@@ -232,7 +232,7 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
     force_band, speed_band = (x if np.isfinite(x).any() else None for x in (p.threshold, limit))
     return [
         Chart(key, title, (unit,) * 3 + (turning,) * 3, AXES, replay.motion.t, tuple(shown),
-              (1, 1, 1, 2, 2, 2), band, label)
+              band=band, band_label=label)
         for key, title, unit, turning, shown, band, label in (
             ("x", "Deviation", "m", "rad", deviation, None, ""),
             ("force", "Force on the robot", "N", "N·m", force, force_band, "± threshold"),

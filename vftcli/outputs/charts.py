@@ -82,7 +82,8 @@ class Chart(NamedTuple):
     panels: tuple[str, ...]  #: Their names. (n,)
     x: Array  #: Horizontal places. (T,)
     series: tuple[ChartLine, ...]  #: Its lines, the last on top.
-    families: tuple[int, ...] = ()  #: Which panels share a scale: those of one number. (n,)
+    #: Which panels share a scale: those of one number; none for all of one unit. (n,)
+    families: tuple[int, ...] = ()
     band: Array | None = None  #: Half the width of a band about zero, one a panel, or None. (n,)
     band_label: str = ""  #: What the band is.
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
@@ -104,8 +105,8 @@ class Chart(NamedTuple):
 
         About ±1 where no value is known.
         """
-        low, high, families = np.inf, -np.inf, self.families or (0,) * len(self.panels)
-        for j in np.flatnonzero(np.equal(families, families[panel])).tolist():
+        low, high, families = np.inf, -np.inf, self.families or self.units
+        for j in (j for j, family in enumerate(families) if family == families[panel]):
             # What is drawn at once, line by line: of a long log all have no room.
             for line in (line for line in self.series if line.shown):
                 half = 0.0 if line.half is None else np.nan_to_num(line.half[:, j])

@@ -17,7 +17,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from vftcli.outputs.charts import GREY, INK, REFERENCE, Chart, ChartLine, Span, level_rows
+from vftcli.outputs.charts import GREY, INK, REFERENCE, Chart, ChartLine, level_rows
 from vftcli.outputs.files import writing
 from vftcli.outputs.rerun_arm import CONTACTS, ROBOT, ArmPoses, Stream, rgba
 
@@ -42,12 +42,6 @@ class Tab(NamedTuple):
     name: str  #: The tab's name.
     plots: list[Chart]  #: Of one panel each; lines with places of their own are points.
     log: Sequence[LogLine] = ()  #: A text log below them, or none.
-
-    def ends(self, plot: Chart) -> Span:
-        """Both ends of a plot's vertical axis: those of its whole family."""
-        alike = [p for p in self.plots if p.families and p.families == plot.families] or [plot]
-        low, high = zip(*(one.ends(0) for one in alike), strict=True)
-        return Span(min(low), max(high))
 
 
 def lines_of(plot: Chart) -> list[ChartLine]:
@@ -179,13 +173,16 @@ def blueprint(
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     """One tab, in two columns if there are many plots; the first one's legend holds for all."""
-    # Plots of a family share their ends; each look at them goes through all samples.
-    families = {plot.families or plot.key: plot for plot in tab.plots}
-    ends_of, views = {family: tab.ends(plot) for family, plot in families.items()}, []
-    for k, plot in enumerate(tab.plots):
-        ends = ends_of[plot.families or plot.key]
+    # Plots of a family, else of a unit, share the ends of their vertical axes.
+    kinds, views = [plot.families or plot.units for plot in tab.plots], []
+    ends: dict[tuple[object, ...], tuple[float, float]] = {}
+    for kind, (low, high) in zip(kinds, (plot.ends(0) for plot in tab.plots), strict=True):
+        lowest, highest = ends.get(kind, (low, high))
+        ends[kind] = min(low, lowest), max(high, highest)
+    for k, (kind, plot) in enumerate(zip(kinds, tab.plots, strict=True)):
+        low, high = ends[kind]
         # In small plots few ticks are labelled.
-        span = f", {ends.low:.3g} to {ends.high:.3g}" if len(tab.plots) > 3 else ""
+        span = f", {low:.3g} to {high:.3g}" if len(tab.plots) > 3 else ""
         # It would cover a corner; of a plot with points the title says it all.
         named = k == 0 and len(lines_of(plot)) == len(plot.series)
         view = rrb.TimeSeriesView(
@@ -193,7 +190,7 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
             name=drawable(f"{plot.title} [{plot.units[0]}]{span}"),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=named),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
-            axis_y=rrb.ScalarAxis(range=ends),
+            axis_y=rrb.ScalarAxis(range=(low, high)),
         )
         views.append(view)
     plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)

@@ -144,8 +144,8 @@ def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart
             edges += [ChartLine(f"{line.name} {name}", end, line.colour) for name, end in ends]
     panel = chart.panels[j]
     named = f"{panel.replace(DAGGER, DOUBT)}: {chart.title}" if panel != chart.title else panel
-    family = chart.families[j : j + 1]
-    return Chart(key, named, chart.units[j : j + 1], (panel,), chart.x, (*lines, *edges), family)
+    unit, family = chart.units[j : j + 1], chart.families[j : j + 1]
+    return Chart(key, named, unit, (panel,), chart.x, (*lines, *edges), family)
 
 
 def wrench_plots(analysis: Analysis) -> Iterator[Chart]:

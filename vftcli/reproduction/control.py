@@ -179,7 +179,6 @@ def loop_chart(run: ClosedLoop, found: Replay, part: slice) -> Chart:
         (*(f"{letter}_{axis}" for axis in "xyz"), *AXES[part]),
         run.t,
         lines,
-        families=(1, 1, 1, 2, 2, 2),
         band=band,
         band_label="± threshold",
     )
@@ -192,5 +191,4 @@ def deviation_chart(found: Replay, part: slice) -> Chart:
         units=chart.units[part],
         panels=chart.panels[part],
         series=tuple(line._replace(values=line.values[:, part]) for line in chart.series),
-        families=chart.families[part],
     )

@@ -154,9 +154,8 @@ def assembled_bearing(
                 ChartLine("libfranka", vendor.known, REFERENCE),
                 ChartLine("virtual sensor, drift removed", zeroed.known, "#0b6fb8"),
             )
-            units, families = tuple(map(unit_of, AXES)), (1, 1, 1, 2, 2, 2)
-            chart = Chart("wrench", "", units, AXES, zeroed.t, lines, families=families)
-            yield "", "fig12", chart
+            units = tuple(map(unit_of, AXES))
+            yield "", "fig12", Chart("wrench", "", units, AXES, zeroed.t, lines)
             yield "", "fig13", deviation_chart(controlled, slice(6))
 
 

@@ -162,7 +162,6 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
         AXES,
         analysis.t,
         tuple(lines),
-        families=(1, 1, 1, 2, 2, 2),
         spans=contact_spans(analysis.listed),
     )
 
@@ -215,8 +214,7 @@ def spectra_chart(found: Spectra) -> Chart:
         )
     ]
     title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
-    chart = over_frequency("spectra", title, "dB", found.frequency[1:], lines)
-    return chart._replace(families=(1,) * found.free.shape[1])
+    return over_frequency("spectra", title, "dB", found.frequency[1:], lines)
 
 
 def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:

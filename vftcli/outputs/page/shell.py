@@ -194,7 +194,7 @@ def label(value: float) -> str:
 
 def scales_of(chart: Chart, box: Box) -> Iterator[Scales]:
     """The scales of every panel's picture."""
-    families = chart.families or (0,) * len(chart.panels)
+    families = chart.families or chart.units
     ends = {family: chart.ends(families.index(family)) for family in set(families)}
     x = Span(float(chart.x[0]), float(chart.x[-1]))
     return (Scales(box, x, ends[family]) for family in families)
