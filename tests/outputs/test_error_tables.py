@@ -268,14 +268,18 @@ def test_latex(errors: pl.DataFrame) -> None:
     assert text.index("floor: RMSE that") < text.index(r"\end{table}")
 
 
-def test_logs_share_a_latex_table_and_a_dagger_goes_with_its_log(errors: pl.DataFrame) -> None:
-    other = errors.with_columns(recording=pl.lit("b.csv"), reference_trusted=pl.col("joint") != 2)
-    text = tables.to_latex(pl.concat([errors, other]))
-    assert text.count(r"\begin{table}") == 1
-    assert r"\textit{b.csv against two-cycle, 100 samples, J2$\dagger$}" in text
-    assert r"\multicolumn{1}{c}{$J_{2}$}" in text
-    alone = tables.to_latex(other)
+def test_logs_share_a_latex_table_where_the_same_joints_rest(errors: pl.DataFrame) -> None:
+    other = errors.with_columns(recording=pl.lit("b.csv"))
+    resting = other.with_columns(
+        recording=pl.lit("c.csv"), reference_trusted=pl.col("joint") != 2
+    )
+    text = tables.to_latex(pl.concat([errors, other, resting], how="diagonal"))
+    shared, alone = text.split(r"\end{table}")[:2]
+    assert text.count(r"\begin{table}") == 2
+    assert r"\textit{b.csv against two-cycle, 100 samples}" in shared
+    assert r"\multicolumn{1}{c}{$J_{2}$}" in shared
     assert r"\multicolumn{1}{c}{$J_{2}$$^\dagger$}" in alone
+    assert r"$\dagger$: the joint rests" in alone
 
 
 def test_a_name_is_no_command_of_latex(errors: pl.DataFrame) -> None:

@@ -5,7 +5,6 @@ newton-metres.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -335,30 +334,15 @@ def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> st
 def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
     """The RMSE as LaTeX tables (needs ``booktabs``), best value of each joint bold.
 
-    Logs of arms with as many joints share a table.
+    Logs of arms with as many joints share a table, where the same ones rest.
     """
     lines = [*doubts_of(errors), *nothing_to_compare(errors)]
     doubts = "".join(f"% {printable(line)}\n" for line in lines)
-    arms = groupby(blocks(errors), key=lambda table: table.joints)
-    found = [alike(list(map(rmse_grid, tables))) for _, tables in arms]
+    alike = groupby(blocks(errors), key=lambda table: table.joint_heads)
+    found = [list(map(rmse_grid, tables)) for _, tables in alike]
     if axes := list(axis_grids(errors, analyses)):
         found.append(axes)
     return doubts + "\n".join(latex(*grids) for grids in found)
-
-
-def alike(grids: Sequence[Grid]) -> Sequence[Grid]:
-    """Tables of several logs with equal heads: a log's dagger moves from them to its title."""
-    if len(grids) == 1:
-        return grids
-    found = []
-    for grid in grids:
-        doubtful = [column.head for column in grid.columns if DAGGER in column.head]
-        plain = [
-            c._replace(head=c.head.replace(DAGGER, ""), symbol=c.symbol.replace(LATEX_DAGGER, ""))
-            for c in grid.columns
-        ]
-        found.append(replace(grid, title=", ".join([grid.title, *doubtful]), given=plain))
-    return found
 
 
 #: Name of a form → the text of the errors table in it.
