@@ -80,13 +80,14 @@ def admit(
 def show(found: "Replayed", *, json: bool, latex: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.outputs.admittance_tables import (
-        comparison_text,
-        latency_text,
+        comparison_grid,
+        latency_grid,
         latex_text,
-        parameter_text,
+        parameter_grid,
     )
+    from vftcli.outputs.grid import terminal
 
-    result = found.replay
+    result, run = found.replay, found.run
     if json:
         logs = [found.recording] if found.recording is not None else []
         say_json(logs, result.remarks, rows=result.rows)
@@ -95,9 +96,14 @@ def show(found: "Replayed", *, json: bool, latex: bool) -> None:
         echo_data(latex_text(result))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")
-    say(parameter_text(result))
+    detail(terminal(parameter_grid(result)).rstrip())
     for note in result.remarks:
         detail(f"note: {note}")
-    if found.run is not None:
-        say(latency_text(found.run))
-    echo(comparison_text(result.rows))
+    if run is not None:
+        grid, words = latency_grid(run), "no force passed a threshold"
+        words = words if run.stable else f"the arm ran away at {run.t[-1]:.2f} s"
+        timed = run.stable and grid.rows
+        say(terminal(grid).rstrip() if timed else f"closed loop: {words}")
+    echo(
+        terminal(comparison_grid(result.rows)).rstrip() if result.rows else "no axis was dragged"
+    )

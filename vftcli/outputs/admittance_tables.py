@@ -9,7 +9,7 @@ from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.law import AXES
 from vftcli.admittance.replay import Replay
 from vftcli.outputs import Record
-from vftcli.outputs.grid import Column, Grid, Rows, keyed_grid, latex, terminal
+from vftcli.outputs.grid import Column, Grid, Rows, keyed_grid, latex
 from vftcli.outputs.quantity import minus
 
 TITLE = "The same force through every controller"  #: Of the comparison.
@@ -42,22 +42,17 @@ COLUMNS = {
 }
 #: What is timed of a contact → its heading.
 LATENCIES = {
-    "force": "force [s]",
-    "detection": "detected [s]",
-    "motion": "moved [s]",
-    "withdrawal": "withdrawal [s]",
-    "reaction": "detection to motion [s]",
-    "turn": "withdrawal to turn [s]",
+    "force": "force",
+    "detection": "detected",
+    "motion": "moved",
+    "withdrawal": "withdrawal",
+    "reaction": "detection to motion",
+    "turn": "withdrawal to turn",
 }
 #: What the headings of the LaTeX table mean.
 RETURNS = (
     "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there",
 )
-
-
-def comparison_text(rows: Sequence[Record]) -> str:
-    """The comparison of all controllers as text for a terminal."""
-    return terminal(comparison_grid(rows)).rstrip("\n") if rows else "no axis was dragged"
 
 
 def comparison_grid(rows: Sequence[Record], title: str = "") -> Grid:
@@ -83,47 +78,10 @@ def latency_grid(run: ClosedLoop) -> Grid:
     """The latencies of a closed loop, from the true force and as the paper times them."""
     columns = {
         "axis": "axis",
-        **{f"{name}_s": Column(head, form=".3f") for name, head in LATENCIES.items()},
+        **{f"{name}_s": Column(head, "s", ".3f") for name, head in LATENCIES.items()},
         "at_rest_before": Column("at rest before"),
     }
-    return keyed_grid(
-        columns,
-        latency_rows(run),
-        "From the true force past its threshold to the estimate's, to 5 mm (0.02 rad) of the "
-        "flange; from its fall below to the estimate's; as the paper times, from the estimate past "
-        "its threshold to 5 mm, from its fall below to where the flange goes no farther",
-    )
-
-
-def latency_text(run: ClosedLoop) -> str:
-    """The latencies of a closed loop in words, one line a contact."""
-    if not run.stable:
-        return f"closed loop: the arm ran away at {run.t[-1]:.2f} s"
-    lines = []
-    for row in latency_rows(run):
-        said = {
-            k: "never" if x is None else f"{x:.3f} s" for k, x in row.items() if k[-2:] == "_s"
-        }
-        moving = "" if row["at_rest_before"] else " (the arm was moving already)"
-        lines.append(
-            f"closed loop: force past the threshold of {row['axis']} at {row['force_s']:.2f} s, "
-            f"detected after {said['detection_s']}, moved after {said['motion_s']}{moving}, "
-            f"withdrawal seen after {said['withdrawal_s']}; from detection to motion "
-            f"{said['reaction_s']}, from withdrawal to turn {said['turn_s']}"
-        )
-    return "\n".join(lines) or "closed loop: no force passed a threshold"
-
-
-def parameter_text(replay: Replay) -> str:
-    """Mass, damping, stiffness, threshold and control period in use, on one line."""
-    p, words = replay.parameters, []
-    values = (p.mass, p.damping, p.stiffness, p.xi, p.threshold, p.speed_limit)
-    for label, each in zip(("M", "B", "K", "ξ", "F_tsd", "limit"), values, strict=True):
-        # Six numbers as position / rotation, three equal ones once.
-        texts = [f"{value:.3g}" for value in np.broadcast_to(each, 6)]
-        halves = (half[:1] if len(set(half)) == 1 else half for half in (texts[:3], texts[3:]))
-        words.append(f"{label} {' / '.join(map(','.join, halves))}")
-    return f"{', '.join(words)}; Ts {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
+    return keyed_grid(columns, latency_rows(run), "Latencies of the closed loop")
 
 
 def parameter_grid(replay: Replay) -> Grid:
@@ -144,7 +102,8 @@ def parameter_grid(replay: Replay) -> Grid:
         "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
     }
     columns = "coordinates", *(Column(h, form="g", symbol=s) for h, s in heads.items())
-    return Grid(columns, rows, f"Values used; {p.source or 'the command line'}")
+    title = f"Values used; {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
+    return Grid(columns, rows, f"{title}; {p.source or 'the command line'}")
 
 
 def stability_grid(replay: Replay) -> Grid:

@@ -69,7 +69,7 @@ class Column(NamedTuple):
             return entry
         if entry is None or (isinstance(entry, float) and not np.isfinite(entry)):
             return GridCell(DASH)
-        if isinstance(entry, bool):
+        if isinstance(entry, bool | np.bool):
             return GridCell("yes" if entry else "no")
         if isinstance(entry, float):
             form = self.form
