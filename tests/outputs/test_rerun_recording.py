@@ -24,13 +24,12 @@ from vftcli.outputs.rerun_recording import (
     write_rrd,
 )
 from vftcli.pipeline import AnalysisChoice
-from vftcli.robots.chain import flange_jacobian, link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.remarks import Where, caution
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 from vftcli.wrench.frames import frame_pose
-from vftcli.wrench.solvers import wrench_of
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 
@@ -117,11 +116,12 @@ def test_the_arm_moves(rows: dict[str, dict[str, list]]) -> None:
 
 def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> None:
     """About 50 arrows a second: every second sample of this log at 125 Hz, of the best."""
-    write_rrd(tmp_path / "r.rrd", replace(analysis, contacts=None, virtual_sensor=None))
+    write_rrd(tmp_path / "r.rrd", replace(analysis, contacts=None))
     drawn = rows_of(tmp_path / "r.rrd", "/robot/flange_force", "Arrows3D:vectors")
-    q, tau = analysis.recording.q[::2], analysis.estimates[0].tau[::2]
-    found = wrench_of(tau, flange_jacobian(analysis.robot.chain, q))
-    expected = np.where(found.known[:, None], found.values[:, :3], np.nan)
+    (best,) = (wrench for wrench in analysis.wrenches if wrench.name == "best")
+    assert best.frame == "flange"
+    flange = link_poses(analysis.robot.chain, analysis.recording.q[::2])
+    expected = np.einsum("tij,tj->ti", flange.rotation[:, -1], best.force[::2])
     assert len(drawn) == len(expected)
     for arrow, force in zip(drawn, expected, strict=True):
         if np.all(np.isfinite(force)):

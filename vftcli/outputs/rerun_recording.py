@@ -2,10 +2,11 @@
 
 Entities: `/tau_ext/J1` … (the reference, then every observer), `/residual/J1` … (every
 estimate minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint),
-`/wrench/fx` … where wrenches are known, as in the page's charts; `/robot` with the arm,
-and the force on it where no contacts are listed. Where they are: `/force` with |F|, its
-band and the spans of the contacts, `/force/points` with the peaks, `/contacts/1` … with
-the arrow and the words of each contact, `/remarks` with what limits the list.
+`/wrench/fx` … where wrenches are known, as in the page's charts; `/robot` with the arm.
+Where contacts are listed: `/force` with |F|, its band and the spans of the contacts,
+`/force/points` with the peaks, `/contacts/1` … with the arrow and the words of each
+contact, `/remarks` with what limits the list. Elsewhere the force of a wrench that was
+asked for is an arrow, `/robot/flange_force`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -45,12 +46,12 @@ from vftcli.outputs.rerun_file import BAR, EDGES, LogLine, Tab, rerun_file, thin
 from vftcli.outputs.run_record import CONVENTIONS, all_remarks
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import COVERS, ExternalTorque
+from vftcli.signals.external_torque import COVERS
 from vftcli.signals.progress import steps
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench.choice import SMOOTHER
-from vftcli.wrench.solvers import ForceArrow, VirtualSensor
+from vftcli.wrench.solvers import ForceArrow
 
 #: Stretches of a long log of which a plot keeps the lowest and highest samples of its
 #: lines.
@@ -243,11 +244,10 @@ def summary(analysis: Analysis) -> str:
     recording, robot, source = analysis.recording, analysis.robot, analysis.recording.source
     drawing = (remark for remark in robot.remarks if remark.code == "meshes-not-found")
     notes = (*source.remarks, *all_remarks(analysis), *drawing)
-    scale, estimate = f"1 m is {newton_per_metre(analysis):g} N", force_source(analysis)
+    scale = f"1 m is {newton_per_metre(analysis):g} N"
     arrow = (
-        f"force on the robot from {'no estimate' if estimate is None else estimate.name}, as in "
-        "the tables of the wrench where one was asked for, else at the flange by the "
-        f"pseudo-inverse of Jᵀ; {scale}; none where the pose leaves it open"
+        "the force on the robot as the tables of the wrench have it, where one was asked for: "
+        f"that of best, else of the first observer; {scale}; none where the pose leaves it open"
     )
     if analysis.contacts is not None:
         arrow = (
@@ -270,31 +270,16 @@ def summary(analysis: Analysis) -> str:
     return "\n".join(lines)
 
 
-def force_source(analysis: Analysis) -> ExternalTorque | None:
-    """The estimate the force arrow is made from: `best`, else a Kalman filter's, else the first."""
-    return min(
-        analysis.estimates,
-        key=lambda estimate: (estimate.name != BEST, not estimate.name.startswith("kfo")),
-        default=None,
-    )
-
-
 def force_arrow(
     analysis: Analysis, poses: ArmPoses, sampled: NDArray[np.intp]
 ) -> ForceArrow | None:
-    """The force of the virtual sensor at the drawn poses, None for an arm of less than six joints.
+    """The force as the tables have it at the drawn poses: that of `best`, else the first's.
 
-    It is that of the wrench that was asked for, its zero removed, as the tables have it;
-    where none was asked for, that of the estimate as it is, at the flange. The drawn
-    poses are those of the log's samples `sampled`. (S,)
+    None without a wrench. The drawn poses are those of the log's samples `sampled`. (S,)
     """
-    source, chain = force_source(analysis), analysis.robot.chain
-    if source is None or chain.joints < 6:
+    sensed = analysis.virtual_sensor
+    found = () if sensed is None else sensed.wrenches
+    wrench = min(found, key=lambda wrench: wrench.name != BEST, default=None)
+    if sensed is None or wrench is None:
         return None
-    if analysis.virtual_sensor is not None:
-        (wrench,) = (w for w in analysis.virtual_sensor.wrenches if w.name == source.name)
-        return analysis.virtual_sensor.sensor.arrow(wrench.force[sampled], poses.q, chain)
-    sensor = VirtualSensor(frame="base")
-    # At the drawn poses only: fifty a second, not every sample.
-    drawn = ExternalTorque(name=source.name, t=poses.t, tau=source.tau[sampled])
-    return sensor.arrow(sensor.wrench(drawn, poses.q, chain).force, poses.q, chain)
+    return sensed.sensor.arrow(wrench.force[sampled], poses.q, analysis.robot.chain)
