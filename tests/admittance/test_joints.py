@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from vftcli.admittance.joints import FlangeSolver, follow, largest_speed, try_pose
+from vftcli.admittance.joints import check_start, follow, largest_speed, try_pose
 from vftcli.robots import load_robot
+from vftcli.robots.robot import FlangeSolver
 from vftcli.signals.errors import ParameterError
 
 UR5 = load_robot("ur5")
@@ -30,19 +31,18 @@ def test_a_pose_beyond_the_arm_is_not_reached() -> None:
 
 
 def test_a_start_has_the_arms_joints_inside_their_limits() -> None:
-    solver = FlangeSolver(UR5)
-    np.testing.assert_array_equal(solver.check_start(START), START)
+    np.testing.assert_array_equal(check_start(UR5, START), START)
     with pytest.raises(ParameterError, match="the start pose has 5 joints; ur5 has 6"):
-        solver.check_start(START[:5])
+        check_start(UR5, START[:5])
     with pytest.raises(ParameterError, match="joint 3 is at 7 rad"):
-        solver.check_start(np.where(np.arange(6) == 2, 7.0, START))
+        check_start(UR5, np.where(np.arange(6) == 2, 7.0, START))
 
 
 def test_the_arm_waits_where_it_cannot_follow() -> None:
     x = np.zeros((30, 1, 6))
     x[10:20, 0, 0] = 3.0  # out of reach for ten rows
     x[20:, 0, 1] = 0.01
-    path = follow(FlangeSolver(UR5), START, x, 0.008)
+    path = follow(UR5, START, x, 0.008)
     np.testing.assert_array_equal(
         path.reached[:, 0], np.r_[[True] * 10, [False] * 10, [True] * 10]
     )

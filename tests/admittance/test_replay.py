@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance.joints import FlangeSolver, follow
+from vftcli.admittance.joints import follow
 from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings, variable
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
+from vftcli.robots.robot import FlangeSolver
 from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.pose import exp_matrix
 from vftcli.signals.remarks import fact
@@ -126,14 +127,13 @@ def test_joints_follow_the_flange() -> None:
 
 def test_redundant_arm_stays_inside_its_limits() -> None:
     panda = load_robot("panda")
-    solver = FlangeSolver(panda)
     q = np.array(panda.admittance["start"])
     x = np.zeros((400, 1, 6))
     x[:, 0, 1] = np.linspace(0.0, 1.2, 400)  # leaves the workspace
-    path = follow(solver, q, x, 0.0025)
+    path = follow(panda, q, x, 0.0025)
     assert path.reached[0, 0]
     assert not path.reached[-1, 0]
-    assert np.all((path.q >= solver.lower) & (path.q <= solver.upper))
+    assert np.all((path.q >= panda.limits.q_min) & (path.q <= panda.limits.q_max))
     lost = int(np.argmin(path.reached[:, 0]))
     np.testing.assert_array_equal(path.q[lost:, 0], np.tile(path.q[lost - 1, 0], (400 - lost, 1)))
 

@@ -5,15 +5,14 @@ import pinocchio as pin
 import pytest
 
 from vftcli.robots import load_robot
+from vftcli.robots.robot import FlangeSolver
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
 from vftcli.simulation.trajectories import (
     HOMES,
     check_limits,
     check_start,
-    flange_pose,
     follow,
-    reach,
 )
 
 
@@ -29,11 +28,13 @@ def test_a_pose_nearby_is_reached(name):
     robot = load_robot(name)
     home = np.array(HOMES[robot.joints])
     # the flange looks down, to the four digits of the angles
-    down = flange_pose(robot.model, home).rotation[:, 2]
+    solver = FlangeSolver(robot, 1e-10)
+    down = solver.pose(home).rotation[:, 2]
     np.testing.assert_allclose(down, [0.0, 0.0, -1.0], atol=2e-4)
-    goal = flange_pose(robot.model, home + 0.1)
-    found = reach(robot.model, goal, home)
-    pose = flange_pose(robot.model, found)
+    goal = solver.pose(home + 0.1)
+    found, good = solver.reach(*goal, home)
+    assert good
+    pose = solver.pose(found)
     # the iteration stops at an error twist of 1e-10
     np.testing.assert_allclose(pose.translation, goal.translation, atol=1e-9)
     np.testing.assert_allclose(pose.rotation, goal.rotation, atol=1e-9)
@@ -43,24 +44,24 @@ def test_a_pose_nearby_is_reached(name):
     np.testing.assert_allclose(frame.translation, goal.translation, atol=1e-9)
 
 
-def test_a_pose_out_of_reach_is_none():
+def test_a_pose_out_of_reach_is_refused():
     robot = load_robot("ur5")
     home = np.array(HOMES[6])
-    here, far = flange_pose(robot.model, home), np.array([2.0, 0.0, 0.0])  # a UR5 reaches 0.85 m
-    assert reach(robot.model, pin.SE3(np.eye(3), far), home) is None
+    offsets = np.array([np.zeros(3), [2.0, 0.0, 0.0]])  # a UR5 reaches 0.85 m
     with pytest.raises(ParameterError, match=r"a line: the flange .* \(point 2 of 2\)"):
-        follow(robot, here.rotation, np.array([here.translation, far]), home, "a line")
+        follow(robot, home, offsets, "a line")
 
 
 def test_a_path_is_followed_without_changing_branch():
     robot = load_robot("ur5")
     home = np.array(HOMES[6])
-    start = flange_pose(robot.model, home)
-    points = start.translation + np.outer(np.arange(10), [0.0, 0.01, 0.0])
-    path = follow(robot, start.rotation, points, home, "a line")
+    offsets = np.outer(np.arange(10), [0.0, 0.01, 0.0])
+    path = follow(robot, home, offsets, "a line")
     np.testing.assert_allclose(path[0], home, atol=1e-9)
     assert np.max(np.abs(np.diff(path, axis=0))) < 0.05  # 1 cm at half a metre, and a wrist
-    np.testing.assert_allclose(flange_pose(robot.model, path[-1]).translation, points[-1])
+    pose = FlangeSolver(robot).pose
+    points = pose(home).translation + offsets
+    np.testing.assert_allclose(pose(path[-1]).translation, points[-1])
 
 
 def test_limits_are_held_joint_by_joint():

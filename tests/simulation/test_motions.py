@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 from vftcli.robots import load_robot
+from vftcli.robots.robot import FlangeSolver
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
 from vftcli.simulation.trajectories import (
@@ -21,7 +22,6 @@ from vftcli.simulation.trajectories import (
     check_limits,
     check_start,
     check_times,
-    flange_pose,
     plan,
 )
 
@@ -63,7 +63,7 @@ def test_circle_is_a_horizontal_circle_of_fixed_orientation() -> None:
     robot = load_robot("ur5")
     spec = CircleSpec(towards=-1.5)
     q = plan(spec, robot, np.linspace(0.0, 20.0, 101)).q
-    poses = [flange_pose(robot.model, row) for row in q]
+    poses = list(map(FlangeSolver(robot).pose, q))
     centre = poses[0].translation + 0.2 * np.array([np.cos(-1.5), np.sin(-1.5), 0.0])
     # counterclockwise, a round in 4 s, from opposite to where the centre is
     angle = np.pi - 1.5 + 2.0 * np.pi * np.linspace(0.0, 5.0, 101)
@@ -88,7 +88,7 @@ def test_moves_lead_straight_to_where_they_say() -> None:
     line, joints = SPECS[2], SPECS[3]
     back = line.motion(robot).at(np.array([2.25, 3.0, 9.0])).q  # type: ignore[attr-defined]
     q = np.vstack([line.motion(robot).at(t).q, back])  # type: ignore[attr-defined]
-    home, *poses = (flange_pose(robot.model, row) for row in q)
+    home, *poses = map(FlangeSolver(robot).pose, q)
     for pose, share in zip(poses, [*way[1:], 1 - MIDWAY, 0, 0], strict=True):
         # a polynomial of degree 16 for the joints leaves less than a nanometre
         away = home.translation + share * np.array([0.1, 0.0, 0.05])
@@ -117,7 +117,7 @@ def test_drawn_poses_are_held_inside_the_limits_above_the_table(unknown: bool) -
     reached = np.array([np.maximum(low, home - 1.8), np.minimum(high, home + 1.8)])
     assert np.all(middle.min(axis=0) <= reached[0])
     assert np.all(middle.max(axis=0) >= reached[1])
-    assert 0.15 < min(flange_pose(robot.model, q).translation[2] for q in middle) < 0.2
+    assert 0.15 < min(pose.translation[2] for pose in map(FlangeSolver(robot).pose, middle)) < 0.2
     # the first of NumPy's draws lies above the table
     first = PosesSpec(count=2, move=0.5, dwell=0.0).motion(robot).at(np.zeros(1)).q[0]
     drawn = home + np.random.default_rng(1).uniform(-0.7, 0.7, 7)
@@ -198,7 +198,7 @@ def test_impossible_circles_are_refused(settings: list[str], words: str) -> None
 
 def test_a_circle_about_the_base_winds_its_joint_up() -> None:
     robot = load_robot("ur5")
-    x, y, _ = flange_pose(robot.model, check_start(robot, ())).translation
+    x, y, _ = FlangeSolver(robot).pose(check_start(robot, ())).translation
     about = CircleSpec(radius=float(np.hypot(x, y)), towards=float(np.arctan2(-y, -x)))
     with pytest.raises(ParameterError, match="winds a joint up"):
         about.motion(robot)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.admittance.choice import ControlChoice
-from vftcli.admittance.joints import FlangeSolver
+from vftcli.admittance.joints import check_start
 from vftcli.admittance.law import Controller, check_stable
 from vftcli.admittance.motion import Recursion, phases
 from vftcli.admittance.replay import Replay, deviation_of
@@ -20,7 +20,7 @@ from vftcli.doctor.examination import Examination
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.paper import KalmanObserver
 from vftcli.robots import load_robot
-from vftcli.robots.robot import Robot
+from vftcli.robots.robot import FlangeSolver, Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
@@ -141,7 +141,7 @@ class Loop:
         self.noise = *sizes, effort if K is None else effort * K
         self.sensor = OnlineKalman(observer, nominal, self.interval, averaged=averaged)
         self.solver = FlangeSolver(nominal)
-        self.start = self.solver.check_start(arm.q.copy())
+        self.start = check_start(nominal, arm.q.copy())
         self.rotation, self.translation = self.solver.pose(self.start)
         self.law = Recursion([controller])
         self.dragged = np.zeros(6, bool)
@@ -272,7 +272,7 @@ def run_closed_loop(
     return ClosedLoop(
         controller=controller,
         truth=truth,
-        moved=deviation_of(loop.solver, loop.start, columns["q"]),
+        moved=deviation_of(arm.true.nominal, loop.start, columns["q"]),
         zero=loop.zero,
         simulation=simulation,
         **columns,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.admittance.joints import FlangeSolver, JointPath, follow
+from vftcli.admittance.joints import JointPath, check_start, follow
 from vftcli.admittance.law import (
     AXES,
     Admittance,
@@ -86,7 +86,7 @@ class Replay:
     @cached_property
     def path(self) -> JointPath:
         """Joint positions along the motion."""
-        return follow(FlangeSolver(self.robot), self.start, self.motion.x, self.parameters.period)
+        return follow(self.robot, self.start, self.motion.x, self.parameters.period)
 
     @cached_property
     def rows(self) -> tuple[dict[str, Any], ...]:
@@ -134,10 +134,9 @@ def replay(
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
     complaints, parameters = check_stable(controllers, anyway=anyway), controllers[0].parameters
-    solver = FlangeSolver(robot)
     clock, newest = on_control_clock(wrench.t, parameters.period)
     force, q = wrench.known[newest], q[newest]
-    start = solver.check_start(q[0])
+    start = check_start(robot, q[0])
     split = phases(force, parameters)
     motion = run(controllers, split.force, split.dragged)
     unknown = np.count_nonzero(~np.isfinite(wrench.known).all(axis=1))
@@ -150,7 +149,7 @@ def replay(
         wrench=force,
         motion=motion._replace(t=motion.t + clock[0]),
         drags=drags_of(split, parameters.period),
-        logged=deviation_of(solver, start, q),
+        logged=deviation_of(robot, start, q),
         force_remarks=(*wrench.remarks, *missing, *complaints),
     )
 
@@ -178,7 +177,7 @@ def replay_release(
     return Replay(
         robot=robot,
         controllers=tuple(controllers),
-        start=FlangeSolver(robot).check_start(start),
+        start=check_start(robot, start),
         wrench=force,
         motion=motion,
         drags=releases_of(x, len(motion.t)),
@@ -222,12 +221,10 @@ def on_control_clock(t: Array, period: float) -> tuple[Array, Indices]:
     return clock, np.maximum(newest, 0)
 
 
-def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
+def deviation_of(robot: Robot, start: Array, q: Array) -> Array:
     """Where the log's own arm was, as a deviation from the start pose. (T, 6) [m, rad]"""
-    poses = link_poses(solver.robot.chain, q)
-    rotation, translation = solver.pose(start)
-    turned = log_matrix(poses.rotation[:, -1] @ rotation.T)
-    return np.concatenate([poses.translation[:, -1] - translation, turned], axis=1)
+    R, p = (part[:, -1] for part in link_poses(robot.chain, np.vstack([start, q])))
+    return np.hstack([p[1:] - p[0], log_matrix(R[1:] @ R[0].T)])
 
 
 def drag_remarks(found: Replay) -> Iterator[Remark]:

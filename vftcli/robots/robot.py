@@ -7,6 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from vftcli.robots.chain import Chain, Payload
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import RobotError
@@ -19,6 +21,13 @@ if TYPE_CHECKING:
 
 #: Joint temperature that friction is for where nobody says one: a warm arm's. [°C]
 REFERENCE = 35.0
+
+ITERATIONS = 12  #: Steps of the inverse kinematics at most.
+#: λ² of a damped step is this times the error, so that it vanishes at the pose.
+DAMPING = 1e-3
+#: Share of the error that is left after three steps where a pose is out of reach.
+STALLED = 0.7
+LARGEST_STEP = 0.2  #: Longest joint step of one iteration. [rad]
 
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
@@ -218,3 +227,54 @@ class Robot(Shown):
     def without_friction(self) -> "Robot":
         """Return the robot with no friction model, for ``model.friction=none``."""
         return replace(self, friction=())
+
+
+class FlangeSolver:
+    """Joint positions that bring the flange to a pose, inside the joint limits where asked.
+
+    A pose counts as reached when position and rotation error are below `reached`. [m, rad]
+    """
+
+    def __init__(self, robot: Robot, reached: float = 1e-6, *, limited: bool = True) -> None:
+        self.model, self.reached = robot.model, reached  # who lacks Pinocchio reads it here
+        import pinocchio as pin
+        from scipy.linalg.lapack import dposv
+
+        self.pin, self.solve = pin, dposv
+        self.data: Any = self.model.createData()
+        self.frame = self.model.getFrameId("flange")
+        self.lower: Array | float = robot.limits.q_min if limited else np.nan
+        self.upper: Array | float = robot.limits.q_max if limited else np.nan
+
+    def pose(self, q: Array) -> Pose:
+        """Orientation (3, 3) and origin (3,) [m] of the flange in the base at `q` (n,) [rad]."""
+        self.pin.framesForwardKinematics(self.model, self.data, np.asarray(q, float))
+        place = self.data.oMf[self.frame]
+        return Pose(np.array(place.rotation), np.array(place.translation))
+
+    def reach(self, rotation: Array, translation: Array, guess: Array) -> tuple[Array, bool]:
+        """Joint positions at a pose, from a guess nearby, and whether the pose is reached.
+
+        A step is Jᵀ(JJᵀ + λ²I)⁻¹e in base axes, cut at the joint limits; where the pose
+        is not reached the joints are those of the last step.
+        """
+        pin, model, data, frame = self.pin, self.model, self.data, self.frame
+        q, error, sizes = guess, np.empty(6), [np.inf, np.inf, np.inf]
+        for _ in range(ITERATIONS):
+            J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+            place = pin.updateFramePlacement(model, data, frame)
+            error[:3] = translation - place.translation
+            error[3:] = pin.log3(rotation @ place.rotation.T)
+            size = float(np.sqrt(error @ error))
+            if size < self.reached:
+                return q, True
+            if size > STALLED * sizes[-3]:
+                break
+            sizes.append(size)
+            normal = J @ J.T
+            normal.flat[::7] += DAMPING * min(size, 1.0) ** 2
+            _, weights, _ = self.solve(normal, error)
+            step = J.T @ weights
+            step *= LARGEST_STEP / max(float(abs(step).max()), LARGEST_STEP)
+            q = np.fmin(np.fmax(q + step, self.lower), self.upper)
+        return q, False

@@ -2,19 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice, pairwise, product
-from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
+from itertools import pairwise, product
+from typing import ClassVar, NamedTuple, TypeVar, dataclass_transform
 
 import numpy as np
 
-from vftcli.robots import Robot
+from vftcli.robots.chain import link_poses
+from vftcli.robots.robot import FlangeSolver, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 
 #: Harmonics kept of a periodic path; those of a circle fall below rounding long before.
 HARMONICS = 48
 TABLE = 0.15  #: Least height of the flange in poses that are drawn. [m]
-ITERATIONS = 100
 #: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-10
 #: Number of joints → a pose from which such an arm can work, the flange looking down.
@@ -137,15 +137,12 @@ class CircleSpec(Spec, kind="circle"):
         if self.radius <= 0 or self.period <= 0 or self.cycles <= 0:
             raise ParameterError("trajectory radius, period and cycles must be positive")
         start = check_start(robot, self.start)
-        home = flange_pose(robot.model, start)
         count = 4 * HARMONICS
-        angle = self.towards + np.pi + 2.0 * np.pi * np.arange(count) / count
+        angle = self.towards + np.pi + 2.0 * np.pi / count * np.arange(count + 1)
         toward = np.array([np.cos(self.towards), np.sin(self.towards), 0.0])
-        centre = home.translation + self.radius * toward
-        ring = self.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
-        q = follow(robot, home.rotation, centre + ring[[*range(count), 0]], start, "the circle")
-        closure = np.outer(np.arange(count) / count, q[-1] - q[0])
-        if abs(closure).max() > 1.0:
+        ring = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+        q = follow(robot, start, self.radius * (toward + ring), "the circle")
+        if abs(q[-1] - q[0]).max() > 1.0:
             raise ParameterError("the circle winds a joint up; choose another start or radius")
         mean, *series = np.fft.rfft(q[:-1], axis=0)[: HARMONICS + 1] / count
         cosine, sine = 2.0 * np.real(series), -2.0 * np.imag(series)
@@ -178,7 +175,6 @@ class OffsetsSpec(Spec, kind="offsets"):
         from numpy.polynomial import chebyshev
 
         q = check_start(robot, self.start)
-        home = flange_pose(robot.model, q)
         times = np.array([m[:2] for m in self.moves])
         check_times(times, self.length)
         before, paths = np.zeros(3), list[Array]()
@@ -186,8 +182,7 @@ class OffsetsSpec(Spec, kind="offsets"):
         for move in self.moves:
             after = np.array(move[2:])
             share = 0.5 * (nodes[:, None] + 1.0)
-            points = home.translation + before + share * (after - before)
-            line = follow(robot, home.rotation, points, q, "a move")
+            line = follow(robot, q, share * (after - before), "a move")
             paths.append(np.asarray(chebyshev.chebfit(nodes, line, 16), float))
             q, before = line[-1], after
         return Stretches(times, tuple(paths), self.length)
@@ -232,10 +227,10 @@ class PosesSpec(Spec, kind="poses"):
         rng, home = np.random.default_rng(1), check_start(robot, ())
         low = np.nan_to_num(robot.limits.q_min + 0.05, nan=-np.pi)
         high = np.nan_to_num(robot.limits.q_max - 0.05, nan=np.pi)
-        tries, size = range(100 * self.count), (-self.spread, self.spread, robot.joints)
-        poses = (np.clip(home + rng.uniform(*size), low, high) for _ in tries)
-        above = (q for q in poses if flange_pose(robot.model, q).translation[2] > TABLE)
-        points = list(islice(above, self.count))
+        size = 100 * self.count, robot.joints
+        poses = np.clip(home + rng.uniform(-self.spread, self.spread, size), low, high)
+        height = link_poses(robot.chain, poses).translation[:, -1, 2]
+        points = list(poses[height > TABLE][: self.count])
         if len(points) < self.count:
             raise ParameterError(
                 f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} "
@@ -314,52 +309,23 @@ def plan(spec: TrajectorySpec, robot: Robot, t: Array) -> Reference:
     return reference
 
 
-def flange_pose(model: Any, q: Array) -> Any:  # noqa: ANN401 - Pinocchio is untyped
-    """Pose of the flange in the base frame at joint positions `q` (n,) [rad], an SE3 [m]."""
-    import pinocchio as pin
+def follow(robot: Robot, start: Array, offsets: Array, what: str) -> Array:
+    """Joint positions along flange points (K, 3) [m] about the start's, each from the last.
 
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, np.asarray(q, float))
-    return data.oMf[model.getFrameId("flange")].copy()
-
-
-def reach(model: Any, goal: Any, guess: Array) -> Array | None:  # noqa: ANN401
-    """Joint positions that bring the flange to a pose, from a nearby guess, or None. (n,) [rad]
-
-    Gauss–Newton on log(T⁻¹ T_d), damped as it errs: redundant arms move least.
+    The flange keeps the orientation that it has at the start (n,) [rad]. (K, n) [rad]
     """
-    import pinocchio as pin
-
-    data, frame = model.createData(), model.getFrameId("flange")
-    q = np.array(guess, float)
-    for _ in range(ITERATIONS):
-        pin.framesForwardKinematics(model, data, q)
-        error = pin.log6(data.oMf[frame].inverse() * goal).vector
-        size = float(np.linalg.norm(error))
-        if size < REACHED:
-            return q
-        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
-        # Damping keeps far steps short at singularities and must not slow near ones.
-        damping = 1e-3 * min(size, 1.0) ** 2
-        q += J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
-    return None
-
-
-def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str) -> Array:
-    """Joint positions along flange points (K, 3) [m], each from the one before. (K, n) [rad]"""
-    import pinocchio as pin
-
-    q, path = np.array(start, float), []
-    for k, point in enumerate(points):
-        found = reach(robot.model, pin.SE3(rotation, point), q)
+    solver, q, path = FlangeSolver(robot, REACHED, limited=False), start, list[Array]()
+    rotation, origin = solver.pose(start)
+    for k, point in enumerate(origin + offsets):
+        last, (q, good) = q, solver.reach(rotation, point, q)
         # A jump of a radian is another branch of the inverse kinematics.
-        if found is None or abs(found - q).max() > 1.0:
+        if not good or abs(q - last).max() > 1.0:
             place = ", ".join(f"{value:.3f}" for value in point)
             raise ParameterError(
                 f"{what}: the flange of {robot.name!r} cannot reach ({place}) m (point {k + 1} of "
-                f"{len(points)}); choose a smaller motion or another start"
+                f"{len(offsets)}); choose a smaller motion or another start"
             )
-        path.append(q := found)
+        path.append(q)
     return np.array(path)
 
 
