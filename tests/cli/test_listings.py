@@ -53,7 +53,7 @@ def test_what_there_is_is_listed_with_the_sources_of_one(run: Run) -> None:
 
 def test_a_description_is_shown_up_to_its_tip(run: Run) -> None:
     whole = helped(run, "robots", FIXTURES / "arm.urdf")
-    joints = [line.split()[0] for line in whole.splitlines()[4:] if line][:3]
+    joints = [line.split()[0] for line in whole.splitlines()[3:] if line][:3]
     part = helped(run, "robots", FIXTURES / "arm.urdf", "--tip", joints[1])
     assert ": 2 joints" in part.splitlines()[0]
 

@@ -59,10 +59,8 @@ def test_the_terminal_keeps_digits_below_digits(grid: Grid) -> None:
 
 
 def test_a_table_without_headings_has_no_line_for_them() -> None:
-    columns = (Column("", words=True, width=4), Column("", form=".2f", width=6))
-    assert terminal(Grid(given=columns, rows=(("a", 1.0), ("b", 22)))) == (
-        "a       1.00\nb         22\n"
-    )
+    columns = (Column("", words=True), Column("", form=".2f"))
+    assert terminal(Grid(given=columns, rows=(("a", 1.0), ("b", 22)))) == "a  1.00\nb    22\n"
 
 
 def test_units_stand_behind_headings_and_below_them_in_latex() -> None:
@@ -215,18 +213,20 @@ def test_a_name_that_a_spreadsheet_would_run_is_a_text_in_csv(first: str) -> Non
     assert row == {"log": f"'{shown}", "value": "-1.5", "at": "'-"}
 
 
-def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom() -> None:
+def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     columns = (
         Column("name", words=True),
         Column("time to the peak", "m, rad", ".1f"),
         Column("work of all", "J", ".1f", seldom=True),
     )
     grid = Grid(given=columns, rows=(("a", 1.0, 2.0), ("b", 10.0, 20.0)))
-    wide, narrow, least = (
-        terminal(grid, width=80),
-        terminal(grid, width=31),
-        terminal(grid, width=15),
-    )
+    texts = []
+    for width in ("80", "31", "15"):
+        monkeypatch.setenv("COLUMNS", width)
+        texts.append(terminal(grid))
+    wide, narrow, least = texts
     assert wide.splitlines()[0] == "name  time to the peak [m, rad]  work of all [J]"
     assert [line.split() for line in narrow.splitlines()[-2:]] == [
         ["a", "1.0", "2.0"],
@@ -237,7 +237,8 @@ def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom
     assert least.splitlines()[-2:] == ["b         10.0", "No room for: work of all."]
 
 
-def test_a_table_without_rows_is_its_headings() -> None:
+def test_a_table_without_rows_is_its_headings(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = Grid(given=(Column("name", words=True), Column("", unit="")), rows=())
     assert terminal(grid) == "name\n"
-    assert terminal(grid, width=3) == "name\n"
+    monkeypatch.setenv("COLUMNS", "3")
+    assert terminal(grid) == "name\n"

@@ -4,7 +4,7 @@ import numpy as np
 
 from vftcli.outputs.grid import terminal
 from vftcli.outputs.grids import bench_grid, joints_grid, robot_text, robots_grid, tuned_grid
-from vftcli.robots import load_robot
+from vftcli.robots import PROFILES, load_robot
 
 
 class Line(NamedTuple):
@@ -21,32 +21,34 @@ def test_one_robot_joint_by_joint() -> None:
     """First joint of the Panda: 4.971 kg, no torque constant, 87 N·m."""
     lines = terminal(joints_grid(load_robot("panda"))).splitlines()
     assert len(lines) == 9
-    assert lines[1].split() == ["kg", "kg·m²", "N·m/A", "N·m"]
-    assert lines[2].split()[:5] == ["joint1", "4.971", "0.000", "-", "87.0"]
+    assert lines[1].split() == ["joint", "[kg]", "[kg·m²]", "[N·m/A]", "[N·m]", "friction"]
+    assert lines[2].split()[:5] == ["joint1", "4.971", "0.000", "–", "87.0"]
     assert lines[0].index("tau_max") + len("tau_max") == lines[2].index("87.0") + len("87.0")
 
 
 def test_friction_is_reported_with_its_numbers_and_how_far_to_trust_it() -> None:
-    text = joints_grid(load_robot("panda")).rows[1][-1]
+    text = joints_grid(load_robot("panda")).rows[0][-1]
     assert str(text).startswith("sigmoid (amplitude 0.54615, ")
     assert str(text).endswith("; published")
 
 
-def test_the_list_of_robots_has_no_heading() -> None:
-    (line,) = terminal(robots_grid([load_robot("panda")])).splitlines()
-    assert line.split()[0] == "panda"
-    assert line.split()[-4:] == ["7", "joints", "link_torque", "sigmoid"]
+def test_the_list_of_robots_fits_a_terminal() -> None:
+    head, *lines = terminal(robots_grid(map(load_robot, PROFILES))).splitlines()
+    assert head.split() == ["name", "arm", "joints", "effort", "friction"]
+    assert max(map(len, lines)) <= 80
+    (panda,) = (line.split() for line in lines if line.startswith("panda "))
+    assert panda[-3:] == ["7", "link_torque", "sigmoid"]
 
 
 def test_gains_that_were_found() -> None:
     two = np.array([140.0, 1.5])
     line = Line("gmo", two, 1e-3 * two, 0.5 * two, np.array([0.12345, 2.0]))
     assert terminal(tuned_grid([line], with_alarms=True)).splitlines() == [  # type: ignore[list-item]
-        "observer                               J1       J2",
-        "gmo       ω [rad/s]                   140      1.5",
-        "          delay [ms]                  140      1.5",
-        "          expected rmse [N·m]          70     0.75",
-        "          false alarms [1/h]        0.123        2",
+        "observer                          J1    J2",
+        "gmo       ω [rad/s]              140   1.5",
+        "          delay [ms]             140   1.5",
+        "          expected rmse [N·m]     70  0.75",
+        "          false alarms [1/h]   0.123     2",
     ]
     quiet = terminal(tuned_grid([line], with_alarms=False))  # type: ignore[list-item]
     assert "alarms" not in quiet
@@ -80,7 +82,7 @@ def test_times_are_in_milliseconds_and_microseconds() -> None:
     one = {"total_s": 0.0123456, "per_sample_us": 1.23456, "paper_s": None}
     found = {"dynamics": one, "observers": [{**one, "name": "gmo", "paper_s": 0.5}]}
     assert terminal(bench_grid({**found, "complete_log": []})).splitlines() == [
-        "                 total [ms]  per sample [µs]  paper, its laptop [s]",
-        "dynamics              12.35            1.235                      –",
-        "gmo                   12.35            1.235                  0.500",
+        "          total [ms]  per sample [µs]  paper, its laptop [s]",
+        "dynamics       12.35            1.235                      –",
+        "gmo            12.35            1.235                  0.500",
     ]

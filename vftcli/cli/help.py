@@ -214,15 +214,14 @@ def contents() -> Iterator[str]:
 
 
 def robots(name: str | None, tip: str | None) -> str:
-    """The robot profiles by maker, or one robot and its sources."""
+    """The robot profiles, or one robot and its sources."""
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.grids import robot_text, robots_grid
-    from vftcli.robots import MAKERS, load_robot
+    from vftcli.robots import PROFILES, load_robot
 
     if name is not None:
         return robot_text(load_robot(name, tip=tip or ""))
-    grids = {maker: robots_grid(map(load_robot, names), maker) for maker, names in MAKERS.items()}
-    return "".join(f"{maker}\n{terminal(grid)}" for maker, grid in grids.items()).rstrip("\n")
+    return terminal(robots_grid(map(load_robot, PROFILES))).rstrip("\n")
 
 
 def observers() -> Iterator[str]:

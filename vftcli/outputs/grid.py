@@ -54,7 +54,6 @@ class Column(NamedTuple):
     form: str | Callable[[float], str] = significant
     #: Whether it holds words, which are at the left; numbers are at the right.
     words: bool = False
-    width: int = 0  #: Least width on the terminal.
     symbol: str = ""  #: The heading in LaTeX where it is a formula.
     seldom: bool = False  #: Whether a terminal without room for it may leave it out.
 
@@ -130,14 +129,13 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
     return tuple(Column(f"J{j}", symbol=f"$J_{{{j}}}$", **shape) for j in numbers)
 
 
-def terminal(grid: Grid, letters: Callable[[str], str] = str, width: int | None = None) -> str:
+def terminal(grid: Grid, letters: Callable[[str], str] = str) -> str:
     """A table as text, two blanks between columns, each line ended.
 
-    A table wider than `width`, by default the terminal's, breaks its headings, then
-    leaves out columns that are seldom asked for, the last first, and names them below.
+    A table wider than the terminal breaks its headings, then leaves out columns that are
+    seldom asked for, the last first, and names them below.
     """
-    width = width or shutil.get_terminal_size().columns
-    left_out: list[str] = []
+    width, left_out = shutil.get_terminal_size().columns, list[str]()
     lines = table_lines(grid, letters)
     if len(max(lines, key=len, default="")) > width:
         lines = table_lines(grid, letters, broken=True)
@@ -171,7 +169,7 @@ def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = Fal
     height = max(map(len, columns), default=0)
     for k, (column, texts) in enumerate(zip(grid.columns, columns, strict=True)):
         full = [""] * (height - len(texts)) + texts
-        wide = max(column.width, *map(len, full))
+        wide = max(map(len, full))
         # Words are at the left of their columns, numbers at the right.
         put = str.ljust if column.words else str.rjust
         columns[k] = [put(text, wide) for text in full]

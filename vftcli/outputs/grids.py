@@ -33,22 +33,20 @@ CONTACTS = {
 }
 
 
-def robots_grid(robots: "Iterable[Robot]", maker: str = "") -> Grid:
-    """The robot profiles of a maker, one row each, without a heading."""
-    rows = []
+def robots_grid(robots: "Iterable[Robot]") -> Grid:
+    """The robot profiles, one row each."""
+    rows: Rows = []
     for robot in robots:
         friction = sorted({f.model.removeprefix("coulomb-") for f in robot.friction})
-        title, joints = robot.title.removeprefix(f"{maker} "), f"{robot.joints} joints"
-        models = ", ".join(friction) or "no friction model"
-        rows.append((robot.name, title, joints, robot.torque_source, models))
-    # The widths keep the columns of one release where they were in the one before.
-    return Grid([Column("", words=True, width=width) for width in (6, 24, 8, 12, 0)], rows)
+        models = ", ".join(friction) or "no model"
+        rows.append((robot.name, robot.title, str(robot.joints), robot.torque_source, models))
+    return Grid(("name", "arm", Column("joints"), "effort", "friction"), rows)
 
 
 def joints_grid(robot: "Robot") -> Grid:
-    """One robot joint by joint: masses, drives, limits, friction; units in the first row."""
+    """One robot joint by joint: masses, drives, limits, friction."""
     chain, constants = robot.chain, robot.torque_constant
-    rows: Rows = [("", "kg", "kg·m²", "N·m/A", "N·m", "")]
+    rows: Rows = []
     for j, joint in enumerate(chain.names):
         friction = "none"
         if table := robot.friction[j].table if robot.friction else {}:
@@ -59,15 +57,15 @@ def joints_grid(robot: "Robot") -> Grid:
             )
             friction = f"{model} ({numbers}); {trust}"
         each = (chain.mass, chain.rotor_inertia, constants, robot.limits.tau_max)
-        known = ("-" if values is None else float(values[j]) for values in each)
+        known = (None if values is None else float(values[j]) for values in each)
         rows.append((joint, *known, friction))
     columns = (
-        Column("joint", words=True, width=16),
-        Column("mass", form=".3f", width=7),
-        Column("rotor", form=".3f", width=7),
-        Column("K", form=".4f", width=8),
-        Column("tau_max", form=".1f", width=7),
-        Column("friction", words=True),
+        "joint",
+        Column("mass", "kg", ".3f"),
+        Column("rotor", "kg·m²", ".3f"),
+        Column("K", "N·m/A", ".4f"),
+        Column("tau_max", "N·m", ".1f"),
+        "friction",
     )
     return Grid(columns, rows)
 
@@ -86,8 +84,7 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
             values["false alarms [1/h]"] = line.alarms.round(3)
         for k, (what, numbers) in enumerate(values.items()):
             rows.append(("" if k else line.observer, what, *map(float, numbers)))
-    joints = joint_columns(len(tuned[0].rate), form=".3g", width=7)
-    return Grid(("observer", Column("", words=True, width=22), *joints), rows)
+    return Grid(("observer", "", *joint_columns(len(tuned[0].rate), form=".3g")), rows)
 
 
 def robot_text(robot: "Robot") -> str:
@@ -112,7 +109,7 @@ def bench_grid(result: Record) -> Grid:
     """Times of dynamics and observers, beside the paper's on its laptop."""
     dynamics = {"name": "dynamics", **result["dynamics"]}
     columns = {
-        "name": Column("", words=True, width=15),
+        "name": "",
         "total_s": Column("total", "ms", lambda seconds: f"{1e3 * seconds:.2f}"),
         "per_sample_us": Column("per sample", "µs", ".3f"),
         "paper_s": Column("paper, its laptop", "s", ".3f"),
@@ -128,15 +125,12 @@ def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
         yield keyed_grid(CONTACTS, rows.iter_rows(named=True), "contacts against the reference")
 
 
-def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
+def drift_grid(drifts: "Iterable[Drift]") -> Grid:
     """Zero drift per observer and axis, with five decimals as the paper prints it."""
-    title, width = ("Zero drift; the first span's is removed", 0) if spans else ("", 9)
-    axes = (Column(axis, unit_of(axis) if spans else "", ".5f", width=width) for axis in AXES)
-    columns = "observer", *[Column("span [s]")] * spans, *axes
-    rows: Rows = [
-        (d.name, *[f"{d.span[0]:g}–{d.span[1]:g}"] * spans, *map(float, d.mean)) for d in drifts
-    ]
-    return Grid(columns, rows, title, swatches=True)
+    axes = (Column(axis, unit_of(axis), ".5f") for axis in AXES)
+    rows: Rows = [(d.name, f"{d.span[0]:g}–{d.span[1]:g}", *map(float, d.mean)) for d in drifts]
+    title = "Zero drift; the first span's is removed"
+    return Grid(("observer", Column("span [s]"), *axes), rows, title, swatches=True)
 
 
 def pairs_text(table: "pl.DataFrame") -> str:

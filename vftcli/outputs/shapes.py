@@ -74,8 +74,8 @@ def link_surfaces(robot: Robot) -> tuple[dict[int, Surface], list[str]]:
     return {link: fewer(corners) for link, corners in whole.items()}, list(lacking)
 
 
-def fewer(corners: Array, most: int = MOST_TRIANGLES) -> Surface:
-    """A surface of so many triangles at most: the corners in each cell of a grid are one.
+def fewer(corners: Array) -> Surface:
+    """A surface of `MOST_TRIANGLES` at most: the corners in each cell of a grid are one.
 
     It is where the planes of the triangles there meet best, within the cell, so that
     nothing moves farther than a cell's diagonal. (Lindstrom 2000, Out-of-core
@@ -83,7 +83,8 @@ def fewer(corners: Array, most: int = MOST_TRIANGLES) -> Surface:
     """
     long = np.ptp(corners, axis=(0, 1)).max()
     sizes = (long / 2.0 ** np.linspace(1.0, FINEST, 100)).tolist()
-    size = sizes[max(bisect(sizes, most, key=lambda size: len(merged(corners, size)[1])) - 1, 0)]
+    count = bisect(sizes, MOST_TRIANGLES, key=lambda size: len(merged(corners, size)[1]))
+    size = sizes[max(count - 1, 0)]
     cells, faces = merged(corners, size)
     count = int(cells.max()) + 1
     middle, planes, ends = np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))

@@ -15,10 +15,9 @@ from vftcli.signals.parsing import counted
 #: A threshold in a call is a multiple of a hundredth: no robot tells less of a
 #: newton-metre.
 SHARES = 100
-BLANK = Column("", words=True, width=3)
 #: Columns of every threshold with its interval, and the tail it comes from.
 COLUMNS = (
-    BLANK, Column("threshold"), BLANK, Column("95 %"), Column("tail from"),
+    "", Column("threshold"), "", Column("95 %"), Column("tail from"),
     Column("λ", "1/h", ".0f"), Column("k"), Column("log", "h"), "needed by",
 )  # fmt: skip
 #: Key of a contact in a check → its column.

@@ -117,7 +117,7 @@ def simd() -> str:
     return str((found.get("SIMD Extensions", {}).get("found") or ["baseline"])[-1])
 
 
-def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) -> dict[str, Any]:
+def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
     """Time the observers.
 
     Returns:
@@ -222,10 +222,9 @@ def computing_time(_seed: int) -> Iterator[Given]:
             yield variant, f"zoh/{name}", cost["kfo-zoh"] / cost[name]
 
 
-def first_order_loops(
-    p: Array, mu: Array, step: float, rate: float = 10.0
-) -> tuple[Array, Array]:
-    """FDO and GMO, one sample after another."""
+def first_order_loops(p: Array, mu: Array, step: float) -> tuple[Array, Array]:
+    """FDO and GMO of 10 1/s, one sample after another."""
+    rate = 10.0
     a = 0.5 * rate * step
     keep, share = (1 - a) / (1 + a), a / (1 + a)
     y1, y2, r = np.zeros(p.shape[1]), -rate * p[0], np.zeros(p.shape[1])

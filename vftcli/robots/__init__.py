@@ -15,24 +15,13 @@ if TYPE_CHECKING:
 else:
     __getattr__ = door(__name__, "chain", "robot")
 
-#: Maker → its built-in profiles.
-MAKERS = {
-    "Universal Robots": (
-        *("ur3", "ur5", "ur10"),
-        *("ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"),
-    ),
-    "Franka Robotics": ("panda", "fr3"),
-    "KUKA": ("iiwa7", "iiwa14"),
-    "Kinova": ("gen3",),
-    "UFACTORY": ("xarm6", "xarm7"),
-    "Doosan Robotics": ("m1013",),
-}
+#: The built-in profiles, maker by maker.
+NAMES = (
+    *("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"),
+    *("panda", "fr3", "iiwa7", "iiwa14", "gen3", "xarm6", "xarm7", "m1013"),
+)
 #: Built-in profile name → its file.
-PROFILES: dict[str, Path] = {
-    name: Path(__file__).parent / "profiles" / f"{name}.toml"
-    for names in MAKERS.values()
-    for name in names
-}
+PROFILES = {name: Path(__file__).parent / "profiles" / f"{name}.toml" for name in NAMES}
 
 
 def plain_name(word: str) -> str:

@@ -84,7 +84,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
             "model": model_pairs(found),
         }
     if (sensed := analysis.virtual_sensor) is not None:
-        grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
+        grids = [drift_grid(sensed.drifts)] if sensed.drifts else []
         grids += contact_grids(analysis.errors)
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
     if (refined := analysis.refinement) is not None and refined.budgets:
