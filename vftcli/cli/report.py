@@ -106,7 +106,8 @@ def show_answers(
 ) -> None:
     """Print the screen; with details every table behind it too."""
     from vftcli.outputs.error_tables import to_terminal
-    from vftcli.outputs.grids import print_text
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.grids import print_grid
     from vftcli.outputs.screen import FILE_LINES, MOST_LINES, log_screen, logs_screen
 
     if len(analyses) + len(failed) > 1:
@@ -117,7 +118,8 @@ def show_answers(
         if made.errors is not None:
             show(to_terminal(made.errors, [made]))
         if made.published is not None:
-            show(print_text(made.published))
+            remarks = (f"- {remark}\n" for remark in made.published.remarks)
+            show(terminal(print_grid(made.published)) + "".join(remarks))
 
 
 @opt.command(*OF_ANALYSIS, opt.Mcap, OutputChoice, Tables)

@@ -37,8 +37,8 @@ def reproduce(
         files_of,
         gather,
         jobs_of,
+        overview,
         run_jobs,
-        short_overview,
         write_reproduction,
     )
     from vftcli.reproduction.paper import paper_of
@@ -54,7 +54,7 @@ def reproduce(
     found = gather(wanted, names, run_jobs(jobs))
     with folder:
         write_reproduction(folder, wanted, found, jobs, asked.line, figures)
-    show(terminal(short_overview(found)))
+    show(terminal(overview(found)))
     say(f"wrote {output}: open {output / 'index.html'}")
     if any(shown.failures for shown in found.values()):
         raise typer.Exit(1)

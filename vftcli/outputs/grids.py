@@ -153,13 +153,12 @@ def pairs_text(table: "pl.DataFrame") -> str:
     return f"{terminal(grid)}*: p below {SURE:g}\n"
 
 
-def print_text(found: "Comparison") -> str:
-    """A printed table beside one's own: two lines an observer, and why they differ."""
+def print_grid(found: "Comparison") -> Grid:
+    """A printed table beside one's own: two lines an observer."""
     rows: Rows = []
     for name in found.names:
         rows.append((f"{name}, printed", *(f"{v:.4f}" for v in found.printed(name))))
         rows.append((f"{name}, here", *map(float, found.ours[name])))
     rows.append(("floor, here", *map(float, found.floor)))
     columns = "observer", *joint_columns(len(found.floor))
-    table = Grid(columns, rows, f"{found.recording} beside {found.published.title}, N·m")
-    return "\n".join([terminal(table), *(f"- {text}" for text in found.remarks), ""])
+    return Grid(columns, rows, f"{found.recording} beside {found.published.title}, N·m")

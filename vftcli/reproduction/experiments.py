@@ -197,14 +197,9 @@ def overview(found: Mapping[str, ShownItem]) -> Grid:
         )
         for name, shown in found.items()
     ]
-    columns = tuple(Column(head, words=head != "ours / print") for head in heads)
-    return Grid(columns, rows=tuple(rows))
-
-
-def short_overview(found: Mapping[str, ShownItem]) -> Grid:
-    """The overview for a terminal: item, ours over the print, verdict."""
-    grid = overview(found)
-    return replace(grid, given=grid.given[::2], rows=tuple(row[::2] for row in grid.rows))
+    seldom = {"what it shows", "ours"}
+    columns = [Column(h, words=h != "ours / print", seldom=h in seldom) for h in heads]
+    return Grid(columns, rows)
 
 
 def wrapped(text: str) -> GridCell:

@@ -7,14 +7,12 @@ from itertools import groupby, repeat
 from operator import itemgetter
 from typing import Any
 
-import numpy as np
 import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.bias.refine import Budget
 from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.errors import JointMeans, joint_means
-from vftcli.evaluation.published import Comparison
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs import Record
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
@@ -27,7 +25,7 @@ from vftcli.outputs.error_tables import (
 )
 from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns
-from vftcli.outputs.grids import contact_grids, drift_grid
+from vftcli.outputs.grids import contact_grids, drift_grid, print_grid
 from vftcli.outputs.page import log_charts
 from vftcli.outputs.page.shell import Box, page, part, scales_of
 from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, still_arm, view_of
@@ -90,7 +88,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
     if (refined := analysis.refinement) is not None and refined.budgets:
         view["budget"] = budget_grid(refined.budgets[0])
     if analysis.published is not None:
-        view["printed"] = beside_print(analysis.published)
+        view["printed"] = print_grid(analysis.published)
     answer, (surfaces, lacking) = headline(analysis), link_surfaces(analysis.robot)
     span = f"{log.duration:.1f} s" + (f" at {rate:.0f} Hz" if (rate := rate_of(log)) else "")
     if lacking:
@@ -240,18 +238,6 @@ def joint_values(values: Array) -> str:
     texts = enumerate(map(significant, values.tolist()), 1)
     runs = [(text, [j for j, _ in run]) for text, run in groupby(texts, itemgetter(1))]
     return part("parts/joint_values", runs)
-
-
-def beside_print(comparison: Comparison) -> Grid:
-    """Printed and computed errors side by side."""
-    columns: list[Column | str] = ["observer"]
-    for j in range(1, len(comparison.floor) + 1):
-        columns += (Column(f"J{j} print", form=".2f"), Column("here"))
-    rows: Rows = []
-    for name in comparison.names:
-        both = np.column_stack([comparison.printed(name), comparison.ours[name]])
-        rows.append((name, *both.ravel().tolist()))
-    return Grid(columns, rows, f"RMSE in N·m: {comparison.published.title}", swatches=True)
 
 
 def budget_grid(budget: Budget) -> Grid:
