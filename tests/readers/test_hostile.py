@@ -218,8 +218,7 @@ def test_steps_down_to_a_tenth_of_a_microsecond_are_a_clock(tmp_path: Path) -> N
 def test_a_bag_cut_between_records_says_what_was_kept(tmp_path: Path, compression: str) -> None:
     recording = read(bag_cut_at_record(tmp_path / "x", compression))
     [cut] = [r for r in recording.source.remarks if r.level == "warning"]
-    assert (cut.code, cut.values["chunks"]) == ("chunks-missing", 2)
-    assert cut.values["counted"] > 2
+    assert cut.code == "bag-cut"
     assert 0 < recording.samples < ROWS
     assert 2 * recording.samples - cut.values["kept"] in {-1, 0, 1}  # two topics of one rate
 
@@ -232,8 +231,7 @@ def test_an_mcap_without_its_middle_says_what_was_kept(tmp_path: Path) -> None:
     assert 0 < kept < 2 * ROWS
     placed = read(mcap_without_its_middle(tmp_path / "y", keep_summary=False))
     [cut] = [r for r in placed.source.remarks if r.level == "warning"]
-    assert (cut.code, cut.values["kept"]) == ("bytes-missing", kept)
-    assert 0 < cut.values["missing_bytes"] < cut.values["bytes"]
+    assert (cut.code, cut.values["kept"]) == ("bag-cut", kept)
     assert placed.samples == counted.samples < ROWS
 
 

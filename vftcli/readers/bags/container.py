@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vftcli.readers.opening import LogFile, check_unpacked, natural
 from vftcli.signals import parsing
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, caution, fact, warning
+from vftcli.signals.remarks import Remark, warning
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
@@ -66,35 +66,20 @@ class MessageCount:
 
     end: int  #: Where its last whole record ends. [B]
     kept: int = 0  #: Messages found.
-    chunks: int = 0  #: Chunks found.
     counted: int | None = None  #: Messages that it counts, None where it does not say.
-    counted_chunks: int | None = None  #: Chunks that it counts, None where it does not say.
-    data_end: int = 0  #: Where its messages end, 0 where that is not known. [B]
-    missing: int = 0  #: Bytes of messages that should stand before that place. [B]
-    closed: bool = False  #: Whether its recorder closed it.
 
-    def report(self, budget: "ReadBudget", size: int, counter: str) -> None:
-        """Say so if the container of this size [B] is cut, and how much of it was kept."""
-        kept, chunks, missing = self.kept, self.chunks, self.missing
-        if self.counted is not None and kept > self.counted:
+    def report(self, budget: "ReadBudget", counter: str, *, cut: bool) -> None:
+        """Say so if messages are missing by its own count, or may be as it is cut."""
+        kept, counted = self.kept, self.counted
+        if counted is not None and kept > counted:
             raise budget.error(
-                f"{counter} counts {self.counted} messages, the chunks hold {kept}; "
+                f"{counter} counts {counted} messages, the chunks hold {kept}; "
                 "the file is damaged."
             )
-        if self.counted is not None and kept < self.counted:
-            budget.note(warning("messages-missing", kept=kept, counted=self.counted, by=counter))
-        elif self.counted_chunks is not None and chunks != self.counted_chunks:
-            counted = self.counted_chunks
-            budget.note(warning("chunks-missing", kept=kept, chunks=chunks, counted=counted))
-        elif self.counted is None and missing > 0:
-            whole = self.data_end + missing
-            budget.note(warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=whole))
-        elif size > self.end and self.closed:
-            budget.note(fact("index-cut", kept=kept, chunks=chunks))
-        elif size > self.end:
-            budget.note(warning("chunks-cut", kept=kept, rest_bytes=size - self.end))
-        elif not self.closed:
-            budget.note(caution("recorder-stopped", kept=kept))
+        if counted is not None and kept < counted:
+            budget.note(warning("messages-missing", kept=kept, counted=counted, by=counter))
+        elif cut:
+            budget.note(warning("bag-cut", kept=kept))
 
 
 #: Records that may be read of a container: no recorded message takes less than some

@@ -107,7 +107,9 @@ def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
     counts = MessageCount(end=BAG_MAGIC)
     channels: dict[bytes, Channel] = {}
     starts, indexed = list[int](), list[int]()  # of messages, by a chunk and by its index
-    chunks = counted = 0  # chunks and messages that the index at the end lists
+    chunks = said = listed = counted = (
+        0  # chunks found, by the header, and in the index; messages
+    )
     with suppress(CutError):
         for kind, header, data, start in _bag_records(file.content.obj, budget, counts):
             if kind == MESSAGE:
@@ -122,30 +124,24 @@ def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
             elif kind == CHUNK:
                 _check_index(starts, indexed, budget)
                 starts, indexed = [], []
-                counts.chunks += 1
+                chunks += 1
             elif kind == CHUNK_INFO:
                 _check_index(starts, indexed, budget)
-                chunks += 1
+                listed += 1
                 counted += sum(count for _, count in struct.iter_unpack("<II", data))
-                counts.counted = counted if chunks == counts.counted_chunks else None
+                counts.counted = counted if listed == said else None
             elif kind == BAG_HEADER:
                 if header.get(b"encryptor"):
                     raise budget.error("the bag is encrypted. Decrypt it first.")
                 # The place of the index is written when the bag is closed.
-                counts.closed = any(header[b"index_pos"])
-                found = int.from_bytes(header[b"chunk_count"], "little")
-                counts.counted_chunks = found if counts.closed else None
+                closed = any(header[b"index_pos"])
+                said = int.from_bytes(header[b"chunk_count"], "little") if closed else -1
             else:
                 raise budget.error("an unknown record; the bag is damaged.")
-    counts.report(budget, len(file.content), "its index")
+    cut = chunks != said or len(file.content) > counts.end
+    counts.report(budget, "its index", cut=cut)
 
 
-#: Kinds of records before the summary of an MCAP file.
-DATA = {
-    Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX,
-    Opcode.ATTACHMENT, Opcode.METADATA,
-}  # fmt: skip
-DATA_END_BYTES = 13  #: Length of the record that ends the data, its head included.
 ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
 
 
@@ -163,8 +159,6 @@ def _mcap_records(
         budget.spend(1)
         if counts:
             counts.end = place
-            if kind in DATA and not counts.closed:
-                counts.data_end = place
         yield kind, body
         if counts and kind == Opcode.CHUNK:
             chunk = Chunk.read(ReadDataStream(BytesIO(body)))
@@ -178,6 +172,7 @@ def _mcap_records(
 def mcap_messages(file: LogFile, budget: ReadBudget) -> Messages:
     """Messages of an MCAP file, chunk by chunk, those outside chunks one by one."""
     counts, size, message = MessageCount(end=MAGIC_SIZE), len(file.content), int(Opcode.MESSAGE)
+    data_end, cut = 0, True
     schemas = defaultdict(lambda: Schema(0, b"", "", ""))
     channels: dict[int, Channel] = {}
     with suppress(CutError):
@@ -192,21 +187,17 @@ def mcap_messages(file: LogFile, budget: ReadBudget) -> Messages:
             elif kind == Opcode.CHANNEL:
                 given = McapChannel.read(ReadDataStream(BytesIO(body)))
                 channels[given.id] = _channel(given, schemas[given.schema_id])
-            elif kind == Opcode.CHUNK:
-                counts.chunks += 1
             elif kind == Opcode.STATISTICS:
-                counts.closed, counts.counted = True, struct.unpack_from("<Q", body)[0]
+                counts.counted = struct.unpack_from("<Q", body)[0]
             elif kind == Opcode.DATA_END:
-                counts.closed = True
+                data_end = counts.end
             elif kind == Opcode.FOOTER:
-                left, counts.end = size - counts.end, size
-                if left != MAGIC_SIZE:
+                if (left := size - counts.end) != MAGIC_SIZE:
                     raise budget.error(f"{left} bytes follow its end, not {MAGIC_SIZE}; damaged.")
-                (summary,) = struct.unpack_from("<Q", body)
-                # Before it should lie the messages, and a record that says so.
-                counts.missing = summary - DATA_END_BYTES - counts.data_end if summary else 0
+                # The summary, if there is one, lies behind the end of the messages.
+                cut = counts.counted is None and struct.unpack_from("<Q", body)[0] > data_end
                 break
-    counts.report(budget, size, "its statistics")
+    counts.report(budget, "its statistics", cut=cut)
 
 
 def _channel(given: McapChannel, schema: Schema) -> Channel:

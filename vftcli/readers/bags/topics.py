@@ -330,8 +330,6 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
         if messages < counted:
             said = warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml")
             budget.note(said)
-        elif messages > counted:
-            budget.note(fact("message-count-differs", counted=counted, found=messages))
     if messages == 0:
         why = "; ".join(["no messages in any whole chunk", *map(str, budget.remarks)])
         raise LogError(f"{file.path}: {why}.")
