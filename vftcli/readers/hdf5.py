@@ -5,7 +5,6 @@ it.
 """
 
 import itertools
-import json
 import math
 import os
 import re
@@ -150,9 +149,9 @@ DROID_STATE = "observation/robot_state/"
 DROID_COMPUTED = "joint_torques_computed"
 #: Where projects that record no torque keep their positions → the project.
 TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
-#: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
-FRANKA = ("panda", "fr3")
-DESCRIPTION_BYTES = 1 << 20  #: Letters of a description beside the numbers that are parsed.
+#: An episode's metadata: the serial number begins with a profile's name.
+SERIAL = re.compile(rb'"robot_serial": *"(panda|fr3)-')
+DESCRIPTION_BYTES = 1 << 20  #: Bytes of a description that are looked at.
 
 TRAJECTORY = "trajectory.h5"
 MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
@@ -186,16 +185,11 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     computed = DROID_STATE + DROID_COMPUTED in table.names
     remarks = (fact("computed-torque-left-out"),) if computed else ()
     raw = from_table(table, request, FORMATS["droid"], remarks=remarks)
-    # The serial number in the episode's metadata begins with the robot's name.
-    serial = ""
     for path in sorted(Path(table.path).parent.glob("metadata_*.json"))[:1]:
-        with (
-            suppress(OSError, ValueError, RecursionError, AttributeError),
-            path.open("rb") as file,
-        ):
-            serial = str(json.loads(file.read(DESCRIPTION_BYTES)).get("robot_serial", "")).lower()
-    hint = next((name for name in FRANKA if serial.startswith(f"{name}-")), None)
-    return replace(raw, robot_hint=hint)
+        with suppress(OSError), path.open("rb") as file:
+            if match := SERIAL.search(file.read(DESCRIPTION_BYTES)):
+                raw = replace(raw, robot_hint=match[1].decode())
+    return raw
 
 
 def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:

@@ -107,9 +107,8 @@ def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
     counts = MessageCount(end=BAG_MAGIC)
     channels: dict[bytes, Channel] = {}
     starts, indexed = list[int](), list[int]()  # of messages, by a chunk and by its index
-    chunks = said = listed = counted = (
-        0  # chunks found, by the header, and in the index; messages
-    )
+    # Chunks found, by the header, and in the index at the end; messages in that index.
+    chunks = said = listed = counted = 0
     with suppress(CutError):
         for kind, header, data, start in _bag_records(file.content.obj, budget, counts):
             if kind == MESSAGE:
