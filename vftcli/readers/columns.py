@@ -240,19 +240,20 @@ def guess_columns(columns: Sequence[Array]) -> Guess | None:
     _, dq, *efforts = (block[few] for block in blocks[joints])
     left = (len(columns) - 1) % joints
     found, why = _efforts(efforts, dq)
-    rest = left if found else (len(efforts) - 1) * joints + left
+    rest = left if found is not None else (len(efforts) - 1) * joints + left
     skipped = f",_:{rest}" if rest else ""
     texts = [
         ",".join(["t", *(f"{name}:{joints}" for name in ("q", "dq", *names))]) + skipped
-        for names in found or [(name,) for name in SINGLE]
+        for names in (SINGLE if found is None else [found])
     ]
-    settled = len(found) == 1 and not left
-    others = () if settled else tuple(texts[1:]) or (texts[0],)
+    others = tuple(texts[1:] or texts) if found is None or left else ()
     return Guess(texts[0], f"the first steps evenly, dq is the derivative of q{why}", others)
 
 
 #: What the numbers behind the velocities may be, the likeliest first.
-SINGLE = ("tau", "current", "tau+g")
+SINGLE = (("tau",), ("current",), ("tau+g",))
+#: The order in which controllers record their targets, and what they are recorded behind.
+TARGETS = ("current", "target_current", "target_torque")
 
 
 def _is_clock(stamps: Array) -> bool:
@@ -288,42 +289,31 @@ def _is_derivative(t: Array, x: Array, dx: Array) -> bool:
     return bool(own.any() and own[np.ptp(x, axis=0) > STILL].all())
 
 
-def _efforts(parts: Sequence[Array], dq: Array) -> tuple[list[tuple[str, ...]], str]:
-    """All readings of the blocks of columns behind the velocities that fit, by name, and why."""
+def _efforts(parts: Sequence[Array], dq: Array) -> tuple[tuple[str, ...] | None, str]:
+    """The names of the blocks behind the velocities, None where they are open, and why."""
     if len(parts) != 3:
-        return ([] if parts else [()]), ""
-    fits = []
-    for order in permutations(range(3)):
-        _, current, torque = (parts[k] for k in order)
-        if np.abs(torque).max() < CONSTANTS[0] * np.abs(current).max():
-            continue
-        size = root_mean_squares(current)
-        live = np.flatnonzero(size > 2e-3 * size.max())
-        each = [_fitted(torque[:, j], current[:, j], dq[:, j]) for j in live]
-        if each and all(CONSTANTS[0] < constant < CONSTANTS[1] for constant, _ in each):
-            fits.append((float(np.median([misfit for _, misfit in each])), order, each))
-    readings = {}
-    for misfit, order, each in sorted(fits):
-        clear = misfit < DRIVEN and misfit <= CLEAR * min(fits)[0]
-        if clear and _alike(parts[order[0]], parts[order[1]]):
-            names = dict(zip(order, ("current", "target_current", "target_torque"), strict=True))
-            shown = " ".join(f"{constant:.3g}" for constant, _ in each)
-            readings[tuple(names[k] for k in range(3))] = shown
-    if len(readings) != 1:
-        return list(readings), ""
-    (shown,) = readings.values()
-    return list(
-        readings
-    ), f", target_torque is target_current times {shown} N·m/A but for friction"
+        return (None if parts else ()), ""
+    current, target, torque = parts
+    (misfit, constants), (rival, _) = (_driven(torque, x, dq) for x in (target, current))
+    if not (misfit < DRIVEN and CLEAR * misfit < rival and _alike(current, target)):
+        return None, ""
+    shown = " ".join(f"{constant:.3g}" for constant in constants)
+    return TARGETS, f", target_torque is target_current times {shown} N·m/A but for friction"
 
 
-def _fitted(torque: Array, current: Array, dq: Array) -> tuple[float, float]:
-    """The drive constant between a torque and a current, and what it leaves of the current."""
-    friction = (np.tanh(dq / 0.002), dq, dq * np.abs(dq))
-    terms = np.stack([torque, *friction], axis=1)
-    values, *_ = np.linalg.lstsq(terms, current, rcond=None)
-    left = np.sqrt(np.mean((current - terms @ values) ** 2) / np.mean(current**2))
-    return (1 / float(values[0]) if values[0] else 0.0), float(left)
+def _driven(torque: Array, current: Array, dq: Array) -> tuple[float, list[float]]:
+    """What a current's fit to a torque leaves, no end where none fits; and the drive constants."""
+    constants, left = list[float](), list[float]()
+    sizes = root_mean_squares(current)
+    for x, y, speed, size in zip(torque.T, current.T, dq.T, sizes, strict=True):
+        if size > 2e-3 * sizes.max():
+            friction = (np.tanh(speed / 0.002), speed, speed * np.abs(speed))
+            terms = np.stack([x, *friction], axis=1)
+            values = np.linalg.lstsq(terms, y, rcond=None)[0]
+            constants.append(1 / float(values[0]) if values[0] else 0.0)
+            left.append(float(root_mean_squares(y - terms @ values) / size))
+    good = left and CONSTANTS[0] < min(constants) <= max(constants) < CONSTANTS[1]
+    return float(np.median(left)) if good else np.inf, constants
 
 
 def _alike(measured: Array, target: Array) -> bool:
