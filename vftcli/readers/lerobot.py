@@ -71,7 +71,7 @@ def read_episode(
         table.rows = np.flatnonzero(numbers == number)
         if not table.rows.size:
             raise LogError(f"{path}: no row is of episode {number}, which its name promises.")
-    usual, names, remarks, side = _columns_of(file.path, table, info.get("features"), request)
+    usual, names, remarks, side = _columns_of(file.path, table, info["features"], request)
     layout = TABLE._replace(columns=usual)
     raw = from_table(table, request, layout, names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
@@ -84,13 +84,12 @@ def read_episode(
 
 
 def _columns_of(
-    path: Path, table: ParquetTable, described: Json, request: ReadChoice
+    path: Path, table: ParquetTable, described: Mapping[str, Json], request: ReadChoice
 ) -> tuple[str, Names, Notes, str]:
     """The columns of an observation, the joints' names, what is to be said, and the arm of two."""
     if request.spec.item("q"):
         return "t=timestamp,q=observation.state", (), (), ""
-    each_of = described.items() if isinstance(described, dict) else ()
-    features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
+    features = {n: each.get("names") for n, each in described.items() if isinstance(each, dict)}
     # What is commanded is no measurement.
     observed = [name for name in table.names if name.startswith("observation.")]
     there = [e for name in observed for e in _elements_of(name, table, features.get(name))]
@@ -171,13 +170,14 @@ def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:
 
 
 def info_of(folder: Path) -> dict[str, Any]:
-    """meta/info.json."""
+    """meta/info.json, with a table of features."""
     path = folder / "meta" / "info.json"
     try:
-        info = json.loads(text_of(path))
-    except (OSError, ValueError, RecursionError):
+        info: dict[str, Any] = json.loads(text_of(path))
+        info.setdefault("features", {}).keys()  # what holds no names is no description
+    except (OSError, ValueError, RecursionError, AttributeError):
         raise LogError(f"{path}: not a readable description of a dataset") from None
-    return info if isinstance(info, dict) else {}
+    return info
 
 
 def text_of(path: Path) -> str:

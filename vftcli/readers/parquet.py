@@ -162,19 +162,19 @@ class ParquetTable(ColumnarTable):
         import pyarrow.parquet as pq
 
         # Read ahead, or as a mapped file, all of it would lie in memory.
-        self._file = pq.ParquetFile(
+        self.file = pq.ParquetFile(
             file.direct or BytesIO(file.content),
             memory_map=False,
             pre_buffer=False,
             buffer_size=BUFFER_BYTES,
         )
-        about = self._file.metadata  # vftcli's own is the file's, not the schema's
-        return self._file.schema_arrow.with_metadata(about.metadata), int(about.num_rows)
+        about = self.file.metadata  # vftcli's own is the file's, not the schema's
+        return self.file.schema_arrow.with_metadata(about.metadata), int(about.num_rows)
 
     def _batches(self, columns: Places, rows: int) -> Iterator[Arrow]:
         names = [self.names[c] for c in columns]
-        for group in range(self._file.num_row_groups):  # together they would all lie in memory
-            yield from self._file.iter_batches(rows, [group], names, use_threads=False)
+        for group in range(self.file.num_row_groups):  # together they would all lie in memory
+            yield from self.file.iter_batches(rows, [group], names, use_threads=False)
 
 
 class ArrowTable(ColumnarTable):

@@ -154,7 +154,7 @@ def test_damaged_statistics_are_one_line(tmp_path: Path, name: str, text: str) -
 def test_features_without_names_are_one_line(tmp_path: Path) -> None:
     (tmp_path / "meta").mkdir()
     (tmp_path / "meta" / "info.json").write_text('{"features": [["action"]]}')
-    with pytest.raises(LogError, match=r"info\.json: its features are no table of names"):
+    with pytest.raises(LogError, match=r"info\.json: not a readable description"):
         LeRobotDataset(tmp_path).finish(COLUMNS, {}, tmp_path / "copy")
 
 

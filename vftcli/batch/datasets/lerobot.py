@@ -19,12 +19,12 @@ from vftcli.batch.datasets import (
     Statistics,
 )
 from vftcli.readers.lerobot import dataset_episodes, info_of, text_of
-from vftcli.readers.parquet import EPISODE, guarded
+from vftcli.readers.opening import open_log
+from vftcli.readers.parquet import EPISODE, ParquetTable, guarded
+from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
-from vftcli.signals.packages import needed
 
 PREFIX = "observation."  #: What the names of observations begin with.
-DATASET = "a dataset of LeRobot"  #: What needs pyarrow.
 #: Key of a Parquet schema's metadata under which the `datasets` library tells its
 #: features.
 METADATA = b"huggingface"
@@ -49,30 +49,21 @@ class LeRobotDataset:
         for place, own in numbers.items():
             yield DataFile(place, self.folder, tuple(own))
 
-    def _opened(self, file: DataFile) -> tuple[Path, Any, Any]:
-        """A data file, as pyarrow has it, and each row's episode, None where it holds one."""
-        pq = needed("pyarrow.parquet", DATASET)
-
+    def _opened(self, file: DataFile) -> tuple[Path, Any, Column]:
+        """A data file, as pyarrow has it, and each row's episode, none where it holds one."""
         path = self.folder / file.place
-        with guarded(path):
-            source = pq.ParquetFile(path)
-            if EPISODE not in source.schema_arrow.names:
-                return path, source, None
-            return path, source, source.read(columns=[EPISODE]).column(0).to_numpy()
+        table = ParquetTable(open_log(path))
+        return path, table.file, table.episodes()
 
     def frames(self, file: DataFile, number: int) -> int:
         """Number of an episode's frames."""
         _, source, numbers = self._opened(file)
-        return int(source.metadata.num_rows if numbers is None else np.sum(numbers == number))
+        return int(np.sum(numbers == number) if numbers.size else source.metadata.num_rows)
 
     def check_new(self, file: DataFile, columns: ForceColumns) -> None:
         """Refuse a file that has such columns already."""
-        pq = needed("pyarrow.parquet", DATASET)
-
-        path = self.folder / file.place
-        with guarded(path):
-            names = pq.read_schema(path).names
-            there = {*names, *named_features(self.folder, info_of(self.folder))}
+        path, source, _ = self._opened(file)
+        there = {*source.schema_arrow.names, *info_of(self.folder)["features"]}
         for column in columns:
             if PREFIX + column.name in there:
                 raise LogError(
@@ -81,14 +72,15 @@ class LeRobotDataset:
 
     def write(self, file: DataFile, columns: ForceColumns, forces: Forces, target: Path) -> None:
         """Write a data file with the columns behind its own; row groups stay as they are."""
-        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
         path, source, numbers = self._opened(file)
         # Every column over all rows, whichever episode each row is of. (rows, k) each
         rows, done = source.metadata.num_rows, 0
         whole = [np.zeros((rows, column.width), np.float32) for column in columns]
         for number, own in forces.items():
-            place = np.arange(rows) if numbers is None else np.flatnonzero(numbers == number)
+            place = np.flatnonzero(numbers == number) if numbers.size else np.arange(rows)
             done += len(place)
             for column, values in zip(columns, whole, strict=True):
                 if len(own[column.name]) != len(place):
@@ -99,17 +91,20 @@ class LeRobotDataset:
                 values[place] = own[column.name]
         if done != rows:
             raise LogError(f"{path}: has rows of episodes that the table of episodes lacks")
-        added = [pa.field(PREFIX + c.name, kind_of(c.width)) for c in columns]
-        metadata = with_features(source.schema_arrow.metadata or {}, columns)
-        schema = pa.schema([*source.schema_arrow, *added], metadata=metadata)
+        schema, added = source.schema_arrow, []
+        for column, flat in zip(columns, map(pa.array, map(np.ravel, whole)), strict=True):
+            several = column.width > 1
+            lists = pa.FixedSizeListArray.from_arrays(flat, column.width) if several else flat
+            schema = schema.append(pa.field(PREFIX + column.name, lists.type))
+            added.append(lists)
+        schema = schema.with_metadata(with_features(schema.metadata or {}, columns))
         first = 0
         with pq.ParquetWriter(target, schema, compression=codec_of(source)) as writer:
             for group in range(source.num_row_groups):
                 with guarded(path):
                     table = source.read_row_group(group)
-                part = slice(first, first + table.num_rows)
-                first = part.stop
-                arrays = [*table.columns, *(as_column(each[part]) for each in whole)]
+                arrays = [*table.columns, *(each.slice(first, len(table)) for each in added)]
+                first += len(table)
                 writer.write_table(
                     pa.table(arrays, schema=schema), row_group_size=len(table) or 1
                 )
@@ -119,9 +114,8 @@ class LeRobotDataset:
         info = info_of(self.folder)
         third = str(info.get("codebase_version", "")).startswith("v3")
         fps = {"fps": info["fps"]} if third and "fps" in info else {}
-        features = named_features(self.folder, info)
         for column in columns:
-            features[PREFIX + column.name] = {
+            info["features"][PREFIX + column.name] = {
                 "dtype": "float32",
                 "shape": [column.width],
                 "names": list(column.elements) or None,
@@ -143,7 +137,8 @@ class LeRobotDataset:
         self, path: Path, columns: ForceColumns, statistics: OfEpisodes, copy: Path
     ) -> None:
         """Write a table of episodes with the statistics of the columns, where it has those."""
-        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
         with guarded(path):
             source = pq.ParquetFile(path)
@@ -201,31 +196,6 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON hold
     """Write a description as LeRobot writes it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(value, indent=4, ensure_ascii=False), "utf-8")
-
-
-def kind_of(width: int) -> Any:  # noqa: ANN401 - a pyarrow type
-    """Storage of a column: single numbers, or lists of one length."""
-    pa = needed("pyarrow", DATASET)
-
-    return pa.float32() if width == 1 else pa.list_(pa.float32(), width)
-
-
-def as_column(values: Any) -> Any:  # noqa: ANN401 - float32 → pyarrow
-    """Values (N, k) as they are stored."""
-    pa = needed("pyarrow", DATASET)
-
-    flat = pa.array(np.ascontiguousarray(values).ravel())
-    width = values.shape[1]
-    return flat if width == 1 else pa.FixedSizeListArray.from_arrays(flat, type=kind_of(width))
-
-
-def named_features(folder: Path, info: dict[str, Any]) -> dict[str, Any]:
-    """The features of a description by their names, to be added to."""
-    features = info.setdefault("features", {})
-    if not isinstance(features, dict):
-        path = folder / "meta" / "info.json"
-        raise LogError(f"{path}: its features are no table of names; nothing can be added")
-    return features
 
 
 def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dict[bytes, bytes]:
