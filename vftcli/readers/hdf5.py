@@ -160,22 +160,19 @@ MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
 def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
     names = table.names
-    if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
+    if request.spec.item("q") or table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
         return read_any(table, request)
-    stated = request.spec.item("q") is not None
     places = "left: columns 0-5, right: columns 7-12"
-    arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, places)
+    arm, remarks = arm_of(table.path, request, ARMS, places)
     first = ALOHA_ARM * ARMS.index(arm)
     span = f"[{first}:{first + ALOHA_ARM - 1}]"
-    usual = f"t@{ALOHA_RATE:g}Hz"
-    if not stated:
-        usual += f",q[rad]={ALOHA}{span},dq=observations/qvel{span},current[mA]={DYNAMIXEL}{span}"
-    if DYNAMIXEL in names and not stated:
+    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span}"
+    usual += f",current[mA]={DYNAMIXEL}{span}"
+    if DYNAMIXEL in names:
         remarks = (*remarks, fact("effort-of-dynamixel"))
     clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
     layout = TABLE._replace(columns=usual, clock=clock)
-    raw = from_table(table, request, layout, remarks=remarks)
-    return replace(raw, part="" if stated else f"{arm} arm")
+    return replace(from_table(table, request, layout, remarks=remarks), part=f"{arm} arm")
 
 
 def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
