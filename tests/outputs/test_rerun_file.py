@@ -13,7 +13,6 @@ from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import (
     LogLine,
     Tab,
-    blueprint,
     drawable,
     grid_of,
     recording_id,
@@ -72,7 +71,7 @@ def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
         LogLine("/remarks", 1.0, "first", "#102030"),
     ]
     tab = Tab("one", [force], log)
-    with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, POSES, "Arm", (1.0, 2.0)):
+    with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, POSES, "Arm"):
         pass
     assert rows_of(tmp_path / "r.rrd", "/force", "Scalars:scalars") == [
         [0.0],
@@ -103,13 +102,6 @@ def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:
     # A twentieth of what is shown on either side.
     ends = ["[N], -0.5 to 10.5"] * 2 + ["[N], -0.05 to 1.05", "[m], -1 to 21"]
     assert names == [f"what {end}" for end in ends]
-
-
-def test_the_time_panel_marks_a_span_in_nanoseconds() -> None:
-    tabs, words = [Tab("none", [])], {"Summary": ""}
-    span = blueprint(tabs, words, POSES, "Arm", (1.25, 2.0)).time_panel.time_selection
-    assert (span.min.value, span.max.value) == (1_250_000_000, 2_000_000_000)
-    assert blueprint(tabs, words, POSES, "Arm", None).time_panel.time_selection is None
 
 
 FULL = """

@@ -70,13 +70,12 @@ def rerun_file(
     words: Mapping[str, str],
     poses: ArmPoses,
     space: str,
-    marked: tuple[float, float] | None = None,
 ) -> Iterator[Stream]:
     """Write a recording with its plots and words; yield its stream, to draw the arm into it.
 
     The plots leave their tabs as they are sent, so that a long log's have room beside the
     file. `words` holds the Markdown of every document by its name. The eye sees all
-    `poses` of the arm, in a space of this name; the time panel marks a span. [s]
+    `poses` of the arm, in a space of this name.
     """
     # Equal data make equal recordings: no random id, no time of writing, nor rows put
     # together by how much time has gone by.
@@ -90,7 +89,7 @@ def rerun_file(
     # waited for.
     made = stream.memory_recording()
     # Active: a viewer in a browser arranges by itself what is a default alone.
-    stream.send_blueprint(blueprint(tabs, words, poses, space, marked))
+    stream.send_blueprint(blueprint(tabs, words, poses, space))
     stream.send_recording_name(drawable(title))
     for tab in tabs:
         while tab.plots:
@@ -130,19 +129,14 @@ def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> U
 
 
 def blueprint(
-    tabs: Sequence[Tab],
-    words: Mapping[str, str],
-    poses: ArmPoses,
-    space: str,
-    marked: tuple[float, float] | None,
+    tabs: Sequence[Tab], words: Mapping[str, str], poses: ArmPoses, space: str
 ) -> rrb.Blueprint:
     """How the recording opens: the arm's space and words to the left, plots to the right, paused.
 
     The eye sees the base and all places where the links have been.
 
-    Rerun lets no file say where its time cursor is: it opens at the first sample. The
-    marked span is visible in the time panel, and a click on a time of the text log goes
-    there.
+    Rerun lets no file say where its time cursor is: it opens at the first sample, and a
+    click on a time of the text log goes there.
     """
     corners = poses.translation.reshape(-1, 3)
     # The base at the origin must be visible too.
@@ -159,11 +153,9 @@ def blueprint(
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
     said = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
     left = rrb.Vertical(arm, said, row_shares=[3, 2])
-    ends = [round(1e9 * end) for end in marked or ()]
-    span = rrb.components.AbsoluteTimeRange(*ends) if ends else None
     return rrb.Blueprint(
         rrb.Horizontal(left, rrb.Tabs(*map(grid_of, tabs), active_tab=0), column_shares=[2, 5]),
-        rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", time_selection=span),
+        rrb.TimePanel(timeline="t", state="collapsed", play_state="paused"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         auto_views=False,

@@ -67,12 +67,11 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     """Write the recording with its blueprint, so that it opens arranged."""
     robot, found = analysis.robot, analysis.contacts
     tabs = tabs_of(analysis, detail)
-    words, marked, arrow, painted = {"Summary": summary(analysis)}, None, None, {}
+    words, arrow, painted = {"Summary": summary(analysis)}, None, {}
     if analysis.errors is not None and (table := to_markdown(analysis.errors, [analysis])):
         words["Errors"] = table
     if found is not None:
         tabs[0] = tabs[0]._replace(log=contact_log(found))
-        marked = next(((c.start, c.stop) for c in found.contacts), None)
         painted = painted_links(found, robot.joints)
     poses = motion(robot.chain, analysis.t, analysis.recording.q)
     if found is None or any(wrench.name == BEST for wrench in analysis.wrenches):
@@ -80,7 +79,7 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     scale, name = newton_per_metre(analysis), analysis.recording.name
     space = f"Arm (arrow: 1 m is {scale:g} N)"
     analysis.recording.release()
-    with rerun_file(path, name, tabs, words, poses, space, marked) as stream:
+    with rerun_file(path, name, tabs, words, poses, space) as stream:
         send_arm(stream, robot, poses, painted)
         if found is not None:
             send_contacts(stream, found, poses, arrow and arrow.force, scale)
