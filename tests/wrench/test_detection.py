@@ -14,7 +14,6 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench.detection import (
     LEAST_TORQUE,
-    WRENCH_LIMITS,
     ContactInterval,
     KnownContacts,
     assignment,
@@ -25,7 +24,7 @@ from vftcli.wrench.detection import (
     learned_free,
     match_contacts,
     read_in_free_runs,
-    true_intervals,
+    true_contacts,
 )
 from vftcli.wrench.sensor_reading import SensorReading, zero_drift
 from vftcli.wrench.solvers import VirtualSensor
@@ -159,11 +158,11 @@ def test_contacts_of_an_exact_reference_are_parted_by_a_shorter_pause(
     assert one.detection.contacts == count
 
 
-def test_true_contacts_exceed_their_limits_on_any_axis() -> None:
+def test_true_contacts_exceed_half_a_newton_metre_on_any_joint() -> None:
     truth = np.zeros((len(T), 6))
-    truth[:, 1], truth[:, 4] = push(1.1), push(0.3, 10.0, 11.0)
-    truth[:, 2], truth[0, 0] = push(0.9, 14.0, 15.0), np.nan
-    found = true_intervals(T, truth, WRENCH_LIMITS)
+    truth[:, 1], truth[:, 4] = push(0.6), push(0.6, 10.0, 11.0)
+    truth[:, 2], truth[0, 0] = push(0.4, 14.0, 15.0), np.nan
+    found = true_contacts(ExternalTorque(name="truth", t=T, tau=truth))
     assert [(round(c.start, 1), round(c.stop, 1)) for c in found] == [(5.0, 7.0), (10.0, 11.0)]
 
 

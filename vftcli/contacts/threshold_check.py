@@ -28,10 +28,9 @@ from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, POINTS, Wrench
 from vftcli.wrench.detection import (
     EARLY,
-    TRUE_TORQUE,
     ContactInterval,
     match_contacts,
-    true_intervals,
+    true_contacts,
 )
 from vftcli.wrench.solvers import VirtualSensor
 
@@ -146,9 +145,7 @@ def check_contacts(
         contacts = tuple(contact._replace(delay=np.nan) for contact in listed)
         remarks = (caution("check-without-truth"),)
         return ThresholdDetection(signals.recording.name, contacts, remarks)
-    floor = 0.0 if reference.floor is None else np.nan_to_num(reference.floor)
-    limits = np.maximum(TRUE_TORQUE, 5.0 * floor)
-    true = [c for c in true_intervals(t, reference.tau, limits) if c.stop >= t[0] + SETTLING]
+    true = [c for c in true_contacts(reference) if c.stop >= t[0] + SETTLING]
     size = np.zeros((len(t), 0)) if wrench is None else np.linalg.norm(wrench.force, axis=1)
     touched = sum(c.stop - max(c.start, t[0] + SETTLING) for c in true)
     return ThresholdDetection(

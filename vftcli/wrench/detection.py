@@ -63,13 +63,6 @@ def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInte
     return contact_intervals(t, inside, HOLD, gap)
 
 
-def true_intervals(
-    t: Array, truth: Array, limits: Array | float, gap: float = GAP
-) -> tuple[ContactInterval, ...]:
-    """Contacts of a true wrench or torque (T, k)."""
-    return find_contacts(t, np.nan_to_num(abs(truth) / limits).max(axis=1), gap=gap)
-
-
 def departure(values: Array, quiet: Array, least: Array | float) -> Array:
     """Largest departure over the columns, in half widths of the free band; 0 if unknown. (T,)
 
@@ -226,6 +219,13 @@ def floor_in_motion(reference: ExternalTorque) -> Array:
     return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), floor)
 
 
+def true_contacts(reference: ExternalTorque) -> tuple[ContactInterval, ...]:
+    """Contacts of a reference torque: a joint beyond `TRUE_TORQUE` and 5 × its own error."""
+    limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
+    score = np.nan_to_num(abs(reference.tau) / limits).max(axis=1)
+    return find_contacts(reference.t, score, TRUE_GAP if reference.floor is None else GAP)
+
+
 def judge_contacts(
     estimates: Sequence[ExternalTorque],
     measured: SensorReading | None,
@@ -239,10 +239,7 @@ def judge_contacts(
     learned in the zero spans, else in the log's own free part, else in free runs, else
     before the first true contact.
     """
-    t = reference.t
-    limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
-    gap = TRUE_GAP if reference.floor is None else GAP
-    true = true_intervals(t, reference.tau, limits, gap)
+    t, true = reference.t, true_contacts(reference)
     kind, least = "torque", np.asarray(LEAST_TORQUE)
     signals = {estimate.name: estimate.tau for estimate in estimates}
     if measured is not None:
