@@ -65,7 +65,7 @@ def test_a_log_at_rest_has_no_samples():
 
 def test_chunks_cover_every_sample_once():
     motion = prepare(log()[0], PANDA)
-    rows = np.concatenate([np.arange(motion.samples)[span] for span in motion.chunks(100)])
+    rows = np.concatenate([np.arange(motion.samples)[span] for span in motion.chunks()])
     np.testing.assert_array_equal(rows, np.arange(motion.samples))
 
 

@@ -90,10 +90,10 @@ class PreparedLog:
         """Filter signals on the log's whole clock (T, m) and keep what is kept. (M, m)"""
         return zero_phase(self.recording.t, signals, self.cutoff)[self.kept]
 
-    def chunks(self, size: int = 1024) -> Iterator[slice]:
-        """Spans of `size` samples: a whole log's regressor would not fit into memory."""
-        for start in range(0, self.samples, size):
-            yield slice(start, min(start + size, self.samples))
+    def chunks(self) -> Iterator[slice]:
+        """Spans of 1024 samples: a whole log's regressor would not fit into memory."""
+        for start in range(0, self.samples, 1024):
+            yield slice(start, start + 1024)
 
     @cached_property
     def load(self) -> Array:
