@@ -9,10 +9,9 @@ from contact_logs import FIXTURES, motion
 
 from vftcli.bias.whole_log import whole_log_bias
 from vftcli.contacts.free_statistics import (
-    BLOCK,
     DRY_SHARE,
     beyond_threshold,
-    block_length,
+    blocks_of,
     expected_torque,
     free_part,
     free_statistics,
@@ -32,17 +31,9 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import runs_of
+from vftcli.wrench.smoother import BLOCK
 
 LOG = read(FIXTURES / "ur5_circle.csv")
-
-
-def test_blocks_are_longer_on_a_clock_that_jitters() -> None:
-    even = 0.01 * np.arange(500)
-    assert block_length(even) == BLOCK
-    # A third of the steps 2 ms off, as on the UR10e logs.
-    rough = even + np.where(np.arange(500) % 3 == 0, 0.002, 0.0)
-    assert block_length(rough) == pytest.approx(0.05, rel=0.21)
-    assert block_length(even[:2]) == BLOCK
 
 
 def test_a_named_span_is_the_free_part() -> None:
@@ -68,7 +59,7 @@ def test_another_log_is_a_free_part_whatever_its_motion() -> None:
 def test_what_repeats_nothing_has_no_free_part() -> None:
     short = read(FIXTURES / "ur5_taps_ur_rtde.csv")
     bare = motion(short, "ur5")
-    assert free_statistics(bare, whole_log_bias(bare.log), BLOCK) is None
+    assert free_statistics(bare, whole_log_bias(bare.log)) is None
     with pytest.raises(ParameterError, match="free part"):
         free_part(motion(short, "ur5", "90:95"))
 
@@ -122,13 +113,13 @@ def test_resting_joints_are_given_their_stiction() -> None:
 
 def test_contacts_that_are_none_read_little() -> None:
     named = motion(LOG, "ur5", "0.3:4")
-    free = free_statistics(named, whole_log_bias(named.log), BLOCK)
+    free = free_statistics(named, whole_log_bias(named.log))
     assert free is not None
     found = self_test(free, START)
     assert np.all(found.widening >= 1.0)
     # Simulations gave 4 to 9 N.
     assert 1.0 < found.smallest_force < 15.0
-    assert len(pseudo_contacts(free.pieces[0], 3)) == 3
+    assert len(pseudo_contacts(blocks_of(free.free, BLOCK)[0], 3)) == 3
 
 
 @pytest.mark.parametrize(
@@ -149,8 +140,8 @@ def test_a_load_in_the_free_part_is_no_noise() -> None:
     load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, moment_sd=np.zeros(3), share=0.5)
     run = plain.log.less(-load.torque(plain.log))
     bias = whole_log_bias(plain.log)
-    heavy = free_statistics(replace(plain, log=run), bias, BLOCK)
-    light = free_statistics(plain, bias, BLOCK)
+    heavy = free_statistics(replace(plain, log=run), bias)
+    light = free_statistics(plain, bias)
     assert heavy is not None
     assert light is not None
     assert [remark.code for remark in heavy.remarks] == ["free-span", "free-part-loaded"]

@@ -20,11 +20,13 @@ from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.model_error import TorqueNoise
 from vftcli.wrench.smoother import (
+    BLOCK,
     MOST_BLOCKS,
     UNLISTED,
     BlockModel,
     WrenchPrior,
     block_length,
+    contact_block,
     deviations,
     hidden_by_blocks,
     smooth_wrench,
@@ -224,6 +226,14 @@ def test_short_blocks_hold_five_samples_of_an_uneven_clock(
     # the median of a drawn clock
     assert block_length(t, fine=True) == pytest.approx(seconds, rel=0.1)
     assert block_length(t, fine=False) == pytest.approx(0.1)
+
+
+def test_a_clock_is_uneven_by_more_than_a_tenth_of_its_steps() -> None:
+    even = 0.01 * np.arange(500)
+    assert contact_block(np.delete(even, np.arange(20, 500, 20))) == BLOCK  # samples are lost
+    # A third of the steps 2 ms off, as on the UR10e logs.
+    rough = even + np.where(np.arange(500) % 3 == 0, 0.002, 0.0)
+    assert contact_block(rough) == pytest.approx(0.05, rel=0.21)
 
 
 def test_blocks_of_a_very_long_log_are_longer() -> None:

@@ -29,11 +29,8 @@ from vftcli.wrench.model_error import (
     infer_noise,
     learn_noise,
 )
-from vftcli.wrench.smoother import BlockLog, Lane, WrenchPrior
+from vftcli.wrench.smoother import BlockLog, Lane, WrenchPrior, contact_block
 
-#: Length of a block [s]; on a clock with steps that differ by this share it holds so many
-#: samples.
-BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
@@ -61,29 +58,21 @@ class FreeStatistics(NamedTuple):
     #: The log, less a load that the free part carries; less the model error of the whole
     #: log where the basis is that.
     log: Run
-    runs: tuple[Run, ...]  #: Free runs in other logs, less a load that they carry.
     free: tuple[RunSamples, ...]  #: Every free piece, less a load that it carries.
-    pieces: tuple[Blocks, ...]  #: The same in blocks.
     #: A load that the arm carries in this log and its model lacks, None
     #: where none shows.
     load: FreeLoad | None
     remarks: tuple[Remark, ...]  #: What it is and how it was found, and a load that it carries.
     basis: Basis = "free motion"  #: What tells a contact from an error of the model.
 
-
-def block_length(t: Array) -> float:
-    """Length of a block for a clock. [s]"""
-    if len(t) < 3:
-        return BLOCK
-    usual = median_step(t)
-    uneven = np.quantile(abs(np.diff(t) - usual), 0.9) > UNEVEN * usual
-    return max(BLOCK, SAMPLES * usual) if uneven else BLOCK
+    @property
+    def seconds(self) -> float:
+        """Length of a block. [s]"""
+        return contact_block(self.log.t)
 
 
-def free_statistics(
-    motion: FreeMotion, bias: WholeLogBias, seconds: float
-) -> FreeStatistics | None:
-    """Statistics of a log's free motion by blocks of a length [s]; None if none is known."""
+def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | None:
+    """Statistics of a log's free motion; None if none is known."""
     part = free_part(motion)
     if part is None:
         return None
@@ -94,23 +83,21 @@ def free_statistics(
     load = free_load(part.pieces)
     # An unknown load is no noise: contacts are found beside it.
     pieces = tuple(p._replace(run=without_load(p.run, load)) for p in pieces)
-    found = noise_of(log, pieces, seconds, known=True)
-    if found is None:
+    noise = noise_of(log, pieces, contact_block(log.t), known=True)
+    if noise is None:
         return None
     return FreeStatistics(
-        noise=found[0],
+        noise=noise,
         level=torque_level(pieces),
         own=part.own,
         log=without_load(log, load),
-        runs=tuple(p.run for p in pieces if p.run.recording is not motion.log.recording),
         free=pieces,
-        pieces=found[1],
         load=load if part.own.any() else None,
         remarks=part.remarks if load is None else (*part.remarks, load.remark),
     )
 
 
-def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeStatistics | None:
+def inferred_statistics(log: Run, bias: WholeLogBias) -> FreeStatistics | None:
     """Statistics that a log without known free motion lets infer, None where it lets infer none.
 
     The model error that was fitted to the whole log is subtracted where its guard allows
@@ -125,18 +112,16 @@ def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeSta
     weighed = free_load([RunSamples(corrected, bias.free)]) if bias.fitted or short else None
     corrected = without_load(corrected, weighed)
     free = (RunSamples(corrected, bias.free),) if bias.fitted else ()
-    found = noise_of(corrected, free, seconds, known=False)
-    if found is None:
+    noise = noise_of(corrected, free, contact_block(log.t), known=False)
+    if noise is None:
         return None
     return FreeStatistics(
         basis="whole log" if bias.fitted else "friction",
-        noise=found[0],
-        level=np.sqrt(found[0].variance + observer_noise(corrected) ** 2),
+        noise=noise,
+        level=np.sqrt(noise.variance + observer_noise(corrected) ** 2),
         own=np.zeros(log.recording.samples, bool),
         log=corrected,
-        runs=(),
         free=free,
-        pieces=found[1],
         load=weighed,
         remarks=() if weighed is None else (weighed.remark,),
     )
@@ -144,14 +129,18 @@ def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeSta
 
 def noise_of(
     log: Run, pieces: Sequence[RunSamples], seconds: float, *, known: bool
-) -> tuple[TorqueNoise, tuple[Blocks, ...]] | None:
-    """Noise of free pieces, else of the log, and the pieces in blocks [s]; or None."""
-    blocks = tuple(disturbance_blocks(run.terms, run.q, seconds, at) for run, at in pieces)
+) -> TorqueNoise | None:
+    """Noise of free pieces, else of the log, by blocks of a length [s]; or None."""
     dry = dry_torques(log.robot)
-    noise = learned = learn_noise(blocks, dry)
-    if not known:
-        noise = infer_noise(disturbance_blocks(log.terms, log.q, seconds), dry, learned)
-    return None if noise is None else (noise, () if learned is None else blocks)
+    learned = learn_noise(blocks_of(pieces, seconds), dry)
+    if known:
+        return learned
+    return infer_noise(disturbance_blocks(log.terms, log.q, seconds), dry, learned)
+
+
+def blocks_of(pieces: Sequence[RunSamples], seconds: float) -> list[Blocks]:
+    """Free pieces in blocks of a length [s]."""
+    return [disturbance_blocks(run.terms, run.q, seconds, inside) for run, inside in pieces]
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
@@ -237,8 +226,8 @@ class PseudoContactTest(NamedTuple):
 def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
     """Make contacts up in free motion, where the wrench is zero, and see what is measured."""
     shares, forces = [], []
-    each = max(MOST_PSEUDO // max(len(free.pieces), 1), 4)
-    for blocks in free.pieces:
+    each = max(MOST_PSEUDO // max(len(free.free), 1), 4)
+    for blocks in blocks_of(free.free, free.seconds):
         if not (made_up := pseudo_contacts(blocks, each)):
             continue
         count = len(blocks.t)

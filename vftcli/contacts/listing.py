@@ -19,10 +19,8 @@ from vftcli.contacts.contact_list import (
     numbered,
 )
 from vftcli.contacts.free_statistics import (
-    BLOCK,
     SETTLED,
     FreeStatistics,
-    block_length,
     free_part,
     free_statistics,
     inferred_statistics,
@@ -51,6 +49,7 @@ from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.signals.series import covered
 from vftcli.wrench.model_error import UNSEEN_SHARE, error_process
 from vftcli.wrench.smoother import (
+    BLOCK,
     DRIVES,
     BlockLog,
     BlockSpan,
@@ -82,12 +81,11 @@ def list_contacts(
     """What touched the arm along a log."""
     log = motion.log
     check_log(log)
-    seconds = block_length(log.t)
     bias = bias or whole_log_bias(log)
-    free = free_statistics(motion, bias, seconds) or inferred_statistics(log, bias, seconds)
+    free = free_statistics(motion, bias) or inferred_statistics(log, bias)
     if free is None:
         return without_list(log)
-    found = by_smoother(free, seconds, proven=referenced or free.basis == "free motion")
+    found = by_smoother(free, proven=referenced or free.basis == "free motion")
     if log.robot.joints < 6:
         return found.without_forces()
     if is_load(log.recording, found.contacts):
@@ -118,9 +116,9 @@ def check_log(run: Run) -> None:
         )
 
 
-def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> ContactList:
+def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     """The list by the two-state filter, evidence, and the gated smoother."""
-    run, named = free.log, free.basis == "free motion"
+    run, named, seconds = free.log, free.basis == "free motion", free.seconds
     found = search(run, free.noise, free.level, seconds)
     t = found.log.blocks.t
     middle = [np.mean(t[slice(*span)]) for span in found.runs]
@@ -164,7 +162,7 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
         basis=free.basis,
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
-        false_on_free=false + false_rows(free, seconds) if named else None,
+        false_on_free=false + false_rows(free) if named else None,
         threshold=least if named else LEAST_IN_MOTION,
         smallest_force=smallest,
         load=None if free.load is None else CarriedLoad.of(free.load, run),
@@ -213,14 +211,13 @@ def fine_rows(
 ) -> list[Contact]:
     """Rows of short contacts by blocks that cut their peaks less, none where there are no such."""
     run, found = free.log, measurement.found
-    seconds, usual = max(FINE, run.step), block_length(run.t)
+    seconds, usual = max(FINE, run.step), free.seconds
     # On a clock that jitters blocks are as short as they may be.
     if not seconds < 0.7 * usual <= 0.7 * BLOCK:
         return []
-    fine = noise_of(run, free.free, seconds, known=free.basis == "free motion")
-    if fine is None:
+    noise = noise_of(run, free.free, seconds, known=free.basis == "free motion")
+    if noise is None:
         return []
-    noise, _ = fine
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     ends = [times_of(found.log.blocks, run) for run in found.runs]
     spans = [(a, b) for a, b in blocks.t.searchsorted(ends).tolist()]
@@ -243,9 +240,11 @@ def is_stop(run: Run, found: Candidates, number: int, seconds: float) -> bool:
     return follows_stop(run.recording, start, stop, seconds)
 
 
-def false_rows(free: FreeStatistics, seconds: float) -> int:
+def false_rows(free: FreeStatistics) -> int:
     """Rows that the same search lists in free runs of other logs."""
-    each = [(run, search(run, free.noise, free.level, seconds)) for run in free.runs]
+    seconds = free.seconds
+    others = [run for run, _ in free.free if run.recording is not free.log.recording]
+    each = [(run, search(run, free.noise, free.level, seconds)) for run in others]
     return sum(
         not is_stop(run, found, k, seconds)
         for run, found in each

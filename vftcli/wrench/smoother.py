@@ -16,7 +16,7 @@ from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
-from vftcli.signals.arrays import Array, Mask, is_uniform
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -31,8 +31,9 @@ from vftcli.wrench.model_error import (
 )
 
 COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]
-#: Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples.
-FINE, JITTERED = 0.024, 5
+#: Length of a block where the wrench moves [s]; on a clock of which one step in ten differs by
+#: more than this share it holds so many samples.
+BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 #: Blocks are longer in a log that would make more: each takes some 6 kB and .1 ms.
 MOST_BLOCKS = 30_000
 #: What the model's own standard deviations of force and moment are multiplied by. The error of the
@@ -188,11 +189,16 @@ def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Ma
     return covered(runs_of(inside), len(inside), 1)
 
 
+def contact_block(t: Array) -> float:
+    """Length of a block where the wrench moves. [s]"""
+    usual = median_step(t)
+    uneven = np.quantile(abs(np.diff(t) - usual), 0.9) > UNEVEN * usual
+    return max(BLOCK, usual * (SAMPLES if uneven else 1))
+
+
 def block_length(t: Array, *, fine: bool) -> float:
     """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
-    length = COARSE
-    if fine and len(t) > 1:
-        length = min(COARSE, max(FINE, median_step(t) * (1 if is_uniform(t) else JITTERED)))
+    length = min(COARSE, contact_block(t)) if fine and len(t) > 1 else COARSE
     return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
 
 
@@ -345,7 +351,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     """
     blocks, J, noise, _ = model
     # A log of one sample is a block without length.
-    R, length = noise.white, np.median(blocks.length) or FINE
+    R, length = noise.white, np.median(blocks.length) or BLOCK
     count = len(blocks.t)
     half = round(0.5 * UNLISTED / length - TIE)  # 12.5 blocks of 24 ms: rounding decides nothing
     variance, time = noise.stationary(blocks)
