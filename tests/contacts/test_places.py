@@ -5,21 +5,19 @@ import pytest
 
 from vftcli.contacts.windows import (
     arm_parts,
-    link_jacobian,
     places,
     point_fits,
 )
 from vftcli.robots import load_robot
-from vftcli.robots.chain import flange_jacobian, link_poses
+from vftcli.robots.chain import flange_jacobian, link_jacobian, link_poses
 
 Q = np.array([0.3, -1.2, 1.6, -1.9, -1.4, 0.5])
 
 
-def test_the_end_of_the_last_link_is_the_flange() -> None:
+def test_the_first_place_is_the_flange() -> None:
     chain = load_robot("ur5").chain
-    end = link_jacobian(link_poses(chain, Q[None]), 6, 1.0)
-    np.testing.assert_allclose(end, flange_jacobian(chain, Q[None]), atol=1e-14)
-    np.testing.assert_allclose(places(chain, Q[None])[0].jacobian, end, atol=1e-14)
+    flange = flange_jacobian(chain, Q[None])
+    np.testing.assert_array_equal(places(chain, Q[None])[0].jacobian, flange)
 
 
 @pytest.mark.parametrize("link", [2, 3, 4])

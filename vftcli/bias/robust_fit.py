@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.bias.model_error import column_numbers
-from vftcli.robots.chain import Chain, flange_jacobian, link_poses
+from vftcli.robots.chain import Chain, link_jacobian, link_poses
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.least_squares import FOLDS, SD_PER_MEDIAN, NormalEquations, huber, robust_sd
 from vftcli.signals.rest import faster
@@ -79,19 +79,17 @@ class SlowLoads(NamedTuple):
 
 def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
     """Columns of slow external loads on a moving arm at times t (S,) [s] and positions q (S, n)."""
-    wrench = flange_jacobian(chain, q).transpose(0, 2, 1) * np.repeat([FORCE, MOMENT], 3)
-    n, poses, along = chain.joints, link_poses(chain, q), []
-    # A force on the link before the elbow's joint, and before the wrist's.
-    for joint in sorted({j for j in ((n + 1) // 2 - 1, n - 3) if j > 0}):
-        torque = np.zeros((*q.shape, 3))
-        lever = poses.translation[:, joint, None] - poses.translation[:, :joint]
-        torque[:, :joint] = FORCE * np.cross(poses.rotation[:, :joint, :, 2], lever)
-        along.append(torque)
+    n, poses = chain.joints, link_poses(chain, q)
+    # At the flange, and a force on the link before the elbow's joint, and before the wrist's.
+    links = n, *sorted({j for j in ((n + 1) // 2 - 1, n - 3) if j > 0})
+    flange, *along = (link_jacobian(poses, link).transpose(0, 2, 1) for link in links)
+    wrench = flange * np.repeat([FORCE, MOMENT], 3)
+    torque = -np.concatenate([wrench, *(FORCE * J[:, :, :3] for J in along)], axis=2)
     length = t[-1] - t[0]
     knots = 1 if length < CONSTANT else min(round(length / KNOTS) + 1, MOST_KNOTS)
     place = (t - t[0]) / length * (knots - 1)
     knot = np.minimum(place.astype(int), max(knots - 2, 0))
-    return SlowLoads(-np.concatenate([wrench, *along], axis=2), knot, place - knot, knots)
+    return SlowLoads(torque, knot, place - knot, knots)
 
 
 BLOCK = 64  #: Rows to substitute at once.

@@ -19,13 +19,11 @@ from vftcli.contacts.windows import (
     arm_parts,
     contact_lanes,
     learn_prior,
-    link_jacobian,
     point_fits,
-    points_on,
     smooth_lanes,
     times_of,
 )
-from vftcli.robots.chain import link_poses
+from vftcli.robots.chain import link_jacobian, link_poses, points_on
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed

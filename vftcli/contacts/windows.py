@@ -19,11 +19,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.robots.chain import Chain, link_poses
+from vftcli.robots.chain import Chain, link_jacobian, link_poses, points_on
 from vftcli.robots.terms import Blocks
-from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.arrays import Array
 from vftcli.signals.linear_model import SPIKE, LinearModel, log_likelihood, smoothed
-from vftcli.signals.pose import Pose
 from vftcli.signals.series import covered
 from vftcli.wrench.model_error import UNKNOWN, ErrorProcess, error_model, innovations
 from vftcli.wrench.smoother import BlockLog, BlockSpan, Lane, WrenchPrior, assembled
@@ -54,27 +53,12 @@ class ContactPlace(NamedTuple):
 def places(chain: Chain, q: Array) -> list[ContactPlace]:
     """The flange, and the middle of every link from the second on, at q (K, n)."""
     poses, n = link_poses(chain, q), chain.joints
-    found = [ContactPlace(0, LEAST_LEVER, link_jacobian(poses, n, 1.0))]
+    found = [ContactPlace(0, LEAST_LEVER, link_jacobian(poses, n))]
     for link in range(FIRST_LINK, n + 1):
         span = poses.translation[0, link] - poses.translation[0, link - 1]
         lever = max(LEAST_LEVER, 0.5 * float(np.linalg.norm(span)))
         found.append(ContactPlace(link, lever, link_jacobian(poses, link, 0.5)))
     return found
-
-
-def points_on(poses: Pose, link: Indices | int, share: Array | float) -> Array:
-    """Points along links, from their joints (0) to the next (1), in base axes. (K, …, 3) [m]"""
-    start, end = poses.translation[:, link - 1], poses.translation[:, link]
-    return start + share * (end - start)
-
-
-def link_jacobian(poses: Pose, link: int, share: float) -> Array:
-    """Jacobian of a point along a link, in base axes. (K, 6, n)"""
-    axes = poses.rotation[:, :-1, :, 2]
-    arms = points_on(poses, link, share)[:, None, :] - poses.translation[:, :-1]
-    J = np.concatenate([np.cross(axes, arms), axes], axis=2).transpose(0, 2, 1)
-    J[:, :, link:] = 0.0
-    return J
 
 
 def arm_parts(joints: int) -> dict[int, ArmPart]:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_shape, seal
+from vftcli.signals.arrays import Array, Indices, check_shape, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import check_kind
@@ -264,13 +264,23 @@ def flange_jacobian(chain: Chain, q: Array) -> Array:
     Velocity [m], then angular velocity; the transpose takes a force and moment ON the
     robot to joint torques. Pinocchio's LOCAL_WORLD_ALIGNED.
     """
-    return jacobian_of(link_poses(chain, q))
+    return link_jacobian(link_poses(chain, q), chain.joints)
 
 
-def jacobian_of(poses: Pose) -> Array:
-    """The Jacobian of `flange_jacobian` where the poses are known. (T, 6, n)"""
+def points_on(poses: Pose, link: Indices | int, share: Array | float) -> Array:
+    """Points along links, from their joints (0) to the next (1), in base axes. (T, …, 3) [m]"""
+    start, end = poses.translation[:, link - 1], poses.translation[:, link]
+    return (1.0 - share) * start + share * end
+
+
+def link_jacobian(poses: Pose, link: int, share: float = 1.0) -> Array:
+    """Jacobian of a point along a link in base axes; the last link's end is the flange. (T, 6, n)
+
+    Columns of joints that do not move it are zero.
+    """
     axes = poses.rotation[:, :-1, :, 2].transpose(2, 1, 0)
-    places = poses.translation.transpose(2, 1, 0)
-    (a, b, c), (x, y, z) = axes, places[:, -1:] - places[:, :-1]
+    places = poses.translation[:, :-1].transpose(2, 1, 0)
+    (a, b, c), (x, y, z) = axes, points_on(poses, link, share).T[:, None] - places
     rows = np.stack([b * z - c * y, c * x - a * z, a * y - b * x, *axes])
+    rows[:, link:] = 0.0
     return np.ascontiguousarray(rows.transpose(2, 0, 1))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.chain import Chain, jacobian_of, link_poses
+from vftcli.robots.chain import Chain, link_jacobian, link_poses
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import RobotError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
@@ -191,7 +191,7 @@ class VirtualSensor(Shown):
         for start in range(0, samples, CHUNK):
             span = slice(start, min(start + CHUNK, samples))
             poses = link_poses(chain, q[span])
-            parts = decompose(jacobian_of(poses))
+            parts = decompose(link_jacobian(poses, chain.joints))
             X = from_base(self.frame, poses.rotation[:, -1], self.mounting)
             solve = SOLVERS[self.solver](parts, X)
             sigma[span] = parts.sigma_min
