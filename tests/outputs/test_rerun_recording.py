@@ -144,17 +144,10 @@ def test_without_a_reference_there_are_no_residuals(
 @pytest.mark.slow
 def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
     plots = list(plot_groups(with_wrench)["Wrench"])
-    assert [entry.key for entry in plots] == [f"/wrench/{a}" for a in (*AXES, "sigma_min")]
+    assert [entry.key for entry in plots] == [f"/wrench/{a}" for a in AXES]
     own = {line.name: line.values[:, 0] for line in plots[4].series}
     for wrench in with_wrench.wrenches:
         np.testing.assert_array_equal(own[wrench.name], wrench.known[:, 4])
-    sigma, masked = plots[6].series
-    assert (sigma.name, masked.name, plots[6].units) == ("σ_min of J", "masked below", ("m",))
-    assert with_wrench.virtual_sensor is not None
-    np.testing.assert_array_equal(
-        sigma.values[:, 0], with_wrench.virtual_sensor.wrenches[0].sigma_min
-    )
-    assert np.all(masked.values == with_wrench.virtual_sensor.sensor.least_sigma)
 
 
 def test_odd_names_do_no_harm(analysis: Analysis, as_if: Callable, tmp_path: Path) -> None:

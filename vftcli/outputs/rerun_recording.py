@@ -25,7 +25,6 @@ from vftcli.outputs.error_tables import DAGGER, to_markdown
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.page.log_charts import (
     estimate_lines,
-    observer_styles,
     reference_name,
     torque_chart,
     wrench_chart,
@@ -50,7 +49,6 @@ from vftcli.signals.external_torque import COVERS
 from vftcli.signals.progress import steps
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.choice import SMOOTHER
 from vftcli.wrench.solvers import ForceArrow
 
 #: Stretches of a long log of which a plot keeps the lowest and highest samples of its
@@ -127,7 +125,12 @@ def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
             for j in joints
             if reference is not None
         ),
-        "Wrench": wrench_plots(analysis),
+        "Wrench": (
+            plot_of(wrench, k, f"/wrench/{axis}")
+            for wrench in (wrench_chart(analysis),)
+            if wrench is not None
+            for k, axis in enumerate(wrench.panels)
+        ),
         "Motion": motion_plots(analysis),
     }
 
@@ -146,29 +149,6 @@ def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart
     named = f"{panel.replace(DAGGER, DOUBT)}: {chart.title}" if panel != chart.title else panel
     unit, family = chart.units[j : j + 1], chart.families[j : j + 1]
     return Chart(key, named, unit, (panel,), chart.x, (*lines, *edges), family)
-
-
-def wrench_plots(analysis: Analysis) -> Iterator[Chart]:
-    """Every axis, what the pose can tell, and the torque that no wrench explains."""
-    if (wrench := wrench_chart(analysis)) is not None:
-        yield from (plot_of(wrench, k, f"/wrench/{axis}") for k, axis in enumerate(wrench.panels))
-    if (sensed := analysis.virtual_sensor) is None or not sensed.wrenches:
-        return
-    t, styles = analysis.t, observer_styles(analysis)
-    # σ_min follows from the pose: all observers share it. The smoother asks no pose: its
-    # band grows where the pose tells little.
-    sigma = sensed.wrenches[0].sigma_min
-    if sigma is not None and sensed.solver != SMOOTHER:
-        least = np.full((len(t), 1), sensed.sensor.least_sigma)
-        lines = [ChartLine("σ_min of J", sigma[:, None])]
-        lines.append(ChartLine("masked below", least, SPARE[0]))
-        title = "What the pose can tell: σ_min"
-        yield Chart.of_one("/wrench/sigma_min", title, "m", t, lines)
-    left = {w.name: w.null_space for w in sensed.wrenches if w.null_space is not None}
-    if left:
-        lines = [ChartLine(name, x[:, None], *styles[name]) for name, x in left.items()]
-        title = "Torque that no wrench at the flange explains"
-        yield Chart.of_one("/wrench/null_space", title, "N·m", t, lines)
 
 
 def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
