@@ -242,7 +242,7 @@ class TestHdf5:
     def test_an_episode_beyond_the_last_is_refused_with_their_number(
         self, tmp_path: Path
     ) -> None:
-        with pytest.raises(LogError, match="no episode 3; it holds 3 episodes, 0 to 10"):
+        with pytest.raises(LogError, match="no episode 3; it holds 3, from 0 to 10"):
             read(seeds.aloha_set(tmp_path / "x"), episode=3)
 
     @pytest.mark.parametrize(
@@ -274,7 +274,7 @@ class TestHdf5:
         second = read(tmp_path, episode=1)
         assert (second.source.format, second.robot_hint) == ("droid", "fr3")
         assert "2023-07-08" in str(second.source.remarks[0])
-        with pytest.raises(LogError, match="no episode 2; it holds 2 episodes, 0 to 1"):
+        with pytest.raises(LogError, match="no episode 2; it holds 2, from 0 to 1"):
             read(tmp_path, episode=2)
 
     def test_names_are_found_in_one_group_alone(self, tmp_path: Path) -> None:
@@ -313,7 +313,7 @@ def test_an_option_that_does_not_apply_is_refused(tmp_path: Path) -> None:
     path = seeds.arrow(tmp_path / "x")
     with pytest.raises(LogError, match="a log of one arm; leave --arm out"):
         read(path, arm="left")
-    with pytest.raises(LogError, match="no episode 1; it holds 1 episode, 0"):
+    with pytest.raises(LogError, match="no episode 1; it holds 1, from 0 to 0"):
         read(path, episode=1)
     with pytest.raises(LogError, match="one recording, without episodes"):
         read(seeds.matlab(tmp_path / "y"), episode=0)

@@ -110,7 +110,7 @@ def test_the_first_is_taken_and_said(tmp_path: Path) -> None:
     recording = read(dataset(tmp_path / "set"))
     assert recording.source.warnings == ("episode 0 of 3: --episode K|all",)
     assert recording.name == "set episode 0"
-    with pytest.raises(LogError, match="no episode 3; it holds 3 episodes, 0 to 2"):
+    with pytest.raises(LogError, match="no episode 3; it holds 3, from 0 to 2"):
         read(tmp_path / "set", episode=3)
 
 
@@ -210,17 +210,9 @@ def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:
     np.testing.assert_array_equal(recording.q, LOG["q"][:30])
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("info.json", "{", "not a readable description"),
-        ("info.json", "\xe5", "not text in UTF-8"),
-    ],
-)
-def test_a_damaged_description_is_refused(
-    name: str, text: str, words: str, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("text", ["{", "\xe5", "[]", '{"features": []}'])
+def test_a_damaged_description_is_refused(text: str, tmp_path: Path) -> None:
     path = dataset(tmp_path, version=2)
-    (path / "meta" / name).write_text(text, encoding="latin-1")
-    with pytest.raises(LogError, match=words):
+    (path / "meta" / "info.json").write_text(text, encoding="latin-1")
+    with pytest.raises(LogError, match="not a readable description"):
         read(path)

@@ -49,7 +49,7 @@ def test_a_folder_of_logs_says_how_to_run_all(tmp_path: Path) -> None:
     for name in ("a.csv", "b.csv", "c.npy", "readme.md"):
         (tmp_path / name).write_text("t,q1\n", "utf-8")
     with pytest.raises(
-        UnknownFormatError, match=r"3 files that may be logs .*/\*\.csv -o OUT\)"
+        UnknownFormatError, match=r"a folder of files that may be logs .*/\*\.csv -o OUT\)"
     ) as e:
         read(tmp_path)
     assert "\n" not in str(e.value)

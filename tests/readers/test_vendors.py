@@ -265,7 +265,7 @@ def test_lerobot_reads_the_first_episode(tmp_path: Path) -> None:
         data / "file-000.parquet", columns="t=timestamp,q=observation.state[0:7]", episode=1
     )
     np.testing.assert_allclose(second.q, log["q"][30:], atol=1e-7)  # float32
-    with pytest.raises(LogError, match="no episode 2; it holds 2 episodes, 0 to 1"):
+    with pytest.raises(LogError, match="no episode 2; it holds 2, from 0 to 1"):
         read(data / "file-000.parquet", episode=2)
 
 

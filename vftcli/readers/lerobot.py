@@ -181,13 +181,10 @@ def info_of(folder: Path) -> dict[str, Any]:
 
 
 def text_of(path: Path) -> str:
-    """The text of a description beside the data."""
+    """The text of a description beside the data; a ValueError if it is no UTF-8."""
     if path.stat().st_size > DESCRIPTION_BYTES:
         raise LogError(f"{path}: larger than {DESCRIPTION_BYTES >> 20} MiB; no description is.")
-    try:
-        return path.read_text("utf-8")
-    except UnicodeDecodeError:
-        raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
+    return path.read_text("utf-8")
 
 
 @lru_cache(maxsize=1024)  # who reads all episodes asks for each again

@@ -200,10 +200,10 @@ def episode_of(
     first, count = numbers[0], len(numbers)
     number = first if request.episode is None else request.episode
     if number not in numbers:
-        there = (
-            f"1 episode, {first}" if count == 1 else f"{count} episodes, {first} to {numbers[-1]}"
+        raise LogError(
+            f"{path}: no episode {number}; it holds {count}, from {first} to {numbers[-1]} "
+            "(--episode K|all)."
         )
-        raise LogError(f"{path}: no episode {number}; it holds {there} (--episode K|all).")
     part = f"episode {number}" if count > 1 else ""
     if request.episode is not None or count == 1:
         return number, part, ()
@@ -212,7 +212,7 @@ def episode_of(
 
 
 def arm_of(
-    path: Path | str, request: ReadChoice, arms: Sequence[str], places: str = ""
+    path: Path | str, request: ReadChoice, arms: Sequence[str], places: str = "by name"
 ) -> "tuple[str, tuple[Remark, ...]]":
     """The arm that is read of a log of two: the one asked for; to look at, the first, and said."""
     from vftcli.signals.remarks import caution
@@ -222,9 +222,7 @@ def arm_of(
     if request.arm is not None or len(arms) == 1:
         return request.arm or arms[0], ()
     if not request.examining:
-        where = f" ({places})" if places else ""
         raise LogError(
-            f"{path}: holds two arms{where}; say which with --arm {' or --arm '.join(arms)}."
+            f"{path}: holds two arms ({places}); say which with --arm {' or --arm '.join(arms)}."
         )
-    there = places or "by name"
-    return arms[0], (caution("arm-side-chosen", arm=arms[0], other=arms[1], places=there),)
+    return arms[0], (caution("arm-side-chosen", arm=arms[0], other=arms[1], places=places),)

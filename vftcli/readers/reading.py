@@ -294,10 +294,9 @@ def of_folder(path: Path, entries: Sequence[str]) -> str:
         return f"a folder without a log ({shown}); give a log, or the folder of a bag"
     endings = [name[name.rindex(".") :] for name in logs]
     ending = max(endings, key=endings.count)
-    count = f"{len(logs)} files that may be logs" if len(logs) > 1 else "a file that may be a log"
     every = f"{shlex.quote(printable(str(path)))}/*{ending}"
     return (
-        f"a folder of {count} ({listed(logs, SHOWN)}), no bag and no data set; give them by name, "
-        f"all at once where the command takes several (vftcli report {every} -o OUT), or "
-        f"one by one: for f in {every}; do vftcli inspect $f; done"
+        f"a folder of files that may be logs ({listed(logs, SHOWN)}), no bag and no data set; give "
+        "them by name, all at once where the command takes several (vftcli report "
+        f"{every} -o OUT), or one by one: for f in {every}; do vftcli inspect $f; done"
     )
