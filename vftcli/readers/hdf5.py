@@ -146,7 +146,7 @@ ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positi
 
 DROID_STATE = "observation/robot_state/"
 #: What DROID's controller commands, without gravity; what it measures includes it.
-DROID_COMPUTED = "joint_torques_computed"
+DROID_COMPUTED = f"{DROID_STATE}joint_torques_computed"
 #: Where projects that record no torque keep their positions → the project.
 TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
 #: An episode's metadata: the serial number begins with a profile's name.
@@ -166,8 +166,10 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     arm, remarks = arm_of(table.path, request, ARMS, places)
     first = ALOHA_ARM * ARMS.index(arm)
     span = f"[{first}:{first + ALOHA_ARM - 1}]"
-    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span}"
-    usual += f",current[mA]={DYNAMIXEL}{span}"
+    usual = (
+        f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span},"
+        f"current[mA]={DYNAMIXEL}{span}"
+    )
     if DYNAMIXEL in names:
         remarks = (*remarks, fact("effort-of-dynamixel"))
     clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
@@ -179,8 +181,7 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
     if request.spec.item("q"):
         return from_table(table, request)
-    computed = DROID_STATE + DROID_COMPUTED in table.names
-    remarks = (fact("computed-torque-left-out"),) if computed else ()
+    remarks = (fact("computed-torque-left-out"),) if DROID_COMPUTED in table.names else ()
     raw = from_table(table, request, FORMATS["droid"], remarks=remarks)
     for path in sorted(Path(table.path).parent.glob("metadata_*.json"))[:1]:
         with suppress(OSError), path.open("rb") as file:

@@ -70,13 +70,14 @@ class MessageCount:
 
     def report(self, budget: "ReadBudget", counter: str, *, cut: bool) -> None:
         """Say so if messages are missing by its own count, or may be as it is cut."""
-        kept, counted = self.kept, self.counted
-        if counted is not None and kept > counted:
+        kept = self.kept
+        counted = kept if self.counted is None else self.counted
+        if kept > counted:
             raise budget.error(
                 f"{counter} counts {counted} messages, the chunks hold {kept}; "
                 "the file is damaged."
             )
-        if counted is not None and kept < counted:
+        if kept < counted:
             budget.note(warning("messages-missing", kept=kept, counted=counted, by=counter))
         elif cut:
             budget.note(warning("bag-cut", kept=kept))

@@ -326,10 +326,10 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
         with (file.path / "metadata.yaml").open("rb") as metadata:
             text = metadata.read(METADATA_BYTES)
         match = re.search(rb"(?m)^  message_count: (\d{1,15})\s*$", text)
-        counted = messages if match is None else int(match[1])
-        if messages < counted:
-            said = warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml")
-            budget.note(said)
+        if match and messages < (counted := int(match[1])):
+            budget.note(
+                warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml")
+            )
     if messages == 0:
         why = "; ".join(["no messages in any whole chunk", *map(str, budget.remarks)])
         raise LogError(f"{file.path}: {why}.")
