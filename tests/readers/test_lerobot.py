@@ -171,7 +171,9 @@ def test_two_arms_are_reported_apart(tmp_path: Path) -> None:
         "observation.torque.right": (-LOG["tau"], None),
     }
     path = dataset(tmp_path / "set", features)
-    with pytest.raises(LogError, match=r"two arms \(by name\); say which with --arm left or --arm right"):
+    with pytest.raises(
+        LogError, match=r"two arms \(by name\); say which with --arm left or --arm right"
+    ):
         read(path)
     right = read(path, arm="right", episode=1)
     np.testing.assert_array_equal(right.q, -LOG["q"][30:50])
