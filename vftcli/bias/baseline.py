@@ -19,7 +19,7 @@ from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
 from vftcli.observers.tuning import Goal, tune_all
 from vftcli.robots.run import LONG, Run, RunSamples
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, rms_of_known
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
@@ -185,10 +185,7 @@ class FreeReading(NamedTuple):
     @property
     def rms(self) -> Array:
         """Root mean square of free samples, with bias; NaN without any. (n,)"""
-        known = np.isfinite(self.samples)
-        square = np.sum(np.where(known, self.samples, 0.0) ** 2, axis=0)
-        count = np.count_nonzero(known, axis=0)
-        return np.where(count, np.sqrt(square / np.maximum(count, 1)), np.nan)
+        return rms_of_known(self.samples)
 
 
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:

@@ -12,7 +12,7 @@ import polars as pl
 
 from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
 from vftcli.evaluation.scores import skill
-from vftcli.signals.arrays import Array, Mask, number_array, root_mean_square
+from vftcli.signals.arrays import Array, Mask, number_array, rms_of_known, root_mean_square
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.lag import lags_of_each
@@ -70,11 +70,7 @@ def rmse(estimate: Array, reference: Array) -> Array:
     reference = number_array(reference, "the reference", "the error")
     if estimate.shape != reference.shape:
         raise ShapeError(f"estimate {estimate.shape} against reference {reference.shape}")
-    error = estimate - reference
-    known = np.isfinite(error)
-    count = np.count_nonzero(known, axis=0)
-    total = np.sum(np.where(known, error, 0.0) ** 2, axis=0)
-    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return rms_of_known(estimate - reference)
 
 
 def correlation(x: Array, y: Array) -> float:

@@ -131,6 +131,14 @@ def root_mean_squares(x: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(x**2, axis=0)))
 
 
+def rms_of_known(x: Array) -> Array:
+    """Root mean square of each column's finite samples (T, n), NaN without any. (n,)"""
+    known = np.isfinite(x)
+    count = np.count_nonzero(known, axis=0)
+    total = np.sum(np.where(known, x, 0.0) ** 2, axis=0)
+    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+
 EVEN = 1e-6  #: Largest share by which steps of an even clock, stamps of nine digits, differ.
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.robots.run import Run, RunSamples
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, rms_of_known
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import intervals, runs_of
@@ -213,10 +213,8 @@ def floor_in_motion(reference: ExternalTorque) -> Array:
     floor, sd, moving = reference.floor, reference.sd, reference.moving
     if floor is None or sd is None or moving is None:
         return np.zeros(reference.joints) if floor is None else floor
-    known = moving & np.isfinite(sd)
-    square = np.sum(np.where(known, sd, 0.0) ** 2, axis=0)
-    count = np.count_nonzero(known, axis=0)
-    return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), floor)
+    own = rms_of_known(np.where(moving, sd, np.nan))
+    return np.where(np.isfinite(own), own, floor)
 
 
 def true_contacts(reference: ExternalTorque) -> tuple[ContactInterval, ...]:
