@@ -269,14 +269,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 53_087,
+    "lines of Python": 52_208,
     "files": 239,
-    "functions": 2844,
+    "functions": 2785,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 376_031,
-    "characters a line that is not blank": 50.89,
-    "noqa": 81,
-    "lines of TOML, JavaScript, CSS": 7454,
+    "names, operators, numbers": 368_794,
+    "characters a line that is not blank": 50.86,
+    "noqa": 70,
+    "lines of TOML, JavaScript, CSS": 7425,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 

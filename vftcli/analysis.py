@@ -54,7 +54,8 @@ class Analysis(Shown):
     published: "Comparison | None" = None
     #: What is wrong with the log, then with its free runs.
     examinations: "tuple[Examination, ...]" = ()
-    remarks: tuple[Remark, ...] = ()  #: What the reader of the numbers should know, as `Remarks`.
+    #: What the reader of the numbers should know, as `Remarks`.
+    remarks: tuple[Remark, ...] = ()
     #: The command, versions and conventions, as `run.json` holds them.
     run: Mapping[str, Any] = field(default_factory=dict)
 

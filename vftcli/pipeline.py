@@ -53,7 +53,8 @@ class AnalysisChoice:
     refinement: RefinementChoice = field(default_factory=RefinementChoice)
     #: What is asked of the virtual force/torque sensor, None for joint torques alone.
     wrench: "WrenchChoice | None" = None
-    reference: "ReferenceChoice | None" = None  #: What the estimates are compared with, or None.
+    #: What the estimates are compared with, or None.
+    reference: "ReferenceChoice | None" = None
     #: Whether what touched the arm is listed, where the complete log may be used.
     contacts: bool = True
     #: Whether the wrench of `best`, which nobody asked for, is left to `sense`: the screen,
@@ -173,7 +174,8 @@ def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
 
 #: What is done with each log of a command.
 Analyser = Callable[[Run, AnalysisChoice], Analysis]
-Failed = Callable[[Any, VftError], None]  #: Who hears which log could not be analysed, and why.
+#: Who hears which log could not be analysed, and why.
+Failed = Callable[[Any, VftError], None]
 
 
 def analyse_logs(

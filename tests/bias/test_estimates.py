@@ -101,10 +101,10 @@ def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
         free = np.array([np.mean(estimate.tau[moves[:, k], k] ** 2) for k in j])
         sd = np.sqrt(free + lag[j])
         k = int(np.argmin(rests[:, j].any(axis=1)))
-        np.testing.assert_allclose(estimate.error_sd[k, j], sd, rtol=1e-12)
+        np.testing.assert_allclose(estimate.error_sd[k, j], sd, rtol=1e-6)
         # J5 rests, and reads less than .45 of its dry friction meanwhile
         still = np.sqrt((0.45 * friction[4]) ** 2 + lag[4])
-        assert estimate.error_sd[k, 4] == pytest.approx(still, rel=1e-12)
+        assert estimate.error_sd[k, 4] == pytest.approx(still, rel=1e-6)
         assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.error_sd[7])
 
 

@@ -49,7 +49,8 @@ class ClosedLoop(NamedTuple):
 
     controller: Controller  #: The controller in the loop.
     t: Array  #: Control instants. (T,) [s]
-    estimate: Array  #: Wrench that the controller saw, zero removed, base axes. (T, 6) [N, N·m]
+    #: Wrench that the controller saw, zero removed, base axes. (T, 6) [N, N·m]
+    estimate: Array
     #: Wrench of the contacts on the flange, about its origin, base
     #: axes. (T, 6) [N, N·m]
     truth: Array

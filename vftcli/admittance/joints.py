@@ -39,7 +39,8 @@ class JointPath(NamedTuple):
     q: Array
     reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
     speed: (
-        Array  #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
+        #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
+        Array
     )
 
 

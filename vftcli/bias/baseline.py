@@ -150,7 +150,8 @@ class Baselines:
     """Input of a log's observers."""
 
     plain: Baseline  #: What all but `best` run on.
-    best: Baseline  #: What `best` runs on: less the bias of the whole log, where that was fitted.
+    #: What `best` runs on: less the bias of the whole log, where that was fitted.
+    best: Baseline
 
     def of(self, name: str) -> Baseline:
         """Input of the observer of this name."""

@@ -31,7 +31,8 @@ from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.series import median_step, summed
 
-CUTOFF = 6.0  #: What is faster is noise, or contact: the model's error follows the motion. [Hz]
+#: What is faster is noise, or contact: the model's error follows the motion. [Hz]
+CUTOFF = 6.0
 PLAY = 0.3e-3  #: Presliding length of the friction that may be missing. [rad]
 SMOOTHING = 0.003  #: Velocity over which its sign turns. [rad/s]
 #: A clock that waits longer counts as waiting so long: six times the period of `CUTOFF`.

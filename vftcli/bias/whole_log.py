@@ -78,7 +78,8 @@ class WholeLogBias:
     #: Standard deviation of the model's error as it was fitted, and of what is subtracted
     #: where that is a part of it: all or nothing, by chance. (T, n) [N·m]
     sd: Array
-    free: Mask  #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
+    #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
+    free: Mask
     #: External torque of the slow loads that the fit believes in, which stays in the
     #: estimates; zero where it believes in none. (T, n) [N·m]
     load: Array

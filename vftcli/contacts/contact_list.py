@@ -77,7 +77,8 @@ class Contact(Shown):
     #: numbers are then means over the row, not those of a peak.
     is_load: bool = False
     peak_force: float | None  #: |F| at the peak. [N]
-    peak_band: float | None  #: Half width of its 95 % band, what the place may change in it. [N]
+    #: Half width of its 95 % band, what the place may change in it. [N]
+    peak_band: float | None
     place_band: float | None  #: Half width of its 95 % band at the place that fits best. [N]
     wrench: Array | None  #: Force and moment at the peak. (6,) [N, N·m]
     wrench_sd: Array | None  #: Standard deviation. (6,) [N, N·m]
@@ -200,7 +201,8 @@ class CarriedLoad(NamedTuple):
     mass: float  #: Its mass. [kg]
     sd: float  #: Standard deviation of the mass. [kg]
     robot: str  #: The model's name.
-    payload: str | None  #: The payload of the robot's file that weighs as much, None without one.
+    #: The payload of the robot's file that weighs as much, None without one.
+    payload: str | None
     #: From the arm's first motion to its last, in which it is weighed. [s]
     span: tuple[float, float]
 
@@ -256,7 +258,8 @@ class ContactList(Shown):
     #: What may be contacts, and what may be errors of the model, with less evidence.
     candidates: tuple[Contact, ...] = ()
     basis: "Basis"  #: What tells a contact from an error of the model.
-    free: tuple[Remark, ...] = ()  #: Remarks on known free motion; none where nothing is known.
+    #: Remarks on known free motion; none where nothing is known.
+    free: tuple[Remark, ...] = ()
     free_seconds: float = 0.0  #: How much of it there is. [s]
     #: Contacts listed in the log's own free part, None where it has none.
     false_on_free: int | None = None

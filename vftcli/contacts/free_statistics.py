@@ -62,7 +62,8 @@ class FreeStatistics(NamedTuple):
     #: A load that the arm carries in this log and its model lacks, None
     #: where none shows.
     load: FreeLoad | None
-    remarks: tuple[Remark, ...]  #: What it is and how it was found, and a load that it carries.
+    #: What it is and how it was found, and a load that it carries.
+    remarks: tuple[Remark, ...]
     basis: Basis = "free motion"  #: What tells a contact from an error of the model.
 
     @property

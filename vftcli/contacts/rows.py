@@ -50,7 +50,8 @@ SHORT, SLOW = 0.25, 95.0
 #: A contact's place is inferred from the blocks in which its force is above this share of
 #: the peak, within so long [s] of it.
 CORE, CORE_TIME = 0.5, 0.1
-POINT_MOMENT = 1e-3  #: Standard deviation of the moment about the point of a point force. [N·m]
+#: Standard deviation of the moment about the point of a point force. [N·m]
+POINT_MOMENT = 1e-3
 
 
 class ContactLocation(NamedTuple):
@@ -58,7 +59,8 @@ class ContactLocation(NamedTuple):
 
     fits: list[PointFit]  #: Points that fit, the best first.
     joints: int  #: How many the arm has.
-    likely: tuple[int, ...]  #: Links that a force and a moment may have touched; 0 is the flange.
+    #: Links that a force and a moment may have touched; 0 is the flange.
+    likely: tuple[int, ...]
 
     @property
     def is_force(self) -> bool:

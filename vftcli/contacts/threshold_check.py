@@ -75,7 +75,8 @@ class CheckedContact(NamedTuple):
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
     peak_force: float  #: Its largest force, NaN where that is not known. [N]
-    delay: float  #: From its start to the first alarm; NaN where there is none, or no truth. [s]
+    #: From its start to the first alarm; NaN where there is none, or no truth. [s]
+    delay: float
     by: str  #: The joint or axis that raises the alarm, "" where there is none.
     #: Whether none begins because one was on already, left over from a
     #: contact before.

@@ -29,7 +29,8 @@ SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero.
 BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]
 APART = 0.5  #: Passages closer than this are one event. [s]
 KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
-ENOUGH = 5  #: Maxima beyond the level that tell a tail; below four its interval has no lower end.
+#: Maxima beyond the level that tell a tail; below four its interval has no lower end.
+ENOUGH = 5
 #: Readings in a tail: at least so many where there are, more an hour, of so many blocks
 #: one.
 LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
@@ -131,7 +132,8 @@ class ComparedSignals(NamedTuple):
     wrench: Array
     of_vendor: bool  #: Whether the torque is the robot's own estimate, not the observer's.
     logged_wrench: bool  #: Whether the wrench is the robot's own, not that of the torque.
-    frame: str  #: Axes of the wrench and the point of its moment, in words; "" without a wrench.
+    #: Axes of the wrench and the point of its moment, in words; "" without a wrench.
+    frame: str
 
     @property
     def t(self) -> Array:

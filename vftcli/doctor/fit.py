@@ -61,7 +61,8 @@ GENERATION = 1.5  #: A load from which another generation of the arm is looked a
 MISTAKEN = 0.1  #: Misfit up to which a cause is believed where nobody said which arm it is.
 #: Share of what one sign leaves that the other may leave at most to be the right one.
 CLEARLY = 0.6
-FELT = 0.02  #: Size of the vendor's torque, relative to the effort, from which it tells its sign.
+#: Size of the vendor's torque, relative to the effort, from which it tells its sign.
+FELT = 0.02
 #: Findings after which a joint's effort is no evidence.
 EFFORT = frozenset({"stuck-effort", "zero-effort", "saturation", "stuck-position"})
 

@@ -53,7 +53,8 @@ SCHEMA: Schema = {
     "samples": pl.Int64,
 }
 
-TRUSTED_SHARE = 0.5  #: A joint's reference is trusted if at least this share of its samples is.
+#: A joint's reference is trusted if at least this share of its samples is.
+TRUSTED_SHARE = 0.5
 #: Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30
 #: %.
 LEAST = 10

@@ -25,7 +25,8 @@ MEMORY = 5.0  #: Length of a block in correlation times of the squared error.
 #: Largest share subtracted: the upper end of an interval is at most five times the RMSE.
 WIDEST = 0.96
 LEVEL = 0.95  #: Coverage of the intervals.
-QUADRATURE, NEWTON_STEPS = 48, 12  #: Of Student's quantile: 1e-12 of it from 1 to 1000 degrees.
+#: Of Student's quantile: 1e-12 of it from 1 to 1000 degrees.
+QUADRATURE, NEWTON_STEPS = 48, 12
 FIRST_LAGS = 1024  #: Lags over which an autocorrelation is looked at first. [samples]
 #: Columns of the significance table: RMSE less that of `other`, 95 % interval, p.
 SIGNIFICANCE: dict[str, type[pl.DataType]] = {

@@ -7,7 +7,8 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.option import COMPARE, Choice, Option
 
 FILE = "file:"  #: Head of the one reference with a path in its name.
-NAMES = ("zero", "vendor", "two-cycle", "sensor")  #: The references that are made from the log.
+#: The references that are made from the log.
+NAMES = ("zero", "vendor", "two-cycle", "sensor")
 
 
 class ReferenceChoice(Choice):

@@ -30,7 +30,8 @@ SHORTLIST = 0.15
 CANDIDATES = 40  #: Valleys looked at, the deepest ones.
 SEARCHED = 0.01  #: Clock on which a period is looked for, where the log's is finer. [s]
 MULTIPLES = 12  #: Multiples of the period that refine it.
-AROUND = 0.03  #: How far from a stated period the true one is looked for, relative: clocks drift.
+#: How far from a stated period the true one is looked for, relative: clocks drift.
+AROUND = 0.03
 ENOUGH = 2560  #: Samples that choose and refine a period: more of them only take longer.
 #: Spans this many times what the samples fill at their usual step are gaps, not motion.
 SPARSE = 10.0

@@ -226,7 +226,8 @@ RATE = 30.0  #: RunSamples a second that are weighed.
 MEMORY = 0.3
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
 PASSES = 4  #: Fits, each with the joints' errors that the last one left.
-WIDE = (20.0, 5.0, 5.0, 5.0)  #: Standard deviations of a load's mass and first moment. [kg, kg·m]
+#: Standard deviations of a load's mass and first moment. [kg, kg·m]
+WIDE = (20.0, 5.0, 5.0, 5.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,8 @@ from vftcli.signals.series import resample_columns
 
 GAP = 5.5  #: A gap of more than this many median steps is not interpolated across.
 FARTHEST = 0.1  #: How far phase may lie from the clock's word, as the low-passed shift. [s]
-PHASE_CUTOFF = 8.0  #: Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]
+#: Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]
+PHASE_CUTOFF = 8.0
 #: A stop of this length leaves the whole of the dry friction open, a shorter one its
 #: share. [s]
 STUCK = 0.3

@@ -13,7 +13,8 @@ from vftcli.robots.friction import FRICTION_MODELS, SMOOTHING, bent_line, coulom
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
-SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)  #: Velocities over which the sign may be smoothed. [rad/s]
+#: Velocities over which the sign may be smoothed. [rad/s]
+SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)
 #: Velocities over which a Stribeck term may fade. [rad/s]
 STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
 #: Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1.

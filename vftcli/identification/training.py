@@ -266,7 +266,8 @@ class Training(NamedTuple):
     logs: tuple[PreparedLog, ...]  #: Those that move, filtered and decimated.
     moves: Mask  #: Joints that move at all. (n,)
     reverses: Mask  #: Joints that move both ways. (n,)
-    fit_constants: bool = False  #: Whether drive constants are unknowns of the friction method.
+    #: Whether drive constants are unknowns of the friction method.
+    fit_constants: bool = False
     rubs: bool = True  #: Whether the joints have friction to be fitted.
 
     @property

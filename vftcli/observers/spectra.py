@@ -40,7 +40,8 @@ from vftcli.signals.filters import welch
 from vftcli.signals.series import grown, intervals, median_step, summed
 
 SEGMENT = 4.0  #: Length of a segment: what changes more slowly counts as constant. [s]
-LEAST_SEGMENT = 32  #: Fewest samples of a segment; a shorter free or loaded part has no spectrum.
+#: Fewest samples of a segment; a shorter free or loaded part has no spectrum.
+LEAST_SEGMENT = 32
 IMPACT = 1.0  #: A loaded part of which nothing lasts longer is one of impacts. [s]
 #: How far the average of neighbouring frequencies reaches, as a share of the frequency.
 NEIGHBOURS = 0.2

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from vftcli.observers.spectra import Spectra
 
 Value = float | str | list[float]
-Gains = Mapping[str, Mapping[str, Any]]  #: Section of a file → parameter → number, list or word.
+#: Section of a file → parameter → number, list or word.
+Gains = Mapping[str, Mapping[str, Any]]
 #: Section ("fdo", "gmo", "kfo", or one observer's own name) → parameter → value.
 Settings = dict[str, dict[str, Value]]
 #: Section → the parameters it takes; `kfo` holds for every Kalman filter.
@@ -130,7 +131,8 @@ class LogSpectra(NamedTuple):
 
     plain: "Spectra | None" = None  #: Of p and μ as the robot's model gives them.
     best: "Spectra | None" = None  #: Of `best`'s, less the bias of the whole log.
-    gains: Gains | None = None  #: The gains that `plain` calls for, as a gains file holds them.
+    #: The gains that `plain` calls for, as a gains file holds them.
+    gains: Gains | None = None
 
     def under(self, name: str) -> "Spectra | None":
         """The spectra of what the observer of this name runs on."""

@@ -84,7 +84,8 @@ class Chart(NamedTuple):
     series: tuple[ChartLine, ...]  #: Its lines, the last on top.
     #: Which panels share a scale: those of one number; none for all of one unit. (n,)
     families: tuple[int, ...] = ()
-    band: Array | None = None  #: Half the width of a band about zero, one a panel, or None. (n,)
+    #: Half the width of a band about zero, one a panel, or None. (n,)
+    band: Array | None = None
     band_label: str = ""  #: What the band is.
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
     unit: str = "s"  #: Unit of the horizontal axis.

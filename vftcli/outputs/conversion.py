@@ -69,7 +69,8 @@ class OutputTopic(NamedTuple):
         return serialised(self.kind, {**stamped(times), **part}, len(times))
 
 
-Event = tuple[int, Mapping[str, Value]]  #: A message of the log of contacts: stamp [ns], values.
+#: A message of the log of contacts: stamp [ns], values.
+Event = tuple[int, Mapping[str, Value]]
 
 
 def joint_topic(

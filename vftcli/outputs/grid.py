@@ -34,7 +34,8 @@ class GridCell(NamedTuple):
     """An entry with emphasis, or with another text on the page."""
 
     text: str  #: Its text.
-    best: bool = False  #: Whether it is the best of its column: bold wherever type can be bold.
+    #: Whether it is the best of its column: bold wherever type can be bold.
+    best: bool = False
     mark: str = ""  #: What follows it on the terminal, as a star.
     #: What the page shows instead of `text`, escaped already; "" for the text itself.
     html: str = ""
@@ -90,7 +91,8 @@ class Grid:
     #: digits are below digits.
     marked: bool = False
     notes: tuple[str, ...] = ()  #: Lines on what the marks mean, footnotes in LaTeX.
-    swatches: bool = False  #: Whether the page shows the colour of the observer that heads a row.
+    #: Whether the page shows the colour of the observer that heads a row.
+    swatches: bool = False
 
     @cached_property
     def columns(self) -> list[Column]:

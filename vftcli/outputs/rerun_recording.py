@@ -54,9 +54,11 @@ from vftcli.wrench.solvers import ForceArrow
 #: Stretches of a long log of which a plot keeps the lowest and highest samples of its
 #: lines.
 STRETCHES = 5000
-AROUND = 1.0  #: Time before and after the start of a contact in which every sample is kept. [s]
+#: Time before and after the start of a contact in which every sample is kept. [s]
+AROUND = 1.0
 WHOLE_TIME = 20.0  #: Time of which every sample is kept, all contacts together. [s]
-DOUBT = " (the joint rests: do not trust the reference)"  #: What a dagger says in a plot's title.
+#: What a dagger says in a plot's title.
+DOUBT = " (the joint rests: do not trust the reference)"
 BELOW = 0.06  #: The spans of the contacts are this share of the largest force below zero.
 BAND = "#e98aa2"  #: The band of |F|: the colour of `best`, paler.
 

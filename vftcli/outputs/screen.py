@@ -43,7 +43,8 @@ from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 
 MOST_LINES = 40  #: Lines of a screen.
-FILE_LINES = 4  #: Of them, those that name what was written: a blank one, two of names, the page.
+#: Of them, those that name what was written: a blank one, two of names, the page.
+FILE_LINES = 4
 
 #: Lines of a ground and rows of the table, None for all; then less and less, till it
 #: fits.

@@ -60,10 +60,12 @@ Cells = tuple[Cell, ...]  #: The cells of a signal.
 class Item(NamedTuple):
     """One item of a --columns text, and in a table the cells that it means."""
 
-    signal: str  #: A key of SIGNALS, `t`, or `_`; of cells found without a text also their field.
+    #: A key of SIGNALS, `t`, or `_`; of cells found without a text also their field.
+    signal: str
     factor: float = 1.0  #: What a value is multiplied with to be in SI units and in our sign.
     unit: str | None = None  #: The unit as written, or None; of a wrench its frame.
-    width: int = 1  #: Columns in a row that it covers, in a headerless table; 0 for all others.
+    #: Columns in a row that it covers, in a headerless table; 0 for all others.
+    width: int = 1
     #: The column names it means, in a headed table; None for those found without it.
     pattern: str | None = None
     rate: float | None = None  #: Sampling rate of a table that has no clock. [Hz]
@@ -197,7 +199,8 @@ FITTED = 2000  #: Rows, of these, from which a drive constant is found.
 JOINTS = range(3, 13)  #: Numbers of joints that a table may be of.
 #: Rows over which a velocity's integral is compared with the change of a position.
 STEPS = (1, 4, 16, 64)
-OPEN = 0.35  #: Share of a position's change that its own velocity may leave; another's leaves 1.
+#: Share of a position's change that its own velocity may leave; another's leaves 1.
+OPEN = 0.35
 STILL = 0.02  #: Travel below which a joint need not show which velocity is its own. [rad]
 EVEN = 20.0  #: How much longer than the median a twentieth of a clock's steps are at most.
 #: Misfit of a current to a torque divided by its drive constant, friction left free.

@@ -142,7 +142,8 @@ def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
 
 ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
 ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
-ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positions and efforts.
+#: ALOHA's positions and efforts.
+ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"
 
 DROID_STATE = "observation/robot_state/"
 #: What DROID's controller commands, without gravity; what it measures includes it.

@@ -24,7 +24,8 @@ from vftcli.signals.remarks import fact
 
 Json = Any  #: A value of a description.
 
-DESCRIPTION_BYTES = 64 * 1024 * 1024  #: Bytes of a description beside the data that are parsed.
+#: Bytes of a description beside the data that are parsed.
+DESCRIPTION_BYTES = 64 * 1024 * 1024
 
 FRAME = "frame_index"
 

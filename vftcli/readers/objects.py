@@ -146,7 +146,8 @@ class Stub:
         self.state = state
 
 
-Built = tuple[Any, int]  #: What was built of a part of a pickle, and how many numbers it holds.
+#: What was built of a part of a pickle, and how many numbers it holds.
+Built = tuple[Any, int]
 #: All that a pickle may call, by the names of NumPy before 2.
 ALLOWED = {
     "numpy.ndarray", "numpy.dtype", "numpy.core.multiarray._reconstruct",

@@ -25,7 +25,8 @@ class RawLog:
 
     stamps: "Array"  #: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
     tick: float = 1.0  #: Length of one tick. [s]
-    origin: float = 0.0  #: What has to be added to the stamps to be on the log's own clock. [s]
+    #: What has to be added to the stamps to be on the log's own clock. [s]
+    origin: float = 0.0
     clock: str  #: Which clock the stamps are from, in words.
     #: Which of several recordings in the file is wanted, from 1; None for all.
     segment: int | None = None
@@ -39,7 +40,8 @@ class RawLog:
     #: What the reader dropped, turned or derived, and what looks suspicious.
     remarks: "tuple[Remark, ...]" = ()
     payload_mass: float | None = None  #: Mass that the controller counts with. [kg]
-    payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
+    #: Its centre of mass in flange axes. (3,) [m]
+    payload_com: tuple[float, ...] | None = None
     #: Which of several recordings in the file this is, as "episode 3"; "" for the only
     #: one.
     part: str = ""

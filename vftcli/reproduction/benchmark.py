@@ -54,7 +54,8 @@ class BenchmarkRun:
     files: dict[str, Path] = field(
         default_factory=dict
     )  #: Name → file of each log that is there.
-    robots: dict[str, Path] = field(default_factory=dict)  #: Name → file of each trained robot.
+    #: Name → file of each trained robot.
+    robots: dict[str, Path] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.folder = BatchFolder(absolute(self.output), "scores.parquet")

@@ -22,7 +22,8 @@ from vftcli.signals.remarks import fact
 CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
 #: Variant → its name with a traditional controller, always driven by the whole force.
 UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
-FORCE, MOMENT = slice(3), slice(3, 6)  #: Axes of force and displacement, of moment and rotation.
+#: Axes of force and displacement, of moment and rotation.
+FORCE, MOMENT = slice(3), slice(3, 6)
 CONTACTS = 2  #: Times that the hand takes hold, in either scenario.
 HOLD = 2.5  #: A drag of a contact begins within this time of its force. [s]
 #: Deviations up to which a release is tried: from .1 on the turn comes ever sooner.

@@ -88,7 +88,8 @@ class PaperItem:
     lines: Sequence[PrintedLine] = ()  #: Its table.
     #: Columns of ours between the print and the floor.
     variants: Sequence[str] = (AS_PRINTED, CORRECTED)
-    nearest: str = CORRECTED  #: The column of ours that is set beside the print in the overview.
+    #: The column of ours that is set beside the print in the overview.
+    nearest: str = CORRECTED
     traces: str = ""  #: What its chart shows, "" if it has none.
 
     @property

@@ -153,7 +153,8 @@ class BodyTree:
             waiting += [(joint.child, pose @ joint.placement) for joint in reversed(fixed)]
 
 
-BEFORE_A_HAND = 4  #: Joints that an arm has at least before what it branches into may be a hand.
+#: Joints that an arm has at least before what it branches into may be a hand.
+BEFORE_A_HAND = 4
 HAND = 0.25  #: Share of the arm's mass that a finger stays below, with all that it carries.
 LISTED = 12  #: Names that a message lists.
 #: What a flange is called, with or without a robot's prefix; the first that is there.

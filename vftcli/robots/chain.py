@@ -55,7 +55,8 @@ class Chain(Shown):
     #: Inertia tensors about the centre of mass, in the link's axes. (n, 3, 3) [kg·m²]
     inertia: Array
     rotor_inertia: Array  #: Rotor inertia reflected to the joint side. (n,) [kg·m²]
-    gravity: Array  #: Gravity vector in base axes, (0, 0, −9.81) for an upright base. (3,) [m/s²]
+    #: Gravity vector in base axes, (0, 0, −9.81) for an upright base. (3,) [m/s²]
+    gravity: Array
     flange_rotation: Array  #: Orientation of the flange in frame n. (3, 3)
     flange_translation: Array  #: Origin of the flange in frame n. (3,) [m]
 

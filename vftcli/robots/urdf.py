@@ -29,7 +29,8 @@ from vftcli.signals.pose import Pose, rpy_matrix
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-MOVING = ("revolute", "continuous", "prismatic", "planar")  #: Types of joints that have an axis.
+#: Types of joints that have an axis.
+MOVING = ("revolute", "continuous", "prismatic", "planar")
 KINDS = (*MOVING, "fixed", "floating")  #: Types of joints.
 #: Attribute of <limit> → field of `vftcli.robots.robot.Limits`.
 LIMITS = {"lower": "q_min", "upper": "q_max", "velocity": "qd_max", "effort": "tau_max"}

@@ -37,7 +37,8 @@ class DynamicsTerms(Shown):
 
     t: Array  #: Time. (T,) [s]
     p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
-    mu: Array  #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+    #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+    mu: Array
     log_clock: Clock | None = None  #: The whole log's clock where these are a block of it.
     before: Instant | None = None  #: The sample before the first of a later block of a log.
 

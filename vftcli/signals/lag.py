@@ -15,8 +15,10 @@ from vftcli.signals.series import median_step, resample_columns, summed
 LONGEST = 1.0  #: Longest delay looked for. [s]
 LEAD = 0.2  #: Longest lead looked for: a two-sided estimate may come early. [s]
 FARTHEST = 0.5  #: Largest offset of two series that all columns tell. [s]
-LEAST_FIT = 0.3  #: Below this correlation at the best delay there is nothing to tell a delay by.
-BLOCK = 8192  #: Samples that one Fourier transform takes, unless the lags looked for need more.
+#: Below this correlation at the best delay there is nothing to tell a delay by.
+LEAST_FIT = 0.3
+#: Samples that one Fourier transform takes, unless the lags looked for need more.
+BLOCK = 8192
 
 
 def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:

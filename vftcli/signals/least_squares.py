@@ -27,7 +27,8 @@ class ColumnFit(NamedTuple):
     """A fitted column."""
 
     values: Array  #: Coefficients. (k,)
-    sd: Array  #: Their standard deviations, the residual's correlation along time counted. (k,)
+    #: Their standard deviations, the residual's correlation along time counted. (k,)
+    sd: Array
     residual: Array  #: What is not explained. (M,)
     weights: Array  #: Final weights, 0 … 1. (M,)
 

@@ -26,7 +26,8 @@ LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
 )  # fmt: skip
 
 
-WORD = re.compile("[a-z][a-z-]+")  #: A value in a metavar, as `svg`; numbers and paths are none.
+#: A value in a metavar, as `svg`; numbers and paths are none.
+WORD = re.compile("[a-z][a-z-]+")
 
 
 def text_of(value: object, name: str) -> str:

@@ -85,7 +85,8 @@ class Source(Shown):
     )
     rows: int = 0  #: Samples the file held before any were dropped.
     duplicates: int = 0  #: Rows dropped because their stamp repeated the one before.
-    derived: tuple[str, ...] = ()  #: Signals that were made of others here and stand in no log.
+    #: Signals that were made of others here and stand in no log.
+    derived: tuple[str, ...] = ()
     #: Facts on what was dropped, turned or derived; cautions and warnings on what looks
     #: suspicious but was left as it is.
     remarks: tuple[Remark, ...] = ()
@@ -161,7 +162,8 @@ class Recording(TimeSeries):
     target_q: Array | None = None  #: Commanded positions. (T, n) [rad]
     target_dq: Array | None = None  #: Commanded velocities. (T, n) [rad/s]
     target_current: Array | None = None  #: The controller's expected currents. (T, n) [A]
-    target_torque: Array | None = None  #: The controller's inverse-dynamics torques. (T, n) [N·m]
+    #: The controller's inverse-dynamics torques. (T, n) [N·m]
+    target_torque: Array | None = None
     #: The vendor's estimate of the external torque ON the robot. (T, n) [N·m]
     tau_ext: Array | None = None
     temperature: Array | None = None  #: Joint temperatures. (T, n) [°C]
@@ -173,7 +175,8 @@ class Recording(TimeSeries):
     robot_hint: str | None = None  #: Name of the profile the log itself settles, or None.
     #: Mass of the payload that the controller knows, None if not logged. [kg]
     payload_mass: float | None = None
-    payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
+    #: Its centre of mass in flange axes. (3,) [m]
+    payload_com: tuple[float, ...] | None = None
     source: Source = IN_MEMORY  #: Where it came from and what was repaired.
     #: True torques and wrenches of a simulated log, the columns those of
     #: PATH.truth.parquet.

@@ -39,7 +39,8 @@ WORDS = Path(__file__).parent / "words"  #: The catalogue: a file a room.
 class Where(NamedTuple):
     """What a remark is about."""
 
-    about: str = ""  #: An observer, log or file by its name; "" where it is the run as a whole.
+    #: An observer, log or file by its name; "" where it is the run as a whole.
+    about: str = ""
     joints: tuple[int, ...] = ()  #: Joints, counted from 1; none where it holds for all alike.
     #: First and last time, None where it holds throughout. [s]
     span: tuple[float, float] | None = None

@@ -55,7 +55,8 @@ def is_fast(recording: Recording) -> bool:
     return recording.samples >= 3 and recording.median_step * RATE <= 1.001
 
 
-NEAR = 2  #: A sample is compared with so many before it and so many behind it, by their median.
+#: A sample is compared with so many before it and so many behind it, by their median.
+NEAR = 2
 #: How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise.
 #: One sample in a hundred may be bad, and three bends in a hundred with it.
 USUAL = 0.97

@@ -11,7 +11,8 @@ from vftcli.signals.series import grown, median_step, runs_of, summed
 #: Speeds between rest and motion, by what each decides. Above the first, more than noise
 #: and last digits, a joint has a direction, and a log's motion begins. [rad/s]
 NONZERO = 1e-3
-COMMANDED = 2e-3  #: Below it a controller holds a joint: what it commands has no noise. [rad/s]
+#: Below it a controller holds a joint: what it commands has no noise. [rad/s]
+COMMANDED = 2e-3
 #: Below it stiction holds the joint: above what sensors add to a joint that is held, up
 #: to what the steps of an encoder make over a block of 24 ms. [rad/s]
 REST = 0.01

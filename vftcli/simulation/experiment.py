@@ -26,7 +26,8 @@ from vftcli.simulation.sensing import (
 )
 from vftcli.simulation.trajectories import Reference, plan
 
-MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
+#: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
+MOST_STEPS = 2_000_000
 #: Offset between the seeds of the two runs' sensors, so that their noise differs.
 PAIR_SEED = 1_000_003
 
@@ -36,7 +37,8 @@ class Truth(NamedTuple):
 
     t: Array  #: Time since the log's first sample, on its clock without jitter. (M,) [s]
     tau_ext: Array  #: External torque on the robot, Σ Jᵢᵀ wᵢ over the contacts. (M, n) [N·m]
-    wrench: Array  #: Wrench of all contacts on the flange, about its origin, in base axes. (M, 6)
+    #: Wrench of all contacts on the flange, about its origin, in base axes. (M, 6)
+    wrench: Array
     #: Name → wrench of each contact elsewhere, about its own point, in base axes. (M, 6)
     contacts: dict[str, Array]
 

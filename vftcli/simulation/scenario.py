@@ -42,7 +42,8 @@ ORIGIN = (0.0, 0.0, 0.0)
 class ServoSpec(Spec):
     """The joint position controller."""
 
-    stiffness: str | float = "stiff"  #: "stiff", "soft", or the loop's natural frequency. [rad/s]
+    #: "stiff", "soft", or the loop's natural frequency. [rad/s]
+    stiffness: str | float = "stiff"
     damping: float = 0.8  #: Damping ratio of that loop.
     #: Whether the nominal model's torque is added (gravity is always compensated).
     feed_forward: bool = True
@@ -219,7 +220,8 @@ class Scenario(Spec):
     step: float = 1e-3  #: Inner step of the integration, at most 1 ms. [s]
     format: str = ""  #: Log format, "" for the vendor's usual one.
     columns: str = "full"  #: "full" or "short" recipe of the RTDE log.
-    pair: bool = False  #: Whether a second log of the same motion without the payload is written.
+    #: Whether a second log of the same motion without the payload is written.
+    pair: bool = False
     trajectory: TrajectorySpec = HoldSpec()  #: The commanded motion.
     servo: ServoSpec = ServoSpec()  #: The position controller.
     friction: FrictionSpec = FrictionSpec()  #: The true friction's kind.

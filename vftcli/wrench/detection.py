@@ -21,7 +21,8 @@ from vftcli.wrench.solvers import VirtualSensor
 LEAVE = 0.6
 HOLD = 0.02  #: A contact must last at least this long, so that one noisy sample is none. [s]
 GAP = 0.25  #: Two contacts closer than this are one: a hand that slips has not let go. [s]
-BAND = 1.3  #: The free band reaches this far beyond the largest departure seen in the free part.
+#: The free band reaches this far beyond the largest departure seen in the free part.
+BAND = 1.3
 #: An alarm that begins earlier than this before a true contact, or later than this after
 #: its end, is false, whatever it meets: a slow observer shows a contact for a while after
 #: it. [s]
@@ -168,7 +169,8 @@ class ContactScore(NamedTuple):
 class KnownContacts(NamedTuple):
     """What is known of a log's contacts before they are judged."""
 
-    untouched: Mask  #: Samples of the log that are known to be free; none where nothing is. (T,)
+    #: Samples of the log that are known to be free; none where nothing is. (T,)
+    untouched: Mask
     #: What each observer reads in free runs of other logs, by name. (S, k) each
     beside: Mapping[str, Array] = {}
     #: Contacts of a list, by the observer that gave the wrench.

@@ -52,7 +52,8 @@ UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
 #: Prior of the correlation time T: its median [s] and the spread of ln T.
 USUAL_TIME, TIME_SPREAD = 0.5, 1.5
 LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
-LEAST_BLOCKS = 20  #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
+#: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
+LEAST_BLOCKS = 20
 ASSUMED_SHARE = 0.2  #: Model error of motion as a share of F_c, where no free part is known.
 #: Share of the free part's blocks in which a joint must move for its reversals to be
 #: bridged.
@@ -85,7 +86,8 @@ class TorqueNoise(NamedTuple):
     variance: Array  #: s² of motion that the free part shows. (n,) [(N·m)²]
     time: Array  #: T, its correlation time. (n,) [s]
     dry: Array  #: F_c. (n,) [N·m]
-    seen: Mask  #: Whether the free part moved the joint; else motion errs by its friction. (n,)
+    #: Whether the free part moved the joint; else motion errs by its friction. (n,)
+    seen: Mask
     at_rest: Array  #: Variance that rest adds. (n,) [(N·m)²]
     pushed: Array  #: Variance that rest under a contact adds. (n,) [(N·m)²]
     near: float = 0.0  #: How long before and after a rest that of rest holds. [s]

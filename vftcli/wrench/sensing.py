@@ -50,7 +50,8 @@ from vftcli.wrench.smoother import (
 )
 from vftcli.wrench.solvers import CHUNK, VirtualSensor
 
-HALF = 0.05  #: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
+#: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
+HALF = 0.05
 
 
 class Gate(NamedTuple):

@@ -50,7 +50,8 @@ UNLISTED = 0.6
 #: the mean that it was learned from, and would be drawn to zero.
 LOOSER = 1.5
 LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]
-TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  #: Correlation times of a wrench that are tried. [s]
+#: Correlation times of a wrench that are tried. [s]
+TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 FORCES = (10.0, 30.0, 60.0)  #: Standard deviations of a force that are tried. [N]
 STEADY = 30.0  #: A wrench that keeps for at least this long is a load, … [s]
 LOAD_CHANGE = (

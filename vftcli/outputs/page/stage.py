@@ -32,7 +32,8 @@ POSES = 600  #: Poses of the log that the view is fitted to.
 WIDEST = np.pi / 4  #: Half the angle of the widest cone that is drawn. [rad]
 SHARES = 0.14, 0.6  #: Length of an arrow of no force, and what the largest adds, in reaches.
 MILLIMETRE = 1e-3  #: Step of a surface's corners. [m]
-WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92  #: Size of the still drawing, and the part it fills.
+#: Size of the still drawing, and the part it fills.
+WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92
 
 
 class View(NamedTuple):

@@ -24,7 +24,8 @@ class Channel(NamedTuple):
     topic: str  #: Its name.
     type: str  #: Message type as package/Name, without the middle part that ROS 2 writes.
     encoding: str  #: How its messages are serialised: ros1, cdr, json, protobuf, or other.
-    definition: str = ""  #: Text of the message definition, or nothing if the container has none.
+    #: Text of the message definition, or nothing if the container has none.
+    definition: str = ""
     idl: bool = False  #: Whether the definition is in IDL.
 
 

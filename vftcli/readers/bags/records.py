@@ -141,7 +141,8 @@ def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
     counts.report(budget, "its index", cut=cut)
 
 
-ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
+#: How messages are serialised that may be read.
+ENCODINGS = {"cdr", "ros1", "json", "protobuf"}
 
 
 def _mcap_records(

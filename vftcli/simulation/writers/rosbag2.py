@@ -24,7 +24,8 @@ JOINT_STATE = "sensor_msgs/JointState"
 WRENCH_STAMPED = "geometry_msgs/WrenchStamped"
 ROBOT_STATE = "franka_msgs/FrankaRobotState"
 
-WRENCH, TWIST = ("force", "torque"), ("linear", "angular")  #: Names of a message's two vectors.
+#: Names of a message's two vectors.
+WRENCH, TWIST = ("force", "torque"), ("linear", "angular")
 UPRIGHT = np.array([[0.0, 0.0, 0.0, 1.0]])  #: The quaternion of no rotation, x, y, z, w.
 
 
