@@ -295,7 +295,7 @@ DEARER = [
 
 WITHOUT_ROW: dict[str, tuple[str, ...]] = {
     "names only the option that is wrong, or the words it takes": (
-        "no such admittance parameter. Sections", "--release … is not …",
+        "no such admittance parameter. Sections", "--release … is not …", "--only names nothing",
         "rad; it must be less than π", "holds no sample of the log",
         "is not a positive number of false alarms per hour",
         "--gains … is not …, a positive number",

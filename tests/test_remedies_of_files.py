@@ -364,6 +364,10 @@ def texts() -> dict[str, str]:
                 text = "".join(spoken(node.exc))
                 if re.search(r"--[a-z]|vftcli [a-z]|[a-z]\.[a-z_-]+=", text):
                     found[f"{path.relative_to(PACKAGE)}:{node.lineno}"] = text
+    # A refusal of all rooms, which each hands its remedy.
+    for node in ast.walk(ast.parse((PACKAGE / "free_motion/free_motion.py").read_text("utf-8"))):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "refuse_repeated_logs":
+            found["refuse_repeated_logs"] = "".join(spoken(node))
     return found
 
 

@@ -48,8 +48,6 @@ from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown
 
-#: What to do where the log, or a free run, is given as a free run too.
-REPEATED = "give another log of the same motion; for free cycles within one log leave --free away"
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
 
@@ -116,7 +114,11 @@ class FreeMotion(Shown):
 
     def __post_init__(self) -> None:
         each = [self.log.recording, *(run.recording for run in self.runs)]
-        refuse_repeated_logs(each, "the log or as --free", REPEATED)
+        refuse_repeated_logs(
+            each,
+            "the log or as --free",
+            "give another log of the same motion; for free cycles within one log leave --free away",
+        )
         if self.runs and (self.choice.cycles or self.choice.period is not None):
             raise ReferenceTorqueError(
                 "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "

@@ -102,8 +102,8 @@ def parameter_grid(replay: Replay) -> Grid:
         "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
     }
     columns = "coordinates", *(Column(h, form="g", symbol=s) for h, s in heads.items())
-    title = f"Values used; {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
-    return Grid(columns, rows, f"{title}; {p.source or 'the command line'}")
+    how = f"{1e3 * p.period:g} ms, {p.threshold_mode} threshold"
+    return Grid(columns, rows, f"Values used; {p.source or 'the command line'}; {how}")
 
 
 def stability_grid(replay: Replay) -> Grid:
