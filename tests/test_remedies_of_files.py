@@ -366,7 +366,7 @@ def texts() -> dict[str, str]:
                     found[f"{path.relative_to(PACKAGE)}:{node.lineno}"] = text
     # A refusal of all rooms, which each hands its remedy.
     for node in ast.walk(ast.parse((PACKAGE / "free_motion/free_motion.py").read_text("utf-8"))):
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "refuse_repeated_logs":
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "again":
             found["refuse_repeated_logs"] = "".join(spoken(node))
     return found
 

@@ -114,11 +114,8 @@ class FreeMotion(Shown):
 
     def __post_init__(self) -> None:
         each = [self.log.recording, *(run.recording for run in self.runs)]
-        refuse_repeated_logs(
-            each,
-            "the log or as --free",
-            "give another log of the same motion; for free cycles within one log leave --free away",
-        )
+        again = "give another log; for free cycles within one log leave --free away"
+        refuse_repeated_logs(each, "the log or as --free", again)
         if self.runs and (self.choice.cycles or self.choice.period is not None):
             raise ReferenceTorqueError(
                 "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
