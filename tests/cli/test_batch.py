@@ -81,6 +81,8 @@ def test_a_second_run_does_what_is_left(run, folder: Path, tmp_path: Path) -> No
     assert run("batch", folder, *HERE, "-o", out)[0] == 3
     # What is finished is not done again; what failed is.
     assert [task["log"] for task in record(out)["tasks"]] == ["empty.csv"]
+    # Of one task from its first moment to its last is its own time.
+    assert record(out)["first_to_last_s"] == pytest.approx(record(out)["in_task_s"], abs=1e-3)
     assert rows_there(out) == done
     assert (out / "batch.parquet").read_bytes() == table
     failures = pl.read_parquet(out / "failures.parquet")

@@ -43,6 +43,13 @@ def test_no_size_in_doubt_is_good(doubt: str) -> None:
     assert [row.trust for row in found.weighed(None, {doubt})] == ["weak", "weak"]
 
 
+def test_a_load_is_as_heavy_as_the_examination_says() -> None:
+    fitted = CarriedLoad(2.5, 0.4, "ur10e", None, (1.0, 9.0))
+    found = replace(contact_list(), load=fitted)
+    assert found.weighed((2.88, 0.09), set()).load == fitted._replace(mass=2.88, sd=0.09)
+    assert found.weighed(None, set()).load == fitted
+
+
 def test_beside_a_joint_without_effort_every_row_is_a_candidate() -> None:
     """In the order of time, each with the reason; nothing is claimed, nor called untouched."""
     late, early = (
