@@ -108,7 +108,7 @@ def test_against_tells_the_lead_the_others_and_the_floor(analysis: Analysis) -> 
     (block,) = blocks(analysis.errors)
     means = block.means.errors
     text = against(block, analysis)
-    assert text.startswith("Against vendor (floor 0.50): ")
+    assert text.startswith("Against vendor (floor 0.50 N·m): RMSE ")
     assert f"({next(iter(means))})" in text
     # Means of the joints, by hand from the tidy table.
     rows = analysis.errors.filter(analysis.errors["observer"] == "best")
@@ -124,7 +124,7 @@ def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> 
         reference_trusted=~first, reference_floor_Nm=pl.when(first).then(9.0).otherwise(0.2)
     )
     (left,) = blocks(rests)
-    assert against(left, analysis).startswith("Against vendor without J1 (floor 0.20): ")
+    assert against(left, analysis).startswith("Against vendor without J1 (floor 0.20 N·m): RMSE ")
     assert left.means.errors["best"] == pytest.approx(block.rmse[0, 1:].mean())
     (every,) = blocks(analysis.errors.with_columns(reference_trusted=pl.lit(value=False)))
     assert every.means == block.means

@@ -244,9 +244,9 @@ def against(block: Block, analysis: Analysis) -> str:
     if not means.errors:
         return f"Against {block.reference}: no sample in common with the estimates"
     (name, least), *others = means.errors.items()
-    floor = f" (floor {significant(means.floor, 2)})" if block.has_floor else ""
+    floor = f" (floor {significant(means.floor, 2)} N·m)" if block.has_floor else ""
     text = f"Against {printable(block.reference)}{means.left_out}{floor}: "
-    text += f"{significant(least, 2)} N·m ({name})"
+    text += f"RMSE {significant(least, 2)} N·m ({name})"
     if others:
         paper = any(remark.code in MEASURED for remark in analysis.remarks)
         sizes = sorted(value for _, value in others)
