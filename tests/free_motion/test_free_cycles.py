@@ -61,6 +61,7 @@ def test_all_cycles_without_a_push_are_free(
 def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
     pushed: Callable[..., Run],
 ) -> None:
+    assert find_free_cycles(pushed(), CYCLES._replace(end=8.0)).numbers == (0,)
     found = find_free_cycles(pushed(), CYCLES)
     assert found.numbers == (0, 1)
     assert found.residuals is not None
@@ -86,11 +87,16 @@ def test_a_cycle_in_a_gap_is_not_free_and_the_others_are_judged(
 def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_the_last() -> None:
     many = FreeCycles(tuple(range(3, 62)), None)
     assert many.drawn == (3, 11, 20, 28, 36, 44, 53, 61)  # 58/7 cycles apart, rounded
-    remark = many.remarks(64)[1]
+    given, remark = many.remarks(64)
+    assert (given.code, given.values["whole"]) == ("free-cycles-given", 64)
+    assert list(given.values["cycles"]) == list(range(4, 63))
+    assert list(remark.values["cycles"]) == [4, 12, 21, 29, 37, 45, 54, 62]
     assert (remark.code, remark.values["free"]) == ("free-cycles-drawn", 59)
     assert remark.values["wider"] == pytest.approx(
         0.0518, abs=1e-4
     )  # √((1 + 1/8)/(1 + 1/59)) − 1
+    (one,) = FreeCycles((2,), np.array([1.5, np.inf, 1.0])).remarks(3)
+    assert (one.code, list(one.values["residuals"])) == ("free-cycle-found", [1.5, 1.0])
     for count in (3, 8):
         few = FreeCycles(tuple(range(count)), None)
         assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)

@@ -93,7 +93,7 @@ def test_the_stated_period_decides_between_multiples(repeated: Make) -> None:
     [
         (100.0, "does not fit into the 14.79 s"),
         (14.0, "more than one cycle"),
-        (0.01, "in seconds"),
+        (0.039, r"shorter than four samples \(0\.01 s each\); .* in seconds"),
         (3.0, "no repetition found near 3 s"),
     ],
 )
@@ -114,6 +114,13 @@ def test_an_arm_at_rest(repeated: Make) -> None:
     still = replace(log, q=np.tile(log.q[:1], (log.samples, 1)), dq=np.zeros(log.q.shape))
     with pytest.raises(ReferenceTorqueError, match="does not move"):
         find_period(still)
+    size = np.ptp(log.q, axis=0).max()
+    with pytest.raises(ReferenceTorqueError, match="does not move"):
+        moving_part(replace(log, q=0.0099 / size * log.q))
+    moving_part(replace(log, q=0.0101 / size * log.q))  # 1 cm at an arm's length of a metre
+    few = replace(log, **{name: getattr(log, name)[:7] for name in ("t", "q", "dq")})
+    with pytest.raises(ReferenceTorqueError, match="7 samples are too few"):
+        moving_part(few)
 
 
 def test_sweeps_of_a_real_arm_are_no_repetition(logs: Path) -> None:

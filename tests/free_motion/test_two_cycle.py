@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 
 from vftcli.free_motion.choice import FreeChoice
-from vftcli.free_motion.difference import RUNGS
-from vftcli.free_motion.two_cycle import friction_change, two_cycle_difference
+from vftcli.free_motion.difference import RUNGS, Difference, ErrorModel
+from vftcli.free_motion.two_cycle import (
+    error_ratio,
+    floor_remarks,
+    friction_change,
+    two_cycle_difference,
+)
 from vftcli.readers.reading import read
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run
@@ -126,11 +131,9 @@ def test_missing_samples(circle: Circle, ur5: Robot) -> None:
     assert np.isnan(reference.tau[hole]).all()
 
 
-def test_filters_and_cycles_that_do_not_exist(circle: Circle, ur5: Robot) -> None:
+def test_filters_that_do_not_exist(circle: Circle, ur5: Robot) -> None:
     with pytest.raises(ReferenceTorqueError, match=r"between 0 and 62\.5 Hz"):
         two_cycle_difference(circle.recording, (), ur5, FreeChoice(low_pass=80.0))
-    with pytest.raises(ReferenceTorqueError, match="no cycle 7; the log holds 5"):
-        two_cycle_difference(circle.recording, (), ur5, FreeChoice(cycles=(7,)))
 
 
 def test_options_of_one_log_do_not_go_with_two(circle: Circle, ur5: Robot) -> None:
@@ -208,6 +211,37 @@ def test_a_payload_is_seen(logs: Path) -> None:
     assert mass == pytest.approx(2.805, rel=0.1)
 
 
+def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle: Circle, ur5: Robot) -> None:
+    """Every fourth of 125 samples a second: .4 · 15.625 Hz."""
+    log = circle.recording
+    thin = Recording(t=log.t[::4], q=log.q[::4], dq=log.dq[::4], current=log.current[::4])
+    remarks = {r.code: r for r in two_cycle_difference(thin, (), ur5).remarks}
+    assert remarks["alignment-floor-filtered"].values["cutoff_Hz"] == pytest.approx(6.25)
+
+
+def test_the_error_s_remarks_and_its_measured_ratio() -> None:
+    """Of 100 samples, each of 2 N·m, joint 1 rests 51, joint 2 50, joint 3 3, joint 4 2."""
+    sd, rests = np.ones((100, 4)), np.arange(100)[:, None] < [51, 50, 3, 2]
+    sd[:2] = np.nan  # without a partner: 49, 48, 1 and no sample at rest of the other 98
+    sd[rests] *= 3.0
+    tau = 2.0 * np.ones((100, 4)) * [1.0, 0.1, 1.0, 2.0]
+    found = Difference("model", None, tau, ErrorModel(sd, rests))
+    ratio = error_ratio(found, found.error.known)
+    np.testing.assert_allclose(ratio, [2.0, 0.3, 2.0, 3.0])  # held from .3 to 3
+    origin, *others = floor_remarks(found, ratio, np.array([0.0, 0.4, 0.0, 0.0]))
+    assert (origin.code, list(origin.values["ratio"])) == ("floor-measured", list(ratio))
+    said = [(r.code, r.where.joints, *r.values.values()) for r in others]
+    assert said[:2] == [
+        ("joint-stands-at-times", (1,), 49 / 98, 3.0),
+        ("joint-stands-at-times", (2,), 48 / 98, 3.0),
+    ]
+    assert [s[:2] for s in said[2:]] == [("friction-changed", (2,))]
+    np.testing.assert_array_equal(said[2][2], [0.4])
+    still = found._replace(error=ErrorModel(sd, rests | (np.arange(100) < 60)[:, None]))
+    codes = [r.code for r in floor_remarks(still, None, np.zeros(4))]
+    assert codes == ["floor-propagated", *["joint-stands"] * 4]
+
+
 @pytest.fixture
 def swing(drive_of: Callable[..., Run]) -> Run:
     """Two joints swinging at 0.4 and 0.7 Hz for 20 s."""
@@ -224,6 +258,8 @@ def test_a_change_is_found(swing: Run, seed: int) -> None:
     found = friction_change(motion, tau, np.ones_like(tau, bool))
     assert found[0] == pytest.approx(0.4, abs=0.03)
     assert found[1] == 0.0
+    for seconds, known in ((3.9, False), (4.9, True)):  # four pieces of a second are too few
+        assert friction_change(motion, tau, motion.t[:, None] < [seconds] * 2).any() == known
 
 
 @pytest.mark.parametrize("seed", range(5))
