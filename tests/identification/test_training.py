@@ -1,17 +1,24 @@
 """Training: joints fitted one by one, contacts left out, wrong robots doubted."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from vftcli.identification import friction_fit
 from vftcli.identification.clean_fit import CleanFit
-from vftcli.identification.friction_fit import all_residuals, data_of_joint, fit_frictions
+from vftcli.identification.friction_fit import (
+    PreslidingScore,
+    all_residuals,
+    data_of_joint,
+    fit_frictions,
+)
 from vftcli.identification.links import stack
 from vftcli.identification.methods import (
     by_constant,
     check_friction,
+    fit_remarks,
     friction_method,
     initial_columns,
     rotor_number,
@@ -124,7 +131,9 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_reported(dat
     pushing = JointFriction(
         model="coulomb-viscous", parameters={"coulomb": -5.0, "viscous": -5.0}
     )
-    with pytest.raises(IdentificationError, match=r"of joint 1 comes out .* it would push"):
+    speed = np.max(np.abs(data.logs[0].dq[:, 0]))
+    ends = f"as {-5 - 0.5 * speed:.2g} to {-5 - 5 * speed:.2g} N·m: it would push"
+    with pytest.raises(IdentificationError, match=f"of joint 1 comes out {ends}"):
         list(check_friction(0, pushing, data))
     crossing = JointFriction(
         model="coulomb-viscous", parameters={"coulomb": -2.0, "viscous": 5.0}
@@ -171,13 +180,29 @@ def test_a_rotor_inertia_three_standard_deviations_off_is_taken(value, sd, taken
     assert found.value == (value if taken is None else taken)
     code = "undetermined-rotor-inertia" if taken is None else "refuted-rotor-inertia"
     assert [(r.code, r.where.joints) for r in remarks] == [(code, (4,))]
+    assert list(remarks[0].values.values()) == [found.value, sd, 2.0]
+
+
+def test_what_was_fitted_is_remarked_on_in_its_units(data, prepared):
+    warm = prepared(T, dq=speeds(J1=(3.0, 3.0)), warmth=np.array([[0.9], [1.2]]))
+    score = PreslidingScore(1e-3, {0.0: 1.0, 1e-3: 0.5})
+    fits = {2: SimpleNamespace(at_bound=("coulomb", "viscous"), presliding=score)}
+    remarks = list(fit_remarks(data._replace(logs=(warm,)), fits))
+    assert [(r.code, list(r.values.values())) for r in remarks] == [
+        ("friction-at-bound", ["coulomb and viscous"]),
+        ("presliding-length", [1.0, [0.0, 1.0], [1.0, 0.5]]),
+        ("friction-by-temperature", [[0.9, 1.2]]),
+    ]
 
 
 def test_a_current_that_falls_with_the_torque_is_refused(data):
-    sd = np.array([0.01])
-    assert by_constant(data, 0, np.array([0.06]), sd)[2].value > 0
-    with pytest.raises(IdentificationError, match="current of joint 1 does not follow"):
-        by_constant(data, 0, np.array([0.05]), sd)
+    before = UR5.torque_constant[1]
+    values, sd, K = by_constant(data, 1, np.array([8.0, 0.8]), np.array([0.4, 0.02]))
+    np.testing.assert_allclose([*values, *sd], [10.0, 1.0, 0.5, 0.025])
+    assert K[:2] == (2, "torque_constant")
+    assert K[2:4] == pytest.approx((before / 0.8, before * 0.02 / 0.8**2))
+    with pytest.raises(IdentificationError, match=r"of joint 1 does not .* \(slope 0\.05\)"):
+        by_constant(data, 0, np.array([0.05]), np.array([0.01]))
 
 
 def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
