@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.cluster import Effort, Failure, Outcome
 from vftcli.batch.keys import digest_of
 from vftcli.batch.log_work import LogJob
-from vftcli.batch.run import BatchRun
+from vftcli.batch.run import BatchCount, BatchRun
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.library import LogEntry
@@ -68,3 +69,25 @@ def test_a_batch_says_how_many_logs_ended_and_which_share_that_is(tmp_path: Path
     with heard_by(lambda *step: heard.append(step)):
         batch(tmp_path, [8] * 4, 0).work()
     assert heard == [(f"{k}/4 logs, {k} failed", k / 4) for k in range(1, 5)]
+
+
+def test_the_record_counts_logs_and_adds_up_the_time_of_their_work(tmp_path: Path) -> None:
+    """Three logs, the second from 5 s before the first's start to 20 s behind it."""
+    asked = batch(tmp_path, [8] * 3, 1)
+    first, second, _ = (task for group in asked.groups() for task in group)
+    assert asked.record(BatchCount(3, 0, 0, 0))["first_to_last_s"] is None
+    efforts = (Effort(100.0, 12.0, 7.0, "here 1"), Effort(95.0, 25.0, 20.0, "here 2"))
+    failure = Failure("reading", "LogError", f"{second.path}: 001.csv: it is cut")
+    asked.take(Outcome(first, effort=efforts[0]))
+    asked.take(Outcome(second, failure=failure, effort=efforts[1]))
+    assert asked.done == {first.key}
+    assert asked.failures == {1: Failure("reading", "LogError", "it is cut")}
+    record = asked.record(BatchCount(logs=3, before=1, done=4, failed=2))
+    assert [log["recording"] for log in record["logs"]] == ["000.csv", "001.csv", "002.csv"]
+    keys = ("do", "done_before", "done_now", "failed", "in_task_s", "in_task_cpu_s",
+            "first_to_last_s")  # fmt: skip
+    assert [record[key] for key in keys] == ["estimate", 1, 4, 2, 37.0, 27.0, 25.0]
+    assert record["tasks"] == [
+        {"log": f"00{k}.csv", "key": task.key, **effort._asdict()}
+        for k, task, effort in zip((0, 1), (first, second), efforts, strict=True)
+    ]

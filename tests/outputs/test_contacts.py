@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from contact_rows import contact, contact_list
 
-from vftcli.contacts.contact_list import CarriedLoad, Unexplained
+from vftcli.contacts.contact_list import SURE_NATS, CarriedLoad, Unexplained
 from vftcli.outputs.contacts import (
     answer,
     contact_grid,
@@ -190,14 +190,57 @@ def test_trust_says_why() -> None:
     sure = contact(
         evidence=400.0, remarks=(), anywhere=(45.0, 60.0), peak_force=50.0, peak_band=5.0
     )
-    assert reason(sure) == "the band is 10% of the force"
-    assert "the place" in reason(replace(sure, anywhere=(20.0, 90.0)))
-    assert "friction" in reason(replace(sure, evidence=14.0))
-    assert "stopped" in reason(
-        replace(sure, remarks=(caution("arm-stopped-abruptly", at_s=3.0),))
+    stopped = (caution("arm-stopped-abruptly", at_s=3.0),)
+    assert [
+        reason(replace(sure, **changed))
+        for changed in (
+            {}, {"anywhere": (20.0, 90.0)}, {"evidence": SURE_NATS}, {"evidence": SURE_NATS - 0.1},
+            {"remarks": stopped}, {"peak_force": None}, {"peak_band": None}, {"is_load": True},
+        )
+    ] == [
+        "the band is 10% of the force",
+        "the band is 10% of the force; the size depends on the place",
+        "the band is 10% of the force",
+        "little evidence: friction explains nearly as much",
+        "the arm stopped abruptly at 3.00 s; what follows is not counted as contact",
+        "too few joints to know the force",
+        "too few joints to know the force",
+        "lasts for most of the log",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({}, "Nothing above 6 N. Weaker pushes would not show."),
+        ({"contacts": (contact(),)}, "Nothing else above 6 N. Weaker pushes would not show."),
+        ({"contacts": (contact(peak_force=6.0),)}, "Nothing else above 6 N (less at good poses)."),
+        ({"contacts": (contact(is_load=True),)}, ""),
+        ({"smallest_force": None}, ""),
+        ({"smallest_force": np.nan}, ""),
+        ({"smallest_force": np.inf},
+         "A push along one axis may go unseen: the pose hardly shows it."),
+        ({"basis": "whole log"}, "Pushes below 6 N do not show."),
+        ({"basis": "whole log", "contacts": (contact(),)}, "Pushes below 6 N do not show."),
+        ({"candidates": (contact(), contact(number=2))},
+         "Pushes below 6 N do not show. 2 candidates more: --all."),
+    ],
+)  # fmt: skip
+def test_what_can_be_said_of_the_rest(changed: dict[str, object], words: str) -> None:
+    assert otherwise(contact_list(**changed)) == words
+
+
+def test_a_log_without_contacts_says_what_its_free_part_and_candidates_allow() -> None:
+    assert answer(contact_list(false_on_free=2)) == (
+        "No contact stands out from the free part, which itself shows 2: was nobody there?"
     )
-    assert "few joints" in reason(replace(sure, peak_force=None, peak_band=None))
-    assert reason(replace(sure, is_load=True)) == "lasts for most of the log"
+    weak = contact(peak_force=21.0, place_band=None, peak=3.04)
+    unknown = contact(peak_force=None)
+    assert answer(contact_list(candidates=(unknown,))) == "No contact stands out."
+    assert answer(contact_list(candidates=(unknown, weak, contact(peak_force=5.0)))) == (
+        "No contact stands out. Up to 21 N near 3.0 s this model cannot explain: measure your "
+        "friction (vftcli identify)."
+    )
 
 
 def test_a_list_survives_its_record() -> None:

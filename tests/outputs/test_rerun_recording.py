@@ -20,12 +20,15 @@ from vftcli.outputs.rerun_recording import (
     contact_log,
     force_arrow,
     plot_groups,
+    summary,
     tabs_of,
     write_rrd,
 )
+from vftcli.outputs.run_record import all_remarks
 from vftcli.pipeline import AnalysisChoice
 from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice
+from vftcli.signals.external_torque import COVERS
 from vftcli.signals.remarks import Where, caution
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
@@ -87,7 +90,71 @@ def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> No
             "best 95 % lower",
         ]  # fmt: skip
         assert f"/residual/J{j}" in rows
-    assert {"/q", "/dq", "/drive_torque", "/summary", "/errors"} <= set(rows)
+    for entity in ("/q", "/dq", "/drive_torque"):
+        assert column(rows, entity, "SeriesLines:names")[-1] == [f"J{j}" for j in range(1, 7)]
+    assert {"/summary", "/errors"} <= set(rows)
+
+
+def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> None:
+    tabs = {tab.name: tab.plots for tab in tabs_of(touched, FULL)}
+    assert {name: [plot.key for plot in plots] for name, plots in tabs.items()} == {
+        "Contacts": ["/force"],
+        "Joint torques": [f"/tau_ext/J{j}" for j in range(1, 7)],
+        "Residual": [f"/residual/J{j}" for j in range(1, 7)],
+        "Wrench": [f"/wrench/{axis}" for axis in AXES],
+        "Motion": ["/q", "/dq", "/drive_torque"],
+    }
+    assert [(plot.title, plot.units) for plots in tabs.values() for plot in plots[-1:]] == [
+        ("|F| on the robot as at the flange, 95 % band; bars: touched; diamonds: peaks by place; "
+         "green: 6 N, the smallest that is listed", ("N",)),
+        ("J6: External torque on the robot", ("N·m",)),
+        ("J6: estimate − reference", ("N·m",)),
+        ("mz: Wrench in flange axes", ("N·m",)),
+        ("drive torque", ("N·m",)),
+    ]  # fmt: skip
+    (force,), q = tabs["Contacts"], tabs["Motion"][0]
+    np.testing.assert_array_equal(np.hstack([li.values for li in q.series]), touched.recording.q)
+    (best,) = (wrench for wrench in touched.wrenches if wrench.name == "best")
+    lines = {line.name: line.values[:, 0] for line in force.series}
+    names = ["|F|", "95 % upper", "95 % lower", "smallest that is listed", "touched: wrist",
+             "touched: forearm", "peaks"]  # fmt: skip
+    assert list(lines) == names
+    assert best.size_sd is not None
+    np.testing.assert_array_equal(lines["|F|"], best.size)
+    np.testing.assert_array_equal(lines["95 % upper"], best.size + COVERS * best.size_sd)
+    assert np.nanmin(lines["95 % lower"]) >= 0.0
+    t, level = touched.t, -0.06 * max(64.8, np.nanmax(best.size))
+    spans = {"wrist": (1.0, 1.5), "forearm": (2.2, 2.6)}
+    for where, (start, stop) in spans.items():
+        inside = (t >= start) & (t <= stop)
+        expected = np.where(inside, level, np.nan)
+        np.testing.assert_allclose(lines[f"touched: {where}"], expected, rtol=1e-15)
+    peaks = force.series[-1]
+    assert peaks.x is not None
+    assert (peaks.x.tolist(), lines["peaks"].tolist()) == ([1.2, 2.4], [64.8, 64.8])
+
+
+def test_the_summary_says_what_the_log_is_and_what_the_arrow_means(
+    touched: Analysis, without_reference: Analysis
+) -> None:
+    lines = summary(touched).splitlines()
+    assert lines[:3] == [
+        r"# script\>&\_%.csv",
+        "Universal Robots UR5 (CB3), 600 samples in 5.192 s at 125 Hz; format table.",
+        "",
+    ]
+    (arrow,) = (line for line in lines if line.startswith("- **arrow**"))
+    # 65 N are a third of a metre.
+    assert "; 1 m is 200 N. On the wrist it is the force as it runs" in arrow
+    notes = lines[lines.index("## Notes") + 1 : -2]
+    assert len(notes) == len(touched.recording.source.remarks) + len(all_remarks(touched))
+    assert notes[0] == r"- turned the sign of \<b\>one\</b\> (--columns)"
+    assert lines[-1] == f"Log sha256 {'ab' * 32}"
+    bare = replace(without_reference, contacts=None)
+    assert (
+        f"first observer; 1 m is {NEWTON_PER_METRE:g} N; none where the pose leaves it open"
+        in summary(bare)
+    )
 
 
 def test_torques_read_back(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
@@ -222,5 +289,13 @@ def test_a_line_of_the_log_stands_at_the_time_that_it_is_about() -> None:
     lines = contact_log(found)
     assert [line[1] for line in lines] == [1.5, 3.0, 0.0]
     assert [line[0] for line in lines] == ["/contacts/1", "/remarks", "/remarks"]
+    assert lines[0][2] == (
+        "1.50 s: contact 1 begins, for 3.28 s: 65 ± 7 N, +y, down, wrist (good)"
+    )
+    by_joint = contact(number=2, peak_force=None, wrench=None, where="cannot tell", places=(2, 3))
+    assert contact_log(contact_list(by_joint))[0][2] == (
+        "4.60 s: contact 2 begins, for 0.18 s: joint torques 0.0, 1.0, 2.0, 3.0, 4.0, 5.0 N·m, "
+        "link 2 … link 3 (weak)"
+    )
     (nothing,) = contact_log(contact_list(remarks=()))
     assert nothing[:3] == ("/remarks", 0.0, answer(contact_list()))

@@ -1,5 +1,6 @@
 """One screen: facts, answer, bars, table, whether it can be believed, what was written."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,8 +89,6 @@ def test_ascii_terminals_get_ascii(analysis: Analysis) -> None:
 
 
 def test_colours_paint_and_change_no_letter(analysis: Analysis) -> None:
-    import re
-
     painted = log_screen(listed(analysis, 3), Canvas(colour=True))
     assert "\x1b[32m" in painted
     assert re.sub(r"\x1b\[\d+m", "", painted) == log_screen(listed(analysis, 3), Canvas())
@@ -142,26 +141,48 @@ def test_results_made_anyway_say_so(analysis: Analysis) -> None:
 
 
 def named(analysis: Analysis, label: str, as_if, count: int = 1) -> Analysis:  # type: ignore[no-untyped-def]
-    source = replace(analysis.recording.source, label=label, remarks=())
+    source = replace(analysis.recording.source, path=Path(label), label=label, remarks=())
     made: Analysis = as_if(analysis, replace(analysis.recording, source=source))
     return listed(made, count)
+
+
+SEVERAL = """\
+6 logs · ur5 · 1 left out
+
+  log        span  contacts  hardest            else  health
+  log0.csv  5.2 s         0  –                   6 N  △ clock
+  log1.csv  5.2 s         1  90 ± 7 N at 0.2 s   6 N  △ clock
+  log2.csv  5.2 s         2  90 ± 7 N at 0.2 s   6 N  ✗ load
+  log3.csv  5.2 s         3  90 ± 7 N at 0.2 s   6 N  △ clock
+  log4.csv  5.2 s         4  90 ± 7 N at 0.2 s   6 N  △ clock
+  bad.csv                                             ✗ left out
+
+Can it be believed?
+  ✗ log2.csv: load    the arm carries 1.20 ± 0.10 kg unknown to ur5, perhaps a
+                      hand or a gripper
+    vftcli identify log2.csv --method payload --robot ur5 -o loaded.toml
+"""
+CLOCK = """\
+  △ {0}: clock   1 gap, the longest 0.41 s at 3.2 s, nothing repaired
+                      vftcli inspect {0}
+"""
 
 
 def test_several_logs_are_a_line_each_then_the_worst_three(
     without_reference: Analysis, as_if
 ) -> None:  # type: ignore[no-untyped-def]
-    logs = [named(without_reference, f"log{k}.csv", as_if, k) for k in range(4)]
+    logs = [named(without_reference, f"log{k}.csv", as_if, k) for k in range(5)]
     load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
     (own, *_) = without_reference.examinations
     logs[2] = replace(logs[2], examinations=(replace(own, findings=(load,)),))
-    text = logs_screen(logs, CANVAS, {"bad.csv": "not recognised"})
-    lines = text.splitlines()
-    assert lines[0] == "5 logs · ur5 · 1 left out"
-    assert lines[2].split() == ["log", "span", "contacts", "hardest", "else", "health"]
-    assert lines[5].endswith("✗ load")
-    assert lines[7].split() == ["bad.csv", "✗", "left", "out"]
-    believed = text.partition("Can it be believed?")[2]
-    assert believed.strip().startswith("✗ log2.csv: load")
+    failed = {"bad.csv": "not recognised"}
+    text = SEVERAL + "".join(CLOCK.format(f"log{k}.csv") for k in (0, 1))
+    assert logs_screen(logs, CANVAS, failed) == f"{text}  and 3 more: --details\n"
+    text += "".join(CLOCK.format(f"log{k}.csv") for k in (2, 3, 4))
+    assert logs_screen(logs, CANVAS, failed, every=True) == text
+    three = logs_screen([logs[k] for k in (0, 1, 3)], CANVAS, {})
+    assert three.startswith("3 logs · ur5\n")
+    assert three.endswith(CLOCK.format("log3.csv"))
 
 
 def test_where_room_is_short_good_grounds_share_a_line() -> None:
@@ -173,15 +194,23 @@ def test_where_room_is_short_good_grounds_share_a_line() -> None:
 
 def test_a_hundred_logs_are_one_screen(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
     logs = [named(without_reference, f"log{k}.csv", as_if) for k in range(100)]
-    text = logs_screen(logs, CANVAS, {})
-    assert len(text.splitlines()) <= MOST_LINES - FILE_LINES
-    assert "of 100; --details shows all" in text
+    lines = logs_screen(logs, CANVAS, {}).splitlines()
+    assert len(lines) == 33 <= MOST_LINES - FILE_LINES
+    assert lines[:2] == ["100 logs · ur5", ""]
+    assert [line.split()[0] for line in lines[3:23]] == [f"log{k}.csv" for k in range(20)]
+    assert lines[23:26] == ["  the 20 worst and hardest of 100; --details shows all", "",
+                            "Can it be believed?"]  # fmt: skip
+    assert lines[-1] == "  and 97 more: --details"
+    lines = logs_screen(logs[:20], CANVAS, {}).splitlines()
+    assert lines[23:25] == ["", "Can it be believed?"]
 
 
 def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis: Analysis) -> None:
-    text = logs_screen([listed(analysis, 1), listed(analysis, 1)], CANVAS, {})
-    assert "error" in text
-    assert "N·m" in text
+    lines = logs_screen([listed(analysis, 1), listed(analysis, 1)], CANVAS, {}).splitlines()
+    (block,) = blocks(analysis.errors)
+    least = next(iter(block.means.errors.values()))
+    assert lines[2].split()[-2:] == ["error", "health"]
+    assert f" 6 N  {least:.1f} N·m  △ " in lines[3]
 
 
 def test_columns_stay_columns_in_ascii(analysis: Analysis) -> None:
@@ -196,20 +225,24 @@ def test_columns_stay_columns_in_ascii(analysis: Analysis) -> None:
 
 def test_the_short_screen_is_facts_and_answer(without_reference: Analysis) -> None:
     made = replace(without_reference, contacts=contact_list(contact(), contact(number=2)))
-    text = short_screen(made, Canvas(width=80))
-    assert len(text.splitlines()) == 2
-    assert "2 contacts" in text
+    head, said = short_screen(made, Canvas(width=80)).splitlines()
+    # The drives carry the model's gravity and noise: what is left is the inertia.
+    assert re.fullmatch(
+        r"script>&_%\.csv · ur5 \(model error 1\d\.\d %\) · 5\.2 s at 125 Hz", head
+    )
+    assert said == "  2 contacts. The hardest, at 4.7 s: 65 ± 7 N on the wrist."
 
 
-def test_only_paths_that_exist_are_printed(tmp_path: Path) -> None:
-    (tmp_path / "run.json").write_text("{}")
-    lines = written_lines(tmp_path, ["index.html", "run.json"], Canvas(width=100))
-    assert "run.json" in "".join(lines)
-    assert "index.html" not in "".join(lines)
-    (tmp_path / "index.html").write_text("")
-    lines = written_lines(tmp_path, ["index.html"], Canvas(width=100), several=True)
-    assert "one folder a log" in " ".join(" ".join(lines).split())  # wherever the line breaks
-    assert any(line.startswith("Open: ") for line in lines)
+def test_only_paths_that_exist_are_printed(tmp_path: Path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    monkeypatch.chdir(tmp_path)
+    Path("run.json").write_text("{}")
+    names, out, wide = ["index.html", "run.json"], Path(), Canvas(width=100)
+    assert written_lines(out, names, wide) == ["./  run.json"]
+    Path("index.html").write_text("")
+    assert written_lines(out, names, wide, several=True) == [
+        "./  index.html  run.json  one folder a log",
+        "Open: index.html        More here: --details",
+    ]
 
 
 def test_a_page_that_this_run_did_not_write_is_not_offered(tmp_path: Path) -> None:

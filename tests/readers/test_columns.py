@@ -64,12 +64,25 @@ def test_time_units(tmp_path: Path, unit: str, factor: float) -> None:
     np.testing.assert_allclose(recording.t, 1000 * factor * np.arange(5), rtol=1e-12)
 
 
-def test_degrees_become_radians(tmp_path: Path) -> None:
-    rows = "\n".join(f"{k / 100},{90 + k},{2 * k}" for k in range(10))
-    recording = read(write(tmp_path / "x", rows + "\n"), columns="t,q[deg],dq[deg/s]")
-    np.testing.assert_allclose(recording.q[:, 0], (90 + np.arange(10)) * DEGREE, rtol=1e-12)
-    assert recording.dq is not None
-    np.testing.assert_allclose(recording.dq[:, 0], 2 * np.arange(10) * DEGREE, rtol=1e-12)
+UNITS = {
+    "q": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "rev": 2 * np.pi},
+    "dq": {"rad/s": 1.0, "rad": 1.0, "deg/s": DEGREE, "deg": DEGREE, "rpm": np.pi / 30},
+    "current": {"A": 1.0, "mA": 1e-3},
+    "tau": {"Nm": 1.0, "N·m": 1.0, "mNm": 1e-3, "Ncm": 1e-2},
+    "temperature": {"C": 1.0, "°C": 1.0, "degC": 1.0},
+}
+UNITS |= {"target_q": UNITS["q"], "target_dq": UNITS["dq"], "target_current": UNITS["current"]}
+UNITS |= dict.fromkeys(("tau+g", "tau_ext", "target_torque"), UNITS["tau"])
+FIELDS = {"tau": "torque", "tau+g": "torque_without_gravity"}
+
+
+@pytest.mark.parametrize(("signal", "unit"), [(s, u) for s, each in UNITS.items() for u in each])
+def test_every_unit_becomes_that_of_the_si(signal: str, unit: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "x", "".join(f"{k / 100},{k / 50},{k / 8}\n" for k in range(10)))
+    columns = f"t,q[{unit}],_" if signal == "q" else f"t,q,{signal}[{unit}]"
+    values = getattr(read(path, columns=columns), FIELDS.get(signal, signal))[:, 0]
+    given = np.arange(10) / (50 if signal == "q" else 8)
+    np.testing.assert_allclose(values, given * UNITS[signal][unit], rtol=1e-12)
 
 
 def test_degrees_without_a_unit_are_refused(tmp_path: Path) -> None:

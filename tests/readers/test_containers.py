@@ -12,7 +12,7 @@ import pytest
 import seed_containers as seeds
 from hypothesis import given
 from hypothesis import strategies as st
-from seed_logs import ROWS, motion
+from seed_logs import ROWS, libfranka_json, motion
 
 from vftcli.readers.hdf5 import numbers_of
 from vftcli.readers.opening import natural, open_log
@@ -97,6 +97,13 @@ def test_panda_py_in_json_is_as_in_npz(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), atol=1e-12)  # ms as float64
     np.testing.assert_array_equal(recording.torque, log["tau"])
     np.testing.assert_array_equal(recording.tau_ext, -log["tau_ext"] + 0.0)  # libfranka's sign
+
+
+def test_lines_without_a_state_are_counted(tmp_path: Path) -> None:
+    path = libfranka_json(tmp_path / "x")  # which ends with "Done."
+    path.write_text(path.read_text() + "Bye.\n")
+    (remark,) = [r for r in read(path).source.remarks if r.code == "lines-skipped"]
+    assert str(remark) == "skipped 2 lines that hold no state"
 
 
 def test_json_takes_columns(tmp_path: Path) -> None:

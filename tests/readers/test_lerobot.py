@@ -93,6 +93,7 @@ def test_an_episode_is_its_rows(version: int, episode: int, tmp_path: Path) -> N
     np.testing.assert_array_equal(recording.t, np.arange(ROWS[episode]) * (1 / FPS))
     assert recording.joint_names == tuple(JOINTS)
     assert (recording.robot_hint, recording.source.remarks) == ("fr3", ())
+    assert recording.source.clock == "column frame_index at 25 Hz"
 
 
 def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
@@ -218,3 +219,14 @@ def test_a_damaged_description_is_refused(text: str, tmp_path: Path) -> None:
     (path / "meta" / "info.json").write_text(text, encoding="latin-1")
     with pytest.raises(LogError, match="not a readable description"):
         read(path)
+
+
+def test_a_description_beyond_64_mebibytes_is_refused_unread(tmp_path: Path) -> None:
+    path = dataset(tmp_path, version=2) / "meta" / "info.json"
+    text = path.read_bytes()
+    path.write_bytes(text.ljust(1 << 20))
+    assert read(tmp_path, episode=0).samples == 30
+    with path.open("r+b") as file:
+        file.truncate((64 << 20) + 1)  # a hole, no bytes
+    with pytest.raises(LogError, match=r"info\.json: larger than 64 MiB; no description is\.$"):
+        read(tmp_path)

@@ -41,6 +41,17 @@ def test_every_separator_reads_the_same(tmp_path: Path, separator: str) -> None:
     assert read(write(tmp_path / "x", text)).joints == 2
 
 
+def test_rows_longer_than_the_names_are_counted_by_the_separator_of_the_names(
+    tmp_path: Path,
+) -> None:
+    for separator in (",", " "):
+        text = table([f"{row},7" for row in rows()]).replace(",", separator)
+        with pytest.raises(LogError, match="row 1 has 4 cells, the first line 3"):
+            read(write(tmp_path / "x", text))
+    with pytest.raises(LogError, match="row 1 has 3 cells, the first line 2"):
+        read(write(tmp_path / "x", "t q1\n0 0.1 0.2\n1 0.1 0.2\n"))
+
+
 def test_decimal_commas_between_semicolons(tmp_path: Path) -> None:
     text = table(rows()).replace(",", ";").replace(".", ",")
     recording = read(write(tmp_path / "x", text))

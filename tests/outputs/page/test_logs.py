@@ -37,12 +37,13 @@ def test_the_index_links_every_report(pushed: Analysis, without_reference: Analy
     assert 'href="%22%3E%3Cscript%3E/index.html"' in html
     assert '"><script>/' not in html
     assert "RMSE in N·m" in html
+    assert "2 logs · Universal Robots UR5 (CB3)</p>" in html
 
 
 def test_a_log_that_is_left_out_is_named(pushed: Analysis) -> None:
     html = render_index([("a", pushed)], {"<bad>.csv": "no log"})
     assert "✗ &lt;bad&gt;.csv is left out: no log" in html
-    assert "2 logs" in html
+    assert ">2 logs · Universal Robots UR5 (CB3)<" in html
 
 
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
@@ -94,13 +95,22 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
 def test_one_line_a_log_the_worst_first_and_what_failed() -> None:
     failures = pl.DataFrame([("c.csv", "reading", "LogError", "empty")], FAILURES, orient="row")
     rows = table(SOUND | FORCE, SOUND | FORCE | {"joint": 2, "rmse_Nm": 0.75}, BAD)
-    page = render_batch(list(batch_lines(rows, {"a.csv": "logs/a 1/index.html"})), failures)
+    lines = list(batch_lines(rows, {"a.csv": "logs/a 1/index.html"}))
+    sound, bad = ("a.csv", "ur5", 20.0), ("b<i>.csv", "ur5", 20.0)
+    # The mean of both joints, and the force rounded.
+    assert lines == [
+        (*sound, "2", "80 ± 6 N at 11.3 s", 80.4, None, "good", "sound", "logs/a 1/index.html",
+         "0.500 N·m (gmo)"),
+        (*bad, "0", "–", 0.0, None, "bad", "effort: turned", "", "–"),
+    ]  # fmt: skip
+    wide = FORCE | {"hardest_band_N": 80.4, "load": True, "log": "d.csv", "detectable_N": 4.0}
+    (load,) = batch_lines(table(SOUND | wide), {})
+    assert load[3:7] == ("load", "unknown (80 ± 80 N at 11.3 s)", 80.4, 4.0)
+    page = render_batch(lines, failures)
     assert page.index("b&lt;i&gt;.csv") < page.index(">a.csv<")
     assert 'href="logs/a%201/index.html"' in page
-    # The mean of both joints, and the force rounded.
-    assert "0.500 N·m (gmo)" in page
-    assert "80 ± 6 N at 11.3 s" in page
     assert "2 logs, 1 of 2 touched." in page
+    assert ">3 logs · ur5<" in page
     assert "1 log could not be analysed." in page
     assert "LogError" in page
     assert "ariaSort" in page
