@@ -409,7 +409,6 @@ WITHOUT_ROW = {
     "no-robot-fits-any": OWN_ARM,
     "no-robot-fits-at-rest": OWN_ARM,
     "payload-mismatch": "the controller's payload stays wrong in the log; the estimate is mended",
-    "payload-mismatch-untold": "as payload-mismatch",
     "print-kalman-density": PRINT,
     "print-noise-floor": PRINT,
     "sign-turned": NAMED,

@@ -132,6 +132,20 @@ def test_a_light_load_is_reported_where_it_is_a_good_part_of_the_misfit(
     assert codes(arm_findings(replace(log, current=current), UR10E)) == expected
 
 
+@pytest.mark.parametrize("declared", [None, 0.0])
+@pytest.mark.parametrize(("arm", "held", "mounted"), [("ur5", 0.0, 0.8), ("panda", 1.0, 2.8)])
+def test_a_mounted_payload_that_the_arm_does_not_carry_is_reported(
+    declared: float | None, arm: str, held: float, mounted: float
+) -> None:
+    """Neither as a factor of the drives nor as another arm, both of which explain it too."""
+    log = replace(moving(arm, load=held), payload_mass=declared)
+    finding = only(log, carrying(load_robot(arm), mounted))
+    assert (finding.code, finding.values["mounted_kg"]) == ("payload-not-carried", mounted)
+    # 10 % of what is missing, as above
+    assert finding.values["carried_kg"] == pytest.approx(held, abs=0.1 * (mounted - held))
+    assert "kg less (" in str(arm_findings(log, carrying(load_robot(arm), mounted)).robots[0])
+
+
 def test_a_declared_payload_that_is_not_mounted_is_reported_once() -> None:
     log = replace(moving(load=2.8), payload_mass=2.8)
     finding = only(log, UR10E)

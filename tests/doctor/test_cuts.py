@@ -10,7 +10,6 @@ import pytest
 from sound_logs import LOGS, recording_of, robot_of
 
 from vftcli.doctor import Examiner, examine
-from vftcli.doctor.fit import profiles
 from vftcli.notebook import contacts
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read
@@ -179,7 +178,7 @@ def test_nothing_is_cut_out_of_a_sound_log(logs: Path, log: Any) -> None:
     if log.robot.startswith("..") and not (logs / log.robot).is_file():
         pytest.skip("the folder of robots is not beside VFT_LOGS")
     recording = recording_of(log, logs)
-    robot = robot_of(log, logs) or profiles()["panda" if recording.joints == 7 else "ur5"]
+    robot = robot_of(log, logs) or load_robot("panda" if recording.joints == 7 else "ur5")
     middle = 0.5 * float(recording.t[0] + recording.t[-1])
     halves = recording.between(0.0, middle), recording.between(middle, float(recording.t[-1]))
     for part in (recording, *halves):

@@ -76,7 +76,10 @@ def test_a_load_is_found_where_the_poses_tell_it() -> None:
     found = match_of(moving("ur10e", load=3.0), load_robot("ur10e"))
     assert found is not None
     assert found.load == pytest.approx(3.0, rel=0.1)
-    assert str(found).startswith(f"ur10e {100 * found.misfit:.3g} % with 3")
+    assert (
+        str(found)
+        == f"ur10e with {found.load:.1f} kg ({100 * found.misfit:.1f} %) by measured effort"
+    )
     heavy = match_of(moving("ur10e", load=14.0), load_robot("ur10e"))
     assert heavy is not None
     assert heavy.load == 0.0

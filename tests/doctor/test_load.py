@@ -52,10 +52,10 @@ def test_the_numbers_of_a_mismatch() -> None:
     assert still.target_current is not None
     still = replace(still, current=2.0 + np.array([0, 1.0, -2.0, 0.1, 0, 0]) + 0 * still.q)
     still = replace(still, target_current=still.target_current + 2.0)
-    (untold,) = payload_mismatch(still, TEN)
-    assert (untold.code, untold.level) == ("payload-mismatch-untold", "warning")
-    assert untold.where.joints == (2, 3)
-    assert dict(untold.values) == {
+    (unstated,) = payload_mismatch(still, TEN)
+    assert (unstated.code, unstated.level) == ("payload-mismatch", "warning")
+    assert unstated.where.joints == (2, 3)
+    assert dict(unstated.values) == {
         "carried_A": pytest.approx([3.0, 0.0]),
         "expected_A": pytest.approx([2.0, 2.0]),
         "extra_Nm": pytest.approx([10.0, -20.0]),

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.windows import Case, Terms, Windows, solve, spread, up_axes, windows_of
+from vftcli.doctor.windows import LESS, Case, Terms, Windows, solve, spread, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
 from vftcli.robots.terms import effort_name
@@ -275,8 +275,9 @@ def scaled(case: Case) -> Iterator[Cause]:
     n, needed, friction = len(case.constant), case.needed[:, :, None], case.windows.friction
     fit = solve(case.given, Terms(needed), friction)
     factor, sd = fit.values[0], fit.sd[0]
-    # No load lightens an arm; a heavy one explains a factor above 1 too.
-    worth = CLEARER if case.loaded.values[0] > 0 else 1 / CLEARER
+    # A load explains a factor, too: above 1 a heavy one, below 1 one that only the robot
+    # file mounts.
+    worth = CLEARER if case.loaded.values[0] > LESS * case.mounted else 1 / CLEARER
     sure = abs(factor - 1) > OFF + SURE * sd and LEAST < factor < MOST
     if sure and worth * fit.size <= case.loaded.size:
         # The rest is relative to the effort as logged.

@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 
 from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.cuts import cut_findings, without_bad_samples
-from vftcli.doctor.fit import RobotMatch, arm_findings, guess_robot, profiles
+from vftcli.doctor.fit import RobotMatch, arm_findings, guess_robot
 from vftcli.doctor.lateness import LAGLESS, effort_lag
 from vftcli.doctor.load import controller_findings, temperature_findings
 from vftcli.doctor.signals import efforts_of, signal_findings, stuck_findings, unusable_findings
 from vftcli.doctor.velocity import clock_findings, velocity_findings, velocity_fit
 from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
+from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Runs, paired, unwound
@@ -124,7 +125,7 @@ def examine(
     by_arm, fits = arm_findings(part, robot, by_signal)
     best = robot
     if best is None and fits and fits[0].fits:
-        best = profiles()[fits[0].robot]
+        best = load_robot(fits[0].robot)
     if any(finding.code in SIZED for finding in by_arm):
         by_signal = [f for f in by_signal if f.code != "milliamperes"]
     findings = [*cut_findings(recording), *by_signal, *controller_findings(part, best), *by_arm]
@@ -276,7 +277,8 @@ class FindingWords(NamedTuple):
     """Text of a finding."""
 
     name: str  #: Short name; variants of one finding share it.
-    severity: str  #: A note informs; a warning can make results wrong and fails ``--strict``.
+    #: A note informs; a warning can make results wrong and fails ``--strict``.
+    severity: str
     evidence: str  #: What was seen, with numbers.
     consequence: str  #: What it does to the results.
     remedy: str  #: What to do about it.

@@ -23,7 +23,7 @@ from vftcli.doctor.causes import (
     is_modelled,
 )
 from vftcli.doctor.lateness import MISTIMED
-from vftcli.doctor.load import declared_payload, load_remarks
+from vftcli.doctor.load import load_remarks
 from vftcli.doctor.signals import efforts_of, inverted_effort
 from vftcli.doctor.windows import Case, Windows, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
@@ -57,8 +57,10 @@ MAKER, RESIDUAL, MEASURED = (
 NO_FIT = 0.35
 DOUBTFUL = 0.15  #: Misfit from which other arms are compared.
 ANOTHER = 0.6  #: Share of the misfit that another profile may leave to be the log's own.
-GENERATION = 1.5  #: A load from which another generation of the arm is looked at first. [kg]
-MISTAKEN = 0.1  #: Misfit up to which a cause is believed where nobody said which arm it is.
+#: A load from which another generation of the arm is looked at first. [kg]
+GENERATION = 1.5
+#: Misfit up to which a cause is believed where nobody said which arm it is.
+MISTAKEN = 0.1
 #: Share of what one sign leaves that the other may leave at most to be the right one.
 CLEARLY = 0.6
 #: Size of the vendor's torque, relative to the effort, from which it tells its sign.
@@ -74,22 +76,20 @@ class RobotMatch(NamedTuple):
     misfit: float  #: Share of the torques that it cannot explain; 0 is perfect.
     fits: bool  #: Whether that is as good as the kind of evidence allows.
     evidence: str  #: The torque that was explained, in words.
-    load: float  #: Mass of the unknown load that was fitted, 0 if none. [kg]
+    load: float  #: Mass fitted beyond the mounted payload, 0 if none. [kg]
     #: Whether the maker's own model was explained rather than a measured effort.
     by_maker: bool = False
 
     def __str__(self) -> str:
-        """The fit in a few words."""
-        load = f" with {self.load:.2g} kg on the flange" if self.load else ""
-        return f"{self.robot} {100 * self.misfit:.3g} %{load} ({self.evidence})"
+        """The fit and its evidence."""
+        return f"{self.in_short} by {self.evidence}"
 
     @property
     def in_short(self) -> str:
         """Its name and model error, as ``ur10 with 0.19 kg (0.50 %)``."""
-        load = f" with {self.load:.2g} kg" if self.load else ""
-        percent = f"{100 * self.misfit:{'.0f' if self.misfit > 0.1 else '#.2g'}}".removesuffix(
-            "."
-        )
+        less = " less" if self.load < 0 else ""
+        load = f" with {abs(self.load):.2g} kg{less}" if self.load else ""
+        percent = f"{100 * self.misfit:{'.0f' if self.misfit > 0.1 else '#.2g'}}".rstrip(".")
         return f"{self.robot}{load} ({percent} %)"
 
 
@@ -100,17 +100,12 @@ class ArmFindings(NamedTuple):
     robots: tuple[RobotMatch, ...] = ()  #: The arms that were compared, best fit first.
 
 
-def profiles() -> dict[str, Robot]:
-    """The built-in profiles by name."""
-    return {name: load_robot(name) for name in PROFILES}
-
-
 def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMatch, ...]]:
     """Profile of a log if the maker's own model settles it, and all fits.
 
     A measured effort settles nothing: friction and loads leave too much open.
     """
-    fits = ranking(recording, profiles().values())
+    fits = ranking(recording, map(load_robot, PROFILES))
     if not fits or not fits[0].by_maker or fits[0].misfit > GUESSED:
         return None, fits
     close = any(fit.misfit < APART * fits[0].misfit for fit in fits[1:2])
@@ -206,7 +201,7 @@ def arm_findings(
     heavy = case.carries_load and case.loaded.values[0] > GENERATION
     refuted = cause is not None and cause.code != "effort-offset"
     if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
-        arms = (other for other in profiles().values() if other.path != robot.path)
+        arms = (other for other in map(load_robot, PROFILES) if other.path != robot.path)
         others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
         # The profile of the same name fits best: the file is rough, the arm is right.
         if others and others[0].robot != robot.name and is_rather(others[0], own, diagnosis):
@@ -237,7 +232,7 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
 def explained(diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Remark]:
     """Findings on the cause, or on none; then on the log once it is put right."""
     healed, cause = diagnosis.healed, diagnosis.cause
-    recording, robot = healed.windows.recording, healed.windows.robot
+    robot = healed.windows.robot
     misfit = 100 * diagnosis.case.misfit
     if cause is None and is_modelled(healed):
         yield warning("no-friction-in-effort", robot=robot.name)
@@ -246,7 +241,7 @@ def explained(diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Re
         yield cause_remark(diagnosis, cause)
     elif healed.gravity_range < RANGE:
         yield fact("effort-unchecked", range_Nm=healed.gravity_range, least_Nm=RANGE)
-        yield from declared_payload(recording, robot)
+        yield from load_remarks(healed)
         return
     elif healed.misfit > NO_FIT:
         ranked = "; ".join(map(str, robots))
@@ -257,24 +252,22 @@ def explained(diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Re
         yield warning(
             "effort-unclear", other=other.code, misfit_percent=misfit, other_percent=left
         )
-    yield from declared_payload(recording, robot)
     yield from load_remarks(healed)
     yield from vendor_sign(healed)
 
 
 def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
     """Findings on a log of an unknown arm: by the profile that fits, or why none does."""
-    robots = profiles()
-    fits = ranking(recording, robots.values())
+    fits = ranking(recording, map(load_robot, PROFILES))
     if not fits:
-        counts = sorted({robot.joints for robot in robots.values()})
+        counts = sorted({load_robot(name).joints for name in PROFILES})
         if recording.joints in counts:
             return ArmFindings()
         return ArmFindings((warning("no-profile", joint_count=recording.joints, counts=counts),))
     # A maker's own model that fits no profile is of another arm.
     is_known = fits[0].fits
     tried = fits[:1] if is_known else [fit for fit in fits if not fit.by_maker]
-    each = (diagnose(recording, robots[fit.robot], ignored) for fit in tried)
+    each = (diagnose(recording, load_robot(fit.robot), ignored) for fit in tried)
     found = [
         one
         for one in filter(None, each)

@@ -16,7 +16,8 @@ from vftcli.signals.remarks import Remark, caution, fact, on_joints, warning
 from vftcli.signals.rest import COMMANDED, MOVES, slower
 
 MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly explains. [N·m]
-USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives lie. [N·m/A]
+#: Torque per current near which every UR's large drives lie. [N·m/A]
+USUAL_CONSTANT = 10.0
 #: Torque per current of UR's five joint sizes, e-Series and CB3, by the controllers'
 #: own tables. [N·m/A]
 JOINT_CONSTANTS = np.array(
@@ -28,7 +29,7 @@ SAME = 0.02  #: Constants of one joint size scatter by this much from firmware t
 #: Drive constants that are 3 % off look like .3 kg on a UR10e; hands weigh .5–1.1 kg.
 #: [kg]
 HAND, LOAD = 0.4, 1.2
-SURE = 4.0  #: Standard deviations that a load has to be.
+SURE = 4.0  #: Standard deviations by the scatter that a load has to be.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
 #: Share of the misfit that a load which changes may leave, and by how much it must
 #: [-, kg].
@@ -38,7 +39,8 @@ CHANGED, CHANGE = 0.6, 0.7
 #: Share that a change in the middle must leave for others to be tried, and the shares of
 #: the log between which they are: pushes last less than a third.
 HALVES, BETWEEN = 0.9, (1 / 3, 2 / 3)
-DECLARED = 0.1  #: A declared payload, or a difference from the mounted one, that is none. [kg]
+#: A declared payload, or a difference from the mounted one, that is none. [kg]
+DECLARED = 0.1
 #: Relative difference between the log's drive constants and the profile's in a finding.
 RATIO = 0.05
 
@@ -73,33 +75,42 @@ def resting(recording: Recording) -> Mask:
 
 
 def load_remarks(case: Case) -> Iterator[Remark]:
-    """A load that the drives carry and neither the robot file nor the log knows of."""
+    """A load declared but not mounted; carried but not stated; or mounted but not carried."""
     recording, robot = case.windows.recording, case.windows.robot
+    declared = recording.payload_mass or 0.0
+    missing = declared - case.mounted
+    if declared < DECLARED or abs(missing) < max(DECLARED, 0.1 * declared):
+        missing = 0.0
+    else:
+        both = {"declared_kg": declared, "mounted_kg": case.mounted}
+        yield warning("payload-not-mounted", **both)
     if (changed := load_change(case)) is not None:
         yield changed
         return
     mass, sd = case.loaded.values[0], case.loaded.sd[0]
-    carried = case.windows.load.columns @ case.loaded.values[:4]
-    if (
-        not case.carries_load
-        or mass < max(HAND, SURE * sd)
-        or not case.lasts(case.loaded, carried)
-    ):
+    if not case.carries_load or abs(mass) < max(HAND, SURE * sd):
         return
-    missing = missing_payload(recording, robot)
+    carried = case.windows.load.columns @ case.loaded.values[:4]
+    if not case.lasts(case.loaded, carried):
+        return
     if missing and abs(mass - missing) < DECLARED + 0.3 * abs(missing):
         return
     share = case.loaded.size / case.bare.size
-    heavy = mass > LOAD and share < EXPLAINED
-    if heavy or share < PARTLY:
-        yield (warning if heavy else caution)(
-            "unmodelled-load" if heavy else "light-load",
-            load_kg=mass,
-            sd_kg=np.hypot(sd, gain_sd(recording, robot) * mass),
-            robot=robot.name,
-            bare_percent=100 * case.bare.size / case.size,
-            loaded_percent=100 * case.loaded.size / case.size,
-        )
+    heavy = abs(mass) > LOAD and share < EXPLAINED
+    if not heavy and share >= PARTLY:
+        return
+    values = {
+        "sd_kg": np.hypot(case.load_sd, gain_sd(recording, robot) * mass),
+        "robot": robot.name,
+        "bare_percent": 100 * case.bare.size / case.size,
+        "loaded_percent": 100 * case.loaded.size / case.size,
+    }
+    level = warning if heavy else caution
+    if mass < 0:
+        values |= {"mounted_kg": case.mounted, "carried_kg": max(case.mounted + mass, 0.0)}
+        yield level("payload-not-carried", **values)
+    else:
+        yield level("unmodelled-load" if heavy else "light-load", load_kg=mass, **values)
 
 
 def load_change(case: Case) -> Remark | None:
@@ -126,21 +137,6 @@ def load_change(case: Case) -> Remark | None:
         return None
     at = case.windows.t[split, 0]
     return warning("load-changes", first_kg=before, last_kg=after, sd_kg=sd, at_s=at)
-
-
-def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
-    """A payload that the log declares and the robot does not carry."""
-    if missing := missing_payload(recording, robot):
-        declared = recording.payload_mass or 0.0
-        yield warning("payload-not-mounted", declared_kg=declared, mounted_kg=declared - missing)
-
-
-def missing_payload(recording: Recording, robot: Robot) -> float:
-    """Payload declared beyond the mounted one, 0 where the log declares none. [kg]"""
-    declared = recording.payload_mass or 0.0
-    missing = declared - (0.0 if robot.payload is None else robot.payload.mass)
-    slight = declared < DECLARED or abs(missing) < max(DECLARED, 0.1 * declared)
-    return 0.0 if slight else missing
 
 
 def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[Remark]:
@@ -183,7 +179,7 @@ def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]
     if heavy.size < 2:
         return
     yield warning(
-        "payload-mismatch" if recording.payload_mass is not None else "payload-mismatch-untold",
+        "payload-mismatch",
         on_joints(heavy),
         carried_A=carried[heavy],
         expected_A=wanted[heavy],

@@ -26,7 +26,8 @@ from vftcli.signals.recording import Recording
 WINDOW, WINDOWS = 0.3, 200  #: Length of a window [s], and how many are looked at at most.
 #: Instants of a window at which the model is asked: 50 ms apart nothing of it is missed.
 POINTS = 7
-GRAVITY = [0, 3, 6]  #: Those of them at which gravity is asked: between them it bends little.
+#: Those of them at which gravity is asked: between them it bends little.
+GRAVITY = [0, 3, 6]
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
 FAST = 0.8  #: Mean direction of a window in which a joint moves.
@@ -40,7 +41,8 @@ ROUGH = 0.1, 0.025
 TIGHTER, ROUGH_FITS = 0.5, 8
 LIGHT = 0.1  #: Links below are as rough as one of this mass. [kg]
 KEPT = (
-    0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
+    #: Share of the windows that a fit is made from and judged by: the rest may be contact.
+    0.7
 )
 ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
 OVERLAP = 2.0  #: Windows that overlap by half count half.
@@ -252,7 +254,9 @@ def up_axes(gravity: Array) -> Array:
 
 
 MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are no loads but another arm. [kg, m]
-TELLING = 0.9  #: Share of the misfit that a load must leave at most, or it only adds freedom.
+LESS = -1.2  #: Share of the mounted payload of which a fit may take away at most. [-]
+#: Share of the misfit that a load must leave at most, or it only adds freedom.
+TELLING = 0.9
 #: Range of gravity's torque, relative to the effort, from which the poses tell a load.
 VARIED = 0.3
 #: A cause shows in a window where it makes this many times what the fit leaves over; it
@@ -305,12 +309,29 @@ class Case:
         return fit
 
     @property
+    def load_sd(self) -> float:
+        """Standard deviation of a load's mass. [kg]
+
+        By the scatter, and by how far errors of the links move it.
+        """
+        moved = self.rough.values[self.windows.weights.columns.shape[2]] - self.loaded.values[0]
+        return float(np.hypot(self.loaded.sd[0], moved))
+
+    @property
+    def mounted(self) -> float:
+        """Mass of the payload in the robot file, 0 without one. [kg]"""
+        payload = self.windows.robot.payload
+        return 0.0 if payload is None else payload.mass
+
+    @property
     def carries_load(self) -> bool:
-        """Whether a load explains a part of what friction leaves."""
+        """Whether a load beyond the mounted one explains a part of what friction leaves."""
         mass, moment = self.loaded.values[0], self.loaded.values[1:4]
         if self.gravity_range < VARIED * self.size:
             return False  # in one pose any residual passes for a load
-        plausible = 0.05 < mass < MAX_MASS and np.linalg.norm(moment) < MAX_ARM * mass + 0.3
+        # Less than nothing hangs on no flange: a negative load takes away what is mounted.
+        possible = 0.05 < mass < MAX_MASS or LESS * self.mounted < mass < -0.05
+        plausible = possible and np.linalg.norm(moment) < MAX_ARM * abs(mass) + 0.3
         return plausible and self.loaded.size < TELLING * self.bare.size
 
     @property

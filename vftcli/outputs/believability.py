@@ -28,8 +28,8 @@ from vftcli.signals.rest import slower
 
 #: Subject → the findings that are about it; any other is about the drives' effort.
 SUBJECTS = {
-    "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-mismatch-untold",
-             "payload-not-mounted", "load-changes"),
+    "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-not-mounted",
+             "payload-not-carried", "load-changes"),
     "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest",
               "no-profile"),
     "time stamps": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps",
@@ -46,9 +46,7 @@ SUBJECTS = {
     "vendor's torque": ("vendor-sign", "zero-tau-ext"),
 }  # fmt: skip
 #: Findings that ``identify --method payload`` answers.
-LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | {
-    "contact-is-load"
-}
+LOADS = frozenset({*SUBJECTS["load"][:3], "contact-is-load"})
 
 
 #: What the remarks of a list of contacts are about.

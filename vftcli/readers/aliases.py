@@ -24,7 +24,8 @@ from vftcli.signals.parsing import tables_beside
 from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
-TABLE = FORMATS["table"]  #: The layout of no program: its columns are known by their names.
+#: The layout of no program: its columns are known by their names.
+TABLE = FORMATS["table"]
 #: Names of the clock; a unit may follow, as in time_ms.
 CLOCKS = (
     "t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds",

@@ -35,7 +35,8 @@ from vftcli.readers.tables import UR, ArrayTable, from_table
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import fact
 
-RESAVE = ". Save it with np.save or np.savez."  #: What to do where NumPy cannot read an array.
+#: What to do where NumPy cannot read an array.
+RESAVE = ". Save it with np.save or np.savez."
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
 
 
@@ -94,13 +95,13 @@ def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes =
     """Read named arrays as panda-py's log, by --columns, or by alias; or the rows of one."""
     named = isinstance(log, dict)
     arrays = _arrays_of(file, log if named else {"rows": log})
-    if not named and (arrays["rows"].ndim != 2 or not arrays["rows"].size):
-        raise NoLogError(
-            f"{file.path}: an array of shape {arrays['rows'].shape}; a log is a matrix, a row a "
-            "sample."
-        )
     if not named:
-        columns = {str(k): column for k, column in enumerate(arrays["rows"].T)}
+        rows = arrays["rows"]
+        if rows.ndim != 2 or not rows.size:
+            raise NoLogError(
+                f"{file.path}: an array of shape {rows.shape}; a log is a matrix, a row a sample."
+            )
+        columns = {str(k): column for k, column in enumerate(rows.T)}
         return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
     # Rows of matrices become flat.
     shaped = {
@@ -112,9 +113,9 @@ def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes =
             f"{file.path}: its arrays have names ({', '.join(list(arrays)[:20])}); --columns must "
             "name them, as in t[ms]=time,q=q,tau=tau_J."
         )
-    panda = {"q", "time"} <= set(shaped) and {"tau_J", "O_T_EE", "dq"} & set(shaped)
-    known = panda and request.columns is None
-    return from_table(table, request, FORMATS["npz" if known else "table"])
+    panda = {"q", "time"} <= shaped.keys() and {"tau_J", "O_T_EE", "dq"} & shaped.keys()
+    layout = FORMATS["npz" if panda and request.columns is None else "table"]
+    return from_table(table, request, layout)
 
 
 def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:

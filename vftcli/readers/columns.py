@@ -62,7 +62,8 @@ class Item(NamedTuple):
 
     #: A key of SIGNALS, `t`, or `_`; of cells found without a text also their field.
     signal: str
-    factor: float = 1.0  #: What a value is multiplied with to be in SI units and in our sign.
+    #: What a value is multiplied with to be in SI units and in our sign.
+    factor: float = 1.0
     unit: str | None = None  #: The unit as written, or None; of a wrench its frame.
     #: Columns in a row that it covers, in a headerless table; 0 for all others.
     width: int = 1

@@ -258,7 +258,8 @@ def _numbers(series: Series, path: Path) -> Column:
     return values
 
 
-STAMP = ("sec", "nanosec", "frame_id")  #: Columns before the names of ros2 topic echo --csv.
+#: Columns before the names of ros2 topic echo --csv.
+STAMP = ("sec", "nanosec", "frame_id")
 
 
 class EchoTable(TextTable):

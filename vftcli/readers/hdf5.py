@@ -29,7 +29,7 @@ from vftcli.readers.opening import (
 )
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import FORMATS, LogFormat
-from vftcli.readers.table import Blocks, Names, Places, listed
+from vftcli.readers.table import Blocks, Places, listed
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
@@ -226,20 +226,16 @@ def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
 LAYOUTS = {ALOHA: read_aloha, f"{DROID_STATE}joint_positions": read_droid}
 
 
-def groups_of(names: Sequence[str], anchor: str) -> Names:
-    """The groups of a layout's episodes, in their order; none in other files."""
-    ends = [name.removesuffix(anchor) for name in names if f"/{name}".endswith(f"/{anchor}")]
-    return tuple(sorted(ends, key=natural))
-
-
 def layout_of(table: Hdf5Table) -> tuple[str, dict[int, str]]:
     """The layout of a file, and the group of each episode; "" of any other.
 
     An episode has the number that its group's name ends with, or is counted from 0.
     """
-    found = ((x, groups) for x in LAYOUTS if (groups := groups_of(table.names, x)))
-    anchor, groups = next(found, ("", ("",)))
-    return anchor, dict(zip(numbers_of(groups), groups, strict=True))
+    for anchor in LAYOUTS:
+        own = [name for name in table.names if f"/{name}".endswith(f"/{anchor}")]
+        if groups := sorted((name.removesuffix(anchor) for name in own), key=natural):
+            return anchor, dict(zip(numbers_of(groups), groups, strict=True))
+    return "", {0: ""}
 
 
 def numbers_of(groups: Sequence[str]) -> Sequence[int]:

@@ -81,7 +81,8 @@ class LogFile:
     #: The first bytes of the content, unpacked from gzip or zstd; empty for a folder.
     head: bytes = b""
     entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
-    wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.
+    #: What the file is compressed with as a whole, or None.
+    wrapping: Wrapping | None = None
 
     @property
     def is_folder(self) -> bool:

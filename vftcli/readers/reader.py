@@ -31,12 +31,15 @@ class RawLog:
     #: Which of several recordings in the file is wanted, from 1; None for all.
     segment: int | None = None
     signals: (
-        "Mapping[str, Array]"  #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
+        #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
+        "Mapping[str, Array]"
     )
     wrench_frame: "WrenchFrame | None" = None  #: What the log states of its wrench.
     joint_names: tuple[str, ...] = ()  #: The joints' names, base to tip, or empty.
-    robot_hint: str | None = None  #: Name of the profile that the log itself settles, or None.
-    degrees_possible: bool = False  #: Whether nothing says that the positions are in radians.
+    #: Name of the profile that the log itself settles, or None.
+    robot_hint: str | None = None
+    #: Whether nothing says that the positions are in radians.
+    degrees_possible: bool = False
     #: What the reader dropped, turned or derived, and what looks suspicious.
     remarks: "tuple[Remark, ...]" = ()
     payload_mass: float | None = None  #: Mass that the controller counts with. [kg]
@@ -45,7 +48,8 @@ class RawLog:
     #: Which of several recordings in the file this is, as "episode 3"; "" for the only
     #: one.
     part: str = ""
-    files: tuple[Path, ...] = ()  #: The files of a folder that it was read from; () for all.
+    #: The files of a folder that it was read from; () for all.
+    files: tuple[Path, ...] = ()
     #: Which rows of the file these are, counted from 0; None for all. (T,)
     rows: "Indices | None" = None
     #: Rows of the file that were left out because a value is no number.

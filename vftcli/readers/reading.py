@@ -47,7 +47,8 @@ class LogFormat(NamedTuple):
     #: Whether it takes any table, and is asked only if no other format fits.
     general: bool = False
     takes_columns: bool = True  #: Whether the columns may be described by ``--columns``.
-    describes: bool = False  #: Whether it reads ``--columns`` itself where its files are text.
+    #: Whether it reads ``--columns`` itself where its files are text.
+    describes: bool = False
     episodes: bool = False  #: Whether a file may hold several recordings.
     columns: str = ""  #: The columns that its program writes, in the grammar of ``--columns``.
     #: Columns of which the last values are the payload's mass and, if there, its centre

@@ -144,8 +144,8 @@ class Stream:
 
 def runs(stamps: Array | Integers) -> bool:
     """Whether stamps are set and never run back."""
-    good = bool(np.all(np.isfinite(stamps))) and bool(np.all(np.diff(stamps) >= 0))
-    return good and (len(stamps) < 2 or bool(stamps[-1] > stamps[0]))
+    good = np.isfinite(stamps).all() and (np.diff(stamps) >= 0).all()
+    return bool(good and (len(stamps) < 2 or stamps[-1] > stamps[0]))
 
 
 Numbers = Callable[[Sequence[str]], Array]

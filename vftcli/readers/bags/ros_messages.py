@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.bags.container import Bytes, Channel, type_name
-from vftcli.readers.opening import reason_of
+from vftcli.readers.opening import DAMAGE, reason_of
 from vftcli.readers.table import Names
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError, OutputError
@@ -165,14 +165,7 @@ def types_of(definition: str, name: str, *, idl: bool) -> Types:
         raise LayoutError(f"a definition of more than {MAX_DEFINITION >> 10} KiB")
     try:
         parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
-    except (
-        TypesysError,
-        ValueError,
-        KeyError,
-        TypeError,
-        RecursionError,
-        AssertionError,
-    ) as error:
+    except (TypesysError, *DAMAGE, AssertionError) as error:
         raise LayoutError(f"no message definition: {reason_of(error)[:60]}") from None
     return parsed
 

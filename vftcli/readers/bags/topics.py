@@ -81,7 +81,7 @@ class Gathering:
         for signal, value in lead.signals.items():
             if signal != "wrench" and value.shape[1] != lead.width:
                 continue
-            if signal == "wrench" or not np.isnan(value[0]).all() or not np.isnan(value).all():
+            if signal == "wrench" or not np.isnan(value).all():
                 self.signals[signal] = value
             elif signal == "q":
                 raise LogError(
@@ -140,11 +140,10 @@ class Gathering:
         if not np.array_equal(stream.host, lead.host):
             return
         if signal in EFFORTS and lead.kind.names:
+            # /joint_states' effort said the same without its kind.
             for other in set(EFFORTS) & set(self.signals):
                 if all(map(np.array_equal, pieces(self.signals[other]), pieces(value))):
-                    del self.signals[
-                        other
-                    ]  # /joint_states' effort said the same without its kind
+                    del self.signals[other]
         self.signals[signal] = value
 
     def take_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
@@ -202,35 +201,27 @@ class Gathering:
         self.signals[signal] = resample_columns(x, xp, values)
         self.used.add(topic)
         rate, leads = 1e9 / usual, lead.topic
-        self.remarks.append(
-            fact("signal-interpolated", signal=signal, topic=topic, rate_Hz=rate, lead=leads)
-        )
+        said = fact("signal-interpolated", signal=signal, topic=topic, rate_Hz=rate, lead=leads)
+        self.remarks.append(said)
         return True
 
-    def report_left_out(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
+    def report_left_out(self, streams: Sequence[Stream], unread: dict[str, str]) -> None:
         """Remark which messages and topics were left out, those with forces first."""
         lead, topic = self.lead, self.lead.topic
-        for stream in streams:
-            if (stream.channel, stream.names) == (
-                lead.channel,
-                lead.names,
-            ) and stream is not lead:
-                there, count = tuple(stream.signals) or ("names",), stream.messages
-                self.remarks.append(
-                    caution("messages-left-out", messages=count, topic=topic, signals=there)
-                )
+        rest = (s for s in streams if s is not lead and s.channel == lead.channel)
+        for stream in (s for s in rest if s.names == lead.names):
+            there, count = tuple(stream.signals) or ("names",), stream.messages
+            left = caution("messages-left-out", messages=count, topic=topic, signals=there)
+            self.remarks.append(left)
         topics = {s.topic for s in streams if not s.topic.startswith(OWN)}
-        topics |= {t for t, kind in others.items() if FORCES.search(t) or FORCES.search(kind)}
-        left = sorted(topics - {topic} - self.used, key=lambda t: (FORCES.search(t) is None, t))
-        if left:
-            self.remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
+        topics |= {t for t, kind in unread.items() if FORCES.search(t) or FORCES.search(kind)}
+        others = sorted(topics - {topic} - self.used, key=lambda t: (not FORCES.search(t), t))
+        if others:
+            self.remarks.append(fact("topics-left-out", topics=tuple(others[:6])))
 
 
-FIELDS = {
-    "position": "q",
-    "velocity": "dq",
-    "effort": "effort",
-}  #: Field of a JointState → signal.
+#: Field of a JointState → signal.
+FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def same_arm(stream: Stream, lead: Stream) -> bool:
@@ -249,10 +240,8 @@ def leading(
 
     One that --columns names, as in q=TOPIC.position, goes before all others.
     """
-    found = [
-        s for s in streams
-        if "q" in s.signals and s.messages > 1 and not TARGETS.search(s.topic)
-    ]  # fmt: skip
+    measured = (s for s in streams if "q" in s.signals and not TARGETS.search(s.topic))
+    found = [s for s in measured if s.messages > 1]
     found = [s for s in found if s.width > 2] or found
     named = {(i.pattern or "").rpartition(".")[0] for i in request.spec.items if i.signal == "q"}
     found = [s for s in found if s.topic in named] or found
@@ -269,12 +258,8 @@ def leading(
     best = max(near, key=lambda s: (s.kind.franka, "effort" in s.signals, s.messages))
     # A stream of as many joints with other names, of the same type and rate, is another
     # arm.
-    width, joints = best.width, set(best.names)
-    rivals = [
-        s for s in near
-        if s.kind is best.kind and s.names and set(s.names) != joints
-        and s.width == width
-    ]  # fmt: skip
+    like = (s for s in near if s.kind is best.kind and s.names and s.width == best.width)
+    rivals = [s for s in like if set(s.names) != set(best.names)]
     if rivals:
         topics = ", ".join(s.topic for s in (best, *rivals))
         raise LogError(
@@ -327,9 +312,8 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
             text = metadata.read(METADATA_BYTES)
         match = re.search(rb"(?m)^  message_count: (\d{1,15})\s*$", text)
         if match and messages < (counted := int(match[1])):
-            budget.note(
-                warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml")
-            )
+            by = "metadata.yaml"
+            budget.note(warning("messages-missing", kept=messages, counted=counted, by=by))
     if messages == 0:
         why = "; ".join(["no messages in any whole chunk", *map(str, budget.remarks)])
         raise LogError(f"{file.path}: {why}.")
