@@ -9,7 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance.closed_loop import ClosedLoop, OnlineKalman, latencies, run_closed_loop
+from vftcli.admittance.closed_loop import (
+    ClosedLoop,
+    OnlineKalman,
+    latencies,
+    run_closed_loop,
+    steps_in,
+)
 from vftcli.admittance.law import controllers, from_table, parse_settings, variable
 from vftcli.admittance.replay import replay
 from vftcli.observers import KalmanObserver
@@ -167,6 +173,10 @@ def test_a_period_that_the_inner_step_does_not_divide_gets_one_that_does() -> No
 
 def test_a_step_that_divides_the_period_stays(loop: ClosedLoop) -> None:
     assert loop.simulation.scenario.step == 0.001
+    assert [steps_in(interval, 0.002, "") for interval in (0.002, 0.008)] == [1, 4]
+    said = "the control period of 8 ms is no multiple of the inner step of 3 ms"
+    with pytest.raises(ParameterError, match=said):
+        steps_in(0.008, 0.003, "control period")
 
 
 def test_wrong_torque_is_refused() -> None:

@@ -109,5 +109,6 @@ def test_release_deviation() -> None:
     for text in ("q=1", "x", "x=much", "x=inf"):
         with pytest.raises(ParameterError, match=f"axis of {', '.join(AXES)}"):
             release_deviation([text])
-    with pytest.raises(ParameterError, match="less than π"):
-        release_deviation(["rx=3.2"])
+    np.testing.assert_array_equal(release_deviation(["rx=3.14"])[3], 3.14)
+    with pytest.raises(ParameterError, match="turns by 4 rad; it must be less than π"):
+        release_deviation(["rx=2.4,ry=-3.2"])

@@ -182,6 +182,10 @@ def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
     x = np.array([0.2, 0, 0, 0, 0, 0])
     found = replay_release(x, UR5, controllers(p), start=START)
     assert not np.any(found.motion.escaped)
+    # Watched for six time constants of the slower, e⁻⁶ = .0025, or as long as you say.
+    assert 1e-3 < np.max(np.abs(found.motion.x[-1, :, 0])) / 0.2 < 0.01
+    second = replay_release(x, UR5, controllers(p), start=START, duration=1.0)
+    np.testing.assert_allclose(second.motion.t, 0.008 * np.arange(126), atol=1e-12)
     with pytest.raises(UnstableError, match=r"beyond 0\.385 m"):
         replay_release(2.0 * x, UR5, controllers(p), start=START)
     studied = replay_release(3.0 * x, UR5, controllers(p), start=START, anyway=True)

@@ -6,10 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.bias.baseline import Baseline, baseline_of, free_reading
+from vftcli.bias.baseline import (
+    Baseline,
+    Baselines,
+    baseline_of,
+    free_reading,
+    on_quiet_samples,
+)
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.observers import MomentumObserver
+from vftcli.observers.tuning import Goal, tune_all
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
@@ -56,3 +63,27 @@ def test_a_log_without_a_free_part_says_why(circle: Recording) -> None:
     assert found.missing.code == "no-free-part"
     assert "no repetition found" in found.missing.values["reason"]
     assert found.remarks == (found.missing,)
+    # What the fit of a bias calls free stands in, if it is long enough for a spectrum.
+    quiet = own.t < 1.2
+    made = on_quiet_samples(found, quiet)
+    assert (made.by_fit, made.untouched, made.missing) == (True, (), None)
+    assert (made.remarks[0].code, made.remarks[0].values["share"]) == (
+        "free-by-the-fit",
+        quiet.mean(),
+    )
+    np.testing.assert_array_equal(made.pieces[0].inside, quiet)
+    assert on_quiet_samples(found, own.t < 0.1) is found
+
+
+def test_gains_come_from_the_spectra_where_they_are_asked_for(circle: Recording) -> None:
+    log, free = part(circle, 4.0, 10.0), part(circle, 0.0, 4.0)
+    found = baseline(log, free)
+    blind = replace(found, spectra=None)
+    both = Baselines(plain=found, best=blind)
+    assert (both.of("best"), both.of("gmo")) == (blind, found)
+    least = {line.section: dict(line.gains) for line in tune_all(found.spectra, Goal("auto"))}
+    asked = both.spectra(gains=True)
+    assert (asked.plain, asked.best) == (found.spectra, None)
+    np.testing.assert_equal(asked.gains, least)
+    assert both.spectra(gains=False).gains is None
+    assert Baselines(plain=blind, best=found).spectra(gains=True).gains is None

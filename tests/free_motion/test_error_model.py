@@ -16,7 +16,7 @@ from vftcli.free_motion.difference import (
     rms,
 )
 from vftcli.free_motion.paired_runs import PairedRuns, pair_with_run
-from vftcli.robots.run import Run, signal_edge
+from vftcli.robots.run import Run
 from vftcli.signals.filters import low_pass
 
 STEP = 0.008
@@ -111,12 +111,6 @@ def test_the_rms_of_no_sample_is_that_of_all() -> None:
     x = np.array([[3.0, 1.0], [4.0, 2.0]])
     where = np.array([[True, False], [False, False]])
     np.testing.assert_allclose(rms(x, where), [3.0, np.sqrt(2.5)])
-
-
-def test_the_signal_s_edge_leaves_room_for_noise_below_half_the_rate() -> None:
-    assert signal_edge(0.001) == 12.0
-    assert signal_edge(0.001, 8.0) == 8.0
-    assert signal_edge(0.02) == pytest.approx(11.0)  # 0.22 of 50 Hz
 
 
 def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_move() -> None:

@@ -131,20 +131,6 @@ def test_shift_rate_and_covered_time_of_a_free_run(
     assert dict(remark.values) == values | deviation | other
 
 
-def test_the_period_as_it_is_remarked_on(circle: Run) -> None:
-    """Five circles of 4 s from 0 s on."""
-    _, remarks = partners_in_log(motion_of(circle, choice=FreeChoice(period=4.02)))
-    values = dict(remarks[0].values)
-    assert 0.0 < values.pop("deviation_rad") < 1e-3  # the servo's repeatability
-    assert values == {
-        "stated_s": 4.02,
-        "period_s": pytest.approx(4.0, rel=2e-4),
-        "whole": 5,
-        "begin_s": pytest.approx(0.0, abs=0.05),
-        "end_s": pytest.approx(20.0, abs=0.05),
-    }
-
-
 def test_the_log_itself_is_no_free_run(circle: Run) -> None:
     run = FreeRun(run=Run(recording=circle.recording, robot=ROBOT), log=circle)
     with pytest.raises(ParameterError, match="given as the log or as --free, are the same run"):

@@ -70,14 +70,6 @@ def test_a_signal_is_taken_from_the_paired_instants(drive: Make) -> None:
     np.testing.assert_allclose(there[300], free.q[100], atol=1e-9)
 
 
-def test_phase_moves_partners_to_the_nearest_place(drive: Make) -> None:
-    """The log runs 30 ms behind the clock's word; the path says so."""
-    log, free = drive(late=0.03), drive()
-    moved = by_phase(log, pair_with_run(T, free, 0.0))
-    middle = slice(200, 1000)  # the low-pass settles at the ends
-    np.testing.assert_allclose(moved.times[middle] - T[middle], -0.03, atol=1e-3)
-
-
 def test_the_mean_is_over_the_runs_that_are_known(drive: Make) -> None:
     free = drive()
     nowhere = Pairing(free, np.full(len(T), np.nan))

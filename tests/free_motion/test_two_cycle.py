@@ -90,19 +90,12 @@ def test_free_cycle_and_joint_at_rest_are_reported(circle: Circle, ur5: Robot) -
     rests = reference.moving[reference.known.all(axis=1)].mean(axis=0) < 0.5
     assert rests.tolist() == [False, False, False, False, True, False]
     remarks = {remark.code: remark for remark in reference.remarks if isinstance(remark, Remark)}
+    assert remarks["period"].values["period_s"] == pytest.approx(4.0, rel=2e-4)
     assert remarks["free-cycle-found"].values["cycles"] == [1]
     assert remarks["free-cycle-found"].values["whole"] == 5
     assert remarks["joint-stands"].where.joints == (5,)
     assert remarks["joint-stands"].values["share"] == 1.0
     assert "alignment-chosen-filtered" in remarks
-
-
-def test_sign(circle: Circle, ur5: Robot) -> None:
-    """Positive is torque on the robot: the truth and the difference go together."""
-    reference = two_cycle_difference(circle.recording, (), ur5)
-    known = np.isfinite(reference.tau[:, 0])
-    both = np.corrcoef(reference.tau[known, 0], circle.truth[known, 0])
-    assert both[0, 1] > 0.99
 
 
 def test_two_free_cycles_measure_the_floor(circle: Circle, ur5: Robot) -> None:
@@ -220,9 +213,9 @@ def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle: Circle, ur5
 
 
 def test_the_error_s_remarks_and_its_measured_ratio() -> None:
-    """Of 100 samples, each of 2 N·m, joint 1 rests 51, joint 2 50, joint 3 3, joint 4 2."""
-    sd, rests = np.ones((100, 4)), np.arange(100)[:, None] < [51, 50, 3, 2]
-    sd[:2] = np.nan  # without a partner: 49, 48, 1 and no sample at rest of the other 98
+    """Of 100 samples joint 1 rests in 52, joint 2 in 51, joint 3 in 3, joint 4 in 2."""
+    sd, rests = np.ones((100, 4)), np.arange(100)[:, None] < [52, 51, 3, 2]
+    sd[:2] = np.nan  # without a partner: 50, 49, 1 and none of the other 98 at rest
     sd[rests] *= 3.0
     tau = 2.0 * np.ones((100, 4)) * [1.0, 0.1, 1.0, 2.0]
     found = Difference("model", None, tau, ErrorModel(sd, rests))
@@ -232,14 +225,11 @@ def test_the_error_s_remarks_and_its_measured_ratio() -> None:
     assert (origin.code, list(origin.values["ratio"])) == ("floor-measured", list(ratio))
     said = [(r.code, r.where.joints, *r.values.values()) for r in others]
     assert said[:2] == [
-        ("joint-stands-at-times", (1,), 49 / 98, 3.0),
-        ("joint-stands-at-times", (2,), 48 / 98, 3.0),
+        ("joint-stands", (1,), 50 / 98, 3.0),
+        ("joint-stands-at-times", (2,), 49 / 98, 3.0),
     ]
     assert [s[:2] for s in said[2:]] == [("friction-changed", (2,))]
     np.testing.assert_array_equal(said[2][2], [0.4])
-    still = found._replace(error=ErrorModel(sd, rests | (np.arange(100) < 60)[:, None]))
-    codes = [r.code for r in floor_remarks(still, None, np.zeros(4))]
-    assert codes == ["floor-propagated", *["joint-stands"] * 4]
 
 
 @pytest.fixture

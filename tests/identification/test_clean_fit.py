@@ -20,8 +20,7 @@ from vftcli.identification.clean_fit import (
     warm_up_remarks,
 )
 from vftcli.identification.friction_fit import fit_frictions
-from vftcli.identification.shapes import Shape
-from vftcli.identification.training import ParameterColumns, Training, prepare_training
+from vftcli.identification.training import Training, prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
@@ -60,11 +59,13 @@ def test_a_push_is_left_out_of_the_fit(recording):
     ends = np.array([remark.values["starts_s"][0], remark.values["stops_s"][0]])
     lost = t[weights[:, 0] == 0.0][[0, -1]] - ends
     np.testing.assert_allclose(lost, [-TOUCH_MARGIN, TOUCH_MARGIN], atol=0.025)
+    # the 8 Hz filter spreads the edges by less than a period of 0.125 s
+    np.testing.assert_allclose(ends, [5.0, 6.0], atol=0.125)
     assert (remark.values["count"], remark.values["worst_joints"]) == (1, [2])
     assert remark.values["total_s"] == ends[1] - ends[0]
     clean = fit_without_contacts(prepare_training([recording], UR5), strict=False)
     assert clean.remarks == []
-    np.testing.assert_allclose(fits[1].fit.values[:2], clean.fits[1].fit.values[:2], rtol=0.05)
+    np.testing.assert_allclose(fits[1].fit.values[:2], clean.fits[1].fit.values[:2], rtol=0.03)
 
 
 def test_the_dry_friction_of_a_fit_is_what_a_joint_may_stick_with(data):
@@ -208,39 +209,6 @@ def test_links_of_another_arm_are_reported_from_an_effort_that_no_links_explain(
     (said,) = [r for r in remarks if r.code == "noisy-effort"]
     assert said.values["ratio"] < 1.2
     np.testing.assert_array_equal(heavy_joints(data), [False, True, True, False, False, False])
-
-
-def test_the_rest_of_the_links_is_over_that_of_plain_least_squares(prepared, sines):
-    """Joints 2, 3 and 6 carry weight, the last is held; no links explain a swing of 7 Hz."""
-    t, q, dq, ddq = sines(seconds=4.0, rate=50.0, seed=3)
-    torque = torque_regressor(UR5.chain, q, dq, ddq) @ (1.2 * chain_parameters(UR5.chain))
-    torque += np.sin(44.0 * t)[:, None] * [1.0, 2.0, 0.5, 0.1, 0.1, 0.1] + 3.0 * dq
-    weights = np.ones(q.shape)
-    weights[:50, 1] = 0.0
-    log = prepared(
-        t, q=q, dq=dq, ddq=ddq, tau=torque, weights=weights, load=abs(q) * [1, 20, 20, 1, 1, 20]
-    )
-    moves = np.array([True] * 5 + [False])
-    shape, left = Shape(("viscous",)), torque - log.rigid
-    fits = {
-        j: SimpleNamespace(shape=shape, fit=SimpleNamespace(residual=left[:, j]))
-        for j in range(6)
-    }
-    data = Training(UR5, (log.recording,), (log,), moves, moves)
-    w = weights * moves
-
-    def rms(x):
-        return np.sqrt(np.sum(w * x**2, axis=0) / np.maximum(w.sum(axis=0), 1.0))
-
-    A = ParameterColumns(UR5.chain, True, (shape,) * 6).rows(log, slice(None))
-    scale = np.sqrt(w) / np.where(moves, rms(left), 1.0)
-    rows, right = (A * scale[:, :, None]).reshape(-1, A.shape[2]), (torque * scale).ravel()
-    freed = rms(torque - A @ np.linalg.lstsq(rows, right, rcond=1e-10)[0])
-    heavy = heavy_joints(data)
-    assert heavy.tolist() == [False, True, True, False, False, False]
-    expected = rms(left)[heavy] / freed[heavy]
-    # directions that the motion hardly shows are cut off elsewhere: 7e-5
-    np.testing.assert_allclose(links_explain(data, fits), expected, rtol=2e-4)
 
 
 @pytest.mark.parametrize(

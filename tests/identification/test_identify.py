@@ -118,14 +118,6 @@ def test_a_stribeck_effect_is_seen():
     assert values["stribeck_velocity"] == 0.1  # one of the velocities that compete
 
 
-def test_drive_constants_come_back():
-    true = rubbed(UR5, "coulomb-viscous-offset")
-    true = replace(true, torque_constant=UR5.torque_constant * 1.1)
-    found = identify([log(true)], UR5, Task(method="friction", constants=True)).robot
-    # joints that carry weight; the wrists' load is no larger than the noise
-    np.testing.assert_allclose(found.torque_constant[1:3], true.torque_constant[1:3], rtol=0.01)
-
-
 @pytest.mark.slow
 def test_links_are_identified_for_another_trajectory():
     scale = np.linspace(0.85, 1.2, 6)
@@ -235,22 +227,6 @@ def test_a_repeated_trajectory_is_reported():
     assert repeated_share(motions[0], motions[2]) < 0.2
 
 
-@pytest.mark.slow
-def test_a_contact_is_found_and_left_out():
-    true = rubbed(UR5, "coulomb-viscous-offset")
-    clean = identify([log(true)], UR5, Task(method="friction")).robot
-    t = motion(0)[0]
-    push = np.where((t > 12) & (t < 13), 40.0, 0.0)[:, None] * np.array([1, 1, 0, 0, 0, 0])
-    touched = identify([log(true, extra=push)], UR5, Task(method="friction"))
-    (reported,) = [r for r in touched.remarks if r.code == "suspected-contacts"]
-    # the 8 Hz filter spreads the edges by less than a period of 0.125 s
-    assert reported.values["starts_s"] == pytest.approx([12.0], abs=0.125)
-    assert reported.values["stops_s"] == pytest.approx([13.0], abs=0.125)
-    for j in (0, 1):
-        a, b = (r.friction[j].parameters["coulomb"] for r in (clean, touched.robot))
-        assert a == pytest.approx(b, rel=0.03)
-
-
 def test_a_log_at_rest_identifies_nothing():
     t = np.arange(0, 10, 0.008)
     still = np.zeros((len(t), 6))
@@ -269,19 +245,6 @@ def test_a_joint_that_rests_keeps_its_numbers():
     assert [r.where.joints for r in found.remarks if r.code == "static-joint"] == [(4,)]
     assert found.robot.friction[3] == UR5.friction[3]
     assert found.robot.chain.rotor_inertia[3] == UR5.chain.rotor_inertia[3]
-
-
-@pytest.mark.slow
-def test_a_joint_that_never_reverses_is_reported():
-    t, q, dq, ddq = motion(0)
-    dq[:, 5], ddq[:, 5] = 0.3, 0.0
-    q[:, 5] = 0.3 * t
-    true = rubbed(UR5, "coulomb-viscous-offset", offset=0.0)
-    torque = drive(true, q, dq, ddq)
-    recording = Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
-    found = identify([recording], UR5, Task(method="friction"))
-    assert [r.where.joints for r in found.remarks if r.code == "one-way-joint"] == [(6,)]
-    assert "offset" not in found.robot.friction[5].parameters
 
 
 def test_missing_currents_are_reported():

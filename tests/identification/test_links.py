@@ -86,6 +86,7 @@ def test_triangles_are_the_weighted_equations(log):
     rows = np.concatenate([A, log.tau[:, :, None]], axis=2)
     rows = (rows * (np.sqrt(weights) / sigma)[:, :, None]).reshape(-1, LAYOUT.size + 1)
     R, right = triangles.joined()
+    assert R.shape == (LAYOUT.size, LAYOUT.size)
     np.testing.assert_allclose(R.T @ R, rows[:, :-1].T @ rows[:, :-1], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(R.T @ right, rows[:, :-1].T @ rows[:, -1], rtol=1e-9, atol=1e-6)
     x = planted()
@@ -109,13 +110,6 @@ def test_stacking_finds_what_was_planted(log):
     left = residuals(LAYOUT, log, x)
     # 53 parameters of 3750 equations take 1.4 % of the noise's square
     np.testing.assert_allclose(np.std(left, axis=0), [0.5, 0.5, 0.5, 0.1, 0.1, 0.1], rtol=0.1)
-
-
-def test_the_triangle_of_many_rows_is_theirs():
-    rows = np.random.default_rng(0).standard_normal((50, 4))
-    R = triangle(rows)
-    assert R.shape == (4, 4)
-    np.testing.assert_allclose(R.T @ R, rows.T @ rows, atol=1e-12)
 
 
 def test_least_squares_leaves_the_start_where_there_is_no_data():
@@ -175,13 +169,6 @@ def test_equal_base_parameters_mean_equal_torque():
     Y = torque_regressor(chain, q, dq, ddq)
     # β comes from a triangle of condition 1e3 or so: 1e-12 of torques of 10²
     np.testing.assert_allclose(Y @ other, Y @ phi, atol=1e-8)
-
-
-def test_names_say_what_is_summed():
-    layout = frictionless("ur5", True)
-    names = group_parameters(layout).sums(layout.names)
-    assert len(set(names)) == 40
-    assert any(" + " in name for name in names)
 
 
 def test_sums_are_written_with_signs_and_factors():

@@ -211,8 +211,10 @@ def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
     data = prepare_training([log], UR5, fit_constants=True)
     found = friction_method(data)
     K = {n.joint: n for n in found.numbers if n.parameter == "torque_constant"}
-    assert K[2].value == pytest.approx(1.05 * UR5.torque_constant[1], rel=0.01)
-    assert K[2].profile == UR5.torque_constant[1]
+    # joints that carry weight; the wrists' load is no larger than the noise
+    for j in (2, 3):
+        assert K[j].value == pytest.approx(1.05 * UR5.torque_constant[j - 1], rel=0.01)
+        assert K[j].profile == UR5.torque_constant[j - 1]
     coulomb = {n.joint: n for n in found.numbers if n.parameter == "coulomb"}
     assert coulomb[2].value == pytest.approx(4.0, rel=0.05)
     assert found.robot.torque_constant[1] == pytest.approx(K[2].value, rel=1e-6)

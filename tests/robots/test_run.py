@@ -12,8 +12,9 @@ from vftcli.readers.aliases import UR_NAMES, UR_WORDS
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
-from vftcli.robots.run import SERIES, Run, Runs, paired, places, unwound
+from vftcli.robots.run import SERIES, Run, Runs, paired, places, signal_edge, unwound
 from vftcli.signals.errors import RobotError
+from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -47,6 +48,20 @@ def test_a_joint_that_stands_is_marked() -> None:
     assert run.standstill[600, 2] == pytest.approx(0.6)
     assert run.standing[600].tolist() == [False, False, True, False, False, False]
     assert run.step == pytest.approx(0.002)
+
+
+@pytest.mark.parametrize(("step", "edge", "path"), [(0.002, 12.0, 12.0), (0.05, 4.4, 4.0)])
+def test_smooth_series_end_below_half_the_rate(step: float, edge: float, path: float) -> None:
+    """At .22 and .2 of the rate of a slow log, so that its noise is left out."""
+    log = replace(swing(), t=T * step / 0.002)
+    run = Run(recording=log, robot=ROBOT)
+    assert (signal_edge(step), signal_edge(step, 4.0)) == pytest.approx((edge, 4.0))
+    np.testing.assert_allclose(run.smooth_dq, low_pass(log.t, log.dq, path), atol=1e-9)
+    np.testing.assert_allclose(
+        run.smooth_model, low_pass(log.t, run.model_torque, edge), atol=1e-9
+    )
+    gap = run.drive_torque - run.model_torque
+    np.testing.assert_allclose(run.smooth_gap, low_pass(log.t, gap, edge), atol=1e-9)
 
 
 def test_a_part_of_a_run_keeps_what_belongs_to_joints() -> None:
@@ -126,6 +141,7 @@ def test_joints_are_found_by_name(logged, joints, expected) -> None:
         ((*NAMES, "base_yaw"), NAMES),  # one stands twice
         (("a_1", "a_2", "b_1", "b_2"), ("x", "y")),  # two arms
         (("joint1", "joint3", "joint4"), NAMES[:3]),  # a hole
+        (("joint2", "joint3", "joint4"), NAMES[:3]),  # the first is missing
         (
             tuple(f"{side}_{name}" for side in ("left", "right") for name in UR_NAMES),
             UR.chain.names,
