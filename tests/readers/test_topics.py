@@ -118,9 +118,10 @@ def test_empty_and_nan_velocities_are_missing_signals(tmp_path: Path) -> None:
 
 
 def test_receive_stamps_where_headers_are_unset(tmp_path: Path) -> None:
-    messages = [ur_message(k, stamp=False) for k in range(20)]
+    messages = [ur_message(40 * k, stamp=False) for k in range(20)]
     recording = read(write_joint_states(tmp_path / "x", messages))
-    np.testing.assert_allclose(recording.t, 0.008 * np.arange(20), atol=1e-9)
+    np.testing.assert_allclose(recording.t, 0.32 * np.arange(20), atol=1e-9)
+    assert recording.source.t0_ns == START + 100
     assert "receive stamps" in recording.source.clock
 
 

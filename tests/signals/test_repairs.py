@@ -91,7 +91,13 @@ def with_sample(log: Recording, signal: str, row: int, joint: int, off: float) -
     ("signal", "off", "left"),
     # left: at an end a line of six samples misses 4 rad/s² by ½(3 Ts)² of it, 1.8 mrad, and its
     # change by less than .01 rad/s; of the torque 6 sd of its noise
-    [("q", 2.0 * np.pi, 2e-3), ("q", -0.05, 2e-3), ("dq", 5.0, 1e-2), ("torque", 200.0, 0.3)],
+    [
+        ("q", 2.0 * np.pi, 2e-3),
+        ("q", -0.05, 2e-3),
+        ("dq", 5.0, 1e-2),
+        ("torque", 200.0, 0.3),
+        ("torque", -200.0, 0.3),
+    ],
 )
 def test_one_bad_sample_is_drawn_to_its_neighbours(signal, off, left, row, joint) -> None:
     log = moving()
