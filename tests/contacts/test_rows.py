@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+import polars as pl
 import pytest
 from contact_logs import FIXTURES, motion
 from contact_rows import contact
@@ -92,15 +93,31 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
     from vftcli.contacts.listing import list_contacts
 
     recording = read(FIXTURES / "ur5_taps_ur_rtde.csv")
+    truth = pl.read_parquet(FIXTURES / "ur5_taps_ur_rtde.csv.truth.parquet")
+    t = truth["t"].to_numpy() - recording.source.t0
+    wrench = truth.select("^wrench/.*$").to_numpy()
     found = list_contacts(motion(recording, "ur5", "0.3:4"))
-    assert len(found.contacts) == 2
+    assert [row.number for row in found.contacts] == [1, 2]
+    assert (found.duration, found.basis, found.stops) == (6.0, "free motion", ())
     for row in found.contacts:
         assert row.wrench is not None
         q = np.array([np.interp(row.peak, recording.t, column) for column in recording.q.T])
         J = flange_jacobian(load_robot("ur5").chain, q[None])[0]
         np.testing.assert_allclose(J.T @ row.wrench, row.joint_torque, atol=1e-9)
         assert row.start < row.peak < row.stop
-        assert row.trust == "good"
+        assert (row.where, row.places, row.trust, row.at_rest) == ("wrist", (0, 6), "good", False)
+        assert (row.vendor_force, row.sensor_force, row.remarks) == (None, None, ())
+        # Truth of the simulation: two standard deviations at the peak, a twentieth of ∫F dt.
+        true = wrench[np.argmin(abs(t - row.peak))]
+        assert np.all(abs(row.wrench - true) < 1.96 * row.wrench_sd)
+        assert np.all(row.wrench_sd < [7.0, 7.0, 7.0, 1.5, 1.5, 1.5])
+        pushed = 0.008 * wrench[(t > row.start - 0.1) & (t < row.stop + 0.1), :3].sum(axis=0)
+        np.testing.assert_allclose(row.impulse, pushed, atol=0.05 * np.linalg.norm(pushed))
+        np.testing.assert_allclose(row.impulse, row.mean_force * (row.stop - row.start))
+        # The wrist alone fits: no other place changes the size.
+        size, band = np.linalg.norm(row.wrench[:3]), row.place_band
+        assert (row.peak_force, row.peak_band) == pytest.approx((size, band))
+        assert row.anywhere == pytest.approx((size - band, size + band))
     # The first lasts 4.560 to 4.792 s and has 75.2 N in truth. In blocks of 8 ms that is found to
     # half a block of 24 ms, which would cut its peak to 71.8 N; the band is that of a longer push.
     tap, _ = found.contacts

@@ -129,14 +129,6 @@ def test_a_robot_is_a_frame_of_its_joints() -> None:
     assert set(bare["friction"]) == {"none"}
 
 
-def test_a_joint_that_is_never_known_is_shown_without_a_warning() -> None:
-    tau = Q.copy()
-    tau[:, 0] = np.nan
-    shown = ExternalTorque(name="gmo", t=T, tau=tau)
-    assert "rms 0 " in repr(shown)
-    assert "<td>0%</td>" in shown._repr_html_()
-
-
 def test_remarks_are_a_tuple_with_a_frame() -> None:
     first, second = fact("as-printed"), replace(caution("as-printed"), level="warning")
     remarks = Remarks([first, second])
