@@ -115,7 +115,7 @@ def test_a_list_is_a_sequence_of_its_rows_and_a_table() -> None:
     )
     assert repr(rows[0]) == "<Contact 1, a contact: 4.60 to 4.78 s, 65 ± 7 N, wrist (good)>"
     assert repr(rows[1]).startswith("<Contact 2, a load: ")
-    assert "0 52 -39" in found._repr_html_()
+    assert "<td>0 52 -39</td>" in found._repr_html_()
     assert bool(contact_list())
     assert repr(contact_list()) == "<ContactList of log.csv: 0 contacts in 20 s>"
     assert contact_list().to_polars().is_empty()
