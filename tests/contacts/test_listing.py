@@ -371,4 +371,5 @@ def test_a_row_without_a_size_belongs_to_the_one_that_it_adjoins() -> None:
     runs = [(10, 40), (41, 80), (90, 120)]
     assert adjoining(runs, [hard, tail, tail]) == [[0, 1], [2]]
     assert adjoining(runs, [hard, hard, hard]) == [[0], [1], [2]]
+    assert adjoining([(10, 40), (42, 80), (80, 99)], [hard, tail, tail]) == [[0], [1, 2]]
     assert adjoining([], []) == []

@@ -45,3 +45,7 @@ def test_a_push_has_its_force_above_with_the_threshold(push: Replay) -> None:
 def test_what_never_moved_is_not_drawn(release: Replay) -> None:
     still = release.motion._replace(x=np.zeros_like(release.motion.x))
     assert replay_figures(replace(release, motion=still, drags=())) == {}
+    both = np.array(release.motion.x)
+    both[:, :, 4] = both[:, :, 0]
+    tilted = replace(release, motion=release.motion._replace(x=both), drags=())
+    assert [axes.get_ylabel() for axes in drawn(tilted, "single").axes] == ["x (m)", "ry (rad)"]

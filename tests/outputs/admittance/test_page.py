@@ -11,6 +11,7 @@ from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance import admittance_record, charts, render_admittance
 from vftcli.outputs.charts import GREY
 from vftcli.robots import load_robot
+from vftcli.signals.remarks import fact, sentence, warning
 
 
 def test_the_page_shows_every_part(release: Replay) -> None:
@@ -30,8 +31,13 @@ def test_the_page_shows_every_part(release: Replay) -> None:
     far = np.array(release.motion.x)
     far[-3:, 0, 0] = 5.0  # metres beyond the arm's reach
     motion = release.motion._replace(x=far)
-    untitled = replace(release, motion=motion, robot=replace(release.robot, title=""))
+    untitled = replace(
+        release, motion=motion, robot=replace(release.robot, title=""),
+        force_remarks=(warning("saturation", signal="current"), fact("as-printed")),
+    )  # fmt: skip
     page = render_admittance(Replayed(untitled), record, "x")
+    banner = page.partition("</h1>")[2].partition("<h2>")[0]
+    assert (sentence(untitled.force_remarks[0]) in banner, "printed" in banner) == (True, False)
     assert ">x · ur5 · 0.000 – " in page
     assert " · threshold hard · 3 poses out of reach</p>" in page
     # An option is in an element of its own, which no line breaks.
