@@ -7,7 +7,15 @@ import pytest
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.replay import Replay, replay
-from vftcli.reproduction.control import latest_turns, released, turn_after, ungated
+from vftcli.reproduction.control import (
+    deviation_chart,
+    latest_turns,
+    loop_chart,
+    released,
+    return_values,
+    turn_after,
+    ungated,
+)
 from vftcli.reproduction.paper import CORRECTED, gathered
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
@@ -73,3 +81,38 @@ def test_without_a_threshold_the_traditional_one_alone_feels_the_rest_of_the_for
     np.testing.assert_array_equal(other.motion.v[:, 0], literal.v[:, 0])
     advance = [one.rows[1]["peak_advance_s"] for one in (found, other)]
     assert advance[1] > advance[0] > 0.0
+
+
+def test_a_contact_s_return_is_that_of_its_own_drag() -> None:
+    """The variable law turns .376 s earlier and is back at a tenth 1.352 s after the release."""
+    found = pushed("hard")
+    before, after = found.rows
+    about_y, later, about_rx = ((0.05, 1), (0.2, 1), (0.0, 3))
+    held = [SimpleNamespace(force=f, axis=axis) for f, axis in (about_y, later, about_rx)]
+    values = {key: value for _, key, value in return_values(CORRECTED, found, held)}
+    assert list(values) == ["back/traditional/1", "peak/1.9/1", "turn/1.9/1", "back/1.9/1"]
+    assert values["back/traditional/1"] is before["return_10_s"] is None
+    assert (values["peak/1.9/1"], values["back/1.9/1"]) == pytest.approx((0.376, 1.352))
+    turns = [turn_after(found, n, row) for n, row in enumerate((before, after))]
+    assert values["turn/1.9/1"] == pytest.approx(turns[0] - turns[1])
+    # To a sample of 8 ms the velocity turns at the peak.
+    assert values["turn/1.9/1"] == pytest.approx(values["peak/1.9/1"], abs=0.009)
+
+
+def test_the_loop_s_charts_hold_force_and_motion_of_one_kind() -> None:
+    found = pushed("hard")
+    t = np.arange(3.0)
+    truth, moved, estimate, commanded = np.random.default_rng(2).standard_normal((4, 3, 6))
+    run = SimpleNamespace(t=t, truth=truth, moved=moved, estimate=estimate, commanded=commanded)
+    for part, units, panels, threshold in (
+        (slice(3), ("N", "m"), ("F_x", "F_y", "F_z", "x", "y", "z"), 20.0),
+        (slice(3, 6), ("N·m", "rad"), ("M_x", "M_y", "M_z", "rx", "ry", "rz"), 6.0),
+    ):
+        chart, own = loop_chart(run, found, part), deviation_chart(found, part)
+        assert (chart.units, chart.panels) == ((units[0],) * 3 + (units[1],) * 3, panels)
+        true, ours = (line.values for line in chart.series)
+        np.testing.assert_array_equal(true, np.hstack([truth[:, part], moved[:, part]]))
+        np.testing.assert_array_equal(ours, np.hstack([estimate[:, part], commanded[:, part]]))
+        np.testing.assert_array_equal(chart.band, [threshold] * 3 + [np.nan] * 3)
+        assert (own.units, own.panels) == ((units[1],) * 3, panels[3:])
+        np.testing.assert_array_equal(own.series[1].values, found.motion.x[:, 1, part])
