@@ -1,7 +1,5 @@
 """From what was found to rows."""
 
-from collections.abc import Callable
-
 import numpy as np
 import polars as pl
 import pytest
@@ -9,7 +7,6 @@ from contact_logs import FIXTURES, motion
 from contact_rows import contact
 from drawn_blocks import blocks, drawn, noise
 
-from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.rows import (
     ContactLocation,
     force_course,
@@ -118,6 +115,12 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
         size, band = np.linalg.norm(row.wrench[:3]), row.place_band
         assert (row.peak_force, row.peak_band) == pytest.approx((size, band))
         assert row.anywhere == pytest.approx((size - band, size + band))
+        course = row.course
+        assert course is not None
+        assert row.start <= course.t[0] < course.t[-1] <= row.stop
+        top = course.force.argmax()
+        highest = course.t[top], course.force[top], course.band[top]
+        assert highest == pytest.approx((row.peak, row.peak_force, row.place_band))
     # The first lasts 4.560 to 4.792 s and has 75.2 N in truth. In blocks of 8 ms that is found to
     # half a block of 24 ms, which would cut its peak to 71.8 N; the band is that of a longer push.
     tap, _ = found.contacts
@@ -170,15 +173,3 @@ def test_a_course_bears_the_band_along_its_force() -> None:
     drives = hidden_by_blocks(force, bent=0.0)
     wider = force_course(t, force, covariance + drives).band[0]
     assert wider == pytest.approx(1.96 * np.hypot(2.6833, 0.15), rel=1e-4)
-
-
-@pytest.mark.slow
-def test_every_row_has_its_course(listed: Callable[..., ContactList]) -> None:
-    for row in listed("ur5_circle.csv", "ur5", "0.3:4").contacts:
-        course = row.course
-        assert course is not None
-        assert row.start <= course.t[0] < course.t[-1] <= row.stop
-        k = int(np.argmax(course.force))
-        assert course.t[k] == pytest.approx(row.peak)
-        assert course.force[k] == pytest.approx(row.peak_force)
-        assert course.band[k] == pytest.approx(row.place_band)

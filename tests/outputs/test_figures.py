@@ -22,7 +22,7 @@ from vftcli.outputs.figures import (
     write_tuned,
 )
 from vftcli.outputs.paper import WIDTHS, figure_files, paper_style
-from vftcli.signals.errors import OutputError
+from vftcli.signals.errors import OutputError, ParameterError
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
@@ -192,3 +192,16 @@ def test_gains_and_figures_appear_together(
     assert path.read_text(encoding="utf-8") == alone
     wanted = {"gains.toml", *figure_files("svg", TUNED_FIGURES, "gains-")}
     assert {p.name for p in tmp_path.iterdir()} == wanted
+
+
+def test_a_plot_for_a_notebook_is_of_the_joints_and_observers_asked_for(
+    analysis: Analysis,
+) -> None:
+    figure = plot(analysis, "torques", [2, 5], "gmo")
+    assert [axes.get_ylabel() for axes in figure.axes] == ["J2 (N·m)", "J5 (N·m)"]
+    assert names_in(figure) == ["reference (vendor)", "gmo", "± floor of the reference"]
+    gmo = next(estimate for estimate in analysis.estimates if estimate.name == "gmo")
+    ends = [np.nanmax(line.get_ydata()) for axes in figure.axes for line in axes.lines]
+    assert {gmo.tau[:, 1].max(), gmo.tau[:, 4].max()} <= set(ends)  # no spike is lost
+    with pytest.raises(ParameterError, match="no joint 7; there is 1 to 6"):
+        plot(analysis, "torques", 7, None)

@@ -19,7 +19,6 @@ from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
 from vftcli.outputs.rerun_recording import (
     contact_log,
     force_arrow,
-    plot_groups,
     summary,
     tabs_of,
     write_rrd,
@@ -121,6 +120,7 @@ def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> N
     assert list(lines) == names
     assert best.size_sd is not None
     np.testing.assert_array_equal(lines["|F|"], best.size)
+    np.testing.assert_array_equal(tabs["Wrench"][4].series[0].values[:, 0], best.known[:, 4])
     np.testing.assert_array_equal(lines["95 % upper"], best.size + COVERS * best.size_sd)
     assert np.nanmin(lines["95 % lower"]) >= 0.0
     t, level = touched.t, -0.06 * max(64.8, np.nanmax(best.size))
@@ -175,12 +175,6 @@ def test_time_reads_back_in_seconds(rows: dict[str, dict[str, list]], analysis: 
     np.testing.assert_allclose(seconds, analysis.t, atol=1e-6)
 
 
-def test_the_arm_moves(rows: dict[str, dict[str, list]]) -> None:
-    for j in range(1, 7):
-        assert any(column(rows, f"/robot/link_{j}", "Transform3D:quaternion"))
-    assert any(column(rows, "/robot/link_2", "Capsules3D:lengths"))
-
-
 def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> None:
     """About 50 arrows a second: every second sample of this log at 125 Hz, of the best."""
     write_rrd(tmp_path / "r.rrd", replace(analysis, contacts=None))
@@ -206,15 +200,6 @@ def test_without_a_reference_there_are_no_residuals(
     entities = {chunk.entity_path for chunk in reader.stream()}
     assert "/tau_ext/J1" in entities
     assert not [entity for entity in entities if entity.startswith("/residual")]
-
-
-@pytest.mark.slow
-def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
-    plots = list(plot_groups(with_wrench)["Wrench"])
-    assert [entry.key for entry in plots] == [f"/wrench/{a}" for a in AXES]
-    own = {line.name: line.values[:, 0] for line in plots[4].series}
-    for wrench in with_wrench.wrenches:
-        np.testing.assert_array_equal(own[wrench.name], wrench.known[:, 4])
 
 
 def test_odd_names_do_no_harm(analysis: Analysis, as_if: Callable, tmp_path: Path) -> None:

@@ -256,10 +256,6 @@ EFFORTS = ",".join(f"e{j}" for j in range(6))
         ("-tau=effort_{i}", "torque", -5.0),
         ("-tau", "torque", -5.0),
         ("t[ms],tau[mNm]", "torque", 5e-3),
-        *(
-            (f"tau[{unit}]", "torque", 5 * one)
-            for unit, one in (("Nm", 1), ("N·m", 1), ("Ncm", 0.01))
-        ),
         ("current[mA]=EFFORT", "current", 5e-3),
         ("t[ms]=time", "torque", 5.0),
     ],

@@ -122,6 +122,10 @@ def test_receive_stamps_where_headers_are_unset(tmp_path: Path) -> None:
     recording = read(write_joint_states(tmp_path / "x", messages))
     np.testing.assert_allclose(recording.t, 0.32 * np.arange(20), atol=1e-9)
     assert recording.source.t0_ns == START + 100
+    for message in messages:  # stamps that begin twice alike are set all the same
+        message["stamp"] = True
+    messages[1]["time"] = START
+    assert "header stamps" in read(write_joint_states(tmp_path / "y", messages)).source.clock
     assert "receive stamps" in recording.source.clock
 
 
