@@ -125,7 +125,8 @@ def test_receive_stamps_where_headers_are_unset(tmp_path: Path) -> None:
     for message in messages:  # stamps that begin twice alike are set all the same
         message["stamp"] = True
     messages[1]["time"] = START
-    assert "header stamps" in read(write_joint_states(tmp_path / "y", messages)).source.clock
+    clock = read(write_joint_states(tmp_path / "y", messages)).source.clock
+    assert clock == "header stamps of /joint_states"
     assert "receive stamps" in recording.source.clock
 
 
