@@ -141,8 +141,8 @@ def test_hand_twists_about_its_turn() -> None:
 
 
 def test_load_pulls_straight_down() -> None:
-    load = started(LoadSpec(name="l", weight=9.2, spans=((0.0, 4.0),)), rng(), 4.0)
-    np.testing.assert_allclose(wrench(load, 2.0), [0, 0, -9.2, 0, 0, 0])
+    load = started(LoadSpec(name="l", weight=0.5, spans=((0.0, 4.0),)), rng(), 4.0)
+    np.testing.assert_allclose(wrench(load, 2.0), [0, 0, -0.5, 0, 0, 0])
 
 
 def test_stop_pushes_and_never_pulls() -> None:

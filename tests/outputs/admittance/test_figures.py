@@ -39,6 +39,8 @@ def test_a_push_has_its_force_above_with_the_threshold(push: Replay) -> None:
     figure = drawn(push, "single")
     assert [axes.get_ylabel() for axes in figure.axes] == ["y (N)", "y (m)"]
     assert [axes.get_xlabel() for axes in figure.axes] == ["", "Time (s)"]
+    levels = {line.get_ydata()[0] for line in figure.axes[0].lines if len(line.get_ydata()) == 2}
+    assert levels == {20.0, -20.0}
     assert "± threshold" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
