@@ -23,6 +23,8 @@ def test_a_list_needs_no_forces(tmp_path: Path) -> None:
     path = tmp_path / "a.contacts.csv"
     path.write_text("start_s,stop_s\n1,2.5\n")
     assert read_list(path) == [(1.0, 2.5, 0.0, 0.0, False)]
+    path.write_text("start_s,stop_s,kind,peak_force_N,peak_force_band_N\n1,2,load,30,4\n3,4,,,\n")
+    assert read_list(path) == [(1.0, 2.0, 30.0, 4.0, True), (3.0, 4.0, 0.0, 0.0, False)]
 
 
 @pytest.mark.parametrize("text", ["start_s\n1\n", "start_s,stop_s,peak_force_N\n1,2,hard\n"])

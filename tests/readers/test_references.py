@@ -52,6 +52,13 @@ def test_torques_that_cannot_be_reported_are_refused(write, names, said):
         read_reference(write(*names))
 
 
+def test_a_cell_without_a_number_is_named(write):
+    path = write("t", "tau_ext_1", "tau_ext_2")
+    path.write_text(path.read_text().replace("2.2", "nan"))
+    with pytest.raises(LogError, match="tau_ext 2 is not a number in row 3"):
+        read_reference(path)
+
+
 def test_a_clock_that_stands_still_is_refused(write):
     with pytest.raises(ClockError):
         read_reference(write("t", "tau_ext_1", clock=(0.0, 0.1, 0.1, 0.2)))

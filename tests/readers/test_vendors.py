@@ -223,6 +223,15 @@ def test_pickles_of_anything_but_arrays_are_refused(tmp_path: Path, held: object
     assert not trap.exists()
 
 
+def test_a_pickle_larger_than_what_is_held_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vftcli.readers.objects.PICKLE_LIMIT", 1 << 21)
+    (tmp_path / "x").write_bytes(pickle.dumps({"q": bytes(3 << 20)}))
+    with pytest.raises(LogError, match=r"x: a pickle of 3 MiB\. Save it with np\.savez\.$"):
+        read(tmp_path / "x")
+
+
 def test_a_pickle_cannot_fill_memory_through_ndarray(tmp_path: Path) -> None:
     # cnumpy\nndarray\n (I1000000000\n t R . : numpy.ndarray((10**9,)) without any data
     (tmp_path / "x").write_bytes(
