@@ -6,6 +6,8 @@ import pytest
 from vftcli.admittance.closed_loop import OnlineKalman
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.wrench.solvers import VirtualSensor
 
@@ -40,5 +42,9 @@ def test_the_first_sample_starts_at_no_torque() -> None:
     sensor = OnlineKalman(KFO, robot, 0.001, averaged=True)
     q, dq = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]), np.full(6, 0.1)
     np.testing.assert_array_equal(sensor.sample(q, dq, np.full(6, 50.0)), np.zeros(6))
-    assert np.any(sensor.p != 0.0)
-    assert np.any(sensor.mu != 0.0)
+    terms = momentum_terms(robot.loaded_chain, q[None], dq[None])
+    np.testing.assert_allclose(sensor.p, terms.p[0], atol=1e-12)
+    # its mean of 50 N·m over the step enters as it is
+    mu = terms.coriolis_transpose_dq - terms.gravity
+    mu -= friction_torque(robot.friction, dq[None], terms.gravity)
+    np.testing.assert_allclose(sensor.mu, mu[0], atol=1e-9)

@@ -11,7 +11,6 @@ from vftcli.bias.baseline import (
     Baselines,
     baseline_of,
     free_reading,
-    on_quiet_samples,
 )
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
@@ -63,16 +62,6 @@ def test_a_log_without_a_free_part_says_why(circle: Recording) -> None:
     assert found.missing.code == "no-free-part"
     assert "no repetition found" in found.missing.values["reason"]
     assert found.remarks == (found.missing,)
-    # What the fit of a bias calls free stands in, if it is long enough for a spectrum.
-    quiet = own.t < 1.2
-    made = on_quiet_samples(found, quiet)
-    assert (made.by_fit, made.untouched, made.missing) == (True, (), None)
-    assert (made.remarks[0].code, made.remarks[0].values["share"]) == (
-        "free-by-the-fit",
-        quiet.mean(),
-    )
-    np.testing.assert_array_equal(made.pieces[0].inside, quiet)
-    assert on_quiet_samples(found, own.t < 0.1) is found
 
 
 def test_gains_come_from_the_spectra_where_they_are_asked_for(circle: Recording) -> None:

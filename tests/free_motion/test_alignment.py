@@ -49,10 +49,10 @@ def test_rates_that_differ_a_little_are_corrected() -> None:
     assert found.deviation < 1e-4  # interpolation between samples 10 ms apart
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.75, 1.05, 1.5, 1000.0])
 def test_rates_that_differ_much_are_refused(rate: float) -> None:
     log = wandering()
+    log = replace(log, t=log.t[::10], q=log.q[::10], dq=log.dq[::10])
     with pytest.raises(ReferenceTorqueError, match=r"clocks .* run at different rates"):
         align(log, replace(log, t=rate * log.t))
 
@@ -98,18 +98,16 @@ def test_another_small_motion_is_neither_slower_nor_on_another_clock() -> None:
 def sixth_joint_off(rate: float, begin: float, off: float) -> tuple[Recording, Recording]:
     """Two logs at 10 Hz of one motion, but for a joint 6 that rests `off` away. [rad]"""
     log = wandering()
-    moves = log.q[::10] * [1, 1, 1, 1, 1, 0]
-    free = Recording(t=rate * log.t[::10] + begin, q=moves + off * np.eye(6)[5])
-    return Recording(t=log.t[::10], q=moves), free
+    t, moves = log.t[::10] + 2.0, log.q[::10] * [1, 1, 1, 1, 1, 0]
+    return Recording(t=t, q=moves), Recording(t=rate * t + begin, q=moves + off * np.eye(6)[5])
 
 
 def test_other_trajectories_are_refused_with_what_is_left_at_equal_clocks() -> None:
-    """At 1.02 times the rate and 5 s later the middles, at 9.95 s, lie 5.199 s apart."""
+    """At 1.02 times the rate and 5 s later the middles, at 11.95 s, lie 5.239 s apart."""
     log, free = sixth_joint_off(1.02, 5.0, 0.5)
-    there = np.column_stack([np.interp(log.t + 5.199, free.t, x) for x in free.q.T])
-    inside = log.t + 5.199 >= free.t[0]
-    left = np.sqrt(np.mean((there - log.q)[inside] ** 2))
-    said = rf"shift \(5\.199 s\) the joint positions still differ by {left:.3g} rad rms"
+    there = np.column_stack([np.interp(log.t + 5.239, free.t, x) for x in free.q.T])
+    left = np.sqrt(np.mean((there - log.q) ** 2))
+    said = rf"shift \(5\.239 s\) the joint positions still differ by {left:.3g} rad rms"
     with pytest.raises(ReferenceTorqueError, match=said):
         align(log, free)
 

@@ -109,17 +109,20 @@ def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
 
 
 def test_the_fit_finds_the_weights_of_its_own_columns() -> None:
-    """Noise of .1 on 400 samples of two joints: the prior of 20 moves nothing."""
+    """Noise on 400 samples of two joints: a prior of 20 moves nothing, one of .01 much."""
     rng = np.random.default_rng(4)
     A = rng.standard_normal((400, 2, 3))
     weights = np.array([2.0, -1.0, 0.5])
-    found, sd, left = weigh(
-        A @ weights + 0.1 * rng.standard_normal((400, 2)), A, np.full(3, 20.0)
-    )
-    np.testing.assert_allclose(found, weights, atol=0.02)  # 4 sd of .1/√800
-    np.testing.assert_allclose(left, 0.1, rtol=0.15)
-    # nine samples count as one: sd = .1·√(9/800)
-    np.testing.assert_allclose(sd, 0.1 * np.sqrt(9 / 800), rtol=0.2)
+    d = A @ weights + [0.1, 0.2] * rng.standard_normal((400, 2))
+    found, sd, left = weigh(d, A, np.array([20.0, 20.0, 0.01]))
+    np.testing.assert_allclose(found[:2], weights[:2], atol=0.05)  # 4 sd of .3/√800
+    np.testing.assert_allclose(left, np.sqrt(np.mean((d - A @ found) ** 2, axis=0)))
+    # nine samples count as one
+    scaled = (A / left[:, None]).reshape(-1, 3)
+    covariance = np.linalg.inv(scaled.T @ scaled / 9.0 + np.diag([1 / 400, 1 / 400, 1e4]))
+    right = scaled.T @ (d / left).ravel() / 9.0
+    np.testing.assert_allclose(found, covariance @ right, rtol=1e-3)  # the last round
+    np.testing.assert_allclose(sd, np.sqrt(np.diag(covariance)), rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,10 @@ def test_the_differences_are_those_of_the_mean_over_the_free_runs(drive_of) -> N
 
     def run():
         torque, model = rng.standard_normal((2, len(T), 2))
+        stops = rng.uniform(0.1, 0.5, (len(T), 2))
         q = np.column_stack([np.sin(T), np.cos(T)])
-        return drive_of(T, q, np.gradient(q, T, axis=0), drive_torque=torque, model_torque=model)
+        series = {"drive_torque": torque, "model_torque": model, "standstill": stops}
+        return drive_of(T, q, np.gradient(q, T, axis=0), **series)
 
     log, frees = run(), [run(), run()]
     pairings = [

@@ -71,7 +71,7 @@ def test_a_load_on_the_flange_is_named(motion, mass):
     assert share > 0.99
     (remark,) = held_out_remarks(trace(motion, residual), np.full(6, 0.01))
     assert remark.code == "apparent-load"
-    assert remark.values["mass_kg"] == found
+    assert dict(remark.values) == {"mass_kg": found, "share_percent": 100.0 * share}
 
 
 def test_no_remark_where_the_score_is_that_of_the_training(motion):
@@ -146,5 +146,6 @@ def test_a_repeated_log_is_no_test_and_the_training_level_is_said(motion):
     train = trace(motion, np.full(motion.q.shape, 2.0), "train")
     remarks = list(score_remarks([train, trace(motion, np.full(motion.q.shape, 2.0))]))
     assert [r.code for r in remarks] == ["repeated-trajectory", "training-residual"]
+    assert remarks[0].values["share_percent"] == 100.0
     assert remarks[1].values["mean_Nm"] == 2.0
     assert not list(score_remarks([]))

@@ -20,11 +20,13 @@ from vftcli.identification.methods import (
     check_friction,
     fit_remarks,
     friction_method,
+    identified_friction,
     initial_columns,
     rotor_number,
     whole_arm,
     with_vector,
 )
+from vftcli.identification.shapes import bent
 from vftcli.identification.training import moving_joints, prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
@@ -193,6 +195,18 @@ def test_what_was_fitted_is_remarked_on_in_its_units(data, prepared):
         ("presliding-length", [1.0, [0.0, 1.0], [1.0, 0.5]]),
         ("friction-by-temperature", [[0.9, 1.2]]),
     ]
+
+
+def test_points_of_a_line_are_listed_beside_the_profile_s(data):
+    arm, sd = load_robot("ur5"), np.array([0.29, 0.31, 0.1])
+    old, x = data._replace(robot=arm), np.array([1.0, -1.0, 0.3])
+    friction, numbers = identified_friction(old, 1, bent(2.0), x, sd, "base")
+    assert friction.confidence == (
+        "identified (base) from recording (sha256 unknown); standard deviations 0.29, 0.31, 0.1"
+    )
+    found = [(n.joint, n.value, n.sd, n.profile, n.determined) for n in numbers]
+    rows = zip([2] * 3, x, sd, arm.friction[1].torques[:3], [True, False, False], strict=True)
+    assert found == list(rows)
 
 
 def test_a_current_that_falls_with_the_torque_is_refused(data):

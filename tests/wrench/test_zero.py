@@ -53,18 +53,23 @@ def test_the_change_between_two_spans_is_reported() -> None:
 
 def test_the_unloaded_start_ends_where_the_load_begins() -> None:
     span = unloaded_start(hung())
-    assert span is not None
-    assert span[0] == pytest.approx(1.0)
     # the load begins at 5 s; 0.3 s are left out before it
-    assert span[1] == pytest.approx(4.7, abs=0.02)
+    assert span == pytest.approx((1.0, 4.7))
 
 
-def test_the_unloaded_start_of_a_log_without_a_load_ends_with_it() -> None:
-    """From the second in which observers settle, on a clock that begins at 3 s, to the last."""
+@pytest.mark.parametrize(
+    ("lasts", "size", "stop"),
+    [(0, 0.0, 12.99), (0.09, 9, 12.99), (0.11, 9, 7.7), (2, 2.8, 12.99), (2, 3.2, 7.7)],
+)
+def test_what_is_short_or_light_does_not_end_the_unloaded_start(
+    lasts: float, size: float, stop: float
+) -> None:
+    """From a second after the log's begin at 3 s to .3 s before a load of .1 s and 3 N, if any."""
     t = 3.0 + np.arange(0.0, 10.0, 0.01)
     values = DRIFT + 0.05 * np.random.default_rng(0).standard_normal((len(t), 6))
+    values[(t > 7.995) & (t < 7.995 + lasts), 1] += size
     span = unloaded_start(Wrench(name="kfo-fe", t=t, values=values, frame="base"))
-    assert span == (pytest.approx(4.0), pytest.approx(t[-1]))
+    assert span == (pytest.approx(4.0), pytest.approx(stop))
 
 
 def test_a_log_too_short_or_masked_has_no_unloaded_start() -> None:
