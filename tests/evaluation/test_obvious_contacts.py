@@ -63,6 +63,22 @@ def test_two_planted_torques_are_where_they_were_planted() -> None:
     assert [round(float(x), 1) for x in (begin, end)] == [begin, end]
 
 
+def test_the_worst_contact_is_the_largest_for_its_joint_s_quiet_level() -> None:
+    """Half of a sine of 7 N·m on J2 is above 4.9: 60 N·m there are less than 30 of 2 on J5."""
+    free = FIXTURE.between(0.0, 4.0)
+    torque = np.zeros_like(free.q)
+    torque[:, 1] = 7.0 * np.sin(2.0 * np.pi * free.t / 2.0)
+    torque[(free.t > 0.4) & (free.t < 0.9), 1] += 60.0
+    torque[(free.t > 3.0) & (free.t < 3.4), 4] += 30.0
+    current = free.require("current") - torque / UR5.torque_constant
+    log = Run(recording=replace(free, current=current), robot=UR5)
+    assert [touch.joint for touch in touches(log)] == [1, 4]
+    assert touches(log)[0].quiet > 4.0
+    (warned,) = touched_remarks(log)
+    assert warned.where.joints == (5,)
+    assert warned.values["torque_Nm"] == pytest.approx(30.0, rel=0.15)
+
+
 def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -> None:
     """That nobody touched this UR10 is its authors' word; 7 N·m of J6's friction are open."""
     path = logs / "salerno_ur10" / "ur10_exciting.db3"
