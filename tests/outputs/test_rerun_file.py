@@ -13,6 +13,7 @@ from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import (
     LogLine,
     Tab,
+    blueprint,
     drawable,
     grid_of,
     recording_id,
@@ -89,6 +90,19 @@ def test_small_plots_say_where_their_axes_end() -> None:
     many, few = grid_of(Tab("many", plots)), grid_of(Tab("few", plots[:3]))
     assert many.contents[3].name == "what [N], -1.5 to 31.5"
     assert few.contents[2].name == "what [N]"
+
+
+def test_the_eye_sees_the_base_and_all_places_of_the_links() -> None:
+    """A box of .4 x .8 x 1 m from the floor: half its diagonal is .6708 m, 2.3 of them away."""
+    places = np.array([[[0.2, -0.4, 0.6], [-0.2, 0.4, 1.0]]])
+    made = blueprint([], {"Summary": ""}, POSES._replace(translation=places), "Arm")
+    eye = made.root_container.contents[0].contents[0].properties["EyeControls3D"]
+    (place,), (target,) = (
+        x.as_arrow_array().to_pylist() for x in (eye.position, eye.look_target)
+    )
+    np.testing.assert_allclose(target, [0.0, 0.0, 0.5])
+    away = 2.3 * 0.6708 * np.array([0.62, -0.66, 0.42])
+    np.testing.assert_allclose(place, [0.0, 0.0, 0.5] + away, atol=1e-4)
 
 
 def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:

@@ -81,3 +81,25 @@ def test_a_wrench_that_is_not_taken_is_named(tmp_path: Path, state: Any) -> None
     path = mcap(tmp_path / "x", joints=state, wrench_of_hand=lambda k: {"force": [k, 0.0, 0.0]})
     (left,) = [r for r in read(path).source.remarks if r.code == "topics-left-out"]
     assert left.values["topics"] == ("/wrench_of_hand",)
+
+
+@pytest.mark.parametrize(
+    ("own", "clock"),
+    [
+        ({"sec": 1, "nanosec": 5}, "header stamps"),
+        ({"sec": 8_999_999_999, "nanosec": 5}, "header stamps"),
+        ({"sec": 9_000_000_000, "nanosec": 5}, "log time of the recorder"),
+        ({"sec": 1, "nanosec": 10**10}, "log time of the recorder"),
+        ({"sec": 1.5, "nanosec": 5}, "log time of the recorder"),
+    ],
+)
+def test_a_stamp_is_whole_seconds_and_nanoseconds_of_some_centuries(
+    tmp_path: Path, own: dict[str, Any], clock: str
+) -> None:
+    def stamped(k: int) -> dict[str, Any]:
+        later = own | {"nanosec": own["nanosec"] + 8_000_000 * k}
+        return joint_state(k) | {"header": {"stamp": later, "frame_id": ""}}
+
+    log = read(mcap(tmp_path / "x", joint_states=stamped))
+    assert log.source.clock.startswith(clock)
+    np.testing.assert_allclose(log.t, 0.008 * np.arange(ROWS), atol=1e-9)

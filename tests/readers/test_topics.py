@@ -49,7 +49,8 @@ def write_joint_states(path: Path, messages: list[dict[str, object]]) -> Path:
                 )
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], time + 100, store.serialize_ros1(typed, kind))
+            content = bytes(store.serialize_ros1(typed, kind)) + bytes(message.get("padding", 0))  # type: ignore[call-overload]
+            writer.write(connections[topic], time + 100, content)
     return path
 
 
@@ -108,6 +109,14 @@ def test_merged_topics_with_a_gripper_and_changing_order(tmp_path: Path) -> None
     expected = np.arange(7.0) + 0.001 * np.arange(40)[:, None]
     np.testing.assert_allclose(recording.q, expected, rtol=1e-15)
     assert recording.robot_hint == "panda"
+
+
+def test_bytes_behind_a_message_are_counted(tmp_path: Path) -> None:
+    messages = [ur_message(k, padding=5 * (k == 9)) for k in range(20)]
+    with pytest.raises(
+        LogError, match=r"sensor_msgs/JointState \(5 bytes too many\)\. The bag is"
+    ):
+        read(write_joint_states(tmp_path / "x", messages))
 
 
 def test_empty_and_nan_velocities_are_missing_signals(tmp_path: Path) -> None:
