@@ -36,7 +36,7 @@ def batch(folder: Path, sizes: list[int], jobs: int | None, **more: int) -> Batc
 @pytest.mark.parametrize(
     ("logs", "jobs", "most"),
     # eight groups a worker at least, of four workers where none are stated, of 64 logs at most
-    [(5, 2, 1), (64, 2, 4), (95, 2, 5), (64, None, 2), (64, 0, 2), (520, 1, 64)],
+    [(5, 2, 1), (64, 2, 4), (95, 2, 5), (64, None, 2), (95, 0, 2), (520, 1, 64)],
 )
 def test_small_logs_go_together_so_that_workers_end_together(
     tmp_path: Path, logs: int, jobs: int | None, most: int

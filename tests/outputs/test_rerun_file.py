@@ -102,7 +102,7 @@ def test_the_eye_sees_the_base_and_all_places_of_the_links() -> None:
     )
     np.testing.assert_allclose(target, [0.0, 0.0, 0.5])
     away = 2.3 * 0.6708 * np.array([0.62, -0.66, 0.42])
-    np.testing.assert_allclose(place, [0.0, 0.0, 0.5] + away, atol=1e-4)
+    np.testing.assert_allclose(np.subtract(place, target), away, atol=1e-4)
 
 
 def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:
