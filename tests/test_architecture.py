@@ -273,10 +273,10 @@ MOST = {
     "files": 239,
     "functions": 2783,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 368_793,
+    "names, operators, numbers": 368_790,
     "characters a line that is not blank": 50.86,
     "noqa": 70,
-    "lines of TOML, JavaScript, CSS": 7424,
+    "lines of TOML, JavaScript, CSS": 7392,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 

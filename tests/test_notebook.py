@@ -67,7 +67,7 @@ def test_a_report_answers_everything(analysis: vft.Analysis) -> None:
     assert analysis.wrench.name == "best"
     assert set(analysis.errors["observer"]) == {"best", "gmo"}
     codes = analysis.remarks.to_polars()["code"].to_list()  # type: ignore[attr-defined]
-    assert {"free-cycle-found", "floor-propagated", "wrench-smoothed"} <= set(codes)
+    assert {"free-cycles-found", "floor-propagated", "wrench-smoothed"} <= set(codes)
     assert len(codes) == len(analysis.remarks)
 
 

@@ -184,7 +184,7 @@ def test_a_fit_that_fails_is_said_and_costs_nothing_else(
 def test_run_json_says_what_the_best_is_made_of(automatic: Analysis) -> None:
     made = run_record(automatic, "")["complete_log"]["best"]
     assert (made["observer"], made["gains"]) == ("rts-auto", "log")
-    assert [remark.code for remark in made["free_part"]] == ["free-cycle-found"]
+    assert [remark.code for remark in made["free_part"]] == ["free-cycles-found"]
     off = made["whole_log_bias"]
     assert set(off["joints"]) >= {1, 2, 3}
     assert np.all(off["rms_Nm"][:3] > 0.2)

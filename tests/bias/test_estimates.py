@@ -45,7 +45,7 @@ def mean_rmse(analysis: Analysis, observer: str) -> float:
 def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis) -> None:
     found = worked_up.refinement
     assert found is not None
-    assert found.remarks[0].code == "free-cycle-found"
+    assert found.remarks[0].code == "free-cycles-found"
     assert (found.remarks[0].values["cycles"], found.remarks[0].values["whole"]) == ([1], 5)
     inside = worked_up.t[found.baselines.plain.part.own]
     assert inside[0] == pytest.approx(0.0, abs=0.05)

@@ -12,7 +12,7 @@ from vftcli.cli import main
 from vftcli.readers.reading import read
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
-SAID = "ur5.arrow episode 0: episode 0 of 2: --episode K|all"
+SAID = "ur5.arrow episode 0: episode 0, of 2 in all: --episode K|all"
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_contacts_and_convert_say_it_too(
     assert run(monkeypatch, "contacts", episodes, "--robot", "ur5", "--anyway") == 0
     assert SAID in capsys.readouterr().err
     assert run(monkeypatch, "convert", episodes, "-o", tmp_path / "x.csv") == 0
-    assert "episode 0 of 2: --episode K|all" in capsys.readouterr().err
+    assert "episode 0, of 2 in all: --episode K|all" in capsys.readouterr().err
 
 
 def test_all_are_logs_of_their_own(episodes: Path, monkeypatch: Any, capsys: Any) -> None:

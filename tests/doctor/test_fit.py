@@ -13,6 +13,7 @@ from vftcli.doctor.fit import (
     MEASURED,
     RESIDUAL,
     RobotMatch,
+    arm_findings,
     guess_robot,
     is_judgeable,
     match_of,
@@ -91,6 +92,15 @@ def test_a_measured_effort_that_needs_a_heavy_load_is_no_fit() -> None:
     assert found is not None
     assert found.misfit < 0.1
     assert not found.fits
+
+
+def test_an_effort_with_columns_in_another_order_is_not_another_arm_s() -> None:
+    """The controller's own model says which arm it is; no pair of joints is exchanged."""
+    log = match_log(moving("ur10e"))
+    mixed = replace(log, current=log.require("current")[:, ::-1])
+    found = arm_findings(mixed, load_robot("ur10e"))
+    assert [finding.code for finding in found.findings] == ["effort-unexplained"]
+    assert found.robots[0].fits
 
 
 def test_a_robot_is_guessed_by_the_maker_s_own_model_alone() -> None:

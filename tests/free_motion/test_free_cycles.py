@@ -96,7 +96,7 @@ def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_t
         0.0518, abs=1e-4
     )  # √((1 + 1/8)/(1 + 1/59)) − 1
     (one,) = FreeCycles((2,), np.array([1.5, np.inf, 1.0])).remarks(3)
-    assert (one.code, list(one.values["residuals"])) == ("free-cycle-found", [1.5, 1.0])
+    assert (one.code, list(one.values["residuals"])) == ("free-cycles-found", [1.5, 1.0])
     for count in (3, 8):
         few = FreeCycles(tuple(range(count)), None)
         assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)

@@ -55,8 +55,8 @@ def test_rungs_without_their_clock_are_left_out(drive: Make) -> None:
         ("model", None),
         ("model", 12.0),
     ]
-    assert made[1].floor_remark().code == "alignment-floor-filtered"
-    assert made[0].floor_remark().code == "alignment-floor"
+    assert made[1].floor_remark().values["rung"] == "period + 12 Hz low-pass"
+    assert made[0].floor_remark().values["rung"] == "period"
 
 
 def test_too_few_partners_are_refused(drive: Make) -> None:

@@ -127,8 +127,8 @@ def test_a_long_gap_restarts_the_filter_and_says_so() -> None:
         np.testing.assert_allclose(estimate.tau[500], 0.0, atol=1e-12)  # afresh
         np.testing.assert_allclose(estimate.tau[-1], tau, rtol=1e-9)
         (remark,) = estimate.remarks
-        assert (remark.code, remark.level) == ("restarted-after-gap", "caution")
-        assert "restarted from zero after one gap" in str(remark)
+        assert (remark.code, remark.level) == ("restarted-after-gaps", "caution")
+        assert "too long for its gain: 1, the longest" in str(remark)
 
 
 @pytest.mark.parametrize(("kappa", "restarts"), [(1.5, True), (1.99, True), (2.5, False)])
@@ -137,7 +137,7 @@ def test_gains_that_already_alternate_restart_nothing(kappa: float, restarts: bo
     t = np.concatenate([np.arange(50) / RATE, 50 / RATE + 1.0 + np.arange(50) / RATE])
     terms = DynamicsTerms(t=t, p=np.outer(t, [4.0]), mu=np.zeros((100, 1)))
     estimate = MomentumObserver(gain=kappa * RATE).estimate(terms)
-    assert [r.code for r in estimate.remarks] == ["restarted-after-gap"] * restarts
+    assert [r.code for r in estimate.remarks] == ["restarted-after-gaps"] * restarts
     assert (estimate.tau[50, 0] == 0.0) == restarts
 
 

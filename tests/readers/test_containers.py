@@ -189,7 +189,7 @@ def test_skills_are_episodes(tmp_path: Path) -> None:
     path = seeds.json_skills(tmp_path / "x", skills=3)
     assert list(episode_numbers(path, ReadChoice())) == [0, 1, 2]
     first, third = read(path), read(path, episode=2)
-    assert [str(remark) for remark in first.source.remarks] == ["episode 0 of 3: --episode K|all"]
+    assert [str(remark) for remark in first.source.remarks] == ["episode 0, of 3 in all: --episode K|all"]
     assert third.source.remarks == ()
     np.testing.assert_allclose(third.q - first.q, 0.2, atol=1e-15)
 
@@ -244,7 +244,7 @@ class TestHdf5:
         assert labels == ("x episode 0 left arm", "x episode 10 left arm")
         np.testing.assert_allclose(last.q - first.q, 0.1, atol=1e-15)
         assert [r.code for r in first.source.remarks] == ["episode-chosen", "episode-place"]
-        assert str(first.source.remarks[0]) == "episode 0 of 3: --episode K|all"
+        assert str(first.source.remarks[0]) == "episode 0, of 3 in all: --episode K|all"
 
     def test_an_episode_beyond_the_last_is_refused_with_their_number(
         self, tmp_path: Path
@@ -351,7 +351,7 @@ def test_episodes_of_a_table_are_read_one_by_one(tmp_path: Path) -> None:
                       "episode_index": np.repeat([3, 7], 5)})  # fmt: skip
     path = seeds.write_arrow(tmp_path / "x", table, stream=False)
     np.testing.assert_array_equal(read(path, episode=7).q, motion()["q"][5:10])
-    assert str(read(path).source.remarks[0]) == "episode 3, the first of 2: --episode K|all"
+    assert str(read(path).source.remarks[0]) == "episode 3, of 2 in all: --episode K|all"
 
 
 def xlsx(path: Path) -> None:

@@ -109,7 +109,7 @@ def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
 
 def test_the_first_is_taken_and_said(tmp_path: Path) -> None:
     recording = read(dataset(tmp_path / "set"))
-    assert recording.source.warnings == ("episode 0 of 3: --episode K|all",)
+    assert recording.source.warnings == ("episode 0, of 3 in all: --episode K|all",)
     assert recording.name == "set episode 0"
     with pytest.raises(LogError, match="no episode 3; it holds 3, from 0 to 2"):
         read(tmp_path / "set", episode=3)

@@ -200,7 +200,7 @@ def test_gaps_are_kept_and_reported(tmp_path: Path) -> None:
     lines = rows(30) + [f"{5 + k / 100},0.1,0.2" for k in range(30)]
     recording = read(write(tmp_path / "x", table(lines)))
     assert recording.samples == 60
-    assert "1 gap" in recording.source.warnings[0]
+    assert "kept: 1; the longest" in recording.source.warnings[0]
 
 
 @pytest.mark.parametrize("garbage", ["1e154,0.1,0.2", "0,1e154,3", "nan,0.1,0.2", "0,nan,2",
@@ -210,7 +210,7 @@ def test_leading_garbage_is_dropped_and_said(tmp_path: Path, garbage: str) -> No
     recording = read(write(tmp_path / "x", table(lines)))
     assert recording.samples == 300
     assert recording.source.t0 == 12621
-    assert "8 leading rows of garbage" in recording.source.repairs[0]
+    assert "garbage (absurd values or a jumping clock): 8" in recording.source.repairs[0]
 
 
 BAD_CELLS = [

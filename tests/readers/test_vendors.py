@@ -269,7 +269,7 @@ def test_lerobot_reads_the_first_episode(tmp_path: Path) -> None:
     assert recording.source.format == "lerobot"
     assert (recording.samples, recording.joints) == (30, 7)
     np.testing.assert_allclose(recording.q, log["q"][:30], atol=1e-7)  # float32
-    assert recording.source.warnings[0] == "episode 0 of 2: --episode K|all"
+    assert recording.source.warnings[0] == "episode 0, of 2 in all: --episode K|all"
     second = read(
         data / "file-000.parquet", columns="t=timestamp,q=observation.state[0:7]", episode=1
     )

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.signals import edges_of, repeated_rows
+from vftcli.doctor.signals import WAY, edges_of, repeated_rows, stuck_stretches, travel_of
 from vftcli.doctor.velocity import GAP_STEPS
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name, gravity_torque
@@ -112,6 +112,13 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     constant = np.ones(robot.joints) if name != "current" else robot.torque_constant
     if effort is None or constant is None:
         return
+    stuck = np.zeros(effort.shape, bool)
+    for j, first, last in stuck_stretches(recording, name):
+        stuck[first + 1 : last + 1, j] = True
+    # Of one joint it is said; without those of most that move nothing can be estimated.
+    moving = np.count_nonzero(travel_of(recording) > WAY)
+    most = np.count_nonzero(stuck, axis=1) > moving / 2
+    yield Bad("frozen-effort", stuck & most[:, None], None, MOST)
     torque, limit = effort * constant, np.nan_to_num(robot.limits.tau_max, nan=np.inf)
     beyond = abs(torque) > BEYOND * limit
     yield Bad("effort-beyond-drive", beyond, torque)

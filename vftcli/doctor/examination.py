@@ -24,7 +24,7 @@ from vftcli.signals.remarks import Remark, Remarks, as_record, fact, filled, sen
 from vftcli.signals.shown import Shown
 
 #: Findings that an arm's model is another's: what identification is for.
-NO_FIT = frozenset({"other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest"})
+NO_FIT = frozenset({"other-robot", "no-robot-fits", "no-robot-fits-any", "effort-unexplained"})
 #: Findings that make every result meaningless. A load or a contact is never one of them.
 REFUSING = NO_FIT | {
     "effort-sign", "effort-sign-by-work", "joint-sign", "effort-order", "joint-order",

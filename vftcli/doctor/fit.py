@@ -65,6 +65,7 @@ MISTAKEN = 0.1
 CLEARLY = 0.6
 #: Size of the vendor's torque, relative to the effort, from which it tells its sign.
 FELT = 0.02
+NAMED = 3  #: Arms that a finding names.
 #: Findings after which a joint's effort is no evidence.
 EFFORT = frozenset({"stuck-effort", "zero-effort", "saturation", "stuck-position"})
 
@@ -229,7 +230,7 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
     return other.fits and other.misfit < share * diagnosis.healed.misfit
 
 
-def explained(diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Remark]:
+def explained(diagnosis: Diagnosis, robots: Sequence[RobotMatch]) -> Iterator[Remark]:
     """Findings on the cause, or on none; then on the log once it is put right."""
     healed, cause = diagnosis.healed, diagnosis.cause
     robot = healed.windows.robot
@@ -244,8 +245,9 @@ def explained(diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Re
         yield from load_remarks(healed)
         return
     elif healed.misfit > NO_FIT:
-        ranked = "; ".join(map(str, robots))
-        yield warning("no-robot-fits", robot=robot.name, misfit_percent=misfit, ranked=ranked)
+        own, ranked = robots[0], "; ".join(map(str, robots[:NAMED]))
+        code = "effort-unexplained" if own.by_maker and own.fits else "no-robot-fits"
+        yield warning(code, robot=robot.name, misfit_percent=misfit, ranked=ranked)
         return
     if (other := diagnosis.unclear) is not None:
         left = 100 * other.misfit
@@ -278,10 +280,8 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
         return ArmFindings(tuple(explained(best, fits)), fits)
     if is_known:
         return ArmFindings(robots=fits)
-    still = np.ptp(recording.q, axis=0).max() < 0.05
-    code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
     # Without an arm the work of its effort is all that tells its sign.
-    remark = warning(code, ranked="; ".join(map(str, fits)))
+    remark = warning("no-robot-fits-any", ranked="; ".join(map(str, fits[:NAMED])))
     return ArmFindings((*inverted_effort(recording), remark), fits)
 
 

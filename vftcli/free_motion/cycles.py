@@ -288,13 +288,12 @@ class FreeCycles(NamedTuple):
     def remarks(self, whole: int) -> list[Remark]:
         """Their numbers among so many whole cycles, and which are paired with the others if few."""
         count = len(self.numbers)
-        code = "free-cycle" if count == 1 else "free-cycles"
         named, drawn = ([k + 1 for k in numbers] for numbers in (self.numbers, self.drawn))
         if self.residuals is None:
-            found = fact(f"{code}-given", cycles=named, whole=whole)
+            found = fact("free-cycles-given", cycles=named, whole=whole)
         else:
             residuals = self.residuals[np.isfinite(self.residuals)]
-            found = fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
+            found = fact("free-cycles-found", cycles=named, whole=whole, residuals=residuals)
         if count <= MOST_PAIRED:
             return [found]
         # The mean of k cycles with independent noise adds 1/k of one cycle's to the

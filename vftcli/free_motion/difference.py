@@ -107,10 +107,9 @@ class Difference(NamedTuple):
     error: ErrorModel  #: What is known of its own error.
 
     def remark(self, code: str, **values: Any) -> Remark:  # noqa: ANN401 - any value
-        """A remark on this rung, by another code, -filtered, where it is low-passed."""
-        if self.cutoff is None:
-            return fact(code, rung=self.rung, **values)
-        return fact(f"{code}-filtered", rung=self.rung, cutoff_Hz=self.cutoff, **values)
+        """A remark on this rung, with its low-pass."""
+        low_pass = "" if self.cutoff is None else f" + {self.cutoff:g} Hz low-pass"
+        return fact(code, rung=f"{self.rung}{low_pass}", **values)
 
     def floor_remark(self) -> Remark:
         """The floor on this rung."""

@@ -101,8 +101,8 @@ class FirstOrderObserver(BlockObserver):
                 gaps, longest = gaps + int(rows.sum()), max(longest, float(terms.dt[rows].max()))
             tau = recursion(decay[None], x, before)[0]
             end = tau[-1:]
-        code = "restarted-after-gap" if gaps == 1 else "restarted-after-gaps"
-        remarks = (caution(code, gaps=gaps, longest_s=longest),) if gaps else ()
+        said = caution("restarted-after-gaps", gaps=gaps, longest_s=longest)
+        remarks = (said,) if gaps else ()
         return self.estimated(terms, tau, remarks=remarks), FirstOrderState(end, gaps, longest)
 
     def tuning(self, step: float, joints: int) -> Tuning:

@@ -30,10 +30,9 @@ from vftcli.signals.rest import slower
 SUBJECTS = {
     "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-not-mounted",
              "payload-not-carried", "load-changes"),
-    "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest",
-              "no-profile"),
+    "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-profile"),
     "time stamps": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps",
-                    "clock-gaps", "clock-gap", "repeats-differ", "absurd-clock", "absurd-steps"),
+                    "clock-gaps", "repeats-differ", "absurd-clock", "absurd-steps"),
     "base": ("upside-down", "tilted-base"),
     "positions": ("degrees", "stuck-position", "coarse-positions", "absurd-values"),
     "velocity": ("no-velocity", "velocity-unit", "velocity-mismatch", "velocity-sign",

@@ -112,10 +112,9 @@ def cleaned(
     gaps = list[Remark]()
     if len(places := gaps_of(t, GAP_STEPS)):
         lengths = t[places + 1] - t[places]
-        k = int(np.argmax(lengths))
-        at, length = float(t[places[k]]), float(lengths[k])
-        code = "clock-gaps" if len(places) > 1 else "clock-gap"
-        gaps = [caution(code, gaps=len(places), steps=GAP_STEPS, longest_s=length, at_s=at)]
+        at, longest = t[places[lengths.argmax()]], lengths.max()
+        values = {"gaps": len(places), "steps": GAP_STEPS, "longest_s": longest, "at_s": at}
+        gaps = [caution("clock-gaps", **values)]
     # In whole nanoseconds, where the log counts its stamps in them.
     per_tick = round(raw.tick * 1e9) if counts else 0
     source = Source(
@@ -229,8 +228,7 @@ def without_leading_garbage(raw: RawLog) -> RawLog:
     count = max(int(np.flatnonzero(absurd)[-1]) + 1, jump)
     if count >= len(raw.stamps) - 1 or absurd[:count].mean() < 0.1:
         return raw
-    code = "leading-garbage" if count > 1 else "leading-garbage-row"
-    return kept(raw, slice(count, None), fact(code, rows=count))
+    return kept(raw, slice(count, None), fact("leading-garbage", rows=count))
 
 
 #: What a column of a signal is that is none of a joint.
@@ -246,7 +244,7 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         if all(max(float(np.max(x)), -float(np.min(x))) < ABSURD for x in pieces(value)):
             continue
         unknown = ~(np.abs(value) < ABSURD)
-        row, column = (int(k) for k in np.argwhere(unknown)[0])
+        row, column = np.argwhere(unknown)[0].tolist()
         lost = int(unknown[:, column].sum())
         if lost == len(value) and np.isnan(value[:, column]).all():
             raise LogError(
@@ -286,7 +284,7 @@ def _restarts(raw: RawLog, path: Path, *, examining: bool) -> list[int]:
             f"{len(lengths)} recordings one after another. Split it, or take one by its number: "
             "--columns segment=1 (with the other columns, if they need describing)."
         )
-    return list(map(int, restarts))
+    return [*restarts.tolist()]
 
 
 def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
@@ -335,14 +333,14 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
     changed = np.zeros(again.size, dtype=bool)
     for value in raw.signals.values():
         changed |= (value[again] != value[again - 1]).any(axis=1)
-    if 2 * int(changed.sum()) > len(raw.stamps):
+    repeats, different = again.size, int(changed.sum())
+    if 2 * different > len(raw.stamps):
         raise ClockError(
-            f"{path}: the clock is coarser than the samples: {changed.sum()} of {len(fresh)} rows "
+            f"{path}: the clock is coarser than the samples: {different} of {len(fresh)} rows "
             "have the stamp of the row before but other values. Name a finer column as t with "
             "--columns, or state the rate of a log without a clock, as in t@125Hz."
         )
-    repeats, different = again.size, int(changed.sum())
-    remarks = [fact("repeats-dropped" if repeats > 1 else "repeat-dropped", rows=repeats)]
+    remarks = [fact("repeats-dropped", rows=repeats)]
     if different:
         remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
     return kept(raw, fresh, *remarks)

@@ -213,8 +213,7 @@ def episode_of(
     part = f"episode {number}" if count > 1 else ""
     if request.episode is not None or count == 1:
         return number, part, ()
-    code = "episode-chosen" if number == 0 else "episode-chosen-first"
-    return number, part, (caution(code, episode=number, episodes=count),)
+    return number, part, (caution("episode-chosen", episode=number, episodes=count),)
 
 
 def arm_of(

@@ -74,8 +74,7 @@ class Simulation(NamedTuple):
         stamp, written, signals = self.measured
         rows = np.unique(written)
         duplicates = len(written) - len(rows)
-        repeated = "repeats-dropped" if duplicates > 1 else "repeat-dropped"
-        remarks = (fact(repeated, rows=duplicates),) if duplicates else ()
+        remarks = (fact("repeats-dropped", rows=duplicates),) if duplicates else ()
         # A UR logs temperatures, a Franka its estimate of contact.
         other = "tau_ext" if "current" in signals else "temperature"
         columns: dict[str, Any] = {k: x[rows] for k, x in signals.items() if k != other}

@@ -114,8 +114,8 @@ class Gathering:
                 raise LogError(f"--columns: {lead.topic} has no field {last!r}; it has {listed}.")
             self.signals.pop(source, None)
             self.signals[signal] = there[source] * item.factor + 0.0
-            code = "field-used-turned" if item.factor < 0 else "field-used"
-            self.remarks.append(fact(code, field=last, signal=signal))
+            minus = "-" if item.factor < 0 else ""
+            self.remarks.append(fact("field-used", field=f"{minus}{last}", signal=signal))
         if "effort" in self.signals:
             kind = effort_of(lead.names)
             self.signals[kind] = self.signals.pop("effort")
