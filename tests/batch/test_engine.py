@@ -40,6 +40,10 @@ def test_here_every_task_is_done_in_order_and_errors_are_outcomes() -> None:
     assert ended[1].failure is not None
     assert ended[1].failure[:2] == ("starting", "ValueError")
     assert all(outcome.effort is not None for outcome in ended)
+    said: list[str] = []
+    for choice in (HERE, WorkersChoice()):  # little work is done here, and nothing is said of it
+        assert [one.value for one in run_tasks([(9.0,)], math.sqrt, choice, said.append)] == [3.0]
+    assert said == []
 
 
 def test_a_failure_is_one_line_at_the_stage_that_was_begun() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contact_rows import contact, contact_list
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
@@ -14,6 +15,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
+from vftcli.signals.remarks import warning
 from vftcli.wrench.choice import WrenchChoice
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -62,6 +64,24 @@ def test_a_log_without_an_observer_has_one_row(analysis: Analysis) -> None:
     assert rows.height == 1
     assert rows["observer"][0] is None
     assert rows["robot"][0] == "ur5"
+
+
+def test_every_row_has_the_facts_of_its_log(analysis: Analysis) -> None:
+    """A finding of the free run beside it is none of the log's."""
+    (own, *_) = analysis.examinations
+    twice = (warning("saturation", signal="current"), warning("saturation", signal="dq"))
+    beside = replace(own, findings=(warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5"),))
+    examined = (replace(own, findings=twice), beside)
+    found = contact_list(contact(), contact(number=2, peak_force=30.0))
+    touched = replace(analysis, contacts=found, examinations=examined)
+    bare = replace(analysis, contacts=None)
+    for made, listed in ((touched, (2, False, 64.8, 7.1, 4.69, 6.5)), (bare, (None,) * 6)):
+        row = rows_of(made, "key").row(-1, named=True)
+        keys = ("contacts", "load", "hardest_N", "hardest_band_N", "hardest_s", "detectable_N")
+        assert tuple(row[key] for key in keys) == listed
+        assert (row["key"], row["samples"], row["duration_s"]) == ("key", 376, 3.0)
+        assert row["rate_hz"] == pytest.approx(125.0)
+    assert rows_of(touched, "key")["findings"][0].to_list() == ["saturation"]
 
 
 def test_the_size_of_what_is_known() -> None:

@@ -132,6 +132,9 @@ def test_one_of_several_recordings(tmp_path: Path) -> None:
     path = write(tmp_path / "x", "t,q1\n" + rows)
     with pytest.raises(ClockError, match="segment=1"):
         read(path)
+    for none in (0, 4):
+        with pytest.raises(ClockError, match=f"no segment {none}; the file holds 3"):
+            read(path, columns=f"segment={none}")
     second = read(path, columns="segment=2")
     assert second.samples == 30
     assert second.q[0, 0] == 1.0
