@@ -53,9 +53,12 @@ def test_rows_longer_than_the_names_are_counted_by_the_separator_of_the_names(
 
 
 def test_decimal_commas_between_semicolons(tmp_path: Path) -> None:
-    text = table(rows()).replace(",", ";").replace(".", ",")
-    recording = read(write(tmp_path / "x", text))
-    np.testing.assert_allclose(recording.t, 0.01 * np.arange(30), rtol=1e-12)
+    semicolons = table(rows()).replace(",", ";").replace(".", ",")
+    # Behind tabs a name may hold a comma: the second line tells that it separates nothing.
+    tabs = semicolons.replace("q2", "wrist,deg").replace(";", "\t")
+    for text in (semicolons, tabs):
+        recording = read(write(tmp_path / "x", text))
+        np.testing.assert_allclose(recording.t, 0.01 * np.arange(30), rtol=1e-12)
 
 
 @pytest.mark.parametrize("prefix", ["\ufeff", "# made by hand\n", "\n\n"])
