@@ -189,7 +189,9 @@ def test_skills_are_episodes(tmp_path: Path) -> None:
     path = seeds.json_skills(tmp_path / "x", skills=3)
     assert list(episode_numbers(path, ReadChoice())) == [0, 1, 2]
     first, third = read(path), read(path, episode=2)
-    assert [str(remark) for remark in first.source.remarks] == ["episode 0, of 3 in all: --episode K|all"]
+    assert [str(remark) for remark in first.source.remarks] == [
+        "episode 0, of 3 in all: --episode K|all"
+    ]
     assert third.source.remarks == ()
     np.testing.assert_allclose(third.q - first.q, 0.2, atol=1e-15)
 
