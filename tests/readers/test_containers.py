@@ -354,6 +354,10 @@ def test_episodes_of_a_table_are_read_one_by_one(tmp_path: Path) -> None:
     path = seeds.write_arrow(tmp_path / "x", table, stream=False)
     np.testing.assert_array_equal(read(path, episode=7).q, motion()["q"][5:10])
     assert str(read(path).source.remarks[0]) == "episode 3, of 2 in all: --episode K|all"
+    numbers = np.repeat([3.0, np.nan], 5)
+    odd = table.set_column(2, "episode_index", pa.array(numbers))
+    with pytest.raises(LogError, match="episode_index is not a number in every row"):
+        read(seeds.write_arrow(tmp_path / "y", odd, stream=False))
 
 
 def xlsx(path: Path) -> None:

@@ -194,6 +194,10 @@ def test_bags_without_joints_say_what_they_hold(tmp_path: Path) -> None:
     messages = [{"topic": "/wrench", "time": START + k, "force": (0.0, 0, 1)} for k in range(9)]
     with pytest.raises(LogError, match=r"no topic with joint positions among /wrench"):
         read(write_joint_states(tmp_path / "x", messages))
+    more = [messages[0] | {"topic": f"/w{k:02}", "time": START + 50 + k} for k in range(15)]
+    # Twelve topics are named.
+    with pytest.raises(LogError, match=r", /w10 \(geometry_msgs/WrenchStamped\)\. Record a"):
+        read(write_joint_states(tmp_path / "y", messages + more))
 
 
 def arm_topic(
