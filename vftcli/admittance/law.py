@@ -106,11 +106,6 @@ class Admittance:
             self.threshold_mode, THRESHOLD_MODES, f"no threshold mode {self.threshold_mode!r}"
         )
 
-    @property
-    def release_threshold(self) -> Array:
-        """Force from which down an axis that is dragged recovers. (6,) [N, N·m]"""
-        return self.threshold * (1.0 - self.hysteresis)
-
 
 def from_table(
     table: Mapping[str, Any],

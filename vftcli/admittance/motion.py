@@ -37,7 +37,8 @@ def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = abs(wrench)
-    on, off = size > parameters.threshold, size <= parameters.release_threshold
+    on = size > parameters.threshold
+    off = size <= parameters.threshold * (1.0 - parameters.hysteresis)
     # The last row at which anything was switched tells the state: no
     # loop over samples.
     last = np.maximum.accumulate(np.where(on | off, np.arange(len(on))[:, None], -1), axis=0)

@@ -117,7 +117,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
         stuck[first + 1 : last + 1, j] = True
     # Of one joint it is said; without those of most that move nothing can be estimated.
     moving = np.count_nonzero(travel_of(recording) > WAY)
-    most = np.count_nonzero(stuck, axis=1) > moving / 2
+    most = stuck.sum(axis=1) > moving / 2
     yield Bad("frozen-effort", stuck & most[:, None], None, MOST)
     torque, limit = effort * constant, np.nan_to_num(robot.limits.tau_max, nan=np.inf)
     beyond = abs(torque) > BEYOND * limit

@@ -197,11 +197,6 @@ class Robot(Shown):
         """The Pinocchio model of the loaded chain, with a frame ``flange``."""
         return self.loaded_chain.to_pinocchio(self.name)
 
-    def with_gains(self, gains: Mapping[str, Mapping[str, Any]]) -> "Robot":
-        """Return the robot with other gains of its observers, in its file too."""
-        document = {**self.document, "observers": dict(gains)}
-        return replace(self, gains=gains, document=document)
-
     def save(self, file: "str | Path", *, force: bool = False) -> None:
         """Write its file, which `load_robot` reads.
 

@@ -131,9 +131,8 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     around = np.arange(-NEAR, NEAR + 1)
     for ends, far in ((made, limit), (made[::-1], limit[::-1])):
         ends[:NEAR] = at_an_end(ends[: 3 * NEAR], END * far[:NEAR])
-    for _ in range(
-        NEAR
-    ):  # the worst of its neighbours first: beside a bad sample others look bad
+    # The worst of its neighbours first: beside a bad sample others look bad.
+    for _ in range(NEAR):
         near = np.sort(made[rows[:, None] + around], axis=1)
         others = np.median(made[rows[:, None] + around[around != 0]], axis=1)
         three = np.min(near[:, NEAR:] - near[:, : NEAR + 1], axis=1)

@@ -5,7 +5,9 @@ of paths.
 """
 
 import json
+import os
 import re
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from html import escape
@@ -39,8 +41,13 @@ TICK_ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
 @cache
 def templates() -> "Environment":
     """The templates: what comes from outside is printable and escaped, what is missing an error."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
+
+    # Compiled templates are kept beside their texts, as Python keeps modules.
+    kept = HERE / "templates" / "__pycache__"
+    if writable := not sys.dont_write_bytecode and os.access(kept.parent, os.W_OK):
+        kept.mkdir(exist_ok=True)
 
     def shown(value: object) -> object:
         """A value as HTML."""
@@ -67,12 +74,12 @@ def templates() -> "Environment":
 
     made = Environment(
         loader=FileSystemLoader(HERE / "templates"),
+        bytecode_cache=FileSystemBytecodeCache(str(kept)) if writable else None,
         autoescape=True,
         undefined=StrictUndefined,
         finalize=shown,
         trim_blocks=True,
         lstrip_blocks=True,
-        optimized=False,  # each template is compiled for one page: folding costs more
     )
     drawing = (ticks, label, scales_of, stripes, strokes, paint)
     words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
