@@ -95,6 +95,7 @@ def test_the_stated_period_decides_between_multiples(repeated: Make) -> None:
         (14.0, "more than one cycle"),
         (0.039, r"shorter than four samples \(0\.01 s each\); .* in seconds"),
         (3.0, "no repetition found near 3 s"),
+        (0.05, "no repetition found near 0.05 s"),
     ],
 )
 def test_impossible_periods(repeated: Make, stated: float, message: str) -> None:

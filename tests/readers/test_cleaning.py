@@ -111,7 +111,7 @@ def test_a_named_joint_without_numbers_is_left_out_and_said():
     with pytest.raises(LogError, match="torque of joint 2 holds no numbers"):
         cleaned(replace(log, joint_names=()), Path("log"), "test")
     wrench = replace(log, signals={"q": q, "wrench": effort})  # of as many axes as joints
-    with pytest.raises(LogError, match=r"^log: wrench of .* 2 holds no numbers at all"):
+    with pytest.raises(LogError, match="log: wrench axis 2 holds no numbers at all"):
         cleaned(wrench, Path("log"), "test")
     effort[:] = np.nan
     with pytest.raises(LogError, match="torque of joint 1 holds no numbers"):

@@ -103,7 +103,7 @@ def test_lines_without_a_state_are_counted(tmp_path: Path) -> None:
     path = libfranka_json(tmp_path / "x")  # which ends with "Done."
     path.write_text(path.read_text() + "Bye.\n")
     (remark,) = [r for r in read(path).source.remarks if r.code == "lines-skipped"]
-    assert str(remark) == "skipped 2 lines that hold no state"
+    assert str(remark) == "skipped lines that hold no state: 2"
 
 
 def test_json_takes_columns(tmp_path: Path) -> None:

@@ -84,7 +84,8 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
         if deviation <= SHORTLIST * spread:
             seconds = refined_period(t, q, seconds)
             deviation = returned(t, q, seconds)
-        if deviation <= RETURNS * spread:
+        # Within a few samples every motion returns: no refinement ends there.
+        if deviation <= RETURNS * spread and seconds > 0.5 * lag * step:
             return Period(seconds, deviation)
         closest = min(closest, (seconds, deviation), key=lambda c: c[1])
     wanted = f" near {stated:g} s" if stated is not None else ""

@@ -245,17 +245,17 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
             continue
         unknown = ~(np.abs(value) < ABSURD)
         row, column = np.argwhere(unknown)[0].tolist()
-        lost = int(unknown[:, column].sum())
-        if lost == len(value) and np.isnan(value[:, column]).all():
+        lost = unknown[:, column].sum()
+        where = f"{path}: {name} {COLUMN.get(name, 'of joint')} {column + 1}"
+        if np.isnan(value[:, column]).all():
             raise LogError(
-                f"{path}: {name} of joint {column + 1} holds no numbers at all, only empty cells "
-                f"or NaN. Record it, or {LEAVING_OUT}."
+                f"{where} holds no numbers at all, only empty cells or NaN. Record it, or "
+                f"{LEAVING_OUT}."
             )
+        at = f"in sample {number_of(raw, row)} (t = {seconds(raw)[row]:.6g} s)"
         raise LogError(
-            f"{path}: {name} {COLUMN.get(name, 'of joint')} {column + 1} is "
-            f"{value[row, column]:.6g} in sample {number_of(raw, row)} (t = "
-            f"{seconds(raw)[row]:.6g} s), {lost} such in all. Nothing is filled in: cut the rows "
-            f"out, or {LEAVING_OUT}."
+            f"{where} is {value[row, column]:.6g} {at}, {lost} such in all. Nothing is filled in: "
+            f"cut the rows out, or {LEAVING_OUT}."
         )
 
 
@@ -269,7 +269,7 @@ def _restarts(raw: RawLog, path: Path, *, examining: bool) -> list[int]:
     restarts = np.flatnonzero(np.diff(raw.stamps) < 0) + 1
     if not restarts.size:
         return []
-    k, t = int(restarts[0]), seconds(raw)
+    k, t = restarts[0], seconds(raw)
     where = f"at sample {number_of(raw, k)} (from {t[k - 1]:.6f} to {t[k]:.6f} s)"
     lengths = np.diff([0, *restarts, len(t)])
     # A clock that restarts begins near zero; any other step back is disorder.
@@ -363,10 +363,8 @@ def _refuse_degrees(raw: RawLog, path: Path) -> None:
     beyond = np.concatenate([np.any(np.abs(rows) > limit, axis=1) for rows in pieces(q)])
     # A few bad samples are no unit; the doctor cuts them out.
     own = (~beyond | (np.mean(beyond) >= BAD_SHARE))[:, None]
-    low, high = (
-        q.min(axis=0, where=own, initial=np.inf),
-        q.max(axis=0, where=own, initial=-np.inf),
-    )
+    low = q.min(axis=0, where=own, initial=np.inf)
+    high = q.max(axis=0, where=own, initial=-np.inf)
     largest, travel = float(np.max([-low, high])), float(np.max(high - low))
     if largest > limit or travel > TWO_TURNS:
         raise LogError(
