@@ -80,7 +80,8 @@ class SlowLoads(NamedTuple):
 def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
     """Columns of slow external loads on a moving arm at times t (S,) [s] and positions q (S, n)."""
     n, poses = chain.joints, link_poses(chain, q)
-    # At the flange, and a force on the link before the elbow's joint, and before the wrist's.
+    # At the flange, and a force on the link before the elbow's joint, and before the
+    # wrist's.
     links = n, *sorted({j for j in ((n + 1) // 2 - 1, n - 3) if j > 0})
     flange, *along = (link_jacobian(poses, link).transpose(0, 2, 1) for link in links)
     wrench = flange * np.repeat([FORCE, MOMENT], 3)

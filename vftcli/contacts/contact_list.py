@@ -87,9 +87,8 @@ class Contact(Shown):
     #: Smallest and largest |F| over every place that fits, bands included. [N]
     anywhere: tuple[float, float] | None
     where: "ArmPart"  #: Part of the arm.
-    lead: (
-        float | None
-    )  #: Evidence of that part's best place less that of every other part. [nats]
+    #: Evidence of that part's best place less that of every other part. [nats]
+    lead: float | None
     places: tuple[int, ...]  #: Links that fit; 0 is the flange.
     evidence: float | None  #: Evidence of the best place less that of nothing. [nats]
     joint_torque: Array  #: Torque on each joint at the peak. (n,) [N·m]

@@ -123,10 +123,8 @@ NEAR = 0.4  #: How far it reaches where only the prior is learned. [s]
 MOST_LANES = 96  #: Lanes that are worked on at once.
 START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
-FORCES, MOMENTS = (
-    (3.0, 300.0),
-    (0.1, 50.0),
-)  #: Smallest and largest standard deviation. [N], [N·m]
+#: Smallest and largest standard deviation. [N], [N·m]
+FORCES, MOMENTS = ((3.0, 300.0), (0.1, 50.0))
 #: Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free
 #: motion one reversal of friction reached 15, everything else but abrupt stops stayed
 #: below 6.

@@ -19,10 +19,8 @@ from vftcli.signals.series import runs_of
 #: Through gravity joints hand energy to one another.
 STRONG = -0.4
 ALONE = -0.85  #: `STRONG` for a joint among sound neighbours.
-ABSURD, FARTHEST = (
-    1e9,
-    1e18,
-)  #: No measurement is this large, in whatever unit, and no time. [-, s]
+#: No measurement is this large, in whatever unit, and no time. [-, s]
+ABSURD, FARTHEST = (1e9, 1e18)
 #: Sample times between which every recorder's lies, read in whatever unit. [s]
 STEPS = (1e-13, 1e10)
 SOME = 5000  #: Samples that tell how large a signal usually is.

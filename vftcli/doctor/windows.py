@@ -37,7 +37,8 @@ LOAD = np.array([5.0, 0.5, 0.5, 0.5])
 #:
 #: Public URDFs and profiles of one arm differ by 2–12 % in gravity's torque.
 ROUGH = 0.1, 0.025
-#: Factor on their prior from fit to fit, so many at most, until a fit needs no larger ones.
+#: Factor on their prior from fit to fit, so many at most, until a fit needs no larger
+#: ones.
 TIGHTER, ROUGH_FITS = 0.5, 8
 LIGHT = 0.1  #: Links below are as rough as one of this mass. [kg]
 KEPT = (
@@ -329,7 +330,8 @@ class Case:
         mass, moment = self.loaded.values[0], self.loaded.values[1:4]
         if self.gravity_range < VARIED * self.size:
             return False  # in one pose any residual passes for a load
-        # Less than nothing hangs on no flange: a negative load takes away what is mounted.
+        # Less than nothing hangs on no flange: a negative load takes away what is
+        # mounted.
         possible = 0.05 < mass < MAX_MASS or LESS * self.mounted < mass < -0.05
         plausible = possible and np.linalg.norm(moment) < MAX_ARM * abs(mass) + 0.3
         return plausible and self.loaded.size < TELLING * self.bare.size

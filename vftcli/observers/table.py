@@ -150,9 +150,8 @@ class Setup(NamedTuple):
     shown: LogSpectra = LogSpectra()  #: What the complete log shows of noise and contact.
 
 
-Built = tuple[
-    Observer, tuple[Remark, ...]
-]  #: An observer, and remarks on gains that nobody gave.
+#: An observer, and remarks on gains that nobody gave.
+Built = tuple[Observer, tuple[Remark, ...]]
 
 
 class Entry(NamedTuple):

@@ -333,7 +333,8 @@ def reference_ground(analysis: Analysis) -> Ground:
                 subject,
                 f"{reads}{missed}" if contacts else f"the log holds {name}",
                 command("compare", analysis.recording, *options),
-                # A missed reading is found in this log; a log without a sensor is like any other.
+                # A missed reading is found in this log; a log without a sensor is like
+                # any other.
                 of_log=bool(missed),
             )
     words = "no force sensor in the log: sizes are unchecked"

@@ -55,10 +55,12 @@ STYLE: dict[str, Any] = {
 TICKS = {"labelsize": 7.0, "direction": "in", "major.width": 0.5, "minor.width": 0.3}
 STYLE |= {f"{axis}tick.{key}": value for axis in "xy" for key, value in TICKS.items()}
 
-#: Width of a letter in a legend, of a line's sample beside it, and height of its lines. [in]
+#: Width of a letter in a legend, of a line's sample beside it, and height of its lines.
+#: [in]
 LETTER, SAMPLE, LINE = 0.043, 0.41, 0.15
 LONGEST = 44  #: Letters of a name in a figure; the end of a longer one is cut off.
-#: Stretches of a line in one plot, two samples each: finer than a printer tells in two inches.
+#: Stretches of a line in one plot, two samples each: finer than a printer tells in two
+#: inches.
 STRETCHES = 500
 #: Below this width a figure is one column wide [in]; height of a row of plots, by whether it is
 #: wide. [in]
@@ -71,10 +73,8 @@ DIGIT, BETWEEN = 0.046, 0.02
 SPREAD = 0.66  #: Share of a joint's room that its dots take.
 RANGE = 10.0  #: Numbers that differ by more than this factor have a logarithmic axis.
 PLOTTED = 0.75  #: About which share of a plot's room its axes take.
-AXES = {
-    "s": "Time (s)",
-    "Hz": "Frequency (Hz)",
-}  #: Unit of a horizontal axis → what it is called.
+#: Unit of a horizontal axis → what it is called.
+AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
 
 Look = dict[str, Any]  #: What matplotlib draws with.
 BAND_LOOK: Look = {
@@ -312,7 +312,8 @@ class DotPlot(NamedTuple):
 
     title: str  #: Which log.
     joints: Sequence[str]  #: Names below. (n,)
-    #: Name, numbers (n,), NaN where not known, and both ends of their intervals (2, n) or None.
+    #: Name, numbers (n,), NaN where not known, and both ends of their intervals (2, n) or
+    #: None.
     rows: Sequence[tuple[str, Array, Array | None]]
     floor: Array  #: The reference's own error, NaN where it is not known. (n,)
 

@@ -199,7 +199,8 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
 def send_plot(stream: Stream, plot: Chart) -> None:
     """Send one plot: names and colours once, then all samples in one batch; then its points."""
     lines = lines_of(plot)
-    # An edge is thin and a bar thick; of the others the reference, then the one to look at.
+    # An edge is thin and a bar thick; of the others the reference, then the one to look
+    # at.
     widths = [
         0.6 if line.name.endswith(EDGES)
         else 6.0 if line.name.startswith(BAR)

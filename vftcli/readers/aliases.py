@@ -48,9 +48,10 @@ WRENCHES = (
     " ".join(f"ft_wrench_{what}_{axis}" for what in ("force", "torque") for axis in "xyz"),
 )
 
+# A number of any length would be tried from each of its digits on
 INDEXED = re.compile(
     r"(?i)(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?|(?P<open>\[))?(?P<index>\d{1,9})(?(open)\])"
-)  # a number of any length would be tried from each of its digits on
+)
 #: What ROS tools put before the fields of a JointState.
 FIELD = re.compile(r"field\.|/?joint_states?[./]")
 #: A joint's name before the signal's, as PlotJuggler exports JointState topics.
@@ -319,11 +320,8 @@ UR_WORDS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 FRANKA = re.compile(r"(?:.*_)?(panda|fr3|fer|fp3)_joint([1-7])")
 NUMBERED = re.compile(r"(?i).*?joint[_ ]?(\d{1,9})")
 
-HINTS = {
-    "panda": "panda",
-    "fer": "panda",
-    "fr3": "fr3",
-}  #: Stem of Franka's joint names → profile.
+#: Stem of Franka's joint names → profile.
+HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}
 
 
 def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:

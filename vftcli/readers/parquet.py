@@ -67,7 +67,8 @@ class ColumnarTable(Table):
                 raise LogError(
                     f"{file.path}: the table has no rows; nothing was recorded into it."
                 )
-        #: What vftcli convert wrote beside the columns; nothing for files of other programs.
+        #: What vftcli convert wrote beside the columns; nothing for files of other
+        #: programs.
         self.about: dict[str, Any] = {}
         with suppress(ValueError, RecursionError, AttributeError):
             found = json.loads(about)

@@ -22,9 +22,8 @@ from vftcli.signals.remarks import Remark, fact
 
 #: A cell of a Jacobian among the columns: row, then column.
 JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
-Column = NDArray[
-    Any
-]  #: One column as it is stored: (T,) numbers, or (T, k) for a column of lists.
+#: One column as it is stored: (T,) numbers, or (T, k) for a column of lists.
+Column = NDArray[Any]
 Columns = dict[str, Column]  #: Name → column.
 Block = dict[int, Column]  #: Place in the table → column, or some rows of it.
 Places = Sequence[int]  #: Places of columns in the table.

@@ -51,9 +51,8 @@ class BenchmarkRun:
     tell: Tell = field(repr=False)
     failures: list[tuple[str, Failure]] = field(default_factory=list)
     efforts: list[dict[str, Any]] = field(default_factory=list)
-    files: dict[str, Path] = field(
-        default_factory=dict
-    )  #: Name → file of each log that is there.
+    #: Name → file of each log that is there.
+    files: dict[str, Path] = field(default_factory=dict)
     #: Name → file of each trained robot.
     robots: dict[str, Path] = field(default_factory=dict)
 

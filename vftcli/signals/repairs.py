@@ -26,9 +26,8 @@ CUTOFF = 12.0
 OF_NYQUIST = 0.4  #: The same in a slow log, as a share of half its rate.
 #: Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz.
 BLUNTED = 0.48
-ONE_TURN = (
-    2 * np.pi + 0.1
-)  #: How far positions travel at most that are logged within a turn. [rad]
+#: How far positions travel at most that are logged within a turn. [rad]
+ONE_TURN = 2 * np.pi + 0.1
 RATE = 50.0  #: Rate from which velocities are derived without being asked for. [Hz]
 
 

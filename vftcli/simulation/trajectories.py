@@ -270,9 +270,8 @@ class ExcitationSpec(Spec, kind="excitation"):
     period: float = 10.0  #: Time of one round. [s]
     cycles: float = 2.0  #: Rounds.
     mean: tuple[float, ...]  #: Mean positions. (n,) [rad]
-    cosine: tuple[
-        tuple[float, ...], ...
-    ]  #: Cosine coefficients, one row a harmonic. (H, n) [rad]
+    #: Cosine coefficients, one row a harmonic. (H, n) [rad]
+    cosine: tuple[tuple[float, ...], ...]
     sine: tuple[tuple[float, ...], ...]  #: Sine coefficients. (H, n) [rad]
 
     def motion(self, robot: Robot) -> Command:

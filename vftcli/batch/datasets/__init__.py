@@ -39,6 +39,5 @@ class DataFile(NamedTuple):
 #: Episode → name of a column → its values, a row a frame of the episode.
 Forces = Mapping[int, Mapping[str, Single]]
 Statistics = Mapping[str, NDArray[Any]]  #: Key of a statistic, as mean → its values. (width,)
-OfEpisodes = Mapping[
-    int, Mapping[str, Statistics]
-]  #: Episode → name of a column → its statistics.
+#: Episode → name of a column → its statistics.
+OfEpisodes = Mapping[int, Mapping[str, Statistics]]

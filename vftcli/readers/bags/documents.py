@@ -117,7 +117,8 @@ def numbers_of(rows: Sequence[Document], paths: Sequence[str]) -> Array:
     return np.hstack([np.empty((len(rows), 0)), *columns])
 
 
-#: The type of ROS that a document is of, its joints' names, its frame, whether it has no stamp.
+#: The type of ROS that a document is of, its joints' names, its frame, whether it has no
+#: stamp.
 Shape = tuple[str, Names, str, bool]
 
 

@@ -31,7 +31,8 @@ SIZES = {
 }  # fmt: skip
 
 
-#: Message type as rosbags names it, package/msg/Name → constants, and each field's name and type.
+#: Message type as rosbags names it, package/msg/Name → constants, and each field's name
+#: and type.
 Types = dict[str, Any]
 
 
