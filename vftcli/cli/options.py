@@ -198,8 +198,9 @@ EMPTY = inspect.Parameter.empty
 
 def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:
     """What may stand behind ``--set``, each name with its equals sign."""
-    for name, (option, _) in settings_by_name(choices).items():
-        yield from (f"{each}=" for each in (option.values() if name == NUMBERS else [name]))
+    for kind in choices:
+        for name, (option, _) in settings_by_name([kind]).items():
+            yield from (f"{each}=" for each in (option.values() if name == NUMBERS else [name]))
 
 
 def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> inspect.Parameter:  # noqa: ANN401
