@@ -8,6 +8,7 @@ import pytest
 from contact_logs import FIXTURES, motion
 from scipy.signal import lfilter
 
+import vftcli as vft
 from vftcli.bias.whole_log import whole_log_bias
 from vftcli.contacts import free_statistics as free_statistics_room
 from vftcli.contacts.free_statistics import (
@@ -207,3 +208,17 @@ def test_the_noise_is_that_of_the_observer_whatever_touches(
     found = observer_noise(SimpleNamespace(t=t))  # type: ignore[arg-type]
     # A push is in 2.7 % of the bends, which widens their median by 0 to 3.4 %; chance is 1 %.
     np.testing.assert_allclose(found / sigma, 0.909 * 1.017, rtol=0.03)
+
+
+@pytest.mark.slow
+def test_the_quietest_of_cycles_that_are_all_touched_is_not_free() -> None:
+    """Pushes of 22 N to 86 N in each of three cycles; as free motion the quietest hid two."""
+    log = vft.simulate("ur5-circle", seed=77)
+    truth = log.truth
+    size = np.linalg.norm(truth.select(f"wrench/f{k}" for k in "xyz").to_numpy(), axis=1)
+    found = vft.contacts(log, robot="ur5", interval="5.7:20")
+    assert found.basis == "whole log"
+    assert len(found.contacts) == 8
+    for row in found.contacts:
+        true = size[truth["t"].is_between(row.start, row.stop)].max()
+        assert abs(row.peak_force - true) < row.peak_band

@@ -59,7 +59,7 @@ JOINT_FIRST = re.compile(
     r"(?:.*/)?(?P<joint>[A-Za-z][\w ]*)[/.](?P<stem>position|velocity|effort)(?:\[\])?"
 )
 
-SIGNAL_WORDS = "pos|position|vel|velocity|eff|effort|tau|torque|current"
+SIGNAL_WORDS = "pos|position|vel|velocity|eff|effort|tau|torque|current|cur"
 #: A signal's name before or behind a joint's, as in pos_elbow and elbow_joint_vel.
 SIGNAL_OF_JOINT = (
     JOINT_FIRST,
