@@ -82,8 +82,7 @@ def load_remarks(case: Case) -> Iterator[Remark]:
     if declared < DECLARED or abs(missing) < max(DECLARED, 0.1 * declared):
         missing = 0.0
     else:
-        both = {"declared_kg": declared, "mounted_kg": case.mounted}
-        yield warning("payload-not-mounted", **both)
+        yield warning("payload-not-mounted", declared_kg=declared, mounted_kg=case.mounted)
     if (changed := load_change(case)) is not None:
         yield changed
         return

@@ -175,9 +175,9 @@ def robot_ground(analysis: Analysis) -> Ground:
     subject, name, own = "robot, gravity", analysis.robot.name, own_match(analysis)
     if own is None:
         return Ground("unknown", subject, "the log does not let the model be checked")
-    listed = analysis.contacts.load if analysis.contacts is not None else None
-    load = f" with {own.load:.2g} kg on the flange" if own.load and listed is None else ""
-    left = percent(own.misfit)
+    listed = analysis.contacts and analysis.contacts.load
+    less, left = "less " if own.load < 0 else "", percent(own.misfit)
+    load = f" with {abs(own.load):.2g} kg {less}on the flange" if own.load and not listed else ""
     if not own.fits:
         return Ground(
             "bad" if own.misfit > MOST_UNEXPLAINED else "caution",
@@ -185,10 +185,8 @@ def robot_ground(analysis: Analysis) -> Ground:
             f"{name} leaves {left} of {own.evidence} unexplained{load}",
             command("inspect", analysis.recording, "--robot", robot_option(analysis)),
         )
-    who = (
-        f"{own.evidence} agrees" if own.by_maker else f"the {own.evidence} agrees with the model"
-    )
-    return Ground("good", subject, f"{who} to {left}{load}")
+    who = "{} agrees" if own.by_maker else "the {} agrees with the model"
+    return Ground("good", subject, f"{who.format(own.evidence)} to {left}{load}")
 
 
 def own_match(analysis: Analysis) -> RobotMatch | None:
