@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.windows import LESS, Case, Terms, Windows, solve, spread, up_axes, windows_of
+from vftcli.doctor.windows import SHED, Case, Terms, Windows, solve, spread, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
 from vftcli.robots.terms import effort_name
@@ -277,7 +277,7 @@ def scaled(case: Case) -> Iterator[Cause]:
     factor, sd = fit.values[0], fit.sd[0]
     # A load explains a factor, too: above 1 a heavy one, below 1 one that only the robot
     # file mounts.
-    worth = CLEARER if case.loaded.values[0] > LESS * case.mounted else 1 / CLEARER
+    worth = CLEARER if case.loaded.values[0] > -SHED * case.mounted else 1 / CLEARER
     sure = abs(factor - 1) > OFF + SURE * sd and LEAST < factor < MOST
     if sure and worth * fit.size <= case.loaded.size:
         # The rest is relative to the effort as logged.

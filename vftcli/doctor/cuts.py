@@ -115,8 +115,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     stuck = np.zeros(effort.shape, bool)
     for j, first, last in stuck_stretches(recording, name):
         stuck[first + 1 : last + 1, j] = True
-    # Of one joint it is said; without those of most that move
-    # nothing can be estimated.
+    # Of one joint a finding is enough; of most that move nothing can be estimated.
     moving = np.count_nonzero(travel_of(recording) > WAY)
     most = stuck.sum(axis=1) > moving / 2
     yield Bad("frozen-effort", stuck & most[:, None], None, MOST)

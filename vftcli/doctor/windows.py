@@ -255,7 +255,7 @@ def up_axes(gravity: Array) -> Array:
 
 
 MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are no loads but another arm. [kg, m]
-LESS = -1.2  #: Share of the mounted payload of which a fit may take away at most. [-]
+SHED = 1.2  #: Share of the mounted payload that a fit may remove at most. [-]
 #: Share of the misfit that a load must leave at most, or it only adds freedom.
 TELLING = 0.9
 #: Range of gravity's torque, relative to the effort, from which the poses tell a load.
@@ -330,9 +330,8 @@ class Case:
         mass, moment = self.loaded.values[0], self.loaded.values[1:4]
         if self.gravity_range < VARIED * self.size:
             return False  # in one pose any residual passes for a load
-        # Less than nothing hangs on no flange: a negative load takes away what is
-        # mounted.
-        possible = 0.05 < mass < MAX_MASS or LESS * self.mounted < mass < -0.05
+        # A negative load removes what is mounted.
+        possible = 0.05 < mass < MAX_MASS or -SHED * self.mounted < mass < -0.05
         plausible = possible and np.linalg.norm(moment) < MAX_ARM * abs(mass) + 0.3
         return plausible and self.loaded.size < TELLING * self.bare.size
 

@@ -45,7 +45,7 @@ SUBJECTS = {
     "vendor's torque": ("vendor-sign", "zero-tau-ext"),
 }  # fmt: skip
 #: Findings that ``identify --method payload`` answers.
-LOADS = frozenset({*SUBJECTS["load"][:3], "contact-is-load"})
+LOADS = {"unmodelled-load", "light-load", "payload-mismatch", "contact-is-load"}
 
 
 #: What the remarks of a list of contacts are about.

@@ -25,11 +25,6 @@ BLOCK_BYTES = 1 << 22  #: Text that is parsed at a time.
 COMPARED_ROWS = 20  #: Rows before the last that tell whether its last number is whole.
 
 
-def is_comment(line: str) -> bool:
-    """Whether a line before the table is a comment, as np.savetxt writes its header."""
-    return line.removeprefix("\ufeff").lstrip().startswith("#")
-
-
 def is_number(text: str) -> bool:
     """Whether a cell holds a number."""
     try:
@@ -56,7 +51,7 @@ class TextTable(Table):
             raise LogError(f"{self.path}: not a table of text; `vftcli inspect` says what it is.")
         if 1 < len(file.lines) <= 200 and len(file.content) > len(file.head):
             lines.pop()  # the head may end inside a line
-        rows = list(dropwhile(is_comment, lines))
+        rows = list(dropwhile(re.compile(r"\s*#").match, lines))  # np.savetxt's header
         #: The first lines that hold something, without comments but for one of names.
         self.sample = rows or lines
         comment = lines[-len(rows) - 1].lstrip("# ") if len(lines) > len(rows) > 0 else ""

@@ -1,12 +1,17 @@
+import errno
 import json
 import re
+import shutil
+import sys
 from html import unescape
+from pathlib import Path
 
 import numpy as np
 import pytest
-from jinja2 import UndefinedError
+from jinja2 import FileSystemBytecodeCache, UndefinedError
 
 from vftcli.outputs.charts import Chart, ChartLine
+from vftcli.outputs.page import shell
 from vftcli.outputs.page.shell import page, part, script_json
 from vftcli.signals import remarks as remarks_module
 from vftcli.signals.remarks import fact, warning
@@ -103,3 +108,22 @@ def test_a_command_without_a_page_loads_no_templates(loaded) -> None:
 def test_what_a_template_misses_is_an_error() -> None:
     with pytest.raises(UndefinedError, match="words"):
         page("logs.html", "t", failures=None)
+
+
+@pytest.mark.parametrize("room", [True, False])
+def test_compiled_templates_are_kept_and_a_full_disk_costs_no_page(
+    room: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As Python's own, beside their texts; what cannot be kept is compiled again."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    there = shutil.copytree(shell.HERE, tmp_path / "page", ignore=lambda *_: {"__pycache__"})
+    monkeypatch.setattr(shell, "HERE", there)
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    if not room:
+        monkeypatch.setattr(FileSystemBytecodeCache, "dump_bytecode", full)
+    for _ in range(2):  # compiled, then read
+        assert shell.templates.__wrapped__().get_template("page.html").name == "page.html"
+    assert len([*there.glob("templates/__pycache__/*.cache")]) == room

@@ -5,10 +5,10 @@ of paths.
 """
 
 import json
-import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cache, partial
 from html import escape
 from pathlib import Path
@@ -38,16 +38,33 @@ PLAIN = re.compile(r"[a-z]+([-’'][a-z]+)*[,:;]?").fullmatch  #: A word that ma
 TICK_ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
 
 
+def capital(text: str) -> str:
+    """A text with a capital first, unless it begins with the name of a file or an option."""
+    first, space, rest = text.partition(" ")
+    return f"{first.capitalize()}{space}{rest}" if PLAIN(first) else text
+
+
+def worst_first(remarks: Iterable[Remark]) -> list[str]:
+    """The words of every remark once, the most serious first."""
+    texts = {sentence(remark, "long"): LEVELS.index(remark.level) for remark in remarks}
+    return sorted(texts, key=lambda text: texts[text])
+
+
 @cache
 def templates() -> "Environment":
     """The templates: what comes from outside is printable and escaped, what is missing an error."""
     from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
+    from jinja2.bccache import Bucket
     from markupsafe import Markup
 
-    # Compiled templates are kept beside their texts, as Python keeps modules.
-    kept = HERE / "templates" / "__pycache__"
-    if writable := not sys.dont_write_bytecode and os.access(kept.parent, os.W_OK):
-        kept.mkdir(exist_ok=True)
+    class Kept(FileSystemBytecodeCache):
+        """Compiled templates beside their texts, as Python keeps modules."""
+
+        def dump_bytecode(self, bucket: Bucket) -> None:
+            """Keep one where the package may be written to, and there is room."""
+            with suppress(OSError):
+                Path(self.directory).mkdir(exist_ok=True)
+                super().dump_bytecode(bucket)
 
     def shown(value: object) -> object:
         """A value as HTML."""
@@ -62,19 +79,9 @@ def templates() -> "Environment":
         whole = r'<span class="option">\g<0></span>'
         return Markup(re.sub(r"(?<![\w-])--?[a-z][\w-]*", whole, str(shown(text))))
 
-    def capital(text: str) -> str:
-        """A text with a capital first, unless it begins with the name of a file or an option."""
-        first, space, rest = text.partition(" ")
-        return f"{first.capitalize()}{space}{rest}" if PLAIN(first) else text
-
-    def worst_first(remarks: Iterable[Remark]) -> list[str]:
-        """The words of every remark once, the most serious first."""
-        texts = {sentence(remark, "long"): LEVELS.index(remark.level) for remark in remarks}
-        return sorted(texts, key=lambda text: texts[text])
-
     made = Environment(
-        loader=FileSystemLoader(HERE / "templates"),
-        bytecode_cache=FileSystemBytecodeCache(str(kept)) if writable else None,
+        loader=FileSystemLoader(texts := HERE / "templates"),
+        bytecode_cache=None if sys.dont_write_bytecode else Kept(f"{texts}/__pycache__"),
         autoescape=True,
         undefined=StrictUndefined,
         finalize=shown,
