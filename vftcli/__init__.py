@@ -45,8 +45,7 @@ if TYPE_CHECKING:
     from vftcli.signals.external_torque import DynamicsTerms
     from vftcli.signals.recording import Recording
 else:
-    #: The modules in which a public name is looked for, those that load
-    #: quickly first.
+    #: Modules in which a public name is looked for, quick ones first.
     __getattr__ = door(
         __name__,
         "signals.errors",

@@ -20,8 +20,7 @@ from vftcli.signals.remarks import caution
 from vftcli.signals.series import clock_of
 from vftcli.signals.steady_filter import PIECE
 
-#: A log of no more rows is analysed in one piece: there is memory for all that is done
-#: with it.
+#: Longer logs are analysed in blocks, to bound memory. [samples]
 WHOLE_ROWS = 100_000
 
 

@@ -46,14 +46,12 @@ class ControlChoice(Choice):
         str | None,
         Option("admittance.controller", "variable|traditional", "By default both."),
     ] = None
-    #: What drives the replay: the log's ``sensor`` or ``file:PATH``; None for an
-    #: observer's wrench.
+    #: ``sensor`` or ``file:PATH``; None for an observer's wrench.
     force: Annotated[
         str | None,
         Option("admittance.force", "sensor|file:PATH", "What drives the replay, if no observer."),
     ] = None
-    #: Joint positions at which a release starts; None for the robot
-    #: file's. (n,) [rad]
+    #: Joints at a release's start; None for the robot file's. (n,) [rad]
     start: Annotated[
         tuple[float, ...] | None,
         Option(
@@ -72,8 +70,7 @@ class ControlChoice(Choice):
         str,
         Option("admittance.loop-torque", "average|instant", "What closed-loop sensors report."),
     ] = "average"
-    #: Parameters the user sets, which go before the robot file's, each
-    #: ``AXIS.PARAMETER=VALUE``.
+    #: The user's parameters, each ``AXIS.PARAMETER=VALUE``.
     assignments: Annotated[
         tuple[str, ...],
         Option(

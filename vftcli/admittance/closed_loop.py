@@ -1,9 +1,8 @@
 """The whole loop in simulation: hand, arm and servo, sensing, observer, Algorithm 1, joints, servo.
 
-The arm is the simulator's; the controller sees what a log would hold, noise and all.
-Between two control periods the servo holds the last command. Latencies are from the true
-force, and as Figs 6 and 9 time them: from detection to motion, and from the estimate's
-fall to the turn.
+The simulator's arm is seen as a log would hold it. The servo holds a command for a control
+period. Latencies are from the true force; Figs 6 and 9 time them from detection to motion, and
+from the estimate's fall to the turn.
 """
 
 from dataclasses import replace
@@ -51,8 +50,7 @@ class ClosedLoop(NamedTuple):
     t: Array  #: Control instants. (T,) [s]
     #: Wrench that the controller saw, zero removed, base axes. (T, 6) [N, N·m]
     estimate: Array
-    #: Wrench of the contacts on the flange, about its origin, base
-    #: axes. (T, 6) [N, N·m]
+    #: Wrench of the contacts about the flange, base axes. (T, 6) [N, N·m]
     truth: Array
     dragged: Mask  #: Phases. (T, 6)
     commanded: Array  #: Deviation X̃ that was commanded. (T, 6) [m, rad]
@@ -160,8 +158,7 @@ class Loop:
     def act(self, zero: tuple[float, float] | None) -> dict[str, Any]:
         """One control period, as a row: Algorithm 1, or rest in the zero's span."""
         t, wrench = self.arm.t, self.sensor.wrench(self.q_measured)
-        # A controller that followed its own drift would never find the zero of a still
-        # arm.
+        # Following its own drift it would never find a still arm's zero.
         first, last = zero or (np.inf, -np.inf)
         if first <= t <= last:
             self.zeros.append(wrench)
@@ -322,11 +319,9 @@ class Latency(NamedTuple):
     motion: float | None
     #: Time from the true force's fall below the threshold to the estimate's.
     withdrawal: float | None
-    #: Time from detection until the flange has moved by as much from
-    #: where it was then.
+    #: From detection until the flange has moved as far again. [s]
     reaction: float | None
-    #: Time from the estimate's fall below the threshold until the
-    #: flange goes no farther.
+    #: From the estimate's fall below the threshold to the turn. [s]
     turn: float | None
     #: Whether the flange was at rest when the force came; else `motion` says nothing.
     rested: bool

@@ -34,8 +34,7 @@ def check_start(robot: Robot, q: Array) -> Array:
 class JointPath(NamedTuple):
     """Joint positions along the motions of N controllers."""
 
-    #: Positions; where a pose is out of reach the arm waits at the last it reached.
-    #: (T, N, n) [rad]
+    #: Positions; out of reach it waits at the last one. (T, N, n) [rad]
     q: Array
     reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
     speed: (
@@ -60,8 +59,7 @@ def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:
             if k and same[k - 1]:
                 before = last
             else:
-                # Straight on from the two poses before: the arm moves evenly between
-                # periods.
+                # Straight on from the two poses before.
                 guess = 2.0 * last - before if good else last
                 found, good = try_pose(solver, goal, point, guess, last)
                 last, before = found, last if good else found

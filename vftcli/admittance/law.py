@@ -23,8 +23,7 @@ from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, warning
 
-#: The six axes: translation of the flange point along the base axes,
-#: rotation about them.
+#: Translation of the flange along the base axes, rotation about them.
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 #: Section of an assignment or of a robot file → the axes it speaks of.
 GROUPS: dict[str, tuple[int, ...]] = {
@@ -46,8 +45,7 @@ MAY_BE_ENDLESS = ("threshold", "speed_limit")
 #: Keys of ``[admittance]`` that are not one number an axis.
 PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
 KINDS = ("traditional", "variable")
-#: Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside
-#: |z| = 1.
+#: 2TsB/M + Ts²K/M below it: both roots of det(zI − A) in |z| = 1.
 DISCRETE_BOUND = 4.0
 UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
@@ -56,9 +54,8 @@ UNITS = ("m", "m", "m", "rad", "rad", "rad")
 class Admittance:
     """Parameters of the variable-parameter law (45)–(51) and of Algorithm 1.
 
-    Translational axes are in kg, N·s/m, N/m, N, m/s; rotational ones in kg·m², N·m·s/rad,
-    N·m/rad, N·m, rad/s. Every array is (6,), in the order of `AXES`; one number is that
-    of all axes.
+    Units are kg, N·s/m, N/m, N, m/s, with N·m and rad for rotations. Arrays are (6,), as
+    `AXES`; one number is that of all axes.
     """
 
     mass: Array  #: M_d.
@@ -229,8 +226,7 @@ class Controller:
     def complaints(self, size: Array | float = np.inf) -> Iterator[Remark]:
         """Its instabilities, in releases from rest of a size (6,) [m, rad] or in all motion."""
         where, limited = Where(self.name), np.isfinite(self.parameters.speed_limit)
-        # Without a speed limit the number is infinite, and the escape says what that
-        # means.
+        # Without a speed limit it is infinite; the escape says why.
         at_limit = np.where(limited, self.recovery, 0.0)
         numbers = {"law-unstable-in-drag": self.drag, "law-unstable-at-limit": at_limit}
         for code, number in numbers.items():
@@ -281,8 +277,7 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     since x is the rotation vector log(R R_dᵀ) and v the angular velocity.
     """
     p, varies = controller.parameters, controller.rate > 0.0
-    # The traditional controller has no speed scale; its branch below does not use the
-    # quotient.
+    # The traditional controller does not use this quotient.
     rate = np.where(varies, controller.rate, 1.0)
     shape = np.where(varies, kinetic_shape(abs(v) * rate) / rate**2, 0.5 * v**2)
     return 0.5 * p.stiffness * x**2 + p.mass * shape / controller.alpha**2

@@ -39,8 +39,7 @@ def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -
     size = abs(wrench)
     on = size > parameters.threshold
     off = size <= parameters.threshold * (1.0 - parameters.hysteresis)
-    # The last row at which anything was switched tells the state: no
-    # loop over samples.
+    # The last row that switched tells the state, without a loop.
     last = np.maximum.accumulate(np.where(on | off, np.arange(len(on))[:, None], -1), axis=0)
     dragged = np.where(last < 0, before, np.take_along_axis(on, np.maximum(last, 0), axis=0))
     if parameters.threshold_mode == "literal":
@@ -117,8 +116,7 @@ def run(
     """The motion under one force record, each axis in the phase the record puts it in.
 
     Force (T, 6) [N, N·m] and phases (T, 6) are those of `Phases`, the start that of
-    `Recursion`. A law that escapes in finite time ends in infinities, which
-    `AxisMotion.escaped` tells.
+    `Recursion`. `AxisMotion.escaped` tells where a law ends in infinities.
     """
     state = Recursion(controllers, x, v)
     rows = [(state.x, state.v)]
@@ -152,8 +150,7 @@ def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
     """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
     found, t = list[Drag](), np.arange(len(phases.dragged), dtype=float) * period
     for axis, dragged in enumerate(phases.dragged.T):
-        # From the last dragged sample of one to the first of the next; stamps are
-        # rounded.
+        # From the last dragged sample of one to the first of the next.
         spans = intervals(t, dragged, gap=PAUSE + period - 1e-9)
         ends = [*(begin + 1 for begin, _ in spans), len(t) + 1]
         found += [Drag(axis, k, *span, ends[k]) for k, span in enumerate(spans, start=1)]
@@ -170,10 +167,8 @@ def rows_of(
 ) -> list[dict[str, Any]]:
     """The comparison as rows, one for each controller, axis and drag.
 
-    `start_s` and `release_s` are on the motion's clock, `time_to_peak_s` and `idle_s`
-    from the drag's start, return times from its release [s]; `work_J` is the hand's in
-    the drag phase. What does not happen before the record ends or the next drag begins is
-    None.
+    `start_s` and `release_s` are on the motion's clock, the other times [s] from the drag's
+    start or its release. `work_J` is the hand's. None: it does not happen in time.
     """
     rows, peaks = list[dict[str, Any]](), dict[Drag, float]()
     for n, controller in enumerate(controllers):

@@ -49,8 +49,7 @@ from vftcli.wrench.sensor_reading import SensorReading, without_zero
 from vftcli.wrench.solvers import VirtualSensor
 
 LONGEST = 600.0  #: Longest release that is computed. [s]
-#: Where the flange stays this near to its first pose a log replays as it was: no remark.
-#: [m]
+#: A flange that stays this near to its first pose is at rest. [m]
 STILL = 0.01
 
 
@@ -63,13 +62,11 @@ class Replay:
     #: Where the force comes from.
     source: Remark = field(default_factory=lambda: fact("force-of-release"))
     start: Array  #: Joint positions of the target pose X_d. (n,) [rad]
-    #: Force and moment on the robot at each control period, base axes.
-    #: (T, 6) [N, N·m]
+    #: Wrench on the robot each period, base axes. (T, 6) [N, N·m]
     wrench: Array
     motion: AxisMotion  #: Deviations and velocities, row 0 before the first force.
     drags: tuple[Drag, ...]  #: The drags of every axis.
-    #: Flange deviation of the log's own arm from X_d, None for a
-    #: release. (T, 6) [m, rad]
+    #: Logged flange less X_d, None for a release. (T, 6) [m, rad]
     logged: Array | None = None
     force_remarks: tuple[Remark, ...] = ()  #: Remarks on the force and on stability.
 
@@ -215,8 +212,7 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
 def on_control_clock(t: Array, period: float) -> tuple[Array, Indices]:
     """Times a period [s] apart (S,) [s] and the number of the newest sample then. (S,)"""
     clock = t[0] + np.arange(np.floor((t[-1] - t[0]) / period + 1e-6) + 1) * period
-    # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay
-    # in step.
+    # Half a microsecond of slack, as stamps are printed.
     newest = t.searchsorted(clock + 5e-7 + 1e-3 * period, side="right") - 1
     return clock, np.maximum(newest, 0)
 

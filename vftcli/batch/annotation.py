@@ -46,8 +46,7 @@ class ForceChoice:
     wrench: WrenchChoice | None = None
     sd: bool = False  #: Whether the observer's own standard deviation is wanted.
     contact: bool = False  #: Whether it is wanted which frames lie in a contact of the list.
-    #: Whether to go on where a finding makes results meaningless, and where there are
-    #: none.
+    #: Whether to go on after a finding, and without results.
     anyway: bool = False
 
     def __post_init__(self) -> None:

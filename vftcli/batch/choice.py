@@ -17,8 +17,7 @@ EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 class WorkersChoice(Choice):
     """Place of many pieces of work."""
 
-    #: How many processes of this machine; 0 for this process alone, None for as many as
-    #: it has cores and memory for.
+    #: Processes; 0 for this one alone, None by cores and memory.
     jobs: Annotated[
         int | None,
         Option(
@@ -34,8 +33,7 @@ class WorkersChoice(Choice):
         str | None,
         Option("cluster.address", "ADDRESS", "A running Dask cluster, as tls://host:8786."),
     ] = None
-    #: What a worker of this machine may take before it is ended, None
-    #: for its share. [GB]
+    #: Memory of a worker before it is ended; None for its share. [GB]
     memory_gb: Annotated[
         float | None,
         Option(

@@ -143,8 +143,7 @@ OF_ESTIMATE: Kinds = {
     "p99_N": Float64,
 }
 COMPARED = "compared_samples"  #: Samples of a comparison; `samples` are the log's.
-#: Columns of the errors, as `vftcli compare --json` has them; null
-#: without a reference.
+#: Errors as in `vftcli compare --json`; null without a reference.
 OF_ERROR: Kinds = {
     COMPARED if name == "samples" else name: kind
     for name, kind in WRENCH_SCHEMA.items()

@@ -116,8 +116,7 @@ class BatchRun:
         first = next(groups, None)
         if first is None:
             return
-        # What every worker has to see: the folder, the first log, and what the options
-        # name.
+        # Every worker must see the folder, the first log, the options' files.
         seen = [str(self.folder.path), str(first[0].path)]
 
         def noted(path: Path) -> Path:

@@ -33,15 +33,13 @@ class Baseline:
 
     motion: FreeMotion  #: The log and its free motion, without samples that stand alone.
     part: FreePart | None = None  #: Its free part, None where there is none.
-    #: Spectra of the raw disturbance, None where the free part is too
-    #: short or not free.
+    #: Of the raw disturbance; None where the free part is short.
     spectra: Spectra | None = None
     #: Why there is no free part, or are no spectra; None where there are both.
     missing: Remark | None = None
     #: A load that the free part carries and the model lacks, None where none shows.
     load: FreeLoad | None = None
-    #: The bias of the whole log, off the terms where its guards apply it; None where none
-    #: was fitted.
+    #: The whole log's bias, off the terms; None if none was fitted.
     correction: WholeLogBias | None = None
     #: Whether the free part is what the fit of that bias takes for free: no contact that
     #: comes and goes, though a load that stays may be in it.

@@ -5,8 +5,7 @@ from typing import Annotated
 from vftcli.signals.option import ESTIMATE, Choice, Option, is_yes
 from vftcli.signals.parsing import check_known
 
-#: The word for what the log allows: the whole log's bias for `best`,
-#: none for the others.
+#: What the log allows: a bias for `best`, none for others.
 AUTOMATIC = "auto"
 #: The word for the bias fitted to the whole log and subtracted before observers run.
 WHOLE_LOG = "whole-log"

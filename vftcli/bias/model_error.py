@@ -35,12 +35,10 @@ from vftcli.signals.series import median_step, summed
 CUTOFF = 6.0
 PLAY = 0.3e-3  #: Presliding length of the friction that may be missing. [rad]
 SMOOTHING = 0.003  #: Velocity over which its sign turns. [rad/s]
-#: A clock that waits longer counts as waiting so long: six times the period of `CUTOFF`.
-#: [s]
+#: Longest wait that counts: six periods of `CUTOFF`. [s]
 WAIT = 1.0
 SHAPES = 5  #: Columns of friction a joint beside its offset.
-#: Speed up to which a joint's friction is looked at where its limit is
-#: unknown. [rad/s]
+#: A joint's speed where its limit is unknown. [rad/s]
 USUAL_SPEED = np.pi
 
 

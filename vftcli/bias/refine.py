@@ -27,8 +27,7 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.series import resample_columns
 from vftcli.signals.shown import Shown, record
 
-#: The cause that is not part of an error's sum: it says what a standing
-#: joint may hide.
+#: The cause that no sum holds: friction hidden at rest.
 STICTION = "stiction at rest"
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
 

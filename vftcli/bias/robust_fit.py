@@ -9,12 +9,9 @@ there are those of external loads that change slowly: a wrench at the flange, fo
 elbow and wrist on the links before them. By the lever rule these make a force anywhere
 along the arm. The estimate keeps their torque: in doubt a torque is a push.
 
-The first fit weighs samples down for all joints together: several feel a contact. The
-second separates contact from free motion by a threshold and fits the free samples alone,
-with the loads beside the model's error. A correction must predict, not only fit: the free
-samples are cut into contiguous folds, and the others predict each, with the model free in
-several degrees. Samples in motion judge a joint: at rest stiction rules, which no model
-predicts.
+The first fit weighs samples down for all joints together: several feel a contact. The second
+fits the samples below a threshold, with the loads. Each fold of the free samples is predicted
+from the others, at several degrees of freedom; samples in motion judge a joint.
 """
 
 from collections.abc import Sequence
@@ -80,8 +77,7 @@ class SlowLoads(NamedTuple):
 def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
     """Columns of slow external loads on a moving arm at times t (S,) [s] and positions q (S, n)."""
     n, poses = chain.joints, link_poses(chain, q)
-    # At the flange, and a force on the link before the elbow's joint, and before the
-    # wrist's.
+    # At the flange, before the elbow's joint, before the wrist's.
     links = n, *sorted({j for j in ((n + 1) // 2 - 1, n - 3) if j > 0})
     flange, *along = (link_jacobian(poses, link).transpose(0, 2, 1) for link in links)
     wrench = flange * np.repeat([FORCE, MOMENT], 3)
@@ -311,8 +307,7 @@ WORTHLESS = 0.95
 class Guarded(NamedTuple):
     """A model error tested on unseen samples."""
 
-    #: From all free samples, at the freedom of the best prediction;
-    #: None if not at all.
+    #: From all free samples, as free as the best prediction, or None.
     solution: FittedError | None
     share: Array  #: Unseen error with over without it, in motion. (n,)
     #: Each joint's part: 0 if not worth having, 1 if clearly worth it. (n,)

@@ -42,11 +42,9 @@ from vftcli.signals.series import median_step, resample_columns
 #: From its first to its last motion a log has to take this long: a shorter one tells
 #: inertia from a push no more, and friction alone is fitted. [s]
 LEAST_MOTION = 10.0
-#: A log that moves for less tells nothing: ten times the `CORRELATED`
-#: of a residual. [s]
+#: Less motion tells nothing: ten times `CORRELATED`. [s]
 LEAST_FRICTION = 3.0
-#: An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a
-#: pose.
+#: An arm that moves a smaller share, and below `LEAST_MOTION`, is held.
 LEAST_SHARE = 0.1
 #: Up to so many times the error of friction that is expected, rms over a short log, its
 #: fit is used in full, … Pieces of 5 s of UR10e logs reach 1.2 on their worst joint. [1]
@@ -54,12 +52,10 @@ USUAL = 1.1
 #: … and from so many times on not at all: a hand leads the arm. With a hand of 20 N along
 #: the flange's path the worst joint reads 1.2 to 2.5. [1]
 LED = 1.4
-#: In a short log a joint's friction is corrected in full if so much of its error is left,
-#: …
+#: A joint's friction is corrected in full with so much error left …
 CLEAR = 0.45
-#: … and not at all if so much is: pieces of 5 s of UR10e logs leave .3 to .9, the same
-#: led by a hand .4 to .9, and with both limits they are no worse than a momentum
-#: observer. [1]
+#: … and not at all with so much. [1]
+#: On UR10e logs 5 s leave .3 to .9; led by hand .4 to .9.
 UNCLEAR = 0.6
 RATE = 30.0  #: Samples a second that are fitted, …
 LONG = 60.0  #: … up to a log of this length [s], …

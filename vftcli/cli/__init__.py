@@ -67,9 +67,7 @@ def vftcli(
 def main() -> None:
     """Run the app; turn what a user can mend into one line on stderr and exit code 1."""
     for library in ("OPENBLAS", "OMP", "MKL"):
-        # The matrices here are small: threads of a linear algebra library only wait for
-        # each other, and the order of their sums would move the last digits, whatever the
-        # caller has set.
+        # Matrices are small: threads only wait for each other, and change last digits.
         os.environ[f"{library}_NUM_THREADS"] = "1"
     gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
     try:
@@ -119,9 +117,8 @@ def launch() -> None:
     os._exit(code if isinstance(code, int) else int(code is not None))
 
 
-#: Address space that the libraries reserve: with two processors the report of 10 s at 1
-#: kHz works in 3.0e9 and ends in their own words in 2.6e9; that of 20 s at 125 Hz works
-#: in 1.9e9. [B]
+#: Address space that the libraries reserve [B]: with two processors
+#: the report of 10 s at 1 kHz needs 3.0e9, of 20 s at 125 Hz 1.9e9.
 ROOM = 3e9
 
 
@@ -163,8 +160,7 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # Else the next file that is opened gets its number, and a
-            # library's words.
+            # Else the next file gets its number, and a library's words.
             os.open(os.devnull, os.O_RDWR)
     if sys.stdout is None:
         sys.stdout = ClosedOutput()

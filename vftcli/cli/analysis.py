@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
 
-#: How a log is read, which arm made it, and all that can be asked of it
-#: but a reference.
+#: How a log is read, its arm, and the rest but a reference.
 OF_LOG = (ReadChoice, RobotChoice)
 OF_ANALYSIS = (
     *OF_LOG,

@@ -62,8 +62,7 @@ DEFAULT = "contacts"  #: The command of words that name none.
 #: Options of the program itself.
 OF_PROGRAM = frozenset({"-h", "--help", "--version", "--install-completion", "--show-completion"})
 
-#: What the `commands` and `options` of the release before are now, and
-#: what is `gone`.
+#: What earlier commands and options are now, and what is `gone`.
 former = partial(tables_beside, __file__, "former.toml")
 
 

@@ -1,8 +1,7 @@
 """Options kept in a TOML file: ``--config FILE``, or `vftcli.toml` in the working folder.
 
-Its values become words behind the typed ones, which go before them, so that they are read
-and checked as if they were typed. What is used is said, and is in the command line of
-`run.json`.
+Its values become words behind the typed ones, and are checked as these. `run.json` has them in
+its command line.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -22,11 +21,9 @@ from vftcli.signals.parsing import did_you_mean, printable, shown, toml_file
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
 NONE = "none"  #: Value of ``--config`` with which no file is read.
-#: Options that are only ever typed: what asks before it overwrites
-#: shall ask each time.
+#: Options that are only typed: overwriting is asked each time.
 TYPED = frozenset({"config", "force", "help", "set"})
-#: Command → options that it takes otherwise than the rest: only its own
-#: table gives them.
+#: Command → options that only its own table gives.
 OTHERWISE = {
     "identify": {"free", "gains"},  # the motion without the load, what gains are found for
     "thresholds": {"reference", "reference-columns"},  # of --check alone
@@ -37,8 +34,7 @@ Click = Any  #: Of typer, which carries a click of its own without types.
 FILE = "file:"  #: What a reference's file begins with.
 
 
-#: The words of this call: former ones by what they are now, and what a file of options
-#: gave it.
+#: The words of this call, with those of a file of options.
 WORDS: ContextVar[Sequence[str]] = ContextVar("words", default=())
 #: The file of options that this call reads, None for none.
 READ: ContextVar[Path | None] = ContextVar("read", default=None)
@@ -235,8 +231,7 @@ def beside(folder: Path, word: str, option: Click) -> str:
         interval(name)
         return word
     takes_file = any(kind in str(option.metavar) for kind in ("FILE", "LOG", "REF"))
-    # A word without an ending is a name of ours, as of a robot, unless
-    # a log is called so.
+    # A word without an ending is a name, unless a log has it.
     is_file = Path(name).suffix or len(Path(name).parts) > 1
     is_file = is_file or ("LOG" in str(option.metavar) and (folder / name).exists())
     return f"{prefix}{folder / name}" if takes_file and (prefix or is_file) else word

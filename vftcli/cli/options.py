@@ -82,8 +82,7 @@ LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).", group=OUTP
 SEED = Option("--seed", "N", "Seed everything random.", least=0)
 
 
-#: What a log's name ends with and its folder's does not; of `run_1.5` the number belongs
-#: to it.
+#: What a log's name ends with; of `run_1.5` the number stays.
 ENDING = re.compile(r"(?<=.)(\.[A-Za-z]\w*)?(\.(gz|zst|zstd|bz2|xz))?$")
 
 
@@ -161,8 +160,7 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
                 function(**dict.fromkeys(own, asked) | own_values)
 
         called.__name__, called.__doc__ = function.__name__, function.__doc__
-        # typer asks for the signature; without annotations of its own
-        # it finds nothing else.
+        # typer asks for the signature.
         vars(called)["__signature__"] = inspect.Signature([each for each, _ in parts])
         vars(called).update(options=options, choices=choices)
         called.__annotations__ = {}
@@ -230,8 +228,7 @@ def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
     for name, value in values.items():
         for word in value if isinstance(value, list | tuple) else (value,):
             path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
-            # A word without an ending is a name of ours, as of a robot, where no log is
-            # asked for.
+            # A word without an ending names a robot, where no log is due.
             named = path is word or (isinstance(path, Path) and path.suffix) or name == "free"
             if name != "output" and isinstance(path, Path) and named:
                 yield path

@@ -67,8 +67,7 @@ def report(
     if published is not None:
         check_published(published, asked.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
-    # Of several logs one without a wrench is left out, and details show
-    # what is said of it.
+    # Of several logs one may lack a wrench; details need all of it.
     choice = replace(choice, answers_first=len(logs) == 1 and not (json or details))
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
@@ -161,8 +160,7 @@ def estimate(
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = for_estimates(choice)
     recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))
-    # What needs no complete log comes in blocks, so that memory does
-    # not grow with it.
+    # Blocks, so that memory does not grow with the log.
     if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
         found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
     else:

@@ -18,8 +18,7 @@ class ContactsRoom(ModuleType):
 
     def __call__(self, *words: Any, **options: Any) -> "ContactList":  # noqa: ANN401
         """What touched the arm along a log; see `vftcli.notebook.contacts`."""
-        # The call is the notebook's, several floors up; the room itself knows nothing of
-        # it.
+        # The notebook's call, several floors up.
         found: ContactList = import_module("vftcli.notebook").contacts(*words, **options)
         return found
 

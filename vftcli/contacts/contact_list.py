@@ -26,19 +26,16 @@ if TYPE_CHECKING:
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
 #: Evidence and band of a row that is good; a wider band makes it weak.
 SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
-#: Where only forces larger than this are detected along an axis, the pose is blind to it.
-#: [N]
+#: An axis that sees only larger forces is blind. [N]
 BLIND = 500.0
-#: A payload of the robot's file is named where it weighs as much as a
-#: load to this share.
+#: Share to which a load weighs as much as the file's payload.
 SAME_MASS = 0.1
 #: Fields of a contact that are unknown where no wrench is.
 OF_FORCES = (
     "peak_force", "peak_band", "place_band", "wrench", "wrench_sd", "mean_force", "impulse",
     "anywhere", "course", "vendor_force",
 )  # fmt: skip
-#: Field of a contact → its key in a record and in columns, in order; a
-#: wrench has four.
+#: Field of a contact → its keys in a record, in order.
 KEYS = {
     "number": "number", "kind": "kind", "start": "start_s", "stop": "stop_s", "peak": "peak_s",
     "peak_force": "peak_force_N", "peak_band": "peak_force_band_N", "place_band": "place_band_N",

@@ -34,8 +34,7 @@ from vftcli.wrench.smoother import BlockLog, Lane, WrenchPrior, contact_block
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
-#: How long it must stay there, and the pause up to which two such
-#: stretches are one. [s]
+#: How long it must stay, and the pause that joins two. [s]
 LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
 #: What tells a contact from an error of the model: motion that is known to be free; the
@@ -55,12 +54,10 @@ class FreeStatistics(NamedTuple):
     noise: TorqueNoise  #: Noise and model error.
     level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
     own: Mask  #: Samples of the log itself that are known to be free. (T,)
-    #: The log, less a load that the free part carries; less the model error of the whole
-    #: log where the basis is that.
+    #: The log, less its load, and less the model error if known.
     log: Run
     free: tuple[RunSamples, ...]  #: Every free piece, less a load that it carries.
-    #: A load that the arm carries in this log and its model lacks, None
-    #: where none shows.
+    #: A load that the model lacks, None where none shows.
     load: FreeLoad | None
     #: What it is and how it was found, and a load that it carries.
     remarks: tuple[Remark, ...]
@@ -101,9 +98,8 @@ def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | 
 def inferred_statistics(log: Run, bias: WholeLogBias) -> FreeStatistics | None:
     """Statistics that a log without known free motion lets infer, None where it lets infer none.
 
-    The model error that was fitted to the whole log is subtracted where its guard allows
-    it, then a load. Nothing is inferred without dry friction where it is subtracted from
-    no joint as a whole.
+    The whole log's model error is subtracted where its guard allows it, then a load. Nothing is
+    inferred without dry friction where no whole joint is corrected.
     """
     if not (dry_torques(log.robot).any() or (bias.weight >= 1.0).any()):
         return None

@@ -64,11 +64,9 @@ SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
 SLOWEST = (
     10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
 )
-#: A contact's evidence must be this much above that of any row in the log's own free
-#: part.
+#: Evidence over that of any row in the log's own free part.
 FALSE_MARGIN = 1.5
-#: What lies within so long of either end of the log is no contact: filters begin there.
-#: [s]
+#: No contacts so near to either end: filters begin there. [s]
 AT_ENDS = 0.3
 #: The arm rests around a contact where no joint is as fast as `MOVES` in 95 % of the
 #: samples from so long before it to so long after it. [s]
@@ -261,8 +259,7 @@ def limits(
         return found
     unseen = [j + 1 for j in np.flatnonzero(~free.noise.seen).tolist()]
     if len(unseen) == run.robot.joints:
-        # At rest the free part shows no friction of motion: the share of F_c that is
-        # added does.
+        # A free part at rest shows no friction: a share of F_c is added.
         dry = UNSEEN_SHARE * free.noise.dry
         found.append(caution("free-part-rests", least_N=max(smallest, felt_by(run, dry))))
     elif unseen:
@@ -299,20 +296,17 @@ def without_list(run: Run) -> ContactList:
 
 
 POSES = 20_000  #: Samples that say what a median pose of a log is.
-#: The arm rests at the beginning of a contact if no joint moves for so long on either
-#: side. [s]
+#: No joint moves for so long about a contact's start: rest. [s]
 EDGE = 1.0
-#: Share of the time since the first motion that contacts must fill
-#: together to be a load.
+#: Share of the time since the first motion that makes a load.
 SHARE = 0.5
 #: Several contacts are one load if their forces add up to more than this share of their
 #: sizes: pushes that follow one another come from different sides.
 ONE_SIDE = 0.95
 PIECE = 5.0  #: Length of the pieces that show by their means how far the mean may be off. [s]
 BRIEF = 0.3  #: Longest row that a stop explains. [s]
-#: When the arm must have moved, how fast it was, and when it must rest: about the
-#: beginning of a row, which is known to a block. A knock on an arm that stood still is
-#: none of this. [s]
+#: Moving, then stopped, then at rest, about the start of a row. [s]
+#: A knock on an arm at rest is none of this.
 BEFORE, AT_STOP, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
 RINGING = 0.05  #: Share of the speed before that may be left at rest, while the arm rings.
 

@@ -32,17 +32,14 @@ from vftcli.signals.series import covered, resample_columns
 from vftcli.wrench.model_error import ErrorProcess, error_model, error_process
 from vftcli.wrench.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
 
-#: What the model's own standard deviations of force and moment are multiplied by: the
-#: error of the friction is not Gaussian. Chosen on simulated seeds together, for all
-#: logs.
+#: Factors on the model's deviations of force and moment: errors
+#: of friction are not Gaussian. Chosen on simulated seeds.
 WIDENED = np.repeat([1.3, 2.0], 3)
 BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
-#: Share of its bend that the peak of a contact may hide that is short
-#: beside the others.
+#: Share of its bend that a short contact's peak may hide.
 BENT_SHORT = 0.4
 NORMAL = 1.96  #: Half width of a 95 % band in standard deviations.
-#: A contact's wrench changes within this share of its duration, however slow the others
-#: are.
+#: Least correlation time of a contact, as a share of its length.
 OWN_TIME = 0.5
 #: The peak of a contact shorter than this [s] is cut by a log of fewer samples a second
 #: [Hz]: a tap's force lasts some 50 ms.
@@ -115,8 +112,7 @@ class ContactMeasurement:
     log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
     prior: WrenchPrior  #: How the wrench of the contacts moves.
     test: PseudoContactTest  #: Errors of a wrench in free motion.
-    #: Mean and variance of the model error, bridged across the contacts. (K, n) [N·m],
-    #: (K, n) [(N·m)²]
+    #: Mean and variance of the model error. (K, n) [N·m], [(N·m)²]
     quiet: tuple[Array, Array]
     bent: float  #: Share of a peak's bend that may be hidden.
 
@@ -199,8 +195,7 @@ class ContactMeasurement:
         """One row of the list."""
         run, blocks = self.found.runs[number], self.log.blocks
         span, inside, factor = slice(*run), course.within(run), WIDENED * self.test.widening
-        # What the drives' constants and the blocks' length may hide, as in the wrench of
-        # `best`.
+        # What drive constants and block length hide, as for `best`.
         hidden = hidden_by_blocks(course.values, self.bent)[run[0] - course.first :]
         covariances = inside.covariance * np.outer(factor, factor) + hidden[: len(inside.values)]
         force, length = inside.values[:, :3], blocks.length[span]

@@ -50,8 +50,7 @@ from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior
 LASTING = 1.0
 #: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
-#: Correlation time of a contact's torque and how long a contact lasts: for taps, for
-#: leans. [s]
+#: Correlation time and length, for taps and for leans. [s]
 SEARCHES = (0.3, 0.5), (2.0, 3.0)
 #: Stretches in which a long log is searched, and how much of the log before each. [s]
 WARM_UP, STRETCH = 5.0, 10.0
@@ -64,9 +63,8 @@ MOST_ODDS = 300.0  #: Log odds are kept within ± this many nats.
 #: A contact is split where the force is below so many standard deviations for so long
 #: [s], and below this share of the peaks on both sides.
 RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
-#: A contact is split too where the force falls below this share of the peaks on both
-#: sides, if these point so far apart (cosine) and each side lasts so long [s]: one hand
-#: follows another.
+#: Also split where the force falls below this share of both peaks,
+#: if they point so far apart (cosine) and each lasts so long [s].
 HALF, TURNED, APART = 0.5, np.cos(np.radians(60.0)), 0.25
 
 
@@ -122,9 +120,8 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     last = np.minimum(np.maximum(last, first + 1), len(blocks.t))
     beyond = [(a, b) for a, b in np.stack([first, last], axis=1).tolist() if a < b]
     struck = inside.copy()
-    # The filter takes a load that hangs on for many seconds for an error of the model,
-    # and sees only what strikes it in the meantime: before, between and behind that the
-    # torque goes on.
+    # A load of many seconds looks like a model error: what strikes
+    # the arm before, during and after it is looked for again.
     for start, stop in beyond:
         within, t = struck[start:stop], blocks.t[start:stop]
         for a, b in runs_of(~within) if within.any() else ():
@@ -225,8 +222,7 @@ def filtered_odds(
     blocks, count, n = d.shape
     time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
     kept = np.exp(-dt[..., 0] / time)[..., None]
-    # Behind a long gap neither mode is certain: 1 exactly would leave 0/0 of a certain
-    # one.
+    # Behind a long gap no mode is certain: exactly 1 leaves 0/0.
     begins, ends = (np.minimum(-np.expm1(-dt[..., 0] / s), 1.0 - 1e-9) for s in (BETWEEN, lasts))
     often = np.log(spikes) - 0.5 * np.log(SPIKE), np.log1p(-spikes)
     # A stretch begins with what b is like anywhere.

@@ -1,8 +1,6 @@
 """Logs beside thresholds: what a robot compares with them, false alarms, contacts detected.
 
-A robot compares its own estimate with the thresholds it is given, so the check reads
-that estimate where the log has it. Else a momentum observer of 10 1/s runs: causal, as
-a robot needs it.
+The log's own estimate is checked, as a robot does it; else a momentum observer of 10 1/s runs.
 """
 
 from collections.abc import Sequence
@@ -78,8 +76,7 @@ class CheckedContact(NamedTuple):
     #: From its start to the first alarm; NaN where there is none, or no truth. [s]
     delay: float
     by: str  #: The joint or axis that raises the alarm, "" where there is none.
-    #: Whether none begins because one was on already, left over from a
-    #: contact before.
+    #: Whether one from before was still on.
     already_above: bool = False
 
 
@@ -131,9 +128,8 @@ def check_contacts(
 ) -> ThresholdDetection:
     """What thresholds would have done along a log: every joint and every axis may raise the alarm.
 
-    A contact is detected if a signal passes its threshold while it lasts; one that has
-    stayed beyond it since before says nothing of it. Contacts that are over before the
-    settling are left out.
+    It is, if a signal passes its threshold while it lasts; one beyond it since before says
+    nothing. Contacts before the settling are left out.
     """
     t, duration = signals.t, signals.recording.duration - SETTLING
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])

@@ -31,8 +31,7 @@ APART = 0.5  #: Passages closer than this are one event. [s]
 KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
 #: Maxima beyond the level that tell a tail; below four its interval has no lower end.
 ENOUGH = 5
-#: Readings in a tail: at least so many where there are, more an hour, of so many blocks
-#: one.
+#: Readings in a tail: at least, in each hour, and per block.
 LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
 NORMAL = 1.96  #: Half width of a normal's 95 % in standard deviations.
 
@@ -113,8 +112,7 @@ def tail_of(maxima: Array) -> Tail | None:
     return Tail(np.sort(maxima)[::-1], count) if count else None
 
 
-#: A log that holds this many false alarms, at their rate, shows it; a shorter one
-#: extrapolates.
+#: So many false alarms show a rate; fewer extrapolate it.
 DUE = 3.0
 LEAST = 1e-9  #: In place of a threshold of zero, so that there is a level. [N·m, N]
 #: A log of this length has enough readings to tell its own tail. [s]
@@ -207,11 +205,9 @@ class Thresholds(Shown):
 
     rate: float  #: False alarms of a whole set, as of any joint. [1/h]
     joints: tuple[SignalThreshold, ...]  #: One a joint. [N·m]
-    #: One an axis of the wrench, none for an arm of fewer than six joints; one that is
-    #: wide is none. [N, N·m]
+    #: One an axis, none below six joints or where wide. [N, N·m]
     axes: tuple[SignalThreshold, ...]
-    #: That of the force's size, or none; its rate is `rate` itself; as
-    #: of an axis. [N]
+    #: Of the force's size, or none; as of an axis. [N]
     force: tuple[SignalThreshold, ...]
     of_vendor: bool  #: Whether the joints' are of the robot's own estimate.
     logged_wrench: bool  #: Whether those of axes and force are of the robot's own wrench.
@@ -253,8 +249,7 @@ class Thresholds(Shown):
         values = [one.value if name == "joints" else one.level for one in getattr(self, name)]
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
-        # A signal that never moved has the threshold zero: whatever it reads then is an
-        # alarm.
+        # A signal that never moved has the threshold zero.
         sizes = abs(getattr(signals, SETS[name])[:, : len(values)])
         return np.asarray(sizes / np.maximum(limits, LEAST))
 
@@ -262,11 +257,9 @@ class Thresholds(Shown):
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     """Thresholds that motion like that of some logs passes at a rate.
 
-    Every signal of a set of n gets rate/n. Several logs are not mixed: every threshold is
-    that of the log which needs the highest, so that the worst day has the rate and the
-    others fewer. A log too short for a tail counts by its largest reading alone, where
-    another is long enough. The rate [1/h] is of all joints together; and as much of all
-    axes.
+    Every signal of a set of n gets rate/n [1/h]. Each threshold is that of the log that needs
+    the highest. A log too short for a tail counts by its largest reading, where another is long
+    enough.
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")
@@ -309,8 +302,7 @@ def thresholds_of_set(
         tails = {name: tail for name, own in maxima.items() if (tail := tail_of(own)) is not None}
         if not tails:
             return ()
-        # Of few readings a tail is a guess, and a guess may not outdo
-        # what others know.
+        # A tail of few readings is a guess, which others may know better.
         sure = {name: tail for name, tail in tails.items() if tail.size >= ENOUGH} or tails
         levels = [
             SignalThreshold(*tail.threshold(share), share, name, tail)

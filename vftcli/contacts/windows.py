@@ -31,8 +31,7 @@ ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of 
 POINTS = 10  #: Points along each link that a force is tried at.
 #: The first link that is tried: on link 1 a force loads one joint, as friction does.
 FIRST_LINK = 2
-#: Lever of the moment that a contact's force may have about the flange or a link's
-#: middle. [m]
+#: Lever of a force about the flange or a link's middle. [m]
 LEAST_LEVER = 0.1
 FORCE_PRIOR = 100.0  #: Standard deviation that a force is given beforehand. [N]
 ALIKE = 4.0  #: Points with a score within this of the best one's fit as well.
@@ -45,8 +44,7 @@ class ContactPlace(NamedTuple):
 
     link: int  #: Number of the link; 0 for the flange.
     lever: float  #: Standard deviation of the moment over that of the force. [m]
-    #: J of its point along the log; columns of joints that do not move it are zero.
-    #: (K, 6, n)
+    #: J of its point, zero for joints that do not move it. (K, 6, n)
     jacobian: Array
 
 
@@ -125,20 +123,17 @@ START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
 #: Smallest and largest standard deviation. [N], [N·m]
 FORCES, MOMENTS = ((3.0, 300.0), (0.1, 50.0))
-#: Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free
-#: motion one reversal of friction reached 15, everything else but abrupt stops stayed
-#: below 6.
+#: Evidence over nothing, which may spike. [nats] In 299 s of real free
+#: motion one reversal had 15, all else but abrupt stops below 6.
 LEAST_EVIDENCE = 12.0
-#: Least evidence where the arm moves and no free motion is known: what the model errs by
-#: in motion reaches 82 nats on logs of six arms; from 75 to 200 nats the same contacts
-#: are found.
+#: The same in motion without free motion known. [nats] Model errors
+#: reach 82 on six arms; 75 to 200 find the same contacts.
 LEAST_IN_MOTION = 120.0
 LEAST_FORCE = 10.0  #: Smallest standard deviation of a force that is tried. [N]
 LONGEST_TIME = 1.0  #: Longest correlation time of a wrench that comes and goes. [s]
 SIZES = 1.0, 3.0  #: Multiples of the standard deviation that are tried.
-#: A candidate that lasts longer than the first may be a wrench that stays, as a load's,
-#: with the second as its correlation time: one that wanders would have to pay for every
-#: block. [s]
+#: Longer candidates may be a wrench that stays, as a load's, with
+#: this correlation time: one that wanders pays for each block. [s]
 LASTING, STEADY_TIME = 1.5, 100.0
 
 

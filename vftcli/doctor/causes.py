@@ -1,8 +1,7 @@
 """The cause of a log that its arm does not explain: the best of all tries.
 
-In one number all faults look alike. So each cause corrects the log in its own way and the
-log is fitted again. Only a cause that leaves much less than the log and all others is
-named.
+Each cause corrects the log in its own way, and the log is fitted again. One is named if it
+leaves much less than the log and all others.
 
 Drivers publish currents, torques, or torques less gravity under one name, some with the
 sign reversed. A reading's rest is relative to the column as logged: relative to the
@@ -33,10 +32,8 @@ OPEN = 0.45  #: Largest misfit that a cause leaves; no gravity beside a hand lea
 GOOD = 0.03  #: Below this misfit the costly swap of two joints is not tried.
 AMBIGUOUS = 1.25  #: A second cause nearer than this ratio of misfits is named too.
 CLEAR = 1.5  #: Ratio of misfits by which another reading beats the second best.
-#: Ratio of misfits by which another reading beats the stated one that fits.
-#:
-#: Torques without gravity read as currents leave only 16 % open on a UR5, read right 1.5
-#: %.
+#: Ratio of misfits by which another reading beats one that fits:
+#: currents read as torques leave 16 % of a UR5, read right 1.5 %.
 OVERWHELMING = 5.0
 #: Misfits below which an effort is as named, and a base as in the robot file.
 #:
@@ -45,8 +42,7 @@ READ_RIGHT, UPRIGHT = 0.1, 0.05
 SUSPECT = 0.35  #: Least misfit of a joint to try its sign and place.
 #: Most of the misfit after one joint's sign change, and after two joints' exchange.
 TURNED, SWAPPED = 0.5, 0.7
-#: Causes on single joints' efforts, or on what a rough description may get wrong too: its
-#: links' masses.
+#: Causes on single joints, or in the links' masses.
 ON_JOINTS = frozenset({"joint-sign", "effort-order", "effort-offset", "drive-scale"})
 #: Largest share of what errors of a rough description leave that any other cause leaves.
 #:
@@ -68,8 +64,7 @@ LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
 SURE = 4.0  #: Least standard deviations of an offset, a factor or missing friction.
 KNOWN = 0.05  #: Largest standard deviation of a factor from motion.
 CLEARER = 1.5  #: Ratio of misfits by which a factor beats a load.
-#: Misfit of a model of the arm to another model; measured efforts leave
-#: 1.3 % and more.
+#: Misfit of one model to another; real efforts leave 1.3 % or more.
 MODELLED = 0.02
 #: Least share of the robot file's friction in any arm, and joints that judge it.
 RUBS, WITHOUT = 0.1, 3
@@ -275,8 +270,7 @@ def scaled(case: Case) -> Iterator[Cause]:
     n, needed, friction = len(case.constant), case.needed[:, :, None], case.windows.friction
     fit = solve(case.given, Terms(needed), friction)
     factor, sd = fit.values[0], fit.sd[0]
-    # A load explains a factor, too: above 1 a heavy one, below 1 one that only the robot
-    # file mounts.
+    # A load explains a factor too: a heavy one, or one not carried.
     worth = CLEARER if case.loaded.values[0] > -SHED * case.mounted else 1 / CLEARER
     sure = abs(factor - 1) > OFF + SURE * sd and LEAST < factor < MOST
     if sure and worth * fit.size <= case.loaded.size:
@@ -329,8 +323,7 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
         return Diagnosis(case)
     best = found[0]
     if best.code == "joint-sign" and 2 * len(best.joints) > len(case.constant):
-        # Of most joints it is the sign of all: joints that rub or carry
-        # nothing hide it.
+        # Most joints turned are all turned: friction hides the rest.
         all_turned = (c for c in found if c.code == "effort-sign")
         best = next((c for c in all_turned if c.misfit < AMBIGUOUS * best.misfit), best)
     # The sign of all covers that of single joints.

@@ -20,8 +20,7 @@ from vftcli.signals.remarks import Remark, Where, fact, on_joints, warning
 from vftcli.signals.rest import REST
 from vftcli.signals.series import covered, runs_of
 
-#: Multiple of its largest torque that no drive gives: drive constants
-#: are uncertain. [1]
+#: Multiple of its largest torque that no drive gives. [1]
 BEYOND = 1.5
 #: Share of the joint's largest torque, and robust deviations of noise, between a bad
 #: sample and its neighbours. [1, -]

@@ -206,8 +206,7 @@ class Examiner:
             RobotError: If the names of its joints are not the robot's.
         """
         recording = unwound(paired(recording, robot), robot)
-        # What no block of a long log shows has no room to be looked for in all of it at
-        # once.
+        # Blocks of a long log say whether all of it is to be cleaned at once.
         blocks = recording.blocks(BLOCK) if in_stretches else ()
         if not in_stretches or any(without_bad_samples(b, robot) is not b for b in blocks):
             recording = without_bad_samples(recording, robot)

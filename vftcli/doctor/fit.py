@@ -317,8 +317,7 @@ def vendor_sign(case: Case) -> Iterator[Remark]:
     if recording.tau_ext is None or recording.torque is None:
         return
     vendor = case.windows.mean(recording.tau_ext)
-    # A load that the vendor's model knows and the robot file does not is in neither of
-    # them.
+    # A load that only the vendor's model knows.
     vendor -= np.median(vendor, axis=0)
     if root_mean_square(vendor) < FELT * case.size:
         return

@@ -25,8 +25,7 @@ from vftcli.signals.rest import MOVES
 from vftcli.signals.series import median_step
 
 WINDOW = 0.15  #: Length of a window; the next begins in its middle. [s]
-#: Most windows, in blocks of neighbours; and a joint's least: 4.5 s of motion, mostly
-#: without a push.
+#: Most windows; neighbours in a block; a joint's least.
 WINDOWS, BLOCK, LEAST = 320, 16, 60
 INSIDE = 12  #: Instants of the model in a window.
 EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01  #: Lags to try, and their step. [s]
@@ -42,8 +41,7 @@ LEAST_RATE = 30.0  #: Least sample rate that shows such a lag. [Hz]
 #: Lag that is named: friction behind a turn looks like 20 ms, simulations like 30. [s]
 LATE = 0.035
 BETTER = 1.45  #: Ratio of rests by which a lag beats none, mean over joints.
-#: Share and number of joints with a best lag within this share of it; half of the arm's
-#: must show one.
+#: Share and number of joints that agree on a lag, to this share.
 AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
 #: Findings on velocities of another motion.
 MISTIMED = frozenset(

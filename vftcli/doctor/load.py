@@ -18,16 +18,13 @@ from vftcli.signals.rest import COMMANDED, MOVES, slower
 MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly explains. [N·m]
 #: Torque per current near which every UR's large drives lie. [N·m/A]
 USUAL_CONSTANT = 10.0
-#: Torque per current of UR's five joint sizes, e-Series and CB3, by the controllers'
-#: own tables. [N·m/A]
+#: Torque per current of UR's joint sizes, e-Series and CB3. [N·m/A]
 JOINT_CONSTANTS = np.array(
     [3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756]
 )
 SAME = 0.02  #: Constants of one joint size scatter by this much from firmware to firmware.
-#: Load that is worth a remark, as a hand is; and one that nobody overlooks.
-#:
-#: Drive constants that are 3 % off look like .3 kg on a UR10e; hands weigh .5–1.1 kg.
-#: [kg]
+#: Loads that are named, and that nobody overlooks. [kg]
+#: Hands weigh .5–1.1; constants 3 % off look like .3 on a UR10e.
 HAND, LOAD = 0.4, 1.2
 SURE = 4.0  #: Standard deviations by the scatter that a load has to be.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
@@ -146,8 +143,7 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
         return
     profile = robot.torque_constant
     ratio = constants / profile - 1
-    # Freedrive and old controllers follow other laws than K·i: a real joint's constant
-    # counts.
+    # Freedrive and old controllers do not follow K·i.
     real = (abs(constants[:, None] / JOINT_CONSTANTS - 1) < SAME).any(axis=1)
     wrong = abs(ratio) > RATIO
     if wrong.any() and real[wrong].all():
@@ -172,8 +168,7 @@ def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]
         return
     carried, wanted = current[rest].mean(axis=0), expected[rest].mean(axis=0)
     torque = (carried - wanted) * np.where(np.isfinite(constants), constants, USUAL_CONSTANT)
-    # Of the base no load shows, of the wrist little: shoulder, elbow and the next joint
-    # tell.
+    # Only shoulder, elbow and the next joint show a load.
     heavy = np.flatnonzero(abs(torque[1:4]) > MISMATCH) + 1
     if heavy.size < 2:
         return
@@ -187,11 +182,9 @@ def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]
     )
 
 
-#: Share less that a joint rubs for each kelvin: UR's five sizes .011–.022 between 28 and
-#: 45 °C.
+#: Share of friction lost a kelvin: UR's sizes .011–.022.
 PER_KELVIN = 0.015
-#: Distance from the temperature of the model from which a joint rubs 8–15 % otherwise.
-#: [K]
+#: Temperature difference at which friction is 8–15 % off. [K]
 FAR = 7.0
 ASSUMED = 10.0  #: `FAR` where the robot file does not state that temperature. [K]
 #: Range of the law: measured from 28 to 46 °C, and 15 to 20 K beyond. [°C]

@@ -35,8 +35,7 @@ LARGE_CURRENT = 60.0  #: No joint of these arms draws this much; readings in mA 
 LONG, MANY, WAY = 0.5, 10, 0.01
 #: A signal's stuck stretch is this many times as long as nearly all its other repeats.
 UNUSUAL = 10.0
-#: Deviation of a speed from a constant acceleration, beyond which its effort changes.
-#: [rad/s]
+#: A speed this far from constant acceleration is bent. [rad/s]
 BENT = 0.005
 TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
 #: Steps of the positions that are worth telling: .02 rad/s at 100 Hz. [rad]
@@ -76,8 +75,7 @@ def signal_findings(recording: Recording) -> Iterator[Remark]:
         yield warning("no-velocity")
     if not efforts_of(recording):
         yield warning("no-effort")
-    # Radians and ampere are never so large. The last joint of some arms turns without
-    # end.
+    # No radians or amperes are so large; last joints turn freely.
     largest = abs(recording.q[:, : max(1, recording.joints - 1)]).max()
     if largest > LARGE_ANGLE:
         yield warning("degrees", largest_rad=largest)
@@ -262,8 +260,7 @@ def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, in
         first, last = edges_of(same[:, j])
         lengths = last - first
         long = (t[last] - t[first] >= LONG) & (lengths >= MANY)
-        # Repeats of a coarse resolution come in all lengths, those of a stuck signal
-        # stand out.
+        # Repeats of a coarse signal vary in length; stuck ones stand out.
         usual = np.sort(lengths[~long])
         least = UNUSUAL * usual[int(0.95 * len(usual))] if usual.size else 0.0
         for a, b in zip(first[long].tolist(), last[long].tolist(), strict=True):
@@ -301,9 +298,8 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
             zero &= ~value.any(axis=0)
     for name, value in efforts_of(recording):
         zero = zeros[name]
-        # Without noise a joint that never moves may need no torque at all: most columns
-        # of a sensor are rougher than motion. Steps of white noise differ by √3 times
-        # their own size.
+        # Most columns of a sensor are rougher than motion.
+        # Steps of white noise differ by √3 times their size.
         steps = np.diff(value[:, ~zero], axis=0)
         rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
         measured = zero.all() or rough.mean() > 0.5
@@ -326,8 +322,7 @@ def is_clipped(value: Array, position: Array, least: int) -> bool:
         # A drive saturates far from zero; one that often repeats a small value rests.
         if size == 0 or abs(extreme) < 0.5 * size or count < least:
             continue
-        # The rounded top of a smooth effort of coarse resolution is wide on the next
-        # level too.
+        # A smooth effort of coarse resolution is wide a level below too.
         if np.count_nonzero(up == up[~at].max()) > 0.2 * count:
             continue
         long = (position[a:b] for a, b in runs_of(at) if b - a >= least)

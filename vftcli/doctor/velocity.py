@@ -18,8 +18,7 @@ from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.rest import MOVES, NONZERO
 from vftcli.signals.series import gaps_of, runs_of
 
-#: Length of a window: short beside motion, long beside noise of single samples and an
-#: arm's vibration. [s]
+#: Window: short beside motion, long beside noise. [s]
 WINDOW = 0.2
 #: Steps of a window of a slow log, and of a fast one after thinning.
 LEAST_STEPS, MOST_STEPS = 8, 40
@@ -34,8 +33,7 @@ TELLING = 0.1
 #: Deviation of the gain from 1 that is named; sound logs stay within 0.004.
 GAIN = 0.02
 SURE = 4.0  #: Standard errors, too, that a deviation must exceed.
-#: Lag that is named, or a longer sample time: a robot's velocity filter needs 2–3 ms, a
-#: host's stamps up to 6. [s]
+#: Lag that is named; robots' filters take 2–3 ms, stamps 6. [s]
 LATE = 0.008
 #: Ratio of open shares at which another joint's position beats the own with a lag, and
 #: the largest gain error of the own for this.
@@ -51,8 +49,7 @@ DEGREES, CLOSE = 180 / np.pi, 0.06
 BEYOND = 1.5
 #: Gain of a gear, not of a clock: arms have 30 to 160.
 GEARED = 10.0
-#: Gain → unit of the stamps; milliseconds read as seconds make the derivative a thousand
-#: times too small.
+#: Gain of the derivative → unit of the stamps.
 UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns", 1e-3: "s", 1e-6: "s", 1e-9: "s"}
 #: Share of moving steps with a repeated velocity that is held: half the rate repeats one
 #: in two, sound logs up to a third.
@@ -181,8 +178,7 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
     surely = abs(fit.lag) - SURE * fit.lag_error
     late = judged & (surely > max(LATE, recording.median_step)) & (gain > DAMPED_MOST)
     if late.any():
-        # Of a squared motion of rate ω a first-order filter of time constant τ leaves
-        # 1/(1 + ω²τ²), a delay all.
+        # At rate ω a lag τ of first order leaves 1/(1 + ω²τ²), a delay all.
         share = median(fit.rate[late] * fit.lag[late]) ** 2
         lost = median(1 - fit.amplitude[late] ** 2)
         damped = median(fit.lag[late]) > 0 and share > DAMPED and lost > share / 2

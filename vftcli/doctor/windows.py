@@ -37,8 +37,7 @@ LOAD = np.array([5.0, 0.5, 0.5, 0.5])
 #:
 #: Public URDFs and profiles of one arm differ by 2–12 % in gravity's torque.
 ROUGH = 0.1, 0.025
-#: Factor on their prior from fit to fit, so many at most, until a fit needs no larger
-#: ones.
+#: Factor on their prior from fit to fit, and most fits.
 TIGHTER, ROUGH_FITS = 0.5, 8
 LIGHT = 0.1  #: Links below are as rough as one of this mass. [kg]
 KEPT = (
@@ -260,9 +259,8 @@ SHED = 1.2  #: Share of the mounted payload that a fit may remove at most. [-]
 TELLING = 0.9
 #: Range of gravity's torque, relative to the effort, from which the poses tell a load.
 VARIED = 0.3
-#: A cause shows in a window where it makes this many times what the fit leaves over; it
-#: is refuted there where the log without it leaves less than this share of what is left
-#: with it.
+#: A cause shows in a window where it makes this many times the rest;
+#: it is refuted where the rest without it is below this share.
 FELT, REFUTED = 4.0, 0.6
 LASTING = 0.95  #: Share of the windows in which a cause that lasts must not be refuted.
 

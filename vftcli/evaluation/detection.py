@@ -27,9 +27,8 @@ def score_list(
 ) -> dict[str, Any]:
     """How a list agrees with the true contacts of a log that lasts `duration` [s], by name.
 
-    `free_h` is vouched time less true contacts [h]. Of the found contacts only loads
-    overlap `found_as_load`; onset is the first row's, peaks are the hardest overlapping
-    row's.
+    `free_h` is vouched time less true contacts [h]. Only loads overlap `found_as_load`; onset
+    is the first row's, peaks the hardest row's.
     """
     on = [
         (each, start, peak)

@@ -55,8 +55,7 @@ SCHEMA: Schema = {
 
 #: A joint's reference is trusted if at least this share of its samples is.
 TRUSTED_SHARE = 0.5
-#: Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30
-#: %.
+#: Fewest samples of a coverage: fewer tell it to ±30 % only.
 LEAST = 10
 POOLED = "pooled"  #: Name of the pooled rows in the column `recording`.
 
@@ -94,13 +93,11 @@ class Scored(NamedTuple):
     #: Bootstrap draws of the mean squared errors, one column an observer, all in the same
     #: blocks: for comparing observers.
     paired: Resampled
-    #: Draws of each observer in blocks of its own length, so that its interval does not
-    #: depend on who else is asked.
+    #: Draws of each observer, in blocks of its own length.
     own: tuple[Resampled, ...]
     lag: Array  #: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
     within: Array  #: Samples with an error within each observer's 95 % band. (m,)
-    #: Samples in which it has a band and the joint moves: `within` is a part of them.
-    #: (m,)
+    #: Samples with a band in which the joint moves. (m,)
     banded: Array
 
     @property
@@ -317,8 +314,7 @@ class JointMeans(NamedTuple):
     floor: float  #: Mean of the reference's own error, NaN where it is not known. [N·m]
     #: Joints that are left out, because the reference is not to be trusted there.
     without: tuple[int, ...]
-    #: Observer → mean |error| [N·m], and what it is better than zero, where that is
-    #: known.
+    #: Observer → mean |error| [N·m], and its gain over zero, if known.
     l1: Mapping[str, float] = {}
     skill: Mapping[str, float] = {}
 

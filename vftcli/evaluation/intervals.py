@@ -102,11 +102,9 @@ def correlation_time(x: Array) -> Array:
 def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, float]:
     """95 % interval of an RMSE from bootstrap draws of its mean square. [N·m]
 
-    The scatter of a mean square is a share of the true value, not of the observed one: a
-    log with few contacts shows both a small mean and a small scatter. With h, that share
-    times Student's quantile for the number of blocks, the true value is at most
-    observed/(1 − h); downwards, where the mean square is skewed, its logarithm is used:
-    observed·e^{−h}.
+    The scatter of a mean square is a share of the true value. With h, that share times
+    Student's quantile for the number of blocks, the true value is at most observed/(1 − h), and
+    at least observed·e^{−h}: the logarithm, as the mean square is skewed.
     """
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")
@@ -136,9 +134,8 @@ def paired_significance(
 ) -> pl.DataFrame:
     """Every pair of observers on every joint: difference of RMSE, its interval, and p.
 
-    Both observers' errors are resampled in the same blocks, so that what they share
-    (contacts, the reference's own error) cancels. A sample without an answer counts as
-    the answer 0.
+    Both observers' errors are drawn in the same blocks, so that what they share cancels. No
+    answer counts as the answer 0.
     """
     rows = []
     for j in range(reference.joints):

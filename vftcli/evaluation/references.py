@@ -35,8 +35,7 @@ from vftcli.wrench.sensor_reading import SensorReading, with_reference
 from vftcli.wrench.solvers import VirtualSensor
 
 AHEAD = 1.05  #: The best is ahead where the paper's gains make this many times its error.
-#: Cutoff of the open torque's low-pass: a hand's push lasts longer, reversals do not.
-#: [Hz]
+#: Cutoff of the open torque: pushes last, reversals do not. [Hz]
 CUTOFF = 2.0
 #: Multiple of a joint's median open torque from which it sticks out.
 #:
@@ -46,8 +45,7 @@ STANDING_OUT = 8.0
 #: Multiple of a joint's dry friction up to which friction may be what is open; free UR10e
 #: logs reach 1.15, logs of hands 1.8–7.
 OF_FRICTION = 1.5
-#: Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open.
-#: [N·m]
+#: No contact below this: link torques leave 1.8 open. [N·m]
 LEAST = 2.0
 #: Multiple of its limit from which open torque is plainly no model error: a free UR10
 #: reaches 1.14, hands and pushes 2.1 and more.
@@ -110,8 +108,7 @@ def touched_remarks(run: Run) -> tuple[Remark, ...]:
     begin, end = max(spans, key=lambda span: span[1] - span[0])
     values = {
         "torque_Nm": worst.torque, "quiet_Nm": worst.quiet, "spans": len(found),
-        # Rounded inwards, so that the span that is offered holds nothing of what it
-        # leaves out.
+        # Inwards, so that the span holds nothing that it leaves out.
         "begin_s": np.ceil(10.0 * begin) / 10.0, "end_s": np.floor(10.0 * end) / 10.0,
     }  # fmt: skip
     where = Where(joints=(worst.joint + 1,), span=(worst.start, worst.stop))
@@ -167,9 +164,8 @@ def file_reference(
 ) -> ReferenceLoad:
     """External torque, wrench or both from a table on the log's own clock.
 
-    A file without torques gives those of its wrench, Jᵀ w. A wrench is read as one in
-    base axes about the flange point unless ``wrench[FRAME]=…`` in the columns says
-    otherwise.
+    A file without torques gives those of its wrench, Jᵀ w, in base axes about the flange unless
+    its columns say ``wrench[FRAME]=…``.
     """
     table = read_reference(path, columns)
     # The recording counts from its first sample, a reference file from the log's zero.
@@ -220,8 +216,7 @@ def since_start(t: Array, recording: Recording) -> Array:
 
 def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:
     """Columns (M, k) at a file's times [s], interpolated to the log's, NaN beyond. (T, k)"""
-    # Half a sample more at either end: stamps of one clock, written by two programs,
-    # round apart.
+    # Half a sample: two programs round one clock differently.
     slack = 0.5 * recording.median_step
     inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
     if not inside.any():
@@ -296,8 +291,7 @@ def reference_wrench(
     A sensor's or a file's stays; any other reference is a torque, solved by least squares.
     """
     torque = reference.torque
-    # Plain least squares whatever the estimates' solver is: a reference is not to be
-    # smoothed.
+    # Plain least squares: a reference is not smoothed.
     solved = replace(sensor, solver="pinv").wrench(torque, recording.q, robot.chain)
     if reference.wrench is None:
         return replace(solved, name=torque.name, sd=None, remarks=())

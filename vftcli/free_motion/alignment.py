@@ -143,9 +143,8 @@ def check_same_arm(recording: Recording, free: Recording) -> None:
 def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     """The shared part of two logs' motions, None if too short.
 
-    At the shift most of the recording's motion is within `SAME_TRAJECTORY`; this must be
-    at least `LEAST_OVERLAP` of it. The partners are unbroken stretches of a second or
-    more.
+    At the shift at least `LEAST_OVERLAP` of the motion is within `SAME_TRAJECTORY`. Partners
+    are unbroken stretches of a second or more.
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
     q = resample_columns(t, recording.t, recording.q)

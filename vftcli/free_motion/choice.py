@@ -9,8 +9,7 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.option import LOG, Choice, Option, interval
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
-#: Rungs of the alignment ladder, from the lowest; `vftcli.free_motion.difference.RUNGS`
-#: makes them.
+#: Ways to align, lowest first: `vftcli.free_motion.difference.RUNGS`.
 ALIGNMENTS = ("commanded", "period", "phase", "model")
 
 

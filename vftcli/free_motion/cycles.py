@@ -19,10 +19,8 @@ from vftcli.signals.series import resample_columns, summed
 
 LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.
 
-#: Positions return if a quarter of them come back within this share of their own spread.
-#:
-#: A quarter: a soft servo is off its path while it is pushed, which may be most of the
-#: time.
+#: A quarter of the positions must return, within this share of
+#: their spread: a soft servo is off its path while it is pushed.
 RETURNS = 0.015
 
 #: A valley is worth refining if a quarter of the samples come back within this share.
@@ -36,13 +34,11 @@ ENOUGH = 2560  #: Samples that choose and refine a period: more of them only tak
 #: Spans this many times what the samples fill at their usual step are gaps, not motion.
 SPARSE = 10.0
 
-#: A sample is on the repeated path if it is there again one period away, within this.
-#: [rad]
+#: How near a sample is to itself one period away. [rad]
 ON_PATH = 0.1
 COMPLETE = 0.97  #: Share of a cycle that must be in the log for it to count as whole.
 
-#: A cycle is free too if its difference from the freest is within this many expected
-#: errors.
+#: Expected errors to the freest cycle within which one is free too.
 ALIKE = 1.5
 MOST_PAIRED = 8  #: Free cycles that are paired with the others, at most.
 SETTLES = 2.0  #: Time around a cycle in which filters settle. [s]
@@ -297,8 +293,7 @@ class FreeCycles(NamedTuple):
             found = fact("free-cycles-found", cycles=named, whole=whole, residuals=residuals)
         if count <= MOST_PAIRED:
             return [found]
-        # The mean of k cycles with independent noise adds 1/k of one cycle's to the
-        # square.
+        # The mean of k cycles adds 1/k of one cycle's noise power.
         wider = np.sqrt((1.0 + 1.0 / MOST_PAIRED) / (1.0 + 1.0 / count)) - 1.0
         return [found, fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider)]
 

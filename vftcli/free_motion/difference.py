@@ -267,10 +267,9 @@ def noise_when_quiet(
 ) -> Array:
     """Coloured noise of a low-passed difference (S, n) from its quietest pieces. (n,) [N·m]
 
-    Real noise is denser at low frequencies than above contacts. In a piece of `PIECE` it
-    is the deviation from a straight line, a slow load's course; `QUIET` of the pieces are
-    assumed without a fast contact. Slower wander does not count: this errs low. Zero for
-    fewer than `LEAST_PIECES`.
+    Of each `PIECE` it is the deviation from a straight line, a slow load's course; `QUIET` of
+    them are assumed free. Slower wander does not count: this errs low. Zero for fewer than
+    `LEAST_PIECES`.
     """
     size = round(PIECE / step)
     count = len(t) // size

@@ -216,12 +216,10 @@ LEAST = (
 SURE = 4.0  #: Standard deviations that it has to be.
 PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
 CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
-#: Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13
-#: through. [s]
+#: Farther away the filter passes e^(−2π 6 Hz · sin(π/8) · 2 s). [s]
 HEARD = 2.0
 RATE = 30.0  #: RunSamples a second that are weighed.
-#: Time over which the model's errors resemble one another: so much counts as one sample.
-#: [s]
+#: The model's errors are alike for so long: one sample. [s]
 MEMORY = 0.3
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
 PASSES = 4  #: Fits, each with the joints' errors that the last one left.

@@ -19,8 +19,7 @@ GAP = 5.5  #: A gap of more than this many median steps is not interpolated acro
 FARTHEST = 0.1  #: How far phase may lie from the clock's word, as the low-passed shift. [s]
 #: Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]
 PHASE_CUTOFF = 8.0
-#: A stop of this length leaves the whole of the dry friction open, a shorter one its
-#: share. [s]
+#: A stop this long leaves all of the dry friction open. [s]
 STUCK = 0.3
 #: Of what lies farther away a filter of 3 Hz, that of a log at 15 Hz, lets
 #: e^(−2π 3 Hz · sin(π/4) · 2 s) = 3e-12 through. [s]
@@ -62,9 +61,8 @@ def in_gap(clock: Array, times: Array) -> Mask:
 def by_phase(motion: Run, pairing: Pairing) -> Pairing:
     """Move each sample's partner to the nearest place on the free run's path.
 
-    The shift along the path minimises the distance of the joint positions, by
-    Gauss–Newton; where the path rests it shows nothing and the clock decides. The shift
-    is smoothed along time.
+    Gauss–Newton minimises the distance of the joints; at rest the clock decides. The shift is
+    smoothed along time.
     """
     known, free = pairing.known, pairing.free
     if np.count_nonzero(known) < 8:
@@ -159,8 +157,7 @@ class PairedRuns:
         for p in self.pairings:
             used = p.free.t.searchsorted(p.times[p.known])
             used = np.unique(used.clip(0, len(p.free.t) - 1))
-            # Of an hour with one free cycle that cycle, and what the filter hears of the
-            # rest.
+            # Of an hour only the free cycle, and what the filter needs.
             pad = round(HEARD / p.free.step)
             first = max(0, int(used[0]) - pad)
             free, used = p.free.part(slice(first, int(used[-1]) + pad + 1)), used - first

@@ -28,8 +28,7 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import REST, faster
 
 BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
-#: Standard errors from which on a change is believed: contacts alone rarely look like
-#: one.
+#: Standard errors of a change that is believed.
 SURE = 3.0
 
 
@@ -103,8 +102,7 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     )
 
 
-#: "found" and, where a period is stated, "commanded" → one pairing a free run; and how
-#: found.
+#: "found" and "commanded" → a pairing for each free run; remarks.
 Partners = tuple[Mapping[str, Sequence[Pairing]], list[Remark]]
 
 
@@ -192,10 +190,9 @@ def error_ratio(found: Difference, where: Mask) -> Array:
 def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     """Change of dry friction since the free run, 0 if maybe chance. (n,) [N·m]
 
-    Joints warm up between two logs, and then friction does not cancel. The change is the
-    mean of the difference (T, n) [N·m] times the sign of the velocity. Contacts do not
-    follow the sign of the velocity over a whole log; its scatter over pieces of `BLOCK`
-    says how sure the mean is.
+    Joints warm up between two logs. The change is the mean of the difference (T, n) [N·m] times
+    the sign of the velocity, which contacts do not follow; its scatter over pieces of `BLOCK`
+    says how sure it is.
     """
     t, n = motion.t, tau.shape[1]
     piece = ((t - t[0]) / BLOCK).astype(np.int64)

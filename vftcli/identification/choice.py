@@ -17,8 +17,7 @@ class Task(Choice):
         ParameterError: If there is no such method, or it has no use for what is set.
     """
 
-    #: Of `METHODS`; None for friction, but base where the profile's links are not the
-    #: arm's.
+    #: Of `METHODS`; None: friction, or base without the arm's own links.
     method: Annotated[
         str | None,
         Option("--method", "|".join(METHODS), "Fit friction, base, targets, payload or gains."),

@@ -172,8 +172,7 @@ def model_doubts(data: Training, fits: Mapping[int, JointFit]) -> Iterator[Remar
     heavy, robot = np.flatnonzero(heavy_joints(data)), data.robot
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
         tau, name = log.tau, log.recording.name
-        # Look for a load before friction is fitted: Coulomb friction would absorb
-        # some of it.
+        # A load first: Coulomb friction would absorb some of it.
         mass, explained = apparent_load(log, tau - log.predicted)
         if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
             load = {"mass_kg": mass, "robot": robot.name, "share_percent": 100.0 * explained}

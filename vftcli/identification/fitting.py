@@ -47,9 +47,8 @@ FITS: dict[str | None, Callable[[Training], MethodResult]] = {
     "targets": targets_method,
     None: chosen_method,
 }
-#: One row a log, model and joint: RMS of measured less predicted torque, in motion.
-#: `log_index` counts the logs from 1, training first: two files of one name stay two
-#: logs.
+#: A row per log, model and joint: RMS of measured less predicted
+#: torque in motion. `log_index` counts logs from 1, training first.
 RESIDUALS = pl.Schema(
     {"log": str, "log_index": int, "role": str, "model": str}
     | {"joint": int, "rms_Nm": float, "samples": int}

@@ -51,8 +51,7 @@ BOUNDED = ("coulomb", "viscous")
 TURNED, PUSH = 2.0, 0.02
 
 SLIDING = 3e-3  #: Smoothing of the sign beside presliding. [rad/s]
-#: Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6
-#: Hz. [Hz]
+#: Observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]
 LISTENING = 2.0
 MARGIN = 1.01  #: A simpler model wins within this factor of the best error.
 #: A shorter presliding length wins within this factor of the best, none over all.
@@ -226,8 +225,7 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
         plain = data.slow(data.columns(Shape(terms, SLIDING)))
         # Outliers' weights are fixed: all lengths answer for one set of samples.
         weights = fit_column(plain, y, data.weights).weights
-        # A smoother sign that explains as much beats presliding; an even smoother one is
-        # presliding in disguise.
+        # A smoother sign that explains as much goes before presliding.
         shapes = [Shape(terms, SLIDING), Shape(terms, SMOOTHING)]
         play = Shape((*terms, "presliding"), SLIDING)
         shapes += [play._replace(presliding_length=length) for length in PRESLIDING_LENGTHS]

@@ -173,10 +173,9 @@ class Grouping(NamedTuple):
 def group_parameters(layout: ParameterColumns) -> Grouping:
     """Base parameters of an arm's unknowns, by rank-revealing QR.
 
-    The regressor of random states, seeded, is decomposed with column pivoting;
-    R = [R₁ R₂] gives β = R₁⁻¹ R₂ (M. Gautier, "Numerical calculation of the base inertial
-    parameters of robots", J. Robotic Systems 8(4), 1991). Friction coefficients stand for
-    themselves.
+    The regressor of seeded random states is decomposed with column pivoting; R = [R₁ R₂] gives
+    β = R₁⁻¹ R₂ (M. Gautier, "Numerical calculation of the base inertial parameters of robots",
+    J. Robotic Systems 8(4), 1991).
     """
     from scipy.linalg import qr
 

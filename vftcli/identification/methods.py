@@ -143,9 +143,8 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
 def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
     """Coefficients of joint j (from 0), sd by its last drive constant, and this.
 
-    Torque was made from currents with the profile's K. Where the rigid body's torque
-    comes out as scale times what it must be, the true K is K / scale, and so are all
-    coefficients beside it.
+    Torque is K i. Where the rigid body's comes out as scale times what it must be, the true K
+    is K / scale, and so are all coefficients.
     """
     scale, scale_sd = values[-1], sd[-1]
     if scale <= LEAST_SLOPE:

@@ -17,8 +17,7 @@ from vftcli.signals.arrays import Array
 SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)
 #: Velocities over which a Stribeck term may fade. [rad/s]
 STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
-#: Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1.
-#: [rad/s]
+#: Where a logarithm may flatten; UR's gears: .28 to 2.1. [rad/s]
 LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
 #: Speeds of the points between which UR's controllers draw friction as a line. [rad/s]
 BENDS = (0.01, 0.5, 1.5, 3.2)

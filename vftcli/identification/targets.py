@@ -1,10 +1,8 @@
 """Method "targets": a UR controller's own model of its arm, by its targets.
 
-The controller logs the torque of its inverse dynamics (target_moment) and the current it
-expects (target_current). At rest their ratio is K; in motion target_moment less the
-maker's rigid body is J q̈, and K·target_current − target_moment is the controller's
-friction. Free motion is not needed: a hand on the arm changes the measured effort, not
-the target.
+The controller logs its inverse dynamics' torque (target_moment) and the current it expects
+(target_current). At rest their ratio is K; in motion target_moment less the rigid body is J q̈,
+and K·target_current − target_moment its friction. A hand changes no target.
 """
 
 from collections.abc import Iterator, Sequence

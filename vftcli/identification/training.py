@@ -159,8 +159,7 @@ def prepare(recording: Recording, robot: Robot, cutoff: float = CUTOFF) -> Prepa
     """Filter, differentiate and decimate a log, one column at a time."""
     torque, dq = drive_torque(recording, robot), recording.require("dq")
     t, each = recording.t, stride(cutoff, recording.median_step)
-    # Before the first and after the last movement stiction holds what no model of
-    # velocity knows.
+    # Stiction before the first and after the last movement.
     moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, each) if moving.size else np.arange(0)
 

@@ -57,9 +57,8 @@ class ObserverChoice(Choice):
 
     GROUP = ESTIMATE
 
-    #: The observers, keys of `vftcli.observers.table.OBSERVERS`, "best" first. None
-    #: given: `DEFAULT`, or the paper's four where their own formulas or one footing for
-    #: all of them is asked for.
+    #: Keys of `vftcli.observers.table.OBSERVERS`. None for `DEFAULT`,
+    #: or the paper's four for its formulas or one footing.
     names: Annotated[
         tuple[str, ...],
         Option(
@@ -84,8 +83,7 @@ class ObserverChoice(Choice):
             completes=names_at("observers.table:NUMBERS"),
         ),
     ] = field(default_factory=dict)
-    #: Which gains the observers have that bring none of their own: `PAPER_GAINS` or
-    #: `LOG_GAINS`.
+    #: `PAPER_GAINS` or `LOG_GAINS`, for observers without their own.
     gains: Annotated[
         "str | Path | Goal",
         Option(

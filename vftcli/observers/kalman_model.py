@@ -167,8 +167,7 @@ def steady(model: Discrete, decay: Array) -> Gains:
     else:
         lam, beta = step * np.sqrt(q22 / R), (q11 - step * q12) / R
         y = 0.5 * (lam + np.sqrt(lam**2 + 16.0 + 4.0 * beta))
-        # 1 − r² and 1/r² − 1 lose digits when r is near 1: both follow from √(y² − 4)
-        # instead.
+        # Near r = 1 the plain forms lose digits; these do not.
         root = np.sqrt(np.maximum((y - 2.0) * (y + 2.0), 0.0))
         r = 2.0 / (y + root)
         l1, l2 = r * root, lam * r / step
@@ -231,8 +230,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
         (o11, o12), (_, o22) = information
         # After k rounds the first k blocks are exact, so this ends, mostly long before.
         for _ in range(blocks):
-            # The posterior at the end after a start changed by Δ: X = Δ(I + OΔ)⁻¹ in
-            # full.
+            # A start changed by Δ: X = Δ(I + OΔ)⁻¹ in full.
             a, b, c = starts - guessed
             delta = a * c - b * b
             whole = 1.0 + o11 * a + 2.0 * o12 * b + o22 * c + (o11 * o22 - o12 * o12) * delta
@@ -277,9 +275,8 @@ def kalman_steps(
 ) -> tuple[Array, Array, KalmanState]:
     """τ̂ and √P₂₂ of a block with the input d [N·m·s], gains by each step's sample time. (T, n)
 
-    `model_of` makes the discrete model of sample times [s] and joints, `guess` is the
-    stationary posterior (n,), and `state` that before the block; where the log begins,
-    after its first sample.
+    Sample times [s] and joints choose the discrete model, `guess` is the stationary posterior
+    (n,), `state` that before the block.
     """
     samples, n = d.shape
     tau, sd = empty_series(samples, n), empty_series(samples, n)

@@ -73,8 +73,7 @@ class KalmanSmoother(Shown):
             return np.subtract(tau, later, out=tau), first
 
         tau, score = smoothed(d, np.zeros((2, n)))
-        # Λ̃ᵗ = Fᵀ(Λ̃ᵗ⁺¹)F + AᵀCᵀCA/S of its entries 11, 12, 22; P₂₂ less [P₁₂ P₂₂] Λ̃
-        # [P₁₂ P₂₂]ᵀ
+        # Λ̃ᵗ = Fᵀ(Λ̃ᵗ⁺¹)F + AᵀCᵀCA/S; P₂₂ less [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ
         (f11, f12), (f21, f22) = F
         information = np.array(
             [
@@ -88,8 +87,7 @@ class KalmanSmoother(Shown):
         variance, known = from_the_end(information, shown, np.ones_like(tau), weights)
         np.subtract(p22, variance, out=variance)
         if len(d) > 1 and model.a22.all():
-            # Whatever was before the log: x⁰ is x̂⁰ − M⁻¹λ̃⁰ ± M⁻¹, M = Λ̃⁰ + S/R² of p⁰
-            # alone.
+            # Unknown before the log: x̂⁰ − M⁻¹λ̃⁰ ± M⁻¹, M = Λ̃⁰ + S/R² of p⁰.
             first = np.s_[...] if even else np.s_[..., 0, :]
             known[0] += (S / model.r**2)[first]
             spread = np.linalg.inv(known[[[0, 1], [1, 2]]].T)

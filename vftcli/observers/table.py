@@ -210,9 +210,8 @@ def read_as(convention: str, setup: Setup) -> Setup:
 def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ...]]:
     """A Kalman observer with the parameters of this name.
 
-    R and Q of a file are read as "discrete" unless a convention is named: with that
-    reading the paper's gains win joints 1 to 3, as its Table I says. Without a file they
-    are densities.
+    A file's R and Q are "discrete" unless a convention is named: so the paper's gains win
+    joints 1 to 3, as in its Table I. Without a file they are densities.
     """
     given = parameters_given(read_as("discrete", setup), "kfo", name)
     convention = str(given.pop("noise_convention", "density"))

@@ -1,8 +1,7 @@
 """Gains for a goal: least error by a log's spectra, one delay or bandwidth, few false alarms.
 
-A Kalman filter's ω_n trades the external torque that its lag leaves out against the noise
-that passes. Both follow from the spectra of the log's free and loaded part, without a
-guess:
+A Kalman filter's ω_n trades what its lag leaves out against the noise that passes. Both follow
+from the spectra of the free and loaded part:
 
     ω_n = argmin ∫ |1 − H(ω_n)|² S_τ + |H(ω_n)|² S_n df,  joint by joint, ζ = 1/√2
 
@@ -35,8 +34,7 @@ TRIED = 96  #: Natural frequencies to try, evenly in logarithm.
 LEAST_SHARE = 1e-3  #: Least R as a share of the noise in the free part. [1]
 FINEST = 1e-6  #: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
 HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
-#: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth
-#: at −3 dB.
+#: Goal → as typed; a delay behind a ramp, a bandwidth at −3 dB.
 GOALS = {
     "auto": "auto",
     "delay": "delay=S (seconds)",
@@ -266,8 +264,7 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
             f"no gain gives {observer.name} a {goal.name} of {goal.value:g} {unit} at "
             f"{1.0 / step:.4g} Hz; choose {limit}"
         )
-    # Both measures are monotonic in the gain, so that halving its logarithm finds the one
-    # crossing.
+    # Monotonic in the gain: halve its logarithm.
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
         above = (excess(middle) > 0.0) == rising
@@ -305,8 +302,7 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
             f"alarm.threshold has {len(threshold)} values; give one, or one for each of {n} joints"
         )
     first_order = rates(momentum, spectra, goal)
-    # FDO has one rate for all joints: the smallest mean error, or what the slowest joint
-    # allows.
+    # FDO's one rate: the least mean error, or the slowest joint's.
     shared = float(first_order.min())
     if goal.name == "auto":
         curve = error_curve(momentum, spectra)

@@ -202,8 +202,7 @@ def render_admittance(found: Replayed, record: Record, title: str) -> str:
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
     """Every controller with its colour: the traditional one's is that of the page's ink."""
-    # Every variable controller its own colour, again from the start when there are no
-    # more.
+    # Colours of variable controllers, again from the first.
     spare = iter(SPARE * len(replay.controllers))
     return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
 

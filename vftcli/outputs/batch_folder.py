@@ -130,8 +130,7 @@ class BatchFolder:
             with atomic(self.path / name, force=True) as temporary, ExitStack() as stack:
                 writer = None
                 for piece in pieces:
-                    # What other programs read: text of the kind that Arrow has always
-                    # had.
+                    # Text of the kind that Arrow has always had.
                     table = piece.to_arrow(compat_level=pl.CompatLevel.oldest())
                     if writer is None:
                         writer = ParquetWriter(temporary, table.schema, compression="zstd")

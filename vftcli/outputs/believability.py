@@ -331,8 +331,7 @@ def reference_ground(analysis: Analysis) -> Ground:
                 subject,
                 f"{reads}{missed}" if contacts else f"the log holds {name}",
                 command("compare", analysis.recording, *options),
-                # A missed reading is found in this log; a log without a sensor is like
-                # any other.
+                # A missed reading is in this log; no sensor is no fault of it.
                 of_log=bool(missed),
             )
     words = "no force sensor in the log: sizes are unchecked"

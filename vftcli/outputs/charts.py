@@ -61,8 +61,7 @@ class ChartLine(NamedTuple):
     leads: bool = False  #: Whether it is the line to look at: drawn thicker.
     shown: bool = True  #: Whether it is drawn at once, rather than when asked for.
     x: Array | None = None  #: Its own horizontal places, None for the chart's. (T,)
-    #: Where the ribbon is grey: no contact is listed there, so that it says what would
-    #: show. None for nowhere. (T,)
+    #: Where the ribbon is grey: no contact is listed. None: nowhere. (T,)
     quiet: Mask | None = None
 
 
@@ -170,11 +169,9 @@ def drawn_line(
 def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tuple[Array, Array]:
     """A series with at most two samples a stretch, and the first and last of the log.
 
-    The lowest and highest sample of every stretch keep their own time and value, so that
-    no spike is lost and none is made. A log of at most twice as many samples is kept
-    whole. The line breaks, by a NaN, where a stretch holds no known value and where the
-    clock has a gap; over a logarithmic axis, where stretches are equal, there is no
-    clock.
+    The lowest and highest sample of every stretch keep their time and value. A log of at most
+    twice as many samples is kept whole. NaN breaks the line where nothing is known and at gaps;
+    a logarithmic axis has no clock.
     """
     gaps = np.empty(0, dtype=np.intp) if log else gaps_of(t, GAP_STEPS)
     x, y = t, values

@@ -144,8 +144,7 @@ def source_stamps(recording: Recording) -> Nanoseconds:
 def stamps_of(recording: Recording) -> Nanoseconds:
     """The log's own stamps, from 0 where ROS cannot count them. (T,) [ns]"""
     stamps = source_stamps(recording)
-    # A log may count from any time, even below zero; a viewer needs stamps that ROS can
-    # hold.
+    # A log may count from below zero; ROS cannot.
     countable = stamps[0] >= 0 and stamps[-1] // 10**9 <= LAST_STAMP
     return stamps if countable else stamps - stamps[0]
 

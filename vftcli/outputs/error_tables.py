@@ -250,13 +250,11 @@ def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Ite
         if not samples:
             continue
         recording, reference = group["recording"][0], group["reference"][0]
-        # A force axis has its number in newtons, a moment axis in newton-metres; never
-        # both.
+        # A force axis is in newtons, a moment axis in newton-metres.
         values = group.select("observer", "axis", rmse=pl.coalesce("rmse_N", "rmse_Nm"))
         wide = values.pivot("axis", index="observer", values="rmse")
         rows: Rows = list(wide.select("observer", *AXES).rows())
-        # The paper compares with a sensor; beside a simulated truth its bounds mean
-        # nothing.
+        # The paper's bounds are those of a sensor.
         if reference == "sensor" and (limits := published.get(recording)):
             force, moment = limits["wrench_rmse_N"], limits["wrench_rmse_Nm"]
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))

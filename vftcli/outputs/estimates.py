@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-#: An analysis and which of its rows are written; None where all of them went by in
-#: blocks.
+#: An analysis and its rows; None where all went by in blocks.
 Group = tuple[Analysis, slice | None]
 #: Rows from which on a table is written as several groups, and rows of such a group.
 LONG, GROUP_ROWS = 1 << 17, 1 << 15
@@ -194,8 +193,7 @@ def write_estimate_folder(
         if isinstance(analysis, Analysis):
             record = run_record(analysis, command)
             write_estimates(table, analysis)
-            # After the record: it names the packages that are loaded, and these made no
-            # number.
+            # After the record, which names the packages of the numbers.
             write_extras(folder, "", analysis, choice)
         else:
             csv = folder / "estimates.csv" if "csv" in choice.extras else None

@@ -164,8 +164,7 @@ class OutputFolder:
             self.made = [p for p in (self.path, *self.path.parents) if not p.exists()][::-1]
             self.path.mkdir(parents=True, exist_ok=True)
             check_writable(self.path)
-            # Inside the folder, so that the files only change their names when they are
-            # moved.
+            # Inside the folder, so that moving is renaming.
             self.temporary = self._partial.enter_context(partial_folder(self.path))
         except OSError as error:
             self._discard()
@@ -196,8 +195,7 @@ class OutputFolder:
         """Every file that an earlier run may have left and that must not outlive it."""
         declared = {self.path / name for name in self.names}
         listed = [sealed_files(path) for path in declared if is_seal(path)]
-        # A killed run had moved the seal of the one before it out of the way, first of
-        # all.
+        # A killed run may have moved the earlier seal away.
         killed = self.path.glob(f"{PARTIAL}/{EARLIER}/0")
         return declared.union(*listed, *(sealed_files(path, self.path) for path in killed))
 

@@ -1,9 +1,8 @@
 """Grid: one table of results, shown on the terminal, in Markdown, in LaTeX or in HTML.
 
-Whoever has a table to show makes a Grid of it; how a table looks is decided here and, for
-HTML, in the pages' templates, and so is what must be escaped: names and words come from
-files, and may hold any letter. Rows for machines, not rounded, are written by `csv_rows`:
-what is not known is empty.
+A table to show is a Grid; how it looks is decided here and in the pages' templates, and so is
+what must be escaped: names from files may hold any letter. `csv_rows` writes numbers that are
+not rounded, and empty cells for what is not known.
 """
 
 import csv
@@ -87,8 +86,7 @@ class Grid:
     quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
     unit: str = ""  #: Their unit, where it is one.
     summaries: int = 0  #: How many rows at the end sum up those above, below a rule.
-    #: Whether numbers may bear a mark: the terminal then keeps a place for it, so that
-    #: digits are below digits.
+    #: Whether the terminal keeps a place for marks on numbers.
     marked: bool = False
     notes: tuple[str, ...] = ()  #: Lines on what the marks mean, footnotes in LaTeX.
     #: Whether the page shows the colour of the observer that heads a row.

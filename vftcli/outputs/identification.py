@@ -168,8 +168,7 @@ def velocity_plot(
         pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
         x = scales.across(trace.motion.dq[pick, j])
         y = scales.up(np.clip(trace.residual[pick, j], -high, high))
-        # One path of strokes without length: 600 circles a log and joint would make a
-        # slow page.
+        # One path of dots: 600 circles a joint make a page slow.
         dots = (polyline(dot[None]) for dot in np.column_stack([x, y]))
         drawn.append((colour, "".join(dots)))
     return f"J{j + 1}", scales, drawn

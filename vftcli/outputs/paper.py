@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 WIDTHS = {"single": 3.5, "double": 7.16}  #: One and two columns of the IEEE's journals. [in]
 RESOLUTION = 600  #: Of PNG: what the IEEE asks of drawings in black and white. [dots/in]
 
-#: Times-like type of matplotlib itself: equal bytes on every machine.
-#:
-#: PDF embeds it as TrueType; SVG holds its letters as paths, which need no font. A dollar sign in a
-#: log's name is a dollar sign.
+#: A Times-like type of matplotlib itself: equal bytes everywhere.
+#: PDF embeds it, SVG holds paths. A dollar sign is a dollar sign.
 STYLE: dict[str, Any] = {
     "font.family": ["STIXGeneral", "DejaVu Sans"],
     "font.size": 8.0,
@@ -55,20 +53,16 @@ STYLE: dict[str, Any] = {
 TICKS = {"labelsize": 7.0, "direction": "in", "major.width": 0.5, "minor.width": 0.3}
 STYLE |= {f"{axis}tick.{key}": value for axis in "xy" for key, value in TICKS.items()}
 
-#: Width of a letter in a legend, of a line's sample beside it, and height of its lines.
-#: [in]
+#: Legend: width of a letter and a line's sample, line height. [in]
 LETTER, SAMPLE, LINE = 0.043, 0.41, 0.15
 LONGEST = 44  #: Letters of a name in a figure; the end of a longer one is cut off.
-#: Stretches of a line in one plot, two samples each: finer than a printer tells in two
-#: inches.
+#: Stretches of a line in a plot of two inches, two samples each.
 STRETCHES = 500
-#: Below this width a figure is one column wide [in]; height of a row of plots, by whether it is
-#: wide. [in]
+#: Below it a figure has one column; height of a row, by width. [in]
 NARROW, HIGH = 5.0, {False: 0.95, True: 1.15}
 #: Marks in turn: their shapes differ, for print without colours.
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
-#: Width of a digit of a contact's number, and room between two numbers: where there is less, the
-#: second is left out. [in]
+#: Width of a contact number's digit; least gap to the next. [in]
 DIGIT, BETWEEN = 0.046, 0.02
 SPREAD = 0.66  #: Share of a joint's room that its dots take.
 RANGE = 10.0  #: Numbers that differ by more than this factor have a logarithmic axis.
@@ -312,8 +306,7 @@ class DotPlot(NamedTuple):
 
     title: str  #: Which log.
     joints: Sequence[str]  #: Names below. (n,)
-    #: Name, numbers (n,), NaN where not known, and both ends of their intervals (2, n) or
-    #: None.
+    #: Name, numbers (n,), ends of their intervals (2, n); NaN unknown.
     rows: Sequence[tuple[str, Array, Array | None]]
     floor: Array  #: The reference's own error, NaN where it is not known. (n,)
 

@@ -21,8 +21,7 @@ from vftcli.outputs.charts import GREY, INK, REFERENCE, Chart, ChartLine, level_
 from vftcli.outputs.files import writing
 from vftcli.outputs.rerun_arm import CONTACTS, ROBOT, ArmPoses, Stream, rgba
 
-#: How the names of lines begin that are drawn as bars, and how those end that are a
-#: band's edges.
+#: Begin of a bar's name; ends of the names of a band's edges.
 BAR, EDGES = "touched: ", ("95 % upper", "95 % lower")
 
 
@@ -85,8 +84,7 @@ def rerun_file(
         send_properties=False,
         batcher_config=rr.ChunkBatcherConfig.NEVER(),
     )
-    # Into memory: Rerun writes a file in a thread, which on a full disk stops and is
-    # waited for.
+    # Into memory: on a full disk Rerun's thread would never end.
     made = stream.memory_recording()
     # Active: a viewer in a browser arranges by itself what is a default alone.
     stream.send_blueprint(blueprint(tabs, words, poses, space))
@@ -199,8 +197,7 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
 def send_plot(stream: Stream, plot: Chart) -> None:
     """Send one plot: names and colours once, then all samples in one batch; then its points."""
     lines = lines_of(plot)
-    # An edge is thin and a bar thick; of the others the reference, then the one to look
-    # at.
+    # Thin edges, thick bars; then the reference, then the best.
     widths = [
         0.6 if line.name.endswith(EDGES)
         else 6.0 if line.name.startswith(BAR)

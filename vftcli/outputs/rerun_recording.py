@@ -51,8 +51,7 @@ from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench.solvers import ForceArrow
 
-#: Stretches of a long log of which a plot keeps the lowest and highest samples of its
-#: lines.
+#: Stretches of a long plot, lowest and highest sample each.
 STRETCHES = 5000
 #: Time before and after the start of a contact in which every sample is kept. [s]
 AROUND = 1.0

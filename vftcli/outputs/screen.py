@@ -1,8 +1,7 @@
 """A command's screen on its logs, and what a terminal can show of it.
 
-Facts, the answer in a sentence, |F| over time as bars, the contacts, whether it can be
-believed, the errors against a reference, and what was written: forty lines at most,
-whatever the number of logs.
+Facts, the answer, |F| as bars, the contacts, whether to believe it, the errors, and what was
+written: forty lines at most.
 """
 
 import textwrap

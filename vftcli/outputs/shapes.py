@@ -41,8 +41,7 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
     shapes: list[list[Capsule]] = []
     for j in range(n + 1):
         shapes.append([])
-        # A joint is a short thick cylinder about its axis, which is z of the link that it
-        # moves.
+        # A joint is a short thick cylinder about its link's z.
         if j > 0:
             axis = np.array([0.0, 0.0, 2.2 * radii[j]])
             shapes[j].append(Capsule(-0.5 * axis, axis, 1.18 * radii[j], "joint"))
@@ -90,8 +89,7 @@ def fewer(corners: Array) -> Surface:
     middle, planes, ends = np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3))
     np.add.at(middle, cells.ravel(), corners.reshape(-1, 3))
     middle /= np.bincount(cells.ravel())[:, None]
-    # Planes n·(x − m) = n·(p − m) about the middle m of each corner's cell, by their
-    # areas.
+    # Planes n·(x − m) = n·(p − m) about the cell's middle m, by area.
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     for cell in cells.T:
         away = np.sum(normal * (corners[:, 0] - middle[cell]), axis=1)

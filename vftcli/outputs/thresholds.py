@@ -12,8 +12,7 @@ from vftcli.outputs.quantity import DASH, significant
 from vftcli.robots.robot_file import lines_of
 from vftcli.signals.parsing import counted
 
-#: A threshold in a call is a multiple of a hundredth: no robot tells less of a
-#: newton-metre.
+#: Steps a unit: no robot tells .01 N·m.
 SHARES = 100
 #: Columns of every threshold with its interval, and the tail it comes from.
 COLUMNS = (

@@ -308,8 +308,7 @@ def clock_pick(table: Table) -> Item | None:
     )
 
 
-#: The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are
-#: alphabetical.
+#: The UR drivers' joint names, base to tip; ROS 1 sorts its arrays.
 UR_NAMES = (
     "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
     "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",

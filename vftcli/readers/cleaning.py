@@ -64,8 +64,7 @@ def row_samples(raw: RawLog, rows: int) -> Indices | None:
     return sample
 
 
-#: Values as large as this are no measurement in any unit; anywhere in a log they are
-#: refused.
+#: No measurement is as large, in any unit: it is refused.
 ABSURD = 1e9
 #: How a log is read without one of its signals.
 LEAVING_OUT = (
@@ -77,8 +76,7 @@ LEAVING_OUT = (
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 2e8
 #: A clock starts within 285 years of 1970: nanoseconds in 64 bits count no farther. [s]
 FARTHEST_START = 9e9
-#: How far a joint goes from its zero, with a little to spare: of seven-joint arms, of
-#: any. [rad]
+#: Reach of a joint: of seven-joint arms, of any. [rad]
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 GAP_STEPS = 4.0  #: A step this many times the median is reported as a gap.
 
@@ -96,10 +94,9 @@ def cleaned(
 ) -> Recording:
     """Make a Recording of what a reader found.
 
-    In order: joints without a signal are left out, garbage of a misaligned packet at the
-    start is dropped, values that are no numbers are refused, repeated stamps are dropped,
-    a clock that runs backwards is refused, gaps are counted, and positions that can only
-    be degrees are refused.
+    In order: joints without a signal and garbage at the start go, values that are no numbers
+    are refused, repeated stamps go, a clock that runs back is refused, gaps are counted,
+    degrees refused.
     """
     rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
     before, raw = raw, measured(raw, path, examining=examining)
@@ -194,8 +191,7 @@ def _without_empty_joints(raw: RawLog) -> RawLog:
 
 #: Rows at the start of a log among which a misaligned packet may have left garbage.
 GARBAGE_ROWS = 100
-#: No joint measurement in SI units is this large; a misread double nearly always is, or
-#: is tiny.
+#: No joint has so large a value in SI units; misread doubles have.
 GARBAGE_VALUE = 1e6
 
 DENORMAL = 1e-300
@@ -259,8 +255,7 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         )
 
 
-#: A stretch between two restarts of the clock that is shorter is not a recording of its
-#: own.
+#: Shortest recording between two restarts of the clock.
 SEGMENT_ROWS = 20
 
 
@@ -346,17 +341,15 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
     return kept(raw, fresh, *remarks)
 
 
-#: Share of samples below which positions of another size are errors, and not of another
-#: unit.
+#: Fewer samples of another size are errors, not another unit.
 BAD_SHARE = 0.05
 
 
 def _refuse_degrees(raw: RawLog, path: Path) -> None:
     """Raise a LogError if positions of unstated unit can hardly be radians.
 
-    The robot is not known yet, and a reader knows no robots: what holds for all must do.
-    No joint goes further than two turns from its zero; those of the arms with seven stay
-    within one.
+    No joint goes further than two turns from its zero; those of arms with seven stay within
+    one.
     """
     q = raw.signals["q"]
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS

@@ -210,8 +210,7 @@ EVEN = 20.0  #: How much longer than the median a twentieth of a clock's steps a
 DRIVEN = 0.12
 CLEAR = 1.3  #: How much better than another current it must fit.
 CONSTANTS = (3.0, 400.0)  #: Drive constants of geared joints. [N·m/A]
-#: Slope and cosine between a target and what was measured, of the joint where they are
-#: nearest.
+#: Slope and cosine of a target against what was measured.
 ALIKE, NEAR = (0.5, 2.0), 0.9
 
 

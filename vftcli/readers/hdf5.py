@@ -50,8 +50,7 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
         raise LogError(f"{name}: its chunks unpack to {size >> 20} MiB each, more than its rows.")
     settings = dataset.id.get_create_plist()
     filters = [settings.get_filter(k)[0] for k in range(settings.get_nfilters())]
-    # Each unpacks what the next has unpacked: two of a kind are a thousandfold of a
-    # thousandfold.
+    # Two filters of one kind may unpack a million times the size.
     if set(filters) - {DEFLATE, SHUFFLE, FLETCHER32, LZF} or len(set(filters)) < len(filters):
         raise LogError(
             f"{name}: packed by HDF5's filters {filters}, of which deflate, shuffle, fletcher32 "
@@ -71,8 +70,7 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
                 )
 
 
-#: Groups and datasets that are looked at, and groups inside groups; a log has some
-#: hundred.
+#: Most objects, and depth of groups; a log has some hundred.
 MOST_OBJECTS, DEEPEST = 100_000, 32
 
 

@@ -29,8 +29,7 @@ DESCRIPTION_BYTES = 64 * 1024 * 1024
 
 FRAME = "frame_index"
 
-#: How far the stamps, 32-bit floats, may lie from frame / fps, which is then the clock.
-#: [s]
+#: How far stamps of 32 bits may lie from frame / fps. [s]
 CLOCK_SLACK = 1e-3
 #: What an element's name says it measures, in words of `ALIASES`.
 WORDS = "pos|positions?|vel|velocity|velocities|efforts?|torques?|currents?"

@@ -20,8 +20,7 @@ from vftcli.signals.recording import Recording
 
 TRUTH = ".truth.parquet"  #: Ending of what a simulation writes beside its log.
 BATCH = "batch.json"  #: The file by which a folder of `vftcli batch` is known.
-#: The file that lists what a command of ours wrote beside it; beside other files its
-#: ending.
+#: Lists what a command wrote into a folder, or beside a file.
 RECORD = "run.json"
 METADATA = "metadata.yaml"  #: The file that lists the pieces of a bag of ROS 2.
 
@@ -109,9 +108,8 @@ class LogEntry(NamedTuple):
 class LogCollection:
     """Finds the logs that a command is given.
 
-    A file is a log, whatever it holds. A folder is searched: what no reader knows is left
-    out, and what our own commands wrote. A file or data set of several episodes is a log
-    an episode.
+    A file is a log, whatever it holds. Of a folder what no reader knows is left out, and what
+    our commands wrote. Each episode is a log.
 
     Attributes:
         passed: Files of folders that were left out.
@@ -202,8 +200,7 @@ class LogCollection:
             except LogError:
                 return True
         lines = open_log(path).lines if reader.general else ()
-        # A table of text has numbers in its second or third line; prose reads as one
-        # column.
+        # Prose has no numbers in its second or third line.
         if lines and all(len(NUMBER.findall(line)) < FEWEST for line in lines[1:3]):
             return False
         return not stored_observers(path)

@@ -176,8 +176,7 @@ class ArrayUnpickler(pickle.Unpickler):
     """
 
     def __init__(self, content: bytes) -> None:
-        # A memo index allocates a list of its size; nothing is built before they are
-        # known.
+        # A memo index allocates a list of its size: look before building.
         for opcode, argument, _ in pickletools.genops(content):
             if isinstance(argument, int) and "PUT" in opcode.name and argument > len(content):
                 raise Refused("a memo larger than the file")

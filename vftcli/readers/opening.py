@@ -23,15 +23,12 @@ Wrapping = Literal["gzip", "zstd"]
 MAGICS: dict[bytes, Wrapping] = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 
 UNPACKED_LIMIT = 128 * 1024 * 1024
-#: A wrapped file may unpack to 128 MiB or to fifty times its size, whichever is more.
-#:
-#: Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded
-#: log.
+#: Most that a file unpacks to, beside 128 MiB: numbers shrink 3 to
+#: 15 times; what shrinks a hundredfold is no log.
 UNPACKED_RATIO = 50
 
 CHUNK = 1024 * 1024
-#: zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a
-#: time.
+#: A piece of zstd so small that even a bomb yields some ten MB.
 ZSTD_BYTES = 1024
 
 

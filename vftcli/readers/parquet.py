@@ -36,8 +36,7 @@ FILE_MAGIC = b"ARROW1\0\0"  #: How a file of Arrow begins.
 ARROW = (FILE_MAGIC, b"\xff\xff\xff\xff")  #: How a file and a stream of Arrow begin.
 #: Whole numbers in a message: an offset or a count, and a number of 64 bits.
 COUNT, NUMBER = struct.Struct("<I"), struct.Struct("<q")
-#: Places of fields in Arrow's Message, RecordBatch and DictionaryBatch
-#: (format/Message.fbs).
+#: Fields of Arrow's messages, by format/Message.fbs.
 MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 0, 2, 3, 1
 
 
@@ -67,8 +66,7 @@ class ColumnarTable(Table):
                 raise LogError(
                     f"{file.path}: the table has no rows; nothing was recorded into it."
                 )
-        #: What vftcli convert wrote beside the columns; nothing for files of other
-        #: programs.
+        #: What vftcli convert wrote beside the columns, else nothing.
         self.about: dict[str, Any] = {}
         with suppress(ValueError, RecursionError, AttributeError):
             found = json.loads(about)

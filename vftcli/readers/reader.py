@@ -45,8 +45,7 @@ class RawLog:
     payload_mass: float | None = None  #: Mass that the controller counts with. [kg]
     #: Its centre of mass in flange axes. (3,) [m]
     payload_com: tuple[float, ...] | None = None
-    #: Which of several recordings in the file this is, as "episode 3"; "" for the only
-    #: one.
+    #: Which of several recordings, as "episode 3"; "" for the only one.
     part: str = ""
     #: The files of a folder that it was read from; () for all.
     files: tuple[Path, ...] = ()
@@ -57,8 +56,7 @@ class RawLog:
 
 
 ARMS = ("left", "right")  #: Values of ``--arm``.
-#: Value of ``log.effort`` → field of Recording; None where the robot's model has to
-#: decide.
+#: ``log.effort`` → field of Recording; None: the model decides.
 EFFORT = {
     "auto": None,
     "current": "current",
@@ -110,8 +108,7 @@ class ReadChoice(Choice):
             "What the log's effort is, whatever its name; auto: what the robot's model explains.",
         ),
     ] = None
-    #: Number of the episode of a file that holds several, or `ALL`; None to leave it to the
-    #: reader.
+    #: Episode, `ALL`, or None to leave it to the reader.
     episode: Annotated[
         int | None,
         Option(

@@ -51,8 +51,7 @@ class LogFormat(NamedTuple):
     describes: bool = False
     episodes: bool = False  #: Whether a file may hold several recordings.
     columns: str = ""  #: The columns that its program writes, in the grammar of ``--columns``.
-    #: Columns of which the last values are the payload's mass and, if there, its centre
-    #: of mass.
+    #: Its last columns hold the payload's mass, then its centre.
     payload: str = ""
     clock: str = ""  #: Which clock its stamps are from, in words; "" for the column's name.
     remedy: str = ""  #: What to do where clock or positions are missing.
@@ -197,8 +196,7 @@ def _reader(file: LogFile, choice: ReadChoice) -> LogFormat:
 
 
 def _recognised(file: LogFile) -> LogFormat:
-    # A general format would take nearly any text, also that of a vendor: it is asked
-    # last.
+    # A general format fits nearly any text, so it comes last.
     found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
     if not found and known_kind(file) is None:
         found = [r for r in FORMATS.values() if r.general and r.recognises(file)]

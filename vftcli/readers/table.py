@@ -59,8 +59,7 @@ class Table(ABC):
 
 
 Picks = dict[str, Item]  #: Field of Recording → its cells; and what is beside the signals.
-#: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes
-#: them.
+#: The log's own stamps, as vftcli convert writes them. [ns]
 OWN_STAMPS = "t_src_ns"
 PAYLOAD = "payload"  #: Columns of which the last values are a mass and its centre.
 BESIDE = {"t", OWN_STAMPS, PAYLOAD}  #: Columns that are kept as they are stored.

@@ -161,11 +161,9 @@ class ArrayTable(Table):
 def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
     """Frame of actual_TCP_force: base axes, about the TCP on CB3; on e-Series by its sensor.
 
-    The sensor in an e-Series' flange gives the moment about the flange: on three logs
-    about the TCP it misses the joints' torque by four times as much. A sensor that a
-    URCap brings gives it about the TCP. No field says which of the two is mounted. An
-    e-Series log that has no `ft_raw_wrench`, with stamps (T,) [s] that all are multiples
-    of 8 ms, reads as a CB3's.
+    The sensor in an e-Series' flange gives the moment about the flange (three logs), a URCap's
+    about the TCP; no field says which. Without `ft_raw_wrench`, and with stamps (T,) [s] of
+    multiples of 8 ms, a log is a CB3's.
     """
     steps = stamps[np.isfinite(stamps)] / CB3_CYCLE
     # Half a millisecond: stamps may be written with three decimals.

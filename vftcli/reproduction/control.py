@@ -26,8 +26,7 @@ UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
 FORCE, MOMENT = slice(3), slice(3, 6)
 CONTACTS = 2  #: Times that the hand takes hold, in either scenario.
 HOLD = 2.5  #: A drag of a contact begins within this time of its force. [s]
-#: Deviations up to which a release is tried: from .1 on the turn comes ever sooner.
-#: [m, rad]
+#: Farthest release: from .1 on the turn comes ever sooner. [m, rad]
 FARTHEST_RELEASE = 0.5
 
 
@@ -115,9 +114,8 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
 def latest_turns(_seed: int, *, alphas: Sequence[float]) -> Iterator[Given]:
     """Latest turn of the UR5 after a release, and the variable law's lead.
 
-    The traditional law turns after arccos(ζ)/ω_d at the latest, from x = 0. The advance
-    is the largest over deviations released at the speed limit, in steps of the control
-    period.
+    The traditional law turns after arccos(ζ)/ω_d at the latest. The advance is the largest over
+    deviations released at the speed limit.
     """
     laws = ControlChoice(alphas=tuple(alphas)).controllers(load_robot("ur5"))
     parameters = laws[0].parameters

@@ -33,8 +33,7 @@ from vftcli.simulation import load_scenario, simulate
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 from vftcli.wrench.solvers import VirtualSensor
 
-#: Variant → how its observers are chosen; the last moves all to FDO's bandwidth, 10
-#: rad/s.
+#: Variant → its observers; the last has all at FDO's 10 rad/s.
 VARIANTS: dict[str, dict[str, Any]] = {
     AS_PRINTED: {"as_printed": True},
     CORRECTED: {},
@@ -49,8 +48,7 @@ OBSERVERS = {
 UNTOUCHED = 0.5  #: True force on the flange below which nothing touches the arm. [N]
 STEP_TIME = 3.0  #: Length of the step that response times are read from. [s]
 REACHED = 0.9  #: Share of a step at which it counts as seen.
-#: Contacts by a person's deliberate action lie below this frequency, the rest is noise.
-#: [Hz]
+#: People's contacts are slower; the rest is noise. [Hz]
 FAST = 5.0
 
 
@@ -85,8 +83,7 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         q, true, tau = made.recording.q, run.truth.wrench, run.truth.tau_ext
         touched = np.linalg.norm(true[:, :3], axis=1) > UNTOUCHED
         error = (made.wrenches[0].known - real.known)[:, 1]
-        # What the observer makes of the true torque and of nothing else: p is 0, μ is
-        # −τ_ext.
+        # The observer of the true torque alone: p is 0, μ is −τ_ext.
         ideal = DynamicsTerms(t=made.recording.t, p=np.zeros_like(tau), mu=-tau)
         late = made.observers[0].estimate(ideal)
         missed = replace(late, tau=late.tau - tau)
@@ -195,8 +192,7 @@ def motion_under_knocks(variant: str, found: Replay, knocked: Sequence[float]) -
         x = found.motion.x[:, n, :3]
         own = [row for row in found.rows if row["controller"] == controller.kind]
         guided = max((row for row in own if row["axis"] == "x"), key=lambda row: abs(row["peak"]))
-        # Noise beyond the threshold begins drags of its own, which are no end of this
-        # one's return.
+        # Noise begins drags of its own: they do not end this return.
         begin, end = t.searchsorted((guided["release_s"] - 1e-9, start)).tolist()
         led = Drag(axis=0, number=1, begin=begin, release=begin, end=end)
         before = x[t <= start][-1]

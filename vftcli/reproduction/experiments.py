@@ -1,8 +1,7 @@
 """Experiments of a paper, each once a seed, and what they gave beside its print.
 
-A run has its own seed and nothing in common with another, so that the numbers do not
-depend on how many run beside one another. They are shown as a page, its Markdown, and
-figures.
+A run has its own seed, so its numbers do not depend on the others. They are shown as a page,
+its Markdown, and figures.
 """
 
 from collections import defaultdict
@@ -38,8 +37,7 @@ from vftcli.reproduction.paper import (
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.progress import stage
 
-#: Name of an experiment's `run` → what it gives of a seed and the experiment's own
-#: arguments.
+#: Experiment → what it gives of a seed and its own arguments.
 RUNS: dict[str, Callable[..., Iterator[Given]]] = {
     run.__name__: run
     for run in (

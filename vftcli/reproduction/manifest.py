@@ -73,15 +73,13 @@ class BenchmarkLog:
     vouched: Spans = (
         ALWAYS  #: Where a row is false if nothing touched; `score` if it is given. [s]
     )
-    #: True contacts, where the truth does not show them: start, end [s], peak [N] if
-    #: known.
+    #: True contacts: start, end [s], peak [N] if known; by hand.
     contacts: tuple[tuple[float, ...], ...] = ()
     contact_N: float = 1.0  #: Force from which the truth is a contact. [N]
     #: Planted: start [s], length [s], peak force on the flange in base axes [N].
     pushes: tuple[tuple[float, float, Vector], ...] = ()
     weight_N: float = 0.0  #: What is carried over `score`. [N]
-    #: What it is scored by, none of what is only trained on; all that it can be if not
-    #: given.
+    #: Protocols it is scored by, none of what only trains.
     protocols: tuple[str, ...] = ("alone",)
     free: tuple[str, ...] = ()  #: Motion that nobody touched: names of logs, or A:B.
     identified: str = ""  #: Name of the ``[[robot]]`` of protocol 3.

@@ -170,8 +170,7 @@ def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> list[
     ]
 
 
-#: Name at the command line → the paper: another one is one more file and one more name
-#: here.
+#: Name at the command line → the paper.
 PAPERS = {name: load_paper(name) for name in ("huang2025",)}
 
 

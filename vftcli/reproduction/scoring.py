@@ -32,15 +32,13 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.wrench.frames import NOTHING
 
-#: Torque from which a joint's truth is a contact where no force is known, and its end.
-#: [N·m]
+#: A joint is touched from here on, until below this. [N·m]
 TOUCHED, UNTOUCHED = 0.05, 0.025
 SAME = 1e-6  #: Stamps nearer than this are the log's own. [s]
 WORST = 10.0  #: Length of the span that is drawn. [s]
 LISTS = ("list", "list with candidates")  #: Parts of rows of lists.
-#: Columns of a log × protocol × method: of a part and joint with the sums over its cells;
-#: of lists; of wrench and weight; of shifts; of the worst 10 s of `best` on its worst
-#: joint.
+#: Columns of a log × protocol × method: sums of parts and joints;
+#: lists; wrench and weight; shifts; the worst 10 s of `best`.
 COLUMNS: tuple[tuple[Any, str], ...] = (
     (String, "log arm protocol method part"),
     (Int64, "joint"),

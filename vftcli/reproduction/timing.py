@@ -41,8 +41,7 @@ RATIOS = ("core_over_rnea_loop", "core_over_rnea_loop_jittering")
 JITTER = 0.05  #: How far the steps of the jittering clock stray, of their mean. [1]
 #: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
 PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
-#: Samples the paper's way runs over, one after another; its time is scaled to all
-#: samples.
+#: Samples of the paper's own loop; its time is scaled to all.
 SCRIPT_SAMPLES = 1_500
 ROUNDS = 3  #: Interleaved repetitions for Table II; the median counts.
 

@@ -1,8 +1,7 @@
 """The arm in a description's tree of links and joints: the longest run of joints that turn.
 
-Whatever else moves is locked: fingers behind it, a rail, a lift or a mobile base before
-it, a second arm beside it. What is locked is merged into the link that carries it: a
-chain.
+The rest is locked (fingers, a rail, a mobile base, a second arm) and merged into the link that
+carries it: a chain.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -28,8 +27,7 @@ class TreeJoint:
     """A joint between two links."""
 
     name: str  #: Its name.
-    #: "revolute", "continuous", "prismatic", "fixed", or another kind, which cannot move
-    #: within an arm.
+    #: revolute, continuous, prismatic, fixed, or one that cannot move an arm.
     kind: str
     parent: str  #: The link that carries it.
     child: str  #: The link that it moves; its frame is the joint's.

@@ -200,8 +200,7 @@ def nearest_tensor(inertia: Array) -> Array:
 
 
 DH = ("a", "d", "alpha", "theta")
-#: Convention → the keys that each joint must have: those of one number, and those of
-#: three.
+#: Convention → keys of each joint: single numbers, then vectors.
 CONVENTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "standard-dh": (DH, ()),
     "modified-dh": (DH, ()),

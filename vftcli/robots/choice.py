@@ -23,8 +23,7 @@ class RobotChoice(Choice):
 
     GROUP = LOG
 
-    #: Profile name, robot file or description, a robot, None to take what the log
-    #: settles.
+    #: Profile, robot file or description; None: the log's own.
     name: Annotated[
         "str | Robot | None",
         Option(

@@ -1,8 +1,7 @@
 """Robots from descriptions (URDF, xacro, MJCF), and from a TOML beside them what these cannot say.
 
-The TOML has the description's name with the ending ``.toml``. Its `tip` and `lock` say
-which arm it is and at which angles the rest is held; its ``[[joints]]`` are matched by
-name.
+The TOML has the description's name, its `tip` and `lock` say which arm it is and where the rest
+is held, its ``[[joints]]`` match by name.
 
 A xacro is a program that writes a URDF: the package xacro expands it, which needs no ROS.
 Packages that it names with $(find NAME) are looked for beside the file and above it, by
@@ -194,8 +193,7 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
     bare = chain.mass == 0.0
     if bare.any():
         yield caution("links-without-mass", on_joints(bare))
-    # What the nearest tensors that a body can have differ by, zero where the tensor was
-    # right.
+    # Zero where the tensor was one that a body can have.
     given = replace(chain, inertia=np.array([body.inertia for _, body in lumped.turned]))
     changed = np.any(chain.inertia != given.inertia, axis=(1, 2))
     if changed.any():
@@ -222,8 +220,7 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
 
 #: Elements within one another: a URDF has four, an MJCF one more than its arm has links.
 DEEPEST = 500
-#: How the tag of an element of xacro begins: a description with one still has to be
-#: expanded.
+#: Tag of an xacro element: it still has to be expanded.
 NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
 #: A declaration of an argument, which has a default.
 DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
@@ -285,8 +282,7 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     limits = {"seconds": SECONDS, "memory": MEMORY, "packages": dict(packages_near(path))}
     try:
         ended = subprocess.run(
-            # By its path and without the current folder, in which anything may be called
-            # xacro.
+            # By path, not from the current folder, which may hold an xacro.py.
             [sys.executable, "-P", str(Path(__file__).with_name("xacro_child.py"))],
             input=json.dumps({"path": str(path), "arguments": given, **limits}),
             capture_output=True,

@@ -30,14 +30,11 @@ from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, on_joints, warning
 
-#: Keys of the presliding friction that may stand beside every model: a [N·m] and s₀
-#: [rad].
+#: Presliding beside every model: a [N·m] and s₀ [rad].
 PRESLIDING = ("presliding", "presliding_length")
-#: Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default.
-#: [rad/s]
+#: Default velocity at which tanh(q̇/smoothing) is tanh(1). [rad/s]
 SMOOTHING = 0.01
-#: Temperatures that a joint can have; a reading beyond them, as a constant zero, is none.
-#: [°C]
+#: Temperatures of a joint; a reading beyond is none. [°C]
 COLDEST, WARMEST = 1.0, 100.0
 
 
@@ -128,8 +125,7 @@ def bent_line(
         (f - before) / (v - slower)
         for (slower, v), (before, f) in zip(pairwise(speeds), pairwise(torques), strict=True)
     ]
-    # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last
-    # slope.
+    # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k).
     torque = coulomb_viscous(dq, torques[0], **others) + slopes[-1] * dq
     for speed, slope, before in zip(speeds, slopes, [0.0, *slopes], strict=False):
         torque -= (slope - before) * dq.clip(-speed, speed)
@@ -272,8 +268,7 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
     """
     if not np.isfinite(limit):
         return float("nan")
-    # The steps beside rest see a Coulomb torque that pushes; 500 of them see a turn to .2
-    # %.
+    # Beside rest a Coulomb torque pushes; 500 steps see a turn to .2 %.
     dq = np.linspace(-limit, limit, 1001)
     torque = steady_torque(friction, dq)
     # A hundred-thousandth of the torque is rounding, at a sigmoid's flat ends too.
@@ -330,12 +325,10 @@ REPEATED_STOP = 0.13
 HELD = 0.45
 #: Standard deviation of the wrench smoother's model error at rest, by the same logs.
 REST_SHARE = 0.5
-#: The same of the list of contacts: what it adds at rest to what was learned, the least
-#: that these logs show, and what it draws anew in the block in which a joint comes to
-#: rest.
+#: For contacts: added at rest to what was learned, the least that
+#: these logs show; and drawn anew where a joint comes to rest.
 CREEP_SHARE, STOP_SHARE = 0.3, 0.7
-#: The same of both for a joint that rests under a contact: the push re-settles its
-#: stiction.
+#: For a joint that rests under a contact, which re-settles it.
 PUSHED_SHARE = 0.6
 #: Standard deviation of a momentum observer near a rest: .6 of F_c are the 95 % bound.
 NEAR_REST_SHARE = 0.6 / 1.96

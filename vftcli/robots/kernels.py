@@ -52,8 +52,7 @@ from vftcli.signals.pose import cross, skew
 #: more than some 6000 gain nothing. Blocks of a long log hold whole chunks.
 CHUNK = 8192
 KEPT = 4  #: Programs that are kept, some 5 MB each: those of the arm in hand.
-#: An entry of a rotation, or of an inertia relative to its largest, that is zero but for
-#: this.
+#: A rotation's entry, or an inertia's share, that counts as zero.
 ROUNDING = 1e-15
 
 

@@ -336,8 +336,7 @@ def xyz_rpy_document(robot: Robot) -> Table:
         joints.append({"name": name, "xyz": chain.translation[j].tolist(), "rpy": rpy, **known})
         if name in robot.endless:
             joints[-1]["endless"] = True
-    # Which arm of a description it is and what is locked is settled: the chain is the
-    # arm's.
+    # The chain is already that of one arm.
     settled = {"joints", "tip", "lock"}
     return {
         **{key: value for key, value in robot.document.items() if key not in settled},

@@ -115,8 +115,7 @@ class Robot(Shown):
     torque_source: str = "joint_torque"
     #: Joint torque per motor current, gear included. (n,) [N·m/A]
     torque_constant: Array | None = None
-    #: Motor turns per turn of the joint, for a log of the motors' side; None for one of
-    #: the joints. (n,)
+    #: Motor turns a joint turn; None for logs of joints. (n,)
     gear: Array | None = None
     #: Share of the motors' torque that arrives behind it, None for all. (n,)
     efficiency: Array | None = None
@@ -124,8 +123,7 @@ class Robot(Shown):
     limits: Limits  #: Joint limits.
     noise: SensorNoise  #: Measurement noise.
     sample_rate_hz: float = float("nan")  #: The vendor's own rate, NaN if not given. [Hz]
-    #: ROS 2 message in which its driver publishes the whole state, "" where it has none
-    #: but JointState.
+    #: ROS 2 message of its whole state, "" for JointState alone.
     ros_state: str = ""
     #: Names of joints that turn on and on: their positions may be logged within a turn.
     endless: tuple[str, ...] = ()

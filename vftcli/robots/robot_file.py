@@ -149,8 +149,7 @@ BOUNDS: dict[str, Bound] = {
     for key in keys.split()
 }
 UNNAMED = either_way(1e6, "")  #: The bound of a number with a key that is not listed.
-#: Least mass of all moving bodies together: the lightest arms have servos of a few grams.
-#: [kg]
+#: Least moving mass: the lightest servos weigh some grams. [kg]
 LIGHTEST = 0.05
 
 
@@ -295,8 +294,7 @@ class Section(NamedTuple):
 def robot_text(path: Path, what: str = "robot file") -> str:
     """The text of a robot file, whatever its format."""
     try:
-        # The pipe of a shell's <(…) has no ending; a robot's file has one, and is read
-        # twice.
+        # A pipe of a shell's <(…) has no ending; a robot's file has.
         if not (path.is_file() or (path.is_fifo() and not path.suffix)):
             raise RobotError(f"{path}: no such {what}")
         if (size := path.stat().st_size) > LARGEST:

@@ -231,8 +231,7 @@ def paired(recording: Recording, robot: Robot) -> Recording:
     done = {remark.code for remark in recording.source.remarks}
     if robot.gear is None or "gear-applied" in done or recording.joints != robot.joints:
         return recording
-    # Logged at the motors: q = q_m / N, τ = N η τ_m. Currents and the vendor's estimate
-    # stay.
+    # q = q_m / N, τ = N η τ_m; currents and the vendor's estimate stay.
     torque = robot.gear if robot.efficiency is None else robot.gear * robot.efficiency
     scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / robot.gear)
     scales |= dict.fromkeys(("torque", "torque_without_gravity", "target_torque"), torque)
@@ -253,8 +252,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     jumping = np.zeros_like(endless)
     for signal in ("q", "target_q"):
         if (values := getattr(recording, signal)) is not None:
-            # A sample that is missing is no number; what is wound up behind it would be
-            # none.
+            # A missing sample is NaN, and would make all behind it NaN.
             turns = endless & (abs(np.diff(values, axis=0)).max(axis=0, initial=0.0) > np.pi)
             if turns.any():
                 changed[signal] = np.where(turns, np.unwrap(values, axis=0), values)

@@ -66,8 +66,7 @@ def follow(low: Array, high: Array, start: Array) -> Array:
     blocks = -(-samples // BLOCK)
     low, high = in_blocks(low, blocks), in_blocks(high, blocks)
     for i in range(1, BLOCK):
-        # Both ends of the map so far go through this sample's clip, which both still have
-        # to see.
+        # Both ends of the map so far go through this sample's clip.
         low[i], high[i] = (clipped(end[i - 1], low[i], high[i]) for end in (low, high))
     ends = follow(low[-1], high[-1], start)
     entering = np.concatenate([start[None], ends[:-1]])

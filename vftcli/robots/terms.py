@@ -170,8 +170,7 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
     return found
 
 
-#: What rounding changes at most, of a speed as a share or of a number of blocks, up to
-#: 1e6 s.
+#: Rounding of a speed, or of a number of blocks up to 1e6 s.
 TIE = 1e-6
 GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch reaches across.
 
@@ -213,8 +212,7 @@ class Blocks(NamedTuple):
     @property
     def rests(self) -> Mask:
         """Blocks in which each joint rests. (K, n)"""
-        # Steps of an encoder make speeds of just `REST`: they move, whatever rounding
-        # makes of it.
+        # An encoder's steps at just `REST` count as motion.
         return slower(self.velocity, (1.0 - TIE) * REST)
 
     def part(self, chosen: slice) -> "Blocks":
@@ -239,8 +237,7 @@ def disturbance_blocks(
     size = max(round(seconds / median_step(t)), 1)
     whole = np.ones(len(t) - 1, bool) if inside is None else inside[1:] & inside[:-1]
     whole[gaps_of(t, GAP)] = False
-    # The unbroken runs of intervals give the edges; between two runs one block reaches
-    # across.
+    # Runs of intervals give the edges; one block spans a gap.
     places = {0, len(t) - 1}
     for start, stop in runs_of(whole):
         count = max(round((stop - start) / size), 1)

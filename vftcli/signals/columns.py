@@ -58,8 +58,7 @@ def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]
     if kind not in COLUMNS:
         return {}
     unit, meaning = COLUMNS[kind]
-    # What touches an arm in a simulation is a wrench, or a torque, under the contact's
-    # own name.
+    # A simulated contact is a wrench or a torque by its own name.
     if kind == "contact" and group:
         unit, meaning = TORQUE, "force and moment, or joint torque, of one contact"
     if last in AXES:

@@ -114,9 +114,8 @@ class ExternalTorque(TimeSeries):
     sd: Array | None = None
     #: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
     floor: Array | None = None
-    #: One standard deviation of the error of `tau` as the log itself shows it, model
-    #: error and lag included, in single precision; None where no free part is known to
-    #: measure it on. (T, n) [N·m]
+    #: One deviation of `tau`, model error and lag included, in single
+    #: precision; None where no free part is known. (T, n) [N·m]
     error_sd: Array | None = None
     #: Whether the joint moves, so that the sample may be relied on; where it rests,
     #: stiction hides what `tau` cannot know. None where that was not looked at. (T, n)

@@ -20,18 +20,15 @@ from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.steady_filter import steady_filter
 
-#: Order of the Butterworth filter; run forwards and backwards it attenuates twice as
-#: much.
+#: Butterworth order; forwards and backwards it counts twice.
 ORDER = 2
-#: Order of one pass where what is behind the filter is differentiated: its noise above
-#: the cutoff has to be gone.
+#: Order of a pass before differentiation: no noise may be left.
 STEEP = 4
 #: Steps that differ from their median by a larger share are resampled; a clock that
 #: jitters by less is filtered as an even one.
 UNEVEN = 0.05
 FREQUENCIES = 1024  #: Frequencies at which a filter's power is summed.
-#: An even clock of more than so many times the log's samples would be filled with gaps
-#: alone.
+#: An even clock this many times the log would mostly be gaps.
 MOSTLY_GAP = 100
 #: Values that are filtered together: a filter's passes take five times their memory.
 TOGETHER = 1 << 20
@@ -194,7 +191,6 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
             power += share * (spectrum.real**2 + spectrum.imag**2)
         count += len(starts)
     power *= 2.0 * step / np.sum(window**2)
-    # The density is one-sided: every frequency counts for its negative too, but 0 and
-    # Nyquist's.
+    # One-sided: every frequency but 0 and Nyquist's counts twice.
     power[:, [0, -1]] *= 0.5
     return np.ascontiguousarray(power.T), count

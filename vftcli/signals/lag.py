@@ -150,8 +150,7 @@ class LagFit(NamedTuple):
     """How well two series fit at every lag of the first behind the second."""
 
     lag: Indices  #: (L,) [samples]
-    #: Mean squared difference of what overlaps, all columns together; infinite where too
-    #: little does. (L,)
+    #: Mean squared difference of all columns; infinite if short. (L,)
     difference: Array
     overlap: Indices  #: Samples that overlap. (L,)
 
@@ -175,8 +174,7 @@ def lag_fit(late: Array, early: Array, least: float) -> LagFit:
 
     At least the share `least` of the shorter one must overlap.
     """
-    # A common offset changes no difference, and without it the sums of squares keep their
-    # digits.
+    # Without a common offset sums of squares keep their digits.
     middle = late.mean(axis=0)
     x, y = late - middle, early - middle
     at = np.arange(-(len(y) - 1), len(x))

@@ -13,8 +13,7 @@ from vftcli.signals.errors import IdentificationError
 #: noise that is 1.2 % of the samples.
 HUBER = 2.5
 PASSES = 6  #: Reweighting passes.
-#: Eigenvalues of scaled normal equations below this share of the largest tell a solution
-#: nothing.
+#: Eigenvalues below this share of the largest tell nothing.
 NULL = 1e-12
 NULL_OF_INVERSE = (
     1e-10  #: `NULL` of an inverse, in which a single such value outweighs all others.
@@ -42,8 +41,7 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
         )
     if not A.shape[1]:
         return ColumnFit(np.zeros(0), np.zeros(0), y, weights)
-    # Iteratively reweighted least squares: what the last fit leaves decides who is an
-    # outlier.
+    # Reweighted: what the last fit leaves shows the outliers.
     outliers = np.ones_like(y)
     for _ in range(PASSES):
         x = normal_equations(A, y, weights * outliers).solution()

@@ -50,8 +50,7 @@ WORDS = str | int | float | Path  #: What a value is made of.
 class Option(NamedTuple):
     """How one value is typed, and what `--help` says of it."""
 
-    #: As it is typed, ``-v/--details`` where it has two names; "" of an argument; a
-    #: dotted name of a setting.
+    #: As typed, ``-v/--details``; "" of an argument; dotted of a setting.
     name: str
     metavar: str  #: What its value is called, "" of an option that is given or not.
     help: str  #: What it means; the short help shows the first sentence.

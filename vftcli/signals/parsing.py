@@ -10,8 +10,7 @@ from typing import Any
 
 from vftcli.signals.errors import ParameterError
 
-#: What no UTF-8 holds: a byte of a file name that is no letter, or half a letter from
-#: JSON.
+#: Not UTF-8: bytes of a file name, half a letter of JSON.
 HALVES = re.compile(r"[\ud800-\udfff]")
 #: Unicode categories that a terminal would act on, or show as nothing: control
 #: characters, marks that turn the direction of writing, ends of lines.
@@ -47,8 +46,7 @@ def printable(text: str) -> str:
     )
 
 
-#: Share of two words' letters that must agree in order: one slip in four letters, two in
-#: eight.
+#: Share of letters that agree: one slip in four, two in eight.
 LIKE = 0.74
 
 

@@ -89,8 +89,7 @@ def rpy_angles(rotation: Array) -> tuple[float, float, float]:
     R = rotation
     level = float(np.hypot(R[0, 0], R[1, 0]))
     pitch = float(np.arctan2(-R[2, 0], level))
-    # The limit leaves the angles nine digits before the quotients of rounding errors take
-    # over.
+    # Above it the angles have nine digits.
     if level < 1e-9:
         return float(np.arctan2(-R[1, 2], R[1, 1])), pitch, 0.0
     return float(np.arctan2(R[2, 1], R[2, 2])), pitch, float(np.arctan2(R[1, 0], R[0, 0]))

@@ -35,8 +35,7 @@ class Cut(NamedTuple):
     stop: float  #: Time of the last. [s]
     rows: int  #: How many there are.
     joints: tuple[int, ...]  #: The joints with signals that say so, from 1.
-    #: The largest of what says so, in the unit of the finding's words; else its length in
-    #: s.
+    #: Largest of its kind, in the unit of the words; else seconds.
     size: float
 
 
@@ -70,8 +69,7 @@ class Source(Shown):
     path: Path | None = (
         None  #: The file or bag directory, or None for a recording made in memory.
     )
-    #: What the log is called in tables, unique within a command; the file's name where
-    #: that is unique.
+    #: Its name in tables, unique within a command.
     label: str = ""
     format: str = "memory"  #: The reader's name.
     columns: str = ""  #: What ``--columns`` said of it, "" for nothing.
@@ -90,8 +88,7 @@ class Source(Shown):
     #: Facts on what was dropped, turned or derived; cautions and warnings on what looks
     #: suspicious but was left as it is.
     remarks: tuple[Remark, ...] = ()
-    #: Which of several recordings in the file this is, as "episode 3"; "" for the only
-    #: one.
+    #: Which of several recordings, as "episode 3"; "" for the only one.
     part: str = ""
     cuts: tuple[Cut, ...] = ()  #: Samples that were cut out because no arm can have made them.
     #: The sample that each of the rows is, or repeats; −1 for one that was dropped
@@ -178,8 +175,7 @@ class Recording(TimeSeries):
     #: Its centre of mass in flange axes. (3,) [m]
     payload_com: tuple[float, ...] | None = None
     source: Source = IN_MEMORY  #: Where it came from and what was repaired.
-    #: True torques and wrenches of a simulated log, the columns those of
-    #: PATH.truth.parquet.
+    #: True torques and wrenches, columns as in PATH.truth.parquet.
     truth: "pl.DataFrame | None" = None
 
     def __post_init__(self) -> None:

@@ -39,8 +39,7 @@ def with_velocity(recording: Recording) -> Recording:
     if recording.dq is not None or recording.samples < 3:
         return recording
     cutoff = min(CUTOFF, OF_NYQUIST * 0.5 / recording.median_step)
-    # An endless joint that is logged within one turn jumps by it; a motor's count does
-    # not.
+    # Endless joints logged within one turn jump; a motor's count does not.
     within = np.ptp(recording.q, axis=0) < ONE_TURN
     q = np.where(within, np.unwrap(recording.q, axis=0), recording.q)
     slopes = np.gradient(q, recording.t, axis=0)
@@ -59,22 +58,18 @@ NEAR = 2
 #: How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise.
 #: One sample in a hundred may be bad, and three bends in a hundred with it.
 USUAL = 0.97
-#: Beyond so many times that a sample is alone: 16 sd of white noise. On 36 sound logs
-#: of eight arms one sample does in most of those of a UR10e, at most 11 in 1896, and none
-#: in 24 of them.
+#: A sample this far off is alone: 16 sd of white noise. Of 36 sound
+#: logs a UR10e's have one, at most 11 in 1896; 24 have none.
 FAR = 6.0
-#: And beyond this share of what a velocity or an effort spans but for its outer
-#: hundredths: of smooth motion without noise the bends say nothing. What an angle spans
-#: is no measure.
+#: And beyond this share of what a velocity or an effort spans
+#: without its outer hundredths: smooth motion has no noise.
 SPREAD = 0.03
 
-#: Angles and velocities off by less are never alone: less than what turns the dry
-#: friction of a joint round, on which a gear's teeth give, and less than a speed at which
-#: a joint rests. [rad, rad/s]
+#: Smaller steps are never alone: a gear's teeth give as much, and
+#: slower joints rest. [rad, rad/s]
 LEAST = {"q": 5e-4, "dq": 1e-2}
 
-#: The first and last samples may be so many times as far off: a line of six samples
-#: bends.
+#: Factor for first and last samples: a line of six bends.
 END = 4.0
 #: An effort is no further off than so many times what its three closest neighbours in
 #: size differ by: a tap of three samples is a tap. Two samples of one stand alone.
@@ -120,8 +115,7 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     if len(x) <= 6 * NEAR:
         return made, np.zeros(x.shape, bool)
     bend, travel = 0.5 * abs(np.diff(x, 2, axis=0)), 0.5 * abs(x[2:] - x[:-2]) + least
-    # Stamps that jitter bend a moving joint's angles, and those of a resting one not at
-    # all.
+    # Jitter of the stamps bends only angles of moving joints.
     by_travel = np.quantile(bend / travel, USUAL, axis=0) * travel
     limit = np.maximum(FAR * np.minimum(np.quantile(bend, USUAL, axis=0), by_travel), least)
     # Of two bad samples in a row each bends by half of what it is off.

@@ -24,8 +24,7 @@ from vftcli.signals.arrays import Array, Indices, empty_series
 #: that begin at multiples of it give the numbers of the whole log to the last bit.
 PIECE = 1 << 14
 FORGOTTEN = 1e-20  #: Share of a state that counts as nothing: far below its last digit.
-#: Samples in a block, a power of two: the work grows with it, the number of blocks
-#: shrinks.
+#: Samples in a block, a power of two: more work, fewer blocks.
 BLOCK = 32
 LENGTH = 36  #: Most samples in a block of `recursion`, the length of its Python loops.
 

@@ -14,8 +14,7 @@ from vftcli.signals.shown import ALL, TimeSeries, record
 
 #: Names of the six components, force first, as in column names and tables.
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
-#: Point that a moment refers to → its words; a log may name another, as a link of its
-#: own.
+#: Point of a moment → its words; a log may name another.
 POINTS = {
     "flange": "the flange point",
     "tool": "the tool's point",
@@ -23,8 +22,7 @@ POINTS = {
     "controller": "the flange point or the tool's, by which sensor the controller has",
     "sensor": "the sensor's origin",
 }
-#: Axes → the point their moments refer to where nothing else is said, if not their own
-#: origin.
+#: Axes → usual point of their moments, if not their origin.
 OWN_POINT = {"base": "flange"}
 #: Whether a force is the environment's on the robot, or the robot's on the environment.
 Sign = Literal["on-robot", "by-robot"]
@@ -34,8 +32,7 @@ Sign = Literal["on-robot", "by-robot"]
 class WrenchFrame:
     """What a log states of its own wrench."""
 
-    #: Axes of base, flange, tool or sensor; or the log's own name of a frame, of which
-    #: nothing is known here.
+    #: base, flange, tool or sensor; or a frame that only the log knows.
     axes: str
     point: str  #: What its moment refers to: a key of `POINTS`, or again the log's own name.
     sign: Sign = "on-robot"  #: On or by the robot.
@@ -83,10 +80,8 @@ class WrenchFrame:
         return f"{self.axes} axes at {point}, as force {sense}"
 
 
-#: O_F_ext_hat_K of libfranka and what is built on it.
-#:
-#: On a log of an FR3 it equals pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's
-#: origin.
+#: O_F_ext_hat_K of libfranka: on an FR3 it equals
+#: pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's origin.
 FRANKA_FRAME = WrenchFrame("base", "base", "by-robot")
 
 
@@ -113,8 +108,7 @@ class Wrench(TimeSeries):
     values: Array
     frame: str  #: Axes and reference point: a key of `vftcli.wrench.frames.FRAMES`.
     sd: Array | None = None  #: One standard deviation of `values`. (T, 6) [N, N·m]
-    #: Smallest singular value of J with angular rows × 0.3 m, None where no Jacobian was
-    #: inverted. (T,) [m]
+    #: Least singular value of J, angular rows × .3 m; None: no J. (T,) [m]
     sigma_min: Array | None = None
     masked: Mask | None = None  #: Samples in which the pose cannot tell the wrench. (T,)
     #: Norm of the part of the joint torque that no wrench at the flange explains, None

@@ -32,9 +32,8 @@ SHAPES = (
 #: What does not grow with the speed for ever.
 DRY = ("coulomb", "load_coulomb", "presliding", "amplitude")
 WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")  #: What does: the film of oil.
-#: Speed below which the dry friction of a joint that gives fades: of forms tried on a
-#: UR10e, a·s beside a sign smoothed over 3 mrad/s leaves a momentum observer least on
-#: unseen logs. [rad/s]
+#: Below it the dry friction of a soft joint fades: on a UR10e a·s
+#: beside a sign smoothed over 3 mrad/s leaves least. [rad/s]
 CREEP = 3e-3
 LARGEST_STEP = 1e-3  #: Largest inner step. [s]
 GUESSES = 12  #: Active-set guesses before the slower way that always converges takes over.
@@ -212,8 +211,7 @@ class Plant:
 
     def advance(self, tau: Array, external: External | None = None) -> None:
         """Move one step on under drive torques `tau` (n,) [N·m] and the contacts' torque."""
-        # The midpoint velocity extrapolates the last acceleration; the first step has
-        # none yet.
+        # The midpoint velocity needs an acceleration before it.
         if not self.moved:
             signs = self.signs
             self.a = (self.impulses(tau, external) - self.v) / self.step

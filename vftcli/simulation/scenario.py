@@ -64,8 +64,7 @@ class FrictionSpec(Spec):
     sticking: float = 0.0
     presliding: float = 0.0  #: Share of the Coulomb torque that is presliding friction.
     presliding_length: float = 3e-4  #: Deflection at which that is full. [rad]
-    #: Temperature of the joints at the start; not given, that of the robot's friction.
-    #: [°C]
+    #: Of the joints at the start; None: the friction's own. [°C]
     temperature_begin: float | None = None
     #: Temperature at the end, on a straight line from the start; not given, that at the
     #: start. Friction follows it where the robot has a law. [°C]

@@ -88,8 +88,7 @@ def sample_run(arm: Arm) -> Samples:
     for name in ("a", "friction"):
         middle = grid[:-1] + 0.5 * arm.scenario.step
         signals[name] = resample_columns(time, middle, history[name][:-1])
-    # The mean over the interval, or the last step: exact, for torque is constant over a
-    # step.
+    # The mean of an interval: torque is constant over a step.
     step = grid[1]
     total = step * summed(history["tau"][:-1])
     span = max(interval if spec.torque == "average" else 0.0, step)
@@ -196,8 +195,7 @@ def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None
     spec = arm.scenario.force_sensor
     if spec is None:
         return None
-    # Its own generator: mounting a sensor leaves the noise of all other signals as it
-    # was.
+    # Its own generator: a sensor changes no other signal's noise.
     rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
     turn, tool = rpy_matrix(spec.rpy), np.array(spec.tool_com)
     model, clean = arm.true.chain.to_pinocchio(), np.zeros((len(samples.time), 6))

@@ -17,8 +17,7 @@ HARMONICS = 48
 TABLE = 0.15  #: Least height of the flange in poses that are drawn. [m]
 #: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-10
-#: Number of joints → a pose from which such an arm can work, the flange looking down.
-#: [rad]
+#: Joints → a pose for work, the flange looking down. [rad]
 HOMES: dict[int, tuple[float, ...]] = {
     6: (0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0),
     7: (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854),

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
 FIT = "fit"  #: The word for a sensor pose that is to be estimated from the log.
 START = "start"  #: The word for the unloaded start of the log.
-#: The word for the solver that takes the whole log at once, and needs no observer before
-#: it.
+#: The solver of the whole log at once, without an observer.
 SMOOTHER = "smoother"
 SMOOTHED = ("best",)  #: Observers with the smoother's wrench where no other solver is named.
 
@@ -92,8 +91,7 @@ class WrenchChoice(Choice):
             "Tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or its [tool.NAME].",
         ),
     ] = None
-    #: The sensor's pose as text or a name in the robot file, "fit", or None for the
-    #: file's own.
+    #: A pose as text or by name, "fit", or None for the file's own.
     sensor_pose: Annotated[
         str | None,
         Option(

@@ -23,13 +23,11 @@ HOLD = 0.02  #: A contact must last at least this long, so that one noisy sample
 GAP = 0.25  #: Two contacts closer than this are one: a hand that slips has not let go. [s]
 #: The free band reaches this far beyond the largest departure seen in the free part.
 BAND = 1.3
-#: An alarm that begins earlier than this before a true contact, or later than this after
-#: its end, is false, whatever it meets: a slow observer shows a contact for a while after
-#: it. [s]
+#: An alarm this long before a true contact, or behind its end, is
+#: false: slow observers show a contact for a while. [s]
 EARLY, LATE = 0.1, 1.0
 TRUE_TORQUE = 0.5  #: A true joint torque beyond this is a contact. [N·m]
-#: A true wrench beyond this is a contact, and half a free band at least so wide. (6,)
-#: [N, N·m]
+#: A true contact, and least half width of a free band. (6,) [N, N·m]
 WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
 LEAST_TORQUE = 0.5  #: Smallest half width of a free band of joint torques. [N·m]
 #: Contacts of an exact reference closer than this are one; those of a measured one, which
@@ -257,8 +255,7 @@ def judge_contacts(
             free = values[quiet] if quiet.any() else known.beside.get(name, values[:0])
             if not len(free):
                 free = values[learned_free(t, true)]
-            # Observers rise from zero: what they read before they have settled touches
-            # nothing.
+            # Observers rise from zero, which is no contact.
             score = np.where(settled, departure(values, free, least), 0.0)
             found, of = find_contacts(t, score), kind
         scores.append(ContactScore(name, of, match_contacts(found, true, t[-1] - t[0])))

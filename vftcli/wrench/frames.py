@@ -110,14 +110,11 @@ def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
     return poses[text]
 
 
-#: What is assumed of a log that states nothing: a sensor's own reading, force on the
-#: robot.
+#: Of a log that states nothing: a sensor's reading, on the robot.
 UNSTATED = WrenchFrame("sensor", "sensor")
-#: As much of a log as counts for one independent sample: friction's errors last as long.
-#: [s]
+#: One independent sample: friction's errors last as long. [s]
 PIECE = 1.0
-#: Evidence from which on the currents' word is believed, that of three standard errors.
-#: [nats]
+#: Evidence of three standard errors, from which currents decide. [nats]
 SURE = 4.5
 
 
@@ -160,8 +157,7 @@ def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wren
     if axes is not None:
         turn = flange @ axes.rotation
         force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (force, moment))
-    # The force acts at the point, so about the flange it has the moment of its lever
-    # besides.
+    # About the flange the force has the moment of its lever too.
     lever = -placed.translation[:, -1]
     if point_pose is not None:
         lever = flange @ point_pose.translation

@@ -40,11 +40,9 @@ from vftcli.signals.series import grown, near, runs_of
 from vftcli.wrench.solvers import TORQUE_SD
 
 REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]
-#: A joint that rests under a contact: the push re-settles its stiction within so long.
-#: [s]
+#: A push re-settles the stiction of a joint at rest so fast. [s]
 PUSHED_TIME = 0.3
-#: Such a push adds to the variance of motion that of rest, by the drives' share under a
-#: push.
+#: What such a push adds to the variance of motion.
 RESETTLED = (PUSHED_SHARE / REST_SHARE) ** 2
 #: A joint that moves in less than the share `SEEN` of the free part's blocks: the model
 #: error of its motion, as a share of F_c, and its least correlation time. [s]
@@ -55,8 +53,7 @@ LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [
 #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
 LEAST_BLOCKS = 20
 ASSUMED_SHARE = 0.2  #: Model error of motion as a share of F_c, where no free part is known.
-#: Share of the free part's blocks in which a joint must move for its reversals to be
-#: bridged.
+#: Share of blocks in which a joint moves, to bridge reversals.
 MOVES = 0.3
 #: Shares of the normalised squares ν²/S, and where χ² of one degree has them.
 QUANTILES = (0.9, 2.706), (0.97, 4.709)
@@ -66,15 +63,13 @@ DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
 #: Where nothing was learned the quietest 60 % of the blocks in which a joint moves count
 #: as free; 60 % of a normal variable lie within so many standard deviations.
 QUIET, QUIET_SD = 0.6, 0.8416
-#: The block in which a joint comes to rest draws b anew: this share is left of what it
-#: was.
+#: Coming to rest draws b anew: so much of it is left.
 STOP_DECAY = np.exp(-5.0)
 #: What a joint has just done: it stops if it moved for more than half of this time
 #: before, and for this time after a start b changes within `START_TIME`. [s]
 RECENT = 0.1
 START_TIME = 0.05  #: Correlation time of b while a joint breaks away. [s]
-#: How often a joint's innovation is a spike within so long [s] of its motion, and at
-#: rest.
+#: Rate of spikes within so long [s] of motion, and at rest.
 SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
 UNKNOWN = 1e9  #: Variance of the white noise of a block that says nothing. [(N·m)²]
 
@@ -188,8 +183,7 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
     moving = log.known[:, None] & ~log.rests
     asked = moving.mean(axis=0) >= SEEN
     if learned is not None:
-        # The fit calls the quietest samples free; what its friction says is a floor, if
-        # it is any.
+        # The fit's friction is a floor, if it has any.
         asked &= DRY_SHARE * dry < LEAST_ERROR
     for j in np.flatnonzero(asked):
         quiet = np.quantile(abs(log.d[moving[:, j], j]), QUIET) / QUIET_SD

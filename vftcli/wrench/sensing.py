@@ -66,8 +66,7 @@ class FreeLog(NamedTuple):
     """A log as an observer has it, and what nobody touched."""
 
     run: Run  #: The log.
-    #: Samples that nobody touched, less a load that they carry; none where nothing is
-    #: known.
+    #: Free samples, less a load that they carry; or none.
     free: tuple[RunSamples, ...]
     #: A load that the free samples carry, and with them the whole log; None without one.
     load: FreeLoad | None = None
@@ -129,8 +128,7 @@ def sense(
     made |= {w.name: smoothed_wrench(smoothed[w.name], w, sensor, log) for w in bare}
     wrenches = [made[torque.name] for torque in estimates]
     bands = [remark for name in names for remark in made[name].remarks]
-    # Beside a smoothed wrench, what is said of the torques' error names those that it is
-    # said of.
+    # Remarks on torques' errors name the torques beside the smoother.
     if others:
         where = Where(", ".join(torque.name for torque in others)) if smoothed else Where()
         bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in on_sds]

@@ -22,8 +22,7 @@ from vftcli.wrench.solvers import VirtualSensor
 
 #: Second to first singular value of the forces below which they lie on one line.
 LEAST_DIRECTIONS = 0.02
-#: A correlation that no independent measurement reaches: the field is made from the
-#: torques.
+#: Correlation of a field that is made from the torques.
 DERIVED = 0.9995
 RESEMBLES = 0.5  #: Below this correlation no convention explains the field.
 
@@ -166,8 +165,7 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
     axes = fit_axes(np.where(usable, moved, np.nan) @ fit.matrix, given)
     if not axes.correlation > RESEMBLES:
         return [*remarks, caution("log-wrench-unlike")]
-    # The trace of a signed permutation is 3 for our own axes and −3 for the opposite
-    # ones.
+    # The trace of a signed permutation: 3 for our axes, −3 for opposite.
     turn = {3: "log-wrench-fits", -3: "log-wrench-fits-turned"}
     remarks.append(
         fact(

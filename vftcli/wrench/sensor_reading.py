@@ -19,8 +19,7 @@ from vftcli.wrench.choice import SMOOTHER, ZeroChoice
 from vftcli.wrench.smoother import SmoothedWrench
 from vftcli.wrench.solvers import SCALE, VirtualSensor
 
-#: The threshold of the null-space torque is so far above the largest value of the free
-#: part.
+#: Null-space threshold, as a multiple of the free part's largest.
 MARGIN = 1.25
 #: Share of samples above the threshold up to which nothing is said: chance reaches it.
 LEAST_SHARE = 0.001
@@ -87,8 +86,7 @@ class SensorReading(Shown):
     wrenches: tuple[Wrench, ...]  #: One an observer, drift removed where a zero was given.
     masked: Mask  #: Samples in which the pose cannot tell a wrench, whoever observes it. (T,)
     drifts: tuple[Drift, ...] = ()  #: Zero drift, one an unloaded span and observer.
-    #: Samples known to be unloaded: those of the zero spans, or of the unloaded start.
-    #: (T,)
+    #: Unloaded samples: of the zero spans, or of the start. (T,)
     free: Mask
     #: What the smoother found, by observer.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)

@@ -23,14 +23,11 @@ from vftcli.wrench.frames import Mounting, check_frame, frame_pose, from_base
 
 LENGTH = 0.3  #: Length by which moments are made comparable with forces. [m]
 SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])  #: Diagonal of S.
-#: Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N.
-#: [m]
+#: σ_min of S J at which 1 N·m of torque error is 20 N. [m]
 LEAST_SIGMA = 0.05
-#: Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,)
-#: [N]
+#: Prior deviations of w_s: 50 N and 10 N·m. (6,) [N]
 PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
-#: Joint torque error against which the MAP solver weighs its prior where none is known: a
-#: weight, no band. [N·m]
+#: Torque error against which the MAP solver weighs its prior. [N·m]
 TORQUE_SD = 0.3
 
 
@@ -56,8 +53,7 @@ def decompose(jacobian: Array) -> Decomposition:
             "leave --wrench and its options out: use the joint torques"
         )
     scaled = SCALE[:, None] * jacobian
-    # The 6×6 product is cheaper to decompose than the 6×n factor, and only the squares
-    # are needed.
+    # 6×6 is cheaper than 6×n, and only the squares are needed.
     squares, U = np.linalg.eigh(scaled @ scaled.swapaxes(1, 2))
     return Decomposition(scaled, U, squares)
 
@@ -179,8 +175,7 @@ class VirtualSensor(Shown):
         for torque in torques:
             if torque.tau.shape != q.shape:
                 raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
-        # A view: one row serves every sample. Zero is raised, so that weights stay
-        # finite.
+        # A view: one row serves all samples.
         errors = [
             np.broadcast_to(np.maximum(sd.get(torque.name, TORQUE_SD), 1e-6), q.shape)
             for torque in torques

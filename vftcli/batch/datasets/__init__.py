@@ -15,8 +15,7 @@ class ForceColumn(NamedTuple):
 
     name: str  #: Its name, as external_torque; the dataset decides its place.
     elements: tuple[str, ...]  #: What each of its numbers is, empty for a single one.
-    #: Unit, sign, frame, observer and whether it is causal, for who
-    #: reads the dataset.
+    #: Unit, sign, frame, observer and whether it is causal.
     about: Mapping[str, Any]
 
     @property

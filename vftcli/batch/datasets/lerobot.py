@@ -25,8 +25,7 @@ from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 
 PREFIX = "observation."  #: What the names of observations begin with.
-#: Key of a Parquet schema's metadata under which the `datasets` library tells its
-#: features.
+#: Key of a Parquet schema under which `datasets` keeps features.
 METADATA = b"huggingface"
 #: Keys of the quantiles.
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}

@@ -76,9 +76,8 @@ def lines_of(
 ) -> list[ChartLine]:
     """A line an observer; one is drawn at once, `best` where it ran, with its 95 % band.
 
-    Beside `best` no other bears a band: five would hide one another; where it did not run
-    every line does, if they are `alike`. Given are name, values and standard deviation.
-    (T, n)
+    Beside `best` no other bears a band: five would hide one another. Without it every line
+    does, if they are `alike`. Given are name, values and deviation. (T, n)
     """
     styles, names = observer_styles(analysis), [name for name, *_ in found]
     first = BEST if BEST in names else next(iter(names), "")

@@ -1,9 +1,8 @@
 """Series of a page as one text: steps of int16, their differences, deflated, in base64.
 
-A clock is the samples that every line of a log shares on the page, so that one index is
-one moment in all of them. A short log has every sample; of a long one each line keeps the
-lowest and the highest value of every stretch, and half of the stretches are where
-contacts are.
+All lines of a log share a clock on the page, so one index is one moment. A short log has every
+sample; of a long one each line keeps the lowest and highest value of every stretch, half of
+them where contacts are.
 """
 
 import base64
@@ -19,8 +18,7 @@ from vftcli.outputs.charts import GAP_STEPS, REFERENCE, Chart, ChartLine, paint
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import gaps_of
 
-#: Samples of a log that is kept whole; of a longer one so many stretches, with two values
-#: each.
+#: Samples kept whole; stretches of two values of longer logs.
 WHOLE, STRETCHES = 8192, 4096
 COARSE = 4  #: Stretches in one value of a line that is not drawn at once.
 AROUND = 0.5  #: Time before and after a contact where the stretches are short. [s]

@@ -133,8 +133,7 @@ def page(
 
 def script_json(data: object) -> str:
     """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
-    # "<" could begin "</script>"; the two separators end a line in JavaScript but not in
-    # JSON.
+    # "<" could begin "</script>"; two separators end JavaScript's lines.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 

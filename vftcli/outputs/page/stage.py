@@ -1,8 +1,7 @@
 """The stage of the page: the arm in three dimensions, its view, and the contacts beside it.
 
-The arm is capsules from the chain's own geometry. It is seen in weak perspective, from
-the side to which it reaches in this log, a little turned; the page's script has the same
-projection.
+Capsules from the chain's geometry, in weak perspective from the side to which the arm reaches;
+the page's script has the same projection.
 """
 
 from collections.abc import Mapping, Sequence
@@ -191,8 +190,7 @@ def stage_data(
             for link, shapes in enumerate(capsules(chain))
             for s in shapes
         ],
-        # Per link the rows of x, y and z of corners, and of the three corners of
-        # triangles.
+        # Per link: corners' x, y and z, then corners of triangles.
         "surfaces": [
             (surface := surfaces.get(link))
             and [clock.blob.add(x, MILLIMETRE) for x in surface.corners.T]

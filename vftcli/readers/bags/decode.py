@@ -31,8 +31,7 @@ class Kind(NamedTuple):
     frame: str = ""  #: Path of the frame's name.
     #: Name → paths to try of the load's numbers, of which the last value counts.
     constants: Mapping[str, Names] = {}
-    #: Whether it is Franka's: it leads, its residual is turned, its wrench's frame is
-    #: known.
+    #: Whether it is Franka's, with its residual and frame.
     franka: bool = False
 
 
@@ -64,8 +63,7 @@ KINDS = {
     "geometry_msgs/WrenchStamped": Kind(_paths_by_name("wrench=wrench"), frame="header.frame_id"),
 }
 
-#: Layouts that messages of one topic may have: joint names, and lengths of lists, hardly
-#: vary.
+#: Layouts of one topic: names and lengths hardly vary.
 LAYOUTS = 512
 
 
@@ -210,8 +208,7 @@ class Decoder:
         """
         kind = KINDS[channel.type]
         each = {signal: numbers(paths) for signal, paths in kind.signals.items()}
-        # Some drivers publish joints alphabetically; every message of a layout has one
-        # order.
+        # Some drivers sort joints by name; a layout has one order.
         own = texts.get(kind.names, ())
         names, signals = along_arm(own, {s: value for s, value in each.items() if value.shape[1]})
         if kind.franka and "tau_ext" in signals:

@@ -88,8 +88,7 @@ class Documents:
             left = sorted(topics - {channel.topic})
             said = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
             return replace(raw, remarks=(*raw.remarks, *said))
-        # The fullest channel is the one that was meant; what it lacks is what the user
-        # can mend.
+        # What the fullest channel lacks the user can mend.
         raise failures[max(failures)]
 
     def _read(self, channel: Channel, rows: Sequence[Document], times: list[int]) -> RawLog:
@@ -117,8 +116,7 @@ def numbers_of(rows: Sequence[Document], paths: Sequence[str]) -> Array:
     return np.hstack([np.empty((len(rows), 0)), *columns])
 
 
-#: The type of ROS that a document is of, its joints' names, its frame, whether it has no
-#: stamp.
+#: ROS type of a document, joint names, frame, lack of a stamp.
 Shape = tuple[str, Names, str, bool]
 
 

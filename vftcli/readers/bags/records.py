@@ -1,9 +1,8 @@
 """Records of ROS 1 bags, of MCAP files and of ROS 2's SQLite databases.
 
-ROS 1 bags (http://wiki.ros.org/Bags/Format/2.0) and MCAP files (https://mcap.dev/spec)
-are read from the start, so that a cut or unclosed one reads up to its last chunk. The
-readers of rosbags and mcap need the index at the end, or unpack a chunk to whatever it
-holds, and take longer.
+ROS 1 bags (http://wiki.ros.org/Bags/Format/2.0) and MCAP files (https://mcap.dev/spec) are read
+from the start, so a cut one reads up to its last chunk. The readers of rosbags and mcap need
+the index at the end.
 
 A database is code as much as data: a column may be computed by functions of SQLite from
 nothing. So only stored columns of plain tables are read, no function runs, and what is
@@ -236,8 +235,7 @@ def _text(value: object) -> str:
 def _opened(file: LogFile) -> sqlite3.Connection:
     """The database, read-only; an unpacked one is held in memory."""
     if file.wrapping is None:
-        # Immutable: SQLite must not look for a journal, nor write one beside a user's
-        # bag.
+        # Immutable: SQLite neither looks for a journal nor writes one.
         db = sqlite3.connect(f"{file.path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
     else:
         db = sqlite3.connect(":memory:")

@@ -20,8 +20,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError, OutputError
 from vftcli.signals.parsing import tables_beside
 
-#: The longest definition of an arm's state, Franka's with all its errors, takes some 10
-#: KiB.
+#: Franka's state with all its errors takes some 10 KiB.
 MAX_DEFINITION = 64 * 1024
 #: Primitive type → NumPy's code for it.
 SIZES = {
@@ -31,8 +30,7 @@ SIZES = {
 }  # fmt: skip
 
 
-#: Message type as rosbags names it, package/msg/Name → constants, and each field's name
-#: and type.
+#: Type as package/msg/Name → constants; names, types of its fields.
 Types = dict[str, Any]
 
 
@@ -101,8 +99,7 @@ class MessageLayout:
     def _walk(self, path: str, kind: str, depth: int) -> None:
         if depth > MAX_DEPTH:
             raise LayoutError("nested too deeply")
-        # Empty messages take no bytes: a few nested types of them would be visited
-        # without end.
+        # Empty messages take no bytes and could nest without end.
         self._visits += 1
         if self._visits > len(self._message) + SPARE_VISITS:
             raise LayoutError("more parts than bytes")
@@ -184,8 +181,7 @@ def element_of(described: Any) -> tuple[str, int | None]:  # noqa: ANN401 - nest
     return name, int(inner[1]) if node == 3 else -1
 
 
-#: The definitions of types that ROS 2 has not, by package/Name: Franka's state,
-#: Foxglove's log.
+#: Definitions that ROS 2 lacks: Franka's state, Foxglove's log.
 DEFINITIONS: dict[str, str] = tables_beside(__file__, "messages.toml")
 
 
@@ -218,8 +214,7 @@ def types_for(channel: Channel) -> Types:
     if channel.definition:
         known |= types_of(channel.definition, long_name(channel.type), idl=channel.idl)
     if channel.encoding == "ros1":
-        # ROS 1 has no int32 seconds in a message of their own: time is a primitive of two
-        # words.
+        # In ROS 1 a time is a primitive of two words.
         time = type_store().fielddefs["builtin_interfaces/msg/Time"]
         known |= {f"builtin_interfaces/msg/{name}": time for name in ("Time", "Duration")}
     if long_name(channel.type) not in known:

@@ -256,8 +256,7 @@ def leading(
     # Topics of one rate may differ by the messages lost at either end.
     near = [s for s in found if s.messages >= 0.9 * most]
     best = max(near, key=lambda s: (s.kind.franka, "effort" in s.signals, s.messages))
-    # A stream of as many joints with other names, of the same type and rate, is another
-    # arm.
+    # As many joints of other names, type and rate alike: another arm.
     like = (s for s in near if s.kind is best.kind and s.names and s.width == best.width)
     rivals = [s for s in like if set(s.names) != set(best.names)]
     if rivals:

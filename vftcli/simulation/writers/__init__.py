@@ -114,8 +114,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
     linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
     matrix = np.zeros((len(time), 4, 4))
     matrix[:, :3, :3], matrix[:, :3, 3], matrix[:, 3, 3] = target.rotation, target.position, 1.0
-    # A controller's estimate stays bounded: directions that the pose cannot tell read
-    # nothing.
+    # Bounded, as a controller's: blind directions read nothing.
     force = wrench_of(signals["tau_ext"], actual.jacobian, left_out=LEAST_SIGMA).values
     return {
         **signals,

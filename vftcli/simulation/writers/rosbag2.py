@@ -29,8 +29,7 @@ WRENCH, TWIST = ("force", "torque"), ("linear", "angular")
 UPRIGHT = np.array([[0.0, 0.0, 0.0, 1.0]])  #: The quaternion of no rotation, x, y, z, w.
 
 
-#: Messages of one topic: its name, their type as package/Name, one serialised a row
-#: (R, size).
+#: A topic's name, type as package/Name, and messages (R, size).
 Topic = tuple[str, str, NDArray[np.uint8]]
 
 
