@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class ContactsRoom(ModuleType):
-    """This package as a module that can be called: its name is that of the question it answers."""
+    """This package as a module that can be called."""
 
     def __call__(self, *words: Any, **options: Any) -> "ContactList":  # noqa: ANN401
         """What touched the arm along a log; see `vftcli.notebook.contacts`."""

@@ -52,7 +52,7 @@ FIRST_COLUMNS = ("number", "start_s", "stop_s", "peak_s", "peak_force_N")
 
 
 class ForceCourse(NamedTuple):
-    """How hard a contact pushes from its start to its end, at the place that its force is for."""
+    """|F| of a contact from its start to its end, at the place of its force."""
 
     t: Array  #: Time. (K,) [s]
     force: Array  #: |F|. (K,) [N]
@@ -61,17 +61,16 @@ class ForceCourse(NamedTuple):
 
 @record
 class Contact(Shown):
-    """One contact: force and moment ON the robot, base axes, the moment about the flange point.
+    """A contact: force and moment ON the robot, base axes, about the flange point.
 
-    Bands and standard deviations are calibrated: they hold what the model errs by, too.
+    Bands and standard deviations are calibrated: they include the model's error.
     """
 
     number: int  #: From 1, in the order of time.
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
     peak: float  #: When |F| is largest. [s]
-    #: Whether it lasts so long that it is a load, a wrong payload or a wrong model; its
-    #: numbers are then means over the row, not those of a peak.
+    #: Whether it is a load, a wrong payload or a wrong model; its numbers are then means.
     is_load: bool = False
     peak_force: float | None  #: |F| at the peak. [N]
     #: Half width of its 95 % band, what the place may change in it. [N]
@@ -96,9 +95,8 @@ class Contact(Shown):
     #: |F| of the log's own wrench at the peak, None without one. [N]
     sensor_force: float | None = None
     course: ForceCourse | None = None  #: |F| from start to end, None where no force is known.
-    inferred: bool = (
-        False  #: Whether neither free motion nor a reference lets its size be checked.
-    )
+    #: Whether neither free motion nor a reference checks its size.
+    inferred: bool = False
     remarks: tuple[Remark, ...] = ()  #: What limits this row.
 
     def __post_init__(self) -> None:
@@ -118,7 +116,7 @@ class Contact(Shown):
 
     @property
     def _size(self) -> str:
-        """|F| at the peak with its band or range; the joints' torques where no force is known."""
+        """|F| at the peak with its band or range; joint torques without a force."""
         if self.peak_force is None:
             return f"{joined(self.joint_torque)} N·m"
         if self.place_unknown and self.anywhere is not None:
@@ -156,7 +154,7 @@ class Contact(Shown):
 
     @property
     def size_known(self) -> bool:
-        """Whether its force is larger than its band, and does not hang on an unknown place."""
+        """Whether its force exceeds its band and depends on no unknown place."""
         size, band = self.peak_force, self.peak_band
         return not (size is None or band is None or self.place_unknown or size <= band)
 
@@ -204,7 +202,7 @@ class CarriedLoad(NamedTuple):
 
     @classmethod
     def of(cls, load: "FreeLoad", run: "Run") -> "CarriedLoad":
-        """A load of a log, with the payload of the robot's file that weighs as much."""
+        """A log's load, with the payload of the robot's file that weighs as much."""
         moves = run.t[faster(run.dq).any(axis=1)]
         ends = moves if len(moves) else run.t
         apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
@@ -272,7 +270,7 @@ class ContactList(Shown):
     remarks: tuple[Remark, ...] = ()  #: What limits the list as a whole.
 
     def __getitem__(self, place: int) -> Contact:
-        """The contact at a place of the list, from 0; it ends the loop over them all."""
+        """The contact at a place of the list, from 0."""
         return self.contacts[place]
 
     def __len__(self) -> int:
@@ -280,7 +278,7 @@ class ContactList(Shown):
         return len(self.contacts)
 
     def __bool__(self) -> bool:
-        """True: a log that nothing touched has a list too, unlike one that tells no contacts."""
+        """True, even if nothing touched the log."""
         return True
 
     def _headline(self) -> str:
@@ -298,7 +296,7 @@ class ContactList(Shown):
             yield c.number, f"{c.start:.2f} – {c.stop:.2f}", c._size, force, c.where, c.trust
 
     def to_polars(self) -> "pl.DataFrame":
-        """One row a contact, the columns those of ``contacts.csv``, units in their names."""
+        """One row a contact, the columns of ``contacts.csv``, units in their names."""
         import polars as pl
 
         if not self.contacts:
@@ -306,15 +304,15 @@ class ContactList(Shown):
         return pl.DataFrame([c.row() for c in self.contacts], infer_schema_length=None)
 
     def plot(self) -> "Figure":
-        """A matplotlib figure of |F| of every contact with its band, neither shown nor saved."""
+        """A matplotlib figure of every contact's |F| with its band, not shown or saved."""
         figures = import_module("vftcli.outputs.figures")
         figure: Figure = figures.on_paper(figures.force_drawing(self))
         return figure
 
     def weighed(self, load: tuple[float, float] | None, doubts: Set[str]) -> "ContactList":
-        """The list by the log's examination: its load with deviation [kg], findings in doubt.
+        """The list, given the load [kg] with its deviation and the findings in doubt.
 
-        Without the effort of a joint every row is a candidate.
+        Without a joint's effort every row is a candidate.
         """
         carried, rows, others = self.load, self.contacts, self.candidates
         if carried is not None and load is not None:
@@ -327,7 +325,7 @@ class ContactList(Shown):
         return replace(self, load=carried, contacts=rows, candidates=others)
 
     def without_forces(self) -> "ContactList":
-        """The list of an arm with too few joints for a wrench: times and joint torques."""
+        """The list of an arm with too few joints for a wrench: times, joint torques."""
         nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
         both = (self.contacts, self.candidates)
         rows, weak = (tuple(replace(row, **nothing) for row in part) for part in both)
@@ -336,9 +334,9 @@ class ContactList(Shown):
 
     @property
     def tells_untouched(self) -> bool:
-        """Whether nothing touches the arm outside of the rows: known from its free motion.
+        """Whether free motion shows that nothing touches the arm outside the rows.
 
-        Where only candidates are, one of them may be a touch that the model hides.
+        A candidate alone may be a touch that the model hides.
         """
         if self.basis != "free motion" or (self.candidates and not self.contacts):
             return False
@@ -346,12 +344,12 @@ class ContactList(Shown):
 
     @property
     def detectable_force(self) -> float | None:
-        """`smallest_force`, None without one or where the pose does not tell an axis. [N]"""
+        """`smallest_force`, None without one or where an axis is blind. [N]"""
         least = self.smallest_force
         return least if least is not None and least < BLIND else None
 
     @property
     def hardest(self) -> Contact | None:
-        """The contact with the largest known force; the largest of all where none is known."""
+        """The contact with the largest known force; the largest of all without any."""
         felt = [contact for contact in self.contacts if contact.peak_force is not None]
         return max(felt, key=lambda c: (c.size_known, c.peak_force or 0.0), default=None)

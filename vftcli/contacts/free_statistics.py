@@ -1,4 +1,4 @@
-"""Motion that nobody touched, named or inferred: its noise, its level, the smallest force."""
+"""Motion that nobody touched, named or inferred: noise, level, smallest force."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -34,15 +34,15 @@ from vftcli.wrench.smoother import BlockLog, Lane, WrenchPrior, contact_block
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
-#: How long it must stay, and the pause that joins two. [s]
+#: How long it must last, and the pause that joins two. [s]
 LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
-#: What tells a contact from an error of the model: motion that is known to be free; the
-#: samples that the fit of the whole log calls free; the drives' dry friction; or nothing.
+#: Basis on which contact and model error are told apart: known free motion, samples that
+#: the fit of the whole log calls free, the drives' dry friction, or nothing.
 Basis = Literal["free motion", "whole log", "friction", "none"]
-#: What the fit of the whole log says of one that is too short for it.
+#: Remarks of the fit of the whole log on one that is too short for it.
 SHORT_LOG = {"whole-log-too-short", "whole-log-friction-unclear"}
-#: Fewest whole cycles of which free ones can be found: one alone cannot be compared.
+#: Fewest whole cycles of which free ones can be found: one has no other to compare with.
 LEAST_CYCLES = 2
 #: Length of the contacts that are made up in free motion [s], and how many at most.
 PSEUDO, MOST_PSEUDO = 0.6, 48
@@ -59,9 +59,9 @@ class FreeStatistics(NamedTuple):
     free: tuple[RunSamples, ...]  #: Every free piece, less a load that it carries.
     #: A load that the model lacks, None where none shows.
     load: FreeLoad | None
-    #: What it is and how it was found, and a load that it carries.
+    #: Its origin, and a load that it carries.
     remarks: tuple[Remark, ...]
-    basis: Basis = "free motion"  #: What tells a contact from an error of the model.
+    basis: Basis = "free motion"  #: Tells contact from model error.
 
     @property
     def seconds(self) -> float:
@@ -96,10 +96,10 @@ def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | 
 
 
 def inferred_statistics(log: Run, bias: WholeLogBias) -> FreeStatistics | None:
-    """Statistics that a log without known free motion lets infer, None where it lets infer none.
+    """Statistics that a log implies without known free motion, None where none.
 
-    The whole log's model error is subtracted where its guard allows it, then a load. Nothing is
-    inferred without dry friction where no whole joint is corrected.
+    The whole log's model error is subtracted where its guard allows it, then a load. None
+    without dry friction where no whole joint is corrected.
     """
     if not (dry_torques(log.robot).any() or (bias.weight >= 1.0).any()):
         return None
@@ -141,7 +141,7 @@ def blocks_of(pieces: Sequence[RunSamples], seconds: float) -> list[Blocks]:
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
-    """The free part of a log, None where there is none, or it is found and to be doubted."""
+    """The free part of a log; None without one, or if the one found is doubtful."""
     try:
         part = motion.known
     except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
@@ -156,7 +156,7 @@ def free_part(motion: FreeMotion) -> FreePart | None:
 
 
 def is_touched(log: Run, own: Mask) -> bool:
-    """Whether a free part that was found is none: no quieter than the rest, and beyond friction."""
+    """Whether a free part is touched: no quieter than the rest, beyond friction."""
     if (beyond_threshold(log, None) & own).any():
         with suppress(ParameterError):  # too short for a spectrum
             return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
@@ -164,10 +164,10 @@ def is_touched(log: Run, own: Mask) -> bool:
 
 
 def beyond_threshold(run: Run, level: Array | None) -> Mask:
-    """Samples in which a joint's torque lies beyond `LEVEL` standard deviations for a while. (T,)
+    """Samples with a joint's torque beyond `LEVEL` standard deviations for a while.
 
-    The standard deviation is that of the observer's torque in free motion, the level (n,)
-    [N·m]; None without any.
+    (T,) The standard deviation is that of the observer's torque in free motion, the level
+    (n,) [N·m], None if unknown.
     """
     t = run.t
     above = np.any(abs(observed(run)) > LEVEL * expected_torque(run, level), axis=1)
@@ -181,10 +181,10 @@ def observed(run: Run) -> Array:
 
 
 def observer_noise(run: Run) -> Array:
-    """Standard deviation of the noise of the observer's torque, whatever touches. (n,) [N·m]
+    """Standard deviation of the observer torque's noise, touched or not. (n,) [N·m]
 
-    By second differences over twice the observer's time, which white noise has six times:
-    what pushes last longer, and a median passes over what begins and ends in between.
+    From second differences over twice the observer's time, of six times the variance of
+    white noise: pushes last longer, and the median ignores their ends.
     """
     torque = observed(run)
     step = max(round(2.0 / (GAIN * median_step(run.t))), 1)
@@ -213,7 +213,7 @@ def expected_torque(run: Run, level: Array | None) -> Array:
 
 
 class PseudoContactTest(NamedTuple):
-    """Smoothed wrench in made-up contacts of free motion, where it should be zero."""
+    """Smoothed wrench in made-up contacts of free motion; it should be zero."""
 
     #: Factor on each axis' standard deviation that would hold 95 %, at least 1. (6,)
     widening: Array
@@ -221,7 +221,7 @@ class PseudoContactTest(NamedTuple):
 
 
 def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
-    """Make contacts up in free motion, where the wrench is zero, and see what is measured."""
+    """Errors and forces measured in made-up contacts of free motion, truly zero."""
     shares, forces = [], []
     each = max(MOST_PSEUDO // max(len(free.free), 1), 4)
     for blocks in blocks_of(free.free, free.seconds):
@@ -246,7 +246,7 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
 
 
 def pseudo_contacts(blocks: Blocks, most: int) -> list[tuple[int, int]]:
-    """Runs of known blocks of `PSEUDO` seconds, half as much on either side, `most` at most."""
+    """At most `most` runs of `PSEUDO` s of known blocks, half as much around each."""
     count = max(round(PSEUDO / np.median(blocks.length)), 1)
     half = (count + 1) // 2
     runs = [

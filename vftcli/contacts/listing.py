@@ -1,7 +1,7 @@
-"""The contacts of a log: found by evidence, measured by the smoother, with what limits them.
+"""The contacts of a log: found by evidence, measured by the smoother.
 
-Two things look like a contact and are none: what lasts for most of a log is a load, a
-wrong payload or a wrong model, and has a mean; the jerk of a brake looks like a knock.
+Two things look like a contact and are none: a load, wrong payload or wrong model lasts
+for most of a log and has a mean; the jerk of a brake looks like a knock.
 """
 
 from collections.abc import Sequence
@@ -57,19 +57,16 @@ from vftcli.wrench.smoother import (
     smooth_wrench,
 )
 
-FINE = (
-    0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
-)
+#: Block of short contacts: longer ones cut the peak. [s]
+FINE = 0.008
 SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
-SLOWEST = (
-    10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
-)
+SLOWEST = 10.0  #: Rate below which a push of tenths of a second may go unseen. [Hz]
 #: Evidence over that of any row in the log's own free part.
 FALSE_MARGIN = 1.5
 #: No contacts so near to either end: filters begin there. [s]
 AT_ENDS = 0.3
-#: The arm rests around a contact where no joint is as fast as `MOVES` in 95 % of the
-#: samples from so long before it to so long after it. [s]
+#: The arm rests around a contact if 95 % of the samples from so long before it to so
+#: long after are below `MOVES` in every joint. [s]
 AROUND = 1.0
 
 
@@ -177,7 +174,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
 
 
 def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[int]]:
-    """Numbers of the rows, those together of which one has no size of its own beside the other."""
+    """Numbers of the rows in groups: joined where one has no size of its own."""
     groups: list[list[int]] = []
     sized = [(row.peak_force or 0.0) > (row.place_band or 0.0) for row in rows]
     for i, (start, _) in enumerate(runs):
@@ -188,7 +185,7 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
 
 
 def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list[Contact]:
-    """The rows of all contacts of a measurement, those of short contacts from finer blocks."""
+    """The rows of a measurement, those of short contacts from finer blocks."""
     rows = measurement.rows()
     if brief := [k for k, seconds in enumerate(measurement.found.lasts) if seconds < SHORT]:
         for k, row in zip(brief, fine_rows(free, brief, measurement), strict=False):
@@ -207,7 +204,7 @@ def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
 def fine_rows(
     free: FreeStatistics, brief: Sequence[int], measurement: ContactMeasurement
 ) -> list[Contact]:
-    """Rows of short contacts by blocks that cut their peaks less, none where there are no such."""
+    """Rows of short contacts from finer blocks; none if no finer ones exist."""
     run, found = free.log, measurement.found
     seconds, usual = max(FINE, run.step), free.seconds
     # On a clock that jitters blocks are as short as they may be.
@@ -226,7 +223,7 @@ def fine_rows(
         places=places(run.robot.loaded_chain, blocks.q),
         runs=[spans[k] for k in brief],
     )
-    # Where it is takes no peak, and is known best from the longer blocks.
+    # The place needs no peak: longer blocks show it best.
     locations = [measurement.locations[k] for k in brief]
     fine_free = free._replace(noise=noise)
     return ContactMeasurement.of(some, fine_free, measurement, BENT_SHORT).rows(locations)
@@ -253,7 +250,7 @@ def false_rows(free: FreeStatistics) -> int:
 def limits(
     run: Run, free: FreeStatistics, stops: tuple[float, ...], smallest: float
 ) -> list[Remark]:
-    """What limits the list as a whole; the smallest force as the free part shows it. [N]"""
+    """Limits of the whole list; the smallest force is the free part's. [N]"""
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
     if free.basis != "free motion":
         return found
@@ -268,9 +265,10 @@ def limits(
 
 
 def felt_by(run: Run, torque: Array) -> float:
-    """Median over the log of the force along its best axis that turns no joint further. [N]
+    """Median over the log of the smallest force that the joint torques show. [N]
 
-    Each joint may hide 1.96 standard deviations of its torque (n,) [N·m].
+    Along the best axis, each joint hiding 1.96 standard deviations of its torque (n,)
+    [N·m].
     """
     some = slice(None, None, -(-len(run.q) // POSES))
     J = abs(flange_jacobian(run.robot.loaded_chain, run.q[some])[:, :3])
@@ -295,26 +293,25 @@ def without_list(run: Run) -> ContactList:
     )
 
 
-POSES = 20_000  #: Samples that say what a median pose of a log is.
+POSES = 20_000  #: Most samples for the median over poses.
 #: No joint moves for so long about a contact's start: rest. [s]
 EDGE = 1.0
 #: Share of the time since the first motion that makes a load.
 SHARE = 0.5
-#: Several contacts are one load if their forces add up to more than this share of their
-#: sizes: pushes that follow one another come from different sides.
+#: Several contacts are one load if their forces add up to more than this share of
+#: their sizes: separate pushes come from different sides.
 ONE_SIDE = 0.95
-PIECE = 5.0  #: Length of the pieces that show by their means how far the mean may be off. [s]
+PIECE = 5.0  #: Length of the pieces that show the mean's spread. [s]
 BRIEF = 0.3  #: Longest row that a stop explains. [s]
-#: Moving, then stopped, then at rest, about the start of a row. [s]
-#: A knock on an arm at rest is none of this.
+#: Moving, then stopped, then at rest, about a row's start; not so a knock at rest. [s]
 BEFORE, AT_STOP, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
 RINGING = 0.05  #: Share of the speed before that may be left at rest, while the arm rings.
 
 
 def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
-    """Whether contacts fill more than half of the time since the first motion, with one force.
+    """Whether contacts of one force fill over half of the time since first motion.
 
-    A load neither begins nor ends while the arm rests: what does is a push.
+    A load neither begins nor ends while the arm rests; a push may.
     """
     if not contacts:
         return False
@@ -333,9 +330,9 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 
 
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
-    """One row for contacts that are a load: the mean of the ungated wrench, with its band.
+    """One row for contacts that are a load: mean of the ungated wrench, and band.
 
-    The mean's standard deviation is √(s²/m + (3 % of the mean)²), s the spread of m means
+    Standard deviation of the mean: √(s²/m + (3 % of the mean)²), s the spread of m means
     over 5 s.
     """
     part = free_part(motion)
@@ -383,5 +380,5 @@ def follows_stop(recording: Recording, start: float, stop: float, block: float) 
     if not len(before) or not len(after):
         return False
     rests = after.max(axis=0) < np.maximum(MOVES, RINGING * around.max(axis=0))
-    # A median, since noise must not pass for motion.
+    # A median: noise is no motion.
     return bool(np.median(before, axis=0).max() > MOVES and rests.all())

@@ -1,4 +1,4 @@
-"""From candidates to the rows of the list: peak, band, place, torques, and what others say."""
+"""From candidates to rows of the list: peak, band, place, torques."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ from vftcli.signals.series import covered, resample_columns
 from vftcli.wrench.model_error import ErrorProcess, error_model, error_process
 from vftcli.wrench.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
 
-#: Factors on the model's deviations of force and moment: errors
-#: of friction are not Gaussian. Chosen on simulated seeds.
+#: Factors on the model's deviations of force and moment: friction's errors are not
+#: Gaussian. Chosen on simulated seeds.
 WIDENED = np.repeat([1.3, 2.0], 3)
 BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
 #: Share of its bend that a short contact's peak may hide.
@@ -41,18 +41,18 @@ BENT_SHORT = 0.4
 NORMAL = 1.96  #: Half width of a 95 % band in standard deviations.
 #: Least correlation time of a contact, as a share of its length.
 OWN_TIME = 0.5
-#: The peak of a contact shorter than this [s] is cut by a log of fewer samples a second
-#: [Hz]: a tap's force lasts some 50 ms.
+#: A contact shorter than this [s] loses its peak below so many samples a second [Hz]: a
+#: tap's force lasts some 50 ms.
 SHORT, SLOW = 0.25, 95.0
-#: A contact's place is inferred from the blocks in which its force is above this share of
-#: the peak, within so long [s] of it.
+#: A contact's place comes from the blocks with a force above this share of the peak,
+#: within so long [s] of it.
 CORE, CORE_TIME = 0.5, 0.1
 #: Standard deviation of the moment about the point of a point force. [N·m]
 POINT_MOMENT = 1e-3
 
 
 class ContactLocation(NamedTuple):
-    """Where a contact is, as far as that is known."""
+    """Place of a contact, as far as it is known."""
 
     fits: list[PointFit]  #: Points that fit, the best first.
     joints: int  #: How many the arm has.
@@ -72,7 +72,7 @@ class ContactLocation(NamedTuple):
 
     @property
     def on_wrist(self) -> bool:
-        """Whether a wrench at the flange explains it: at the wrist, or more than a point force."""
+        """Whether a wrench at the flange explains it: wrist, or no point force."""
         return "wrist" in self.parts or not self.is_force
 
     @property
@@ -87,7 +87,7 @@ class ContactLocation(NamedTuple):
     def spread(self, size: float) -> float:
         """Error of the size for the place, 0 of a contact at the wrist alone. [N]
 
-        The root mean square over the points that fit, each as likely as its score makes it.
+        Root mean square over the points that fit, weighted by likelihood.
         """
         if self.parts == ["wrist"] or not self.is_force:
             return 0.0
@@ -124,7 +124,7 @@ class ContactMeasurement:
         like: "ContactMeasurement | None" = None,
         bent: float = BENT,
     ) -> "ContactMeasurement":
-        """Contacts of `free`'s log with their prior and test, or those of another measurement."""
+        """Contacts of `free`'s log; prior and test from `like`, else from the log."""
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = covered(found.runs, len(blocks.t), 1)
         process = error_process(free.noise, blocks, gate)._replace(white=found.log.process.white)
@@ -148,11 +148,11 @@ class ContactMeasurement:
 
     @cached_property
     def locations(self) -> list[ContactLocation]:
-        """Where every contact is, from the torque that is left of the disturbance."""
+        """Where every contact is, from the disturbance less the model error."""
         return [self.location(i) for i in range(len(self.found.runs))]
 
     def rows(self, locations: Sequence[ContactLocation] | None = None) -> list[Contact]:
-        """The contacts, in the order of time, numbered; their places may be known better."""
+        """The contacts, numbered, in the order of time; better places may be given."""
         runs, J, wrenches = self.found.runs, self.found.places[0].jacobian, [*self.wrenches]
         poses = link_poses(self.run.robot.loaded_chain, self.log.blocks.q)
         locations = self.locations if locations is None else locations
@@ -207,7 +207,7 @@ class ContactMeasurement:
         spread = 0.0 if named == "wrist" and lead >= SURE_NATS else location.spread(size)
         remarks = list[Remark]()
         if len(location.parts) > 1 and NORMAL * spread > WIDE * size:
-            # Where another part may have been touched, another force touched it.
+            # Another place means another force.
             least, most = anywhere
             remarks.append(caution("size-goes-with-place", least_N=least, most_N=most))
         rate = 1.0 / self.run.step
@@ -250,7 +250,7 @@ class ContactMeasurement:
         )
 
     def part(self, number: int, location: ContactLocation) -> tuple[ArmPart, ArmPart, float]:
-        """The part of the arm that alone fits, the one that leads, and by how much evidence."""
+        """The only part of the arm that fits, the likeliest, and its lead. [nats]"""
         names, best = arm_parts(self.run.robot.joints), dict[ArmPart, float]()
         for place, nats in zip(self.found.places, self.found.evidence[number], strict=True):
             part = names[place.link]
@@ -262,26 +262,26 @@ class ContactMeasurement:
 
 
 def shows_force(row: Contact, smallest: float) -> bool:
-    """Whether a force is beyond its band, or sure and not below what free motion reads. [N]"""
+    """Whether a force exceeds its band, or is sure and reaches `smallest`. [N]"""
     force, sure = row.peak_force or 0.0, (row.evidence or 0.0) >= LEAST_IN_MOTION
     return force > (row.place_band or 0.0) or (sure and not force < smallest)
 
 
 def quiet_error(d: Array, process: ErrorProcess, hidden: Mask) -> tuple[Array, Array]:
-    """Mean and variance of b given d (K, n) outside of the hidden blocks (K,). (K, n) each"""
+    """Mean and variance of b given d (K, n) outside hidden blocks (K,). (K, n)"""
     mean, covariance = smoothed(error_model(d, process.hiding(hidden)))
     return mean[..., 0], covariance[..., 0, 0]
 
 
 def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
-    """|F| over a contact with its band along the force (K, 3) [N], of covariance (K, 3, 3)."""
+    """|F| of a force (K, 3) [N] of covariance (K, 3, 3), band along the force."""
     size = np.linalg.norm(force, axis=1)
     u = force / np.maximum(size, 1e-12)[:, None]
     return ForceCourse(t, size, NORMAL * np.sqrt(np.einsum("ki,kij,kj->k", u, covariance, u)))
 
 
 def vendor_force(run: Run, J: Array, at: float) -> float | None:
-    """|F| at the flange of the log's own torque estimate at a time, None without one. [N]"""
+    """|F| at the flange of the log's own torque at a time, None without one. [N]"""
     own = run.recording.tau_ext
     if own is None or J.shape[1] < 6:
         return None
@@ -290,7 +290,7 @@ def vendor_force(run: Run, J: Array, at: float) -> float | None:
 
 
 def sensor_force(run: Run, at: float) -> float | None:
-    """|F| of the log's own wrench at a time, None without one or where it is all zeros. [N]"""
+    """|F| of the log's own wrench at a time, None without one or all zeros. [N]"""
     own = run.recording.wrench
     if own is None or not own.any():
         return None

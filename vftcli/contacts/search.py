@@ -1,14 +1,14 @@
-"""The search along one log: candidates of two kinds, split, each with its evidence.
+"""Search along one log: candidates of two kinds, split, each with evidence.
 
 The first kind is found by an interacting two-state filter (IMM) in joint space, for any
 arm and any place of contact. Its mode "free" says d = b + n, its mode "contact"
-d = b + x + n with x of every joint an Ornstein–Uhlenbeck process, as large as a push of
-30 N and 3 N·m at the flange makes; the mode is shared by all joints, the states are each
-joint's own. It runs forward and backward in time, so that ends are as sharp as
-beginnings, for taps and for leans.
+arm and place. Its mode "free" is d = b + n, its mode "contact" d = b + x + n with x of
+every joint an Ornstein–Uhlenbeck process, as large as a push of 30 N and 3 N·m at the
+flange makes. The mode is shared by all joints, the states are each joint's own. It runs
+forward and backward in time for sharp starts and ends, for taps and for leans.
 
-The second is beyond a threshold on a momentum observer: what rises slowly or loads one
-joint alone, which the filter takes for friction.
+The second is beyond a momentum observer's threshold: a slow rise, or one joint loaded
+alone, which looks like friction to the filter.
 
 References:
     H. A. P. Blom, Y. Bar-Shalom, "The interacting multiple model algorithm for systems with
@@ -45,14 +45,14 @@ from vftcli.wrench.model_error import (
 )
 from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior
 
-#: A torque that stays beyond the threshold for longer than this beside a contact is part
-#: of it: the observer's lag is over, friction has turned. [s]
+#: A torque beyond the threshold for longer than this beside a contact is part of it: no
+#: lag of the observer, no turn of friction. [s]
 LASTING = 1.0
 #: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
 #: Correlation time and length, for taps and for leans. [s]
 SEARCHES = (0.3, 0.5), (2.0, 3.0)
-#: Stretches in which a long log is searched, and how much of the log before each. [s]
+#: Warm-up and length of the stretches of a long log. [s]
 WARM_UP, STRETCH = 5.0, 10.0
 BETWEEN = 30.0  #: Mean time from one contact to the next. [s]
 AT_FIRST = 0.1  #: Probability that a log begins in contact.
@@ -120,8 +120,7 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     last = np.minimum(np.maximum(last, first + 1), len(blocks.t))
     beyond = [(a, b) for a, b in np.stack([first, last], axis=1).tolist() if a < b]
     struck = inside.copy()
-    # A load of many seconds looks like a model error: what strikes
-    # the arm before, during and after it is looked for again.
+    # A load of many seconds looks like a model error: the search goes on around it.
     for start, stop in beyond:
         within, t = struck[start:stop], blocks.t[start:stop]
         for a, b in runs_of(~within) if within.any() else ():
@@ -129,7 +128,7 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     apart = [r for r in beyond if not inside[max(r[0] - 1, 0) : r[1] + 1].any()]
     runs = sorted([*runs_of(inside), *apart])
     inside |= covered(runs, len(inside))
-    # What is no candidate keeps its spikes, whatever hypothesis is weighed.
+    # No candidate: spikes stay under every hypothesis.
     spiked = spiked_white(blocks.d, ahead.hiding(inside))
     white = np.where(inside[:, None], ahead.white, spiked)
     log = BlockLog(blocks, ahead._replace(white=white))
@@ -154,8 +153,7 @@ def filtered_contacts(
 ) -> Mask:
     """Blocks that the two-state filter calls contact. (K,)
 
-    They are the runs in which the mean of the log odds of both directions is positive,
-    one of them sure.
+    Runs with a positive mean of both directions' log odds, one of them sure.
     """
     size = np.sqrt(np.einsum("kij,i->kj", J**2, PUSH**2))
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
@@ -171,10 +169,10 @@ def filtered_contacts(
 def two_state_odds(
     blocks: Blocks, processes: tuple[ErrorProcess, ErrorProcess], size: Array
 ) -> list[tuple[Array, Array]]:
-    """Log odds of contact of the search for taps and of that for leans, forward and backward.
+    """Log odds of contact, forward and backward, for taps and for leans.
 
-    A long log is searched in stretches side by side, each after `WARM_UP` seconds of the
-    log before it, in which the filter forgets that it has just begun.
+    A long log is searched in stretches side by side, each after `WARM_UP` seconds, in
+    which the filter forgets its start.
     """
     step, usual, many = steps(blocks), np.median(blocks.length), len(SEARCHES)
     step[0] = usual
@@ -193,7 +191,7 @@ def two_state_odds(
 
 
 def stretches_of(count: int, step: float) -> tuple[list[int], int, int]:
-    """First blocks of the stretches that are searched, their warm-up and their length. [blocks]"""
+    """First blocks of the searched stretches, warm-up and length. [blocks]"""
     warm, own = max(round(WARM_UP / step), 1), max(round(STRETCH / step), 2)
     if count <= warm + 2 * own:
         return [0], 0, count
@@ -222,7 +220,7 @@ def filtered_odds(
     blocks, count, n = d.shape
     time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
     kept = np.exp(-dt[..., 0] / time)[..., None]
-    # Behind a long gap no mode is certain: exactly 1 leaves 0/0.
+    # Behind a long gap exactly 1 leaves 0/0.
     begins, ends = (np.minimum(-np.expm1(-dt[..., 0] / s), 1.0 - 1e-9) for s in (BETWEEN, lasts))
     often = np.log(spikes) - 0.5 * np.log(SPIKE), np.log1p(-spikes)
     # A stretch begins with what b is like anywhere.
@@ -248,8 +246,7 @@ def imm_predict(
 ) -> ImmState:
     """The states of each mode a block later, moments matched.
 
-    B keeps the share f and gains variance; x keeps the share g and wanders within its
-    variance.
+    State b keeps the share f and gains variance; x keeps g, its variance is stationary.
     """
     f, added, g = moves
     p1 = 1.0 / (1.0 + np.exp(-state.odds))
@@ -270,7 +267,7 @@ def imm_predict(
 
 
 def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Array]) -> ImmState:
-    """The states with a block's disturbance in them; a joint that spikes tells a 40th."""
+    """The states updated by a block's disturbance; a spike counts a 40th."""
     own = state.bx + state.xx
     # Covariance of b, as each mode has it, with d. (2, S, n)
     cross = np.stack([state.bb[0], state.bb[1] + state.bx])
@@ -296,7 +293,7 @@ def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Arra
 
 
 def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -> list[BlockSpan]:
-    """A contact's blocks, split where force and joint torque are gone for a while between peaks."""
+    """A contact's blocks, split where force and torque pause between peaks."""
     inside = wrench.within(run)
     size = inside.size
     torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
@@ -312,7 +309,7 @@ def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -
 
 
 def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> list[BlockSpan]:
-    """A stretch of a contact, split at valleys of force and torque between different directions."""
+    """A contact's stretch, split at valleys between forces of different directions."""
     span = slice(*piece)
     at, there, load = t[span], force[span], torque[span]
     size = np.linalg.norm(there, axis=1)

@@ -1,6 +1,6 @@
-"""Logs beside thresholds: what a robot compares with them, false alarms, contacts detected.
+"""Logs against thresholds: signals, false alarms, detected contacts.
 
-The log's own estimate is checked, as a robot does it; else a momentum observer of 10 1/s runs.
+They check the log's own estimate, as a robot does; else a momentum observer of 10 1/s.
 """
 
 from collections.abc import Sequence
@@ -36,13 +36,13 @@ GAIN = 10.0  #: Of the momentum observer. [1/s]
 
 
 def compared_signals(run: Run) -> ComparedSignals:
-    """What a robot would compare along a log.
+    """Signals that a robot would compare along a log.
 
-    The wrench is the log's own where the robot made it; one in sensor axes is an
-    instrument's, which no threshold of the robot sees. Else it is that of the torque, by
-    least squares in base axes about the flange point.
+    The wrench is the log's own where the robot made it (sensor axes are an instrument's,
+    unseen by the robot), else by least squares from the torque, in base axes about the
+    flange point.
     """
-    # The robot's own estimate asks for no model, which else would check.
+    # Without a model nothing else checks the joints.
     log = run.recording
     check_joints(log, run.robot)
     vendor, stated, own = log.tau_ext, log.wrench_frame, log.wrench
@@ -72,11 +72,11 @@ class CheckedContact(NamedTuple):
 
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
-    peak_force: float  #: Its largest force, NaN where that is not known. [N]
+    peak_force: float  #: Its largest force, NaN if unknown. [N]
     #: From its start to the first alarm; NaN where there is none, or no truth. [s]
     delay: float
-    by: str  #: The joint or axis that raises the alarm, "" where there is none.
-    #: Whether one from before was still on.
+    by: str  #: Joint or axis of the alarm, "" without one.
+    #: Whether an earlier alarm was still on.
     already_above: bool = False
 
 
@@ -86,10 +86,9 @@ class ThresholdDetection(NamedTuple):
     log: str  #: The log.
     contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
     remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
-    #: What says where the contacts are, None where nothing does: then the alarms
-    #: themselves are listed as contacts.
+    #: Source of the true contacts; without one (None) the alarms count as contacts.
     reference: str | None = None
-    #: Alarms that touch no contact, None where nothing says where they are.
+    #: Alarms that touch no contact, None without a reference.
     false_alarms: int | None = None
     untouched_h: float = np.nan  #: Time without contact, NaN if not known. [h]
 
@@ -110,12 +109,12 @@ class ThresholdDetection(NamedTuple):
 
     @property
     def smallest_detected(self) -> float:
-        """Peak force of the weakest contact that is detected, NaN if none's is known. [N]"""
+        """Peak force of the weakest detected contact, NaN if unknown. [N]"""
         return float(np.fmin.reduce([c.peak_force for c in self.detected], initial=np.nan))
 
     @property
     def largest_missed(self) -> float:
-        """Peak force of the hardest contact that is not detected, NaN if there is none. [N]"""
+        """Peak force of the hardest missed contact, NaN if there is none. [N]"""
         missed = [c.peak_force for c in self.contacts if not (c.by or c.already_above)]
         return float(np.fmax.reduce(missed, initial=np.nan))
 
@@ -126,10 +125,10 @@ def check_contacts(
     reference: ExternalTorque | None,
     wrench: Wrench | None,
 ) -> ThresholdDetection:
-    """What thresholds would have done along a log: every joint and every axis may raise the alarm.
+    """Contacts of a log that a joint or an axis detects at the thresholds.
 
-    It is, if a signal passes its threshold while it lasts; one beyond it since before says
-    nothing. Contacts before the settling are left out.
+    Detected: a signal passes its threshold during the contact; one beyond it since before
+    says nothing. Contacts before the settling are left out.
     """
     t, duration = signals.t, signals.recording.duration - SETTLING
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])
@@ -161,7 +160,7 @@ def checked(
     size: Array,
     alarms: Sequence[tuple[str, ContactInterval]],
 ) -> CheckedContact:
-    """A contact with its peak force, and who raises the first of the alarms within it."""
+    """A contact with its peak force and the first alarm within it."""
     force = size[(t >= contact.start) & (t <= contact.stop)]
     peak = float(np.fmax.reduce(force[np.isfinite(force)], initial=np.nan))
     begun = [
@@ -200,9 +199,9 @@ def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedA
 
 
 def left_out(free: Sequence[ComparedSignals], rate: float) -> tuple[CountedAlarms, ...]:
-    """Every free log at the thresholds of the others: what a new day would have brought.
+    """False alarms of every free log at the thresholds of the others.
 
-    None where there is one log alone, or the others are all too short.
+    None of a single log, or if the others are all too short.
     """
     others = ([*free[:k], *free[k + 1 :]] for k in range(len(free)))
     return tuple(

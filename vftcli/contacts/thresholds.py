@@ -37,7 +37,7 @@ NORMAL = 1.96  #: Half width of a normal's 95 % in standard deviations.
 
 
 def block_maxima(t: Array, level: Array) -> Array:
-    """The largest value of every known 1 s block, the settling left out, NaN ignored. (B,)"""
+    """Largest value of every known 1 s block without settling, NaN ignored. (B,)"""
     used = t >= t[0] + SETTLING
     if np.count_nonzero(used) < 2:
         return np.zeros(0)
@@ -50,7 +50,7 @@ def block_maxima(t: Array, level: Array) -> Array:
 
 
 def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
-    """When a level (T,) exceeds 1, the settling left out; NaN, where it is not known, does not."""
+    """Times of a level (T,) above 1, without the settling; NaN is not above."""
     above = (np.nan_to_num(level, nan=0.0) > 1.0) & (t >= t[0] + SETTLING)
     return contact_intervals(t, above, gap=APART)
 
@@ -84,9 +84,9 @@ class Tail(NamedTuple):
     def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
         """The level passed at a rate [1/h], u + e ln(λ/rate), and the ends of its 95 %.
 
-        They are those of e, (1 ± 1.96/√k) e, the lower one u at the least. What happens
-        more often than λ is no matter of the tail: of m times in all it is the m-th
-        largest maximum, of m its 95 %, m ± 1.96 √m.
+        They are those of e, (1 ± 1.96/√k) e, the lower one u at the least. Above λ the tail is
+        not used: of m events in all the level is the m-th largest maximum, of m its 95 %,
+        m ± 1.96 √m.
         """
         if rate <= self.rate:
             step = self.excess * np.log(self.rate / rate)
@@ -117,7 +117,7 @@ DUE = 3.0
 LEAST = 1e-9  #: In place of a threshold of zero, so that there is a level. [N·m, N]
 #: A log of this length has enough readings to tell its own tail. [s]
 LONG_ENOUGH = SETTLING + 5 * ENOUGH * BLOCK
-SELDOM = 0.5  #: A wrench that is known in less than this share of the samples is said to be.
+SELDOM = 0.5  #: A wrench known in a smaller share of samples gets a remark.
 
 
 class ComparedSignals(NamedTuple):
@@ -174,8 +174,8 @@ class SignalThreshold(NamedTuple):
     interval: tuple[float, float]  #: 95 % of it.
     rate: float  #: The false alarms that are this signal's share. [1/h]
     log: str  #: The free log that it comes from: the one that needs the highest.
-    #: That log's tail; None where the log is too short for one, and its largest reading
-    #: is higher than what the others' tails say.
+    #: That log's tail; None of a log that is too short for one and reads higher than the
+    #: others' tails.
     tail: Tail | None
 
     @property
@@ -185,12 +185,12 @@ class SignalThreshold(NamedTuple):
 
     @property
     def level(self) -> float:
-        """The threshold of an axis or of the force's size, NaN of one that is wide. [N, N·m]"""
+        """The threshold of an axis or of the force's size, NaN if wide. [N, N·m]"""
         return float("nan") if self.is_wide else self.value
 
     @property
     def more_share(self) -> float:
-        """Share of its log's motion that is missing to narrow the interval to the value."""
+        """Share of more motion that narrows the interval to the value."""
         if self.tail is None or not self.is_wide:
             return 0.0
         width = (self.interval[1] - self.interval[0]) / max(self.value, LEAST)
@@ -219,9 +219,9 @@ class Thresholds(Shown):
 
     @property
     def named(self) -> tuple[tuple[str, str, float, SignalThreshold], ...]:
-        """Name, unit, level and threshold of every joint and axis, and of the force's size.
+        """Name, unit, level, threshold of joints, axes and the force's size.
 
-        The level is NaN of an axis that has none.
+        An axis without a threshold has the level NaN.
         """
         return (
             *((f"J{j}", "N·m", one.value, one) for j, one in enumerate(self.joints, start=1)),
@@ -235,7 +235,7 @@ class Thresholds(Shown):
             yield name, level, unit, joined(one.interval), one.log
 
     def to_polars(self) -> "pl.DataFrame":
-        """One row a signal: its threshold, null where there is none, interval, unit, rate, log."""
+        """One row a signal: threshold (null without one), interval, unit, rate, log."""
         import polars as pl
 
         names = ("signal", "threshold", "low", "high", "unit", "rate_per_h", "log")
@@ -245,7 +245,7 @@ class Thresholds(Shown):
         )
 
     def level(self, name: str, signals: ComparedSignals) -> Array:
-        """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)"""
+        """A set's signals in multiples of their thresholds, those without left out. (T, k)"""
         values = [one.value if name == "joints" else one.level for one in getattr(self, name)]
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
@@ -257,9 +257,8 @@ class Thresholds(Shown):
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     """Thresholds that motion like that of some logs passes at a rate.
 
-    Every signal of a set of n gets rate/n [1/h]. Each threshold is that of the log that needs
-    the highest. A log too short for a tail counts by its largest reading, where another is long
-    enough.
+    Every signal of a set of n gets rate/n [1/h]; the log that needs the highest threshold
+    sets it. A log too short for a tail counts by its largest reading beside a longer one.
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")
@@ -293,7 +292,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
 def thresholds_of_set(
     free: Sequence[ComparedSignals], field: str, rate: float
 ) -> tuple[SignalThreshold, ...]:
-    """The threshold of every signal of a set, none if no log tells one; see `find_thresholds`."""
+    """Thresholds of a set's signals, none if no log shows one; `find_thresholds`."""
     signals = {log.recording.name: (log.t, abs(getattr(log, field)).T) for log in free}
     count = getattr(free[0], field).shape[1]
     share, found = rate / max(count, 1), []
@@ -302,7 +301,7 @@ def thresholds_of_set(
         tails = {name: tail for name, own in maxima.items() if (tail := tail_of(own)) is not None}
         if not tails:
             return ()
-        # A tail of few readings is a guess, which others may know better.
+        # A tail of few readings is a guess: others come first.
         sure = {name: tail for name, tail in tails.items() if tail.size >= ENOUGH} or tails
         levels = [
             SignalThreshold(*tail.threshold(share), share, name, tail)
@@ -318,14 +317,14 @@ def thresholds_of_set(
 
 
 def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> list[Remark]:
-    """What the logs can bear: who made the estimate, how far it is extrapolated, what lacks."""
+    """Remarks on the logs: source, extrapolation, missing signals."""
     first = free[0]
     vendor = fact("thresholds-of-vendor")
     remarks = [vendor if first.of_vendor else caution("thresholds-of-observer")]
     if first.frame:
         code = "thresholds-of-logged-wrench" if first.logged_wrench else "thresholds-of-torques"
         remarks.append(fact(code, frame=first.frame))
-    # How many readings there are is the same for every joint.
+    # Every joint has equally many readings.
     tails = (tail_of(block_maxima(signals.t, signals.torque[:, 0])) for signals in free)
     longest = max(filter(None, tails), key=lambda tail: tail.hours)
     if longest.hours < (need := DUE / rate):

@@ -1,17 +1,15 @@
-"""Windows of a log in which its contacts are weighed, and their wrench is smoothed.
+"""Windows of a log: evidence of its contacts, and their smoothed wrench.
 
-A contact may be at the flange or on a link: joints behind its place do not feel it, and
-nothing else tells where it is. Outside its contact a wrench is pinned to zero, so that
-the model error is learned from the quiet blocks on both sides of a contact, and the
-contact is measured against that. What other contacts load says nothing of it. The prior
-of the wrench is learned from the contacts.
+A contact may be at the flange or on a link; only the joints behind its place, which do
+not feel it, show where. Outside its contact a wrench is zero, so that the quiet blocks
+on both sides show the model error, and the contact is measured against it. Other
+contacts are hidden. The prior of the wrench is learned from the contacts.
 
-Evidence is how much better a contact explains a stretch of log than nothing does, place
-by place: around every candidate the likelihood of the disturbance is found under
-"nothing", under a wrench at the flange and under a force and moment on each link, the
-forward pass of the smoother with the Jacobian of the place. It is the best place's less
-that of nothing, in nats; the lead of a part of the arm is how far its best place is ahead
-of the best of every other part.
+Evidence is the log likelihood of a stretch with a contact less that without, in nats:
+around every candidate the disturbance's likelihood under "nothing", a wrench at the
+flange, and a force and moment on each link, by the smoother's forward pass with the
+Jacobian of the place. The best place counts; a part of the arm leads by its best
+place's evidence less the best of every other part.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +27,7 @@ from vftcli.wrench.smoother import BlockLog, BlockSpan, Lane, WrenchPrior, assem
 
 ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
 POINTS = 10  #: Points along each link that a force is tried at.
-#: The first link that is tried: on link 1 a force loads one joint, as friction does.
+#: First link that is tried: on link 1 a force loads one joint, as friction does.
 FIRST_LINK = 2
 #: Lever of a force about the flange or a link's middle. [m]
 LEAST_LEVER = 0.1
@@ -60,10 +58,10 @@ def places(chain: Chain, q: Array) -> list[ContactPlace]:
 
 
 def arm_parts(joints: int) -> dict[int, ArmPart]:
-    """Link → part of the arm, 0 the flange: what looks like the flange is the wrist.
+    """Link → part of the arm; 0 is the flange, which belongs to the wrist.
 
     Of six joints links 4 to 6 are the wrist and link 3 the forearm; of seven joints links
-    6 and 7, and 4 and 5. What comes before is the upper arm.
+    6 and 7, and 4 and 5. The links before are the upper arm.
     """
     forearm, wrist = (3, 4) if joints <= 6 else (4, 6)
     links = range(1, joints + 1)
@@ -88,12 +86,11 @@ class PointFit(NamedTuple):
 
 
 def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFit]:
-    """A force at each of the points of the links that fit within `ALIKE`, the best first.
+    """Forces at points of the links that fit within `ALIKE`, the best first.
 
-    `POINTS` a link are tried, from `FIRST_LINK` on.
-
-    F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows of the point's Jacobian over sd: joints behind
-    the point count with a prediction of zero, which is what tells the place.
+    `POINTS` a link are tried, from `FIRST_LINK` on. F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows
+    of the point's Jacobian over sd. Joints behind the point predict zero: so the torque
+    shows the place.
     """
     poses, n = link_poses(chain, q[None]), chain.joints
     links = np.arange(FIRST_LINK, n + 1).repeat(POINTS)
@@ -123,17 +120,17 @@ START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
 #: Smallest and largest standard deviation. [N], [N·m]
 FORCES, MOMENTS = ((3.0, 300.0), (0.1, 50.0))
-#: Evidence over nothing, which may spike. [nats] In 299 s of real free
-#: motion one reversal had 15, all else but abrupt stops below 6.
+#: Evidence over nothing, which may spike. [nats] In 299 s of real free motion one
+#: reversal had 15, all else but abrupt stops below 6.
 LEAST_EVIDENCE = 12.0
-#: The same in motion without free motion known. [nats] Model errors
-#: reach 82 on six arms; 75 to 200 find the same contacts.
+#: The same in motion without known free motion. [nats] Model errors reach 82 on six
+#: arms; 75 to 200 find the same contacts.
 LEAST_IN_MOTION = 120.0
 LEAST_FORCE = 10.0  #: Smallest standard deviation of a force that is tried. [N]
 LONGEST_TIME = 1.0  #: Longest correlation time of a wrench that comes and goes. [s]
 SIZES = 1.0, 3.0  #: Multiples of the standard deviation that are tried.
-#: Longer candidates may be a wrench that stays, as a load's, with
-#: this correlation time: one that wanders pays for each block. [s]
+#: Longer candidates may also be a steady wrench, as a load's, of this correlation time:
+#: one that wanders pays for each block. [s]
 LASTING, STEADY_TIME = 1.5, 100.0
 
 
@@ -174,7 +171,7 @@ def contact_lanes(
     priors: Sequence[WrenchPrior | None],
     margin: float = MARGIN,
 ) -> list[Lane]:
-    """A lane for every run of blocks, the others' hidden, with J (K, 6, n) and prior of each."""
+    """A lane for every run of blocks, the others hidden; jacobians (K, 6, n)."""
     t, own = log.blocks.t, {}
     every = covered(runs, len(t), 1)
     for run in set(runs):
@@ -185,7 +182,7 @@ def contact_lanes(
 
 
 def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
-    """Numbers of lanes that are about equally long, so that little is padded."""
+    """Numbers of lanes of about equal length, so that little is padded."""
     length = np.array([stop - start for start, stop in (lane.window for lane in lanes)])
     left = length.argsort(kind="stable")
     while left.size:
@@ -207,9 +204,9 @@ def smooth_lanes(log: BlockLog, lanes: Sequence[Lane]) -> list[WindowWrench]:
 
 
 def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
-    """Log likelihood ln p(d) of every lane; only lanes of one window may be compared. [nats]
+    """Log likelihood ln p(d) of every lane, comparable within one window. [nats]
 
-    Where nothing touches, in lanes without prior, an innovation in the gate may be a spike.
+    Without prior nothing touches, and an innovation in the gate may be a spike.
     """
     found = np.empty(len(lanes))
     for batch in batches(lanes):
@@ -217,7 +214,7 @@ def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
         model = assembled(log, some)
         bare = some[0].prior is None
         nats = untouched_likelihood(log, some, model) if bare else log_likelihood(model)
-        # What the blocks behind the shorter lanes take off.
+        # Less the blocks behind the shorter lanes.
         length = np.array([lane.window[1] - lane.window[0] for lane in some])
         padding = 0.5 * (length.max() - length) * log.blocks.d.shape[1] * np.log(UNKNOWN)
         found[batch] = nats + padding
@@ -225,7 +222,7 @@ def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
 
 
 def untouched_likelihood(log: BlockLog, lanes: Sequence[Lane], model: LinearModel) -> Array:
-    """Log likelihood of lanes in which nothing touches, each joint for itself. (L,) [nats]"""
+    """Log likelihood of untouched lanes, each joint for itself. (L,) [nats]"""
     often = np.zeros_like(model.d)
     for place, lane in enumerate(lanes):
         span = slice(*lane.window)
@@ -242,7 +239,7 @@ def untouched_likelihood(log: BlockLog, lanes: Sequence[Lane], model: LinearMode
 def learn_prior(
     log: BlockLog, jacobian: Array, runs: Sequence[BlockSpan], prior: WrenchPrior, rounds: int
 ) -> WrenchPrior:
-    """The prior by expectation and maximisation: τ_w by likelihood, σ_f and σ_m by the mean."""
+    """The prior by expectation and maximisation: τ_w by likelihood, σ by the mean."""
     for _ in range(rounds):
         priors = [prior._replace(time=time) for time in TIMES for _ in runs]
         each = [jacobian] * len(priors)
@@ -262,7 +259,7 @@ def learn_prior(
 def evidence(
     log: BlockLog, places: Sequence[ContactPlace], runs: Sequence[BlockSpan], prior: WrenchPrior
 ) -> Array:
-    """Evidence ln p(d | contact there) − ln p(d | nothing) of the best size. (C, places) [nats]"""
+    """Evidence of the best size: ln p(d | contact) − ln p(d). (C, places) [nats]"""
     force, time = max(prior.force, LEAST_FORCE), min(prior.time, LONGEST_TIME)
     moving = [(time, size * force) for size in SIZES]
     owners, priors = [], []
