@@ -1,1 +1,1 @@
-"""Admittance: the paper's variable-parameter law, on recorded forces and in closed loop."""
+"""The paper's variable-parameter admittance law, replayed and in closed loop."""

@@ -1,4 +1,4 @@
-"""What a user may choose of an admittance replay: its controllers, and a release from rest."""
+"""A user's choices for an admittance replay: controllers, and a release from rest."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,7 +27,7 @@ def listed(text: str, option: str) -> tuple[float, ...]:
 
 
 class ControlChoice(Choice):
-    """Which controllers are compared, and with which parameters."""
+    """The controllers of a comparison, and their parameters."""
 
     GROUP = "The controller"
 
@@ -107,14 +107,14 @@ class ControlChoice(Choice):
 
     @classmethod
     def takes(cls, name: str) -> bool:
-        """Whether a name is a setting of the replay, or a parameter as ``rz.threshold``."""
+        """Whether a name is a setting or a parameter, as ``rz.threshold``."""
         from vftcli.admittance.law import GROUPS
 
         section, dot, _ = name.rpartition(".")
         return super().takes(name) or not dot or section in GROUPS
 
     def start_pose(self, robot: "Robot") -> "Array":
-        """Joint positions of a release's target pose: as set, else the robot file's. (n,) [rad]"""
+        """Joints at a release's target pose: as set, else the robot file's. (n,) [rad]"""
         import numpy as np
 
         start = self.start or robot.admittance.get("start")

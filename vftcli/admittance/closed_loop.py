@@ -1,4 +1,4 @@
-"""The whole loop in simulation: hand, arm and servo, sensing, observer, Algorithm 1, joints, servo.
+"""The closed loop in simulation: hand, arm, servo, sensing, observer and law.
 
 The simulator's arm is seen as a log would hold it. The servo holds a command for a control
 period. Latencies are from the true force; Figs 6 and 9 time them from detection to motion, and
@@ -36,11 +36,11 @@ from vftcli.simulation.trajectories import Reference, plan
 from vftcli.wrench.solvers import wrench_of
 
 FARTHEST = 3.0  #: A flange this far from its start has run away. [m]
-STARTED = 5e-3  #: Displacement of the flange at which it is said to have moved. [m]
-TURNED = 0.02  #: Rotation of the flange at which it is said to have turned. [rad]
+STARTED = 5e-3  #: A flange has moved from this displacement on. [m]
+TURNED = 0.02  #: A flange has turned from this rotation on. [rad]
 #: Speeds below which the flange counts as at rest when a force comes. [m/s, rad/s]
 STILL = (0.005, 0.05)
-REST = 1.0  #: A contact begins where the force had been below the threshold for this long. [s]
+REST = 1.0  #: A contact begins after this time below the threshold. [s]
 
 
 class ClosedLoop(NamedTuple):
@@ -67,23 +67,22 @@ class ClosedLoop(NamedTuple):
 
     @property
     def wrench(self) -> Wrench:
-        """The wrench the controller acted on, to be replayed: the paper's way to Figs 7 and 10."""
+        """Wrench the controller acted on, for a replay as in the paper's Figs 7 and 10."""
         return Wrench(name="controller", t=self.t, values=self.estimate, frame="base")
 
 
 class OnlineKalman:
-    """A disturbance Kalman filter run sample by sample at a constant rate, from x̂⁰ = [p⁰; 0].
+    """Disturbance Kalman filter, sample by sample at a constant rate, x̂⁰ = [p⁰; 0].
 
-    A mean torque over the sampling interval enters as it is: the trapezoid over two is
-    half a sample late, which turns every jerk of the arm into a false force. An
-    instantaneous one enters by the trapezoid, as the rest of μ: the numbers are those of
-    `KalmanObserver.estimate`.
+    A torque averaged over the sampling interval enters as it is: the trapezoid is half a
+    sample late, and makes a false force of every jerk. An instantaneous one enters by the
+    trapezoid, like the rest of μ, as in `KalmanObserver.estimate`.
     """
 
     def __init__(
         self, observer: KalmanObserver, robot: Robot, step: float, *, averaged: bool
     ) -> None:
-        """Prepare for samples every `step` [s]; `averaged`: torque is its mean over the step."""
+        """Samples come every `step` [s]; `averaged`: torque is the mean over a step."""
         import pinocchio as pin
 
         n = robot.joints
@@ -115,9 +114,9 @@ class OnlineKalman:
         return self.tau
 
     def wrench(self, q: Array) -> Array:
-        """F = pinv(J_Fᵀ) τ̂ (46) at the flange, base axes; zero where the pose cannot tell it. (6,)
+        """Flange force pinv(J_Fᵀ) τ̂ of (46), base axes; zero if unknown. (6,) [N, N·m]
 
-        A controller that knows no force must not move by it.
+        An unknown force must not move the arm.
         """
         pin, frame = self.pin, self.model.getFrameId("flange")
         J = pin.computeFrameJacobian(self.model, self.data, q, frame, pin.LOCAL_WORLD_ALIGNED)
@@ -149,7 +148,7 @@ class Loop:
         self.reached, self.zeros, self.zero = True, list[Array](), np.zeros(6)
 
     def sample(self) -> None:
-        """Read positions, velocities and drive torques, noise and all, and run the observer."""
+        """Run the observer on one noisy sample of positions, velocities and torques."""
         arm = self.arm
         q, dq, torque = (size * self.rng.standard_normal(len(size)) for size in self.noise)
         self.q_measured = rounded(arm.q + q, arm.scenario.sensing.position_step)
@@ -209,9 +208,9 @@ def loop_of(
     observers: ObserverChoice,
     **how: Any,  # noqa: ANN401 - of `run_closed_loop`
 ) -> tuple[ClosedLoop, Robot]:
-    """A scenario with the last of the controllers in the loop, on the first observer; its arm.
+    """A closed-loop run of the last controller on the first observer, and its arm.
 
-    The rest is as `run_closed_loop` has it; the arm holds still while nothing touches it.
+    As `run_closed_loop`; the arm holds still while nothing touches it.
     """
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
@@ -232,10 +231,11 @@ def run_closed_loop(
     zero: tuple[float, float] | None = None,
     anyway: bool = False,
 ) -> ClosedLoop:
-    """A scenario's contacts against an arm under admittance control, from the trajectory's start.
+    """A closed-loop run: a scenario's contacts on an arm under admittance control.
 
-    The torque is the "average" over the sampling interval, or the last "instant". In the
-    unloaded span `zero` [s] the arm holds still, and its mean wrench is removed.
+    It begins at the trajectory's start. The torque is the "average" over the sampling
+    interval, or the last "instant". In the unloaded span `zero` [s] the arm holds still, and
+    its mean wrench is removed.
     """
     if torque not in {"average", "instant"}:
         raise ParameterError(f"torque is {torque!r}; it is average or instant")
@@ -278,7 +278,7 @@ def run_closed_loop(
 
 
 def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
-    """The scenario's arm at rest at its start, with an inner step that divides the period."""
+    """The scenario's arm at rest at its start; its inner step divides the period."""
     robot = load_robot(scenario.robot)
     count = period / scenario.step
     if abs(count - round(count)) >= 1e-9:
@@ -310,7 +310,7 @@ class Replayed(NamedTuple):
 
 
 class Latency(NamedTuple):
-    """One application of a force, all in seconds; None where it did not happen."""
+    """Times of one application of a force [s]; None where it did not happen."""
 
     axis: int  #: Index of the axis on which the true force passes its threshold first.
     force: float  #: When it passes.
@@ -349,7 +349,7 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
         return np.asarray(np.linalg.norm(moved - moved[since], axis=1) > start)
 
     def until(flags: Mask, row: int | None) -> float | None:
-        """Time from a row to the first from there on that is set, None without any. [s]"""
+        """Time from a row to the first set from there on, or None. [s]"""
         found = first_true(flags, row)
         return None if row is None or found is None else (t[found] - t[row])
 

@@ -1,4 +1,4 @@
-"""From flange poses to joint positions: damped least squares, each sample started from the last."""
+"""Joint positions from flange poses, by damped least squares sample by sample."""
 
 from typing import NamedTuple
 
@@ -44,7 +44,7 @@ class JointPath(NamedTuple):
 
 
 def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:
-    """Joint positions for flange deviations (T, N, 6) [m, rad] from a start pose (n,) [rad].
+    """Joints along flange deviations (T, N, 6) [m, rad] from `start` (n,) [rad].
 
     Deviations are in base axes, rotation vectors last, a `period` [s] apart.
     """
@@ -71,7 +71,7 @@ def follow(robot: Robot, start: Array, x: Array, period: float) -> JointPath:
 def try_pose(
     solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
 ) -> tuple[Array, bool]:
-    """Joints at a pose from a guess, and if that fails or leaps, from the joints before it."""
+    """Joints at a pose, from a guess or, if that fails or leaps, from `last`. (n,)"""
     if not np.isfinite(point).all():
         return last, False
     found, good = solver.reach(rotation, point, guess)

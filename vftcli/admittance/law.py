@@ -1,4 +1,4 @@
-"""The variable-parameter law (47), its parameters (Tables III and IV), energy, and stability.
+"""The variable-parameter law (47): parameters (Tables III, IV), energy, stability.
 
 In the recovery phase an axis has K = αK_d e^{|v|/v₀}, M = M_d e^{−|v|/v₀}/α, B = 2ξ√(MK),
 so that B = 2ξ√(M_d K_d) is constant. The traditional controller has α = 1, no v in K and
@@ -63,11 +63,9 @@ class Admittance:
     stiffness: Array  #: K_d.
     alpha: Array  #: α of (47).
     threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
-    #: ξ of (47), which the paper does not print; given as NaN it becomes B_d/(2√(M_d K_d)),
-    #: the damping ratio of the drag phase.
+    #: ξ of (47), not in the paper; NaN: the drag phase's, B_d/(2√(M_d K_d)).
     xi: Array | float = np.nan
-    #: Share of the threshold by which the force has to fall below it before an axis that
-    #: is dragged recovers; 0 is the paper's.
+    #: A dragged axis recovers below 1 − this share of the threshold; the paper's is 0.
     hysteresis: Array | float = 0.0
     speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
     speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
@@ -109,7 +107,7 @@ def from_table(
     robot: str,
     settings: Mapping[str, Mapping[str, Any]],
 ) -> Admittance:
-    """The parameters of a robot file's ``[admittance]``, over which the user's settings win.
+    """Parameters of a robot file's ``[admittance]``; the user's settings go first.
 
     Settings are section (a key of `GROUPS`) → parameter → value.
 
@@ -174,7 +172,7 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Controller:
-    """One controller of a comparison: what its recovery phase is made of. Arrays are (6,)."""
+    """One controller of a comparison: its recovery phase. Arrays are (6,)."""
 
     kind: str  #: "traditional" or "variable".
     alpha: Array  #: α; 1 for the traditional one.
@@ -184,7 +182,7 @@ class Controller:
 
     @property
     def name(self) -> str:
-        """A label: ``traditional``, ``α = 1.6``, or ``α = 6 / 3`` for position and rotation."""
+        """Label: ``traditional``, ``α = 1.6``, or ``α = 6 / 3`` (position / rotation)."""
         if self.kind == "traditional":
             return "traditional"
         distinct = list(dict.fromkeys(f"{a:g}" for a in self.alpha))
@@ -212,9 +210,9 @@ class Controller:
 
     @cached_property
     def escape(self) -> Array:
-        """Largest deviation from which a release at rest without a speed limit returns. (6,)
+        """Largest deviation from which a release without a speed limit returns. (6,)
 
-        Infinite for the traditional controller. [m, rad]
+        From rest; infinite for the traditional controller. [m, rad]
         """
         p = self.parameters
         distinct, each = np.unique(self.xi, return_inverse=True)
@@ -224,7 +222,7 @@ class Controller:
             return factor * scale / self.rate
 
     def complaints(self, size: Array | float = np.inf) -> Iterator[Remark]:
-        """Its instabilities, in releases from rest of a size (6,) [m, rad] or in all motion."""
+        """Instabilities of releases from rest of a size (6,) [m, rad], or of all motion."""
         where, limited = Where(self.name), np.isfinite(self.parameters.speed_limit)
         # Without a speed limit it is infinite; the escape says why.
         at_limit = np.where(limited, self.recovery, 0.0)
@@ -245,7 +243,7 @@ def traditional(parameters: Admittance) -> Controller:
 
 
 def variable(parameters: Admittance, alpha: float | None = None) -> Controller:
-    """The variable law (47) in the recovery phase, with another α than its parameters'."""
+    """The variable law (47) in the recovery phase, with another α if given."""
     # B_dva = 2ξ√(M_dva K_dva) = 2ξ√(M_d K_d): the same at every speed and every α.
     damping = 2.0 * parameters.xi * np.sqrt(parameters.mass * parameters.stiffness)
     rate = 1.0 / np.asarray(parameters.speed_scale)
@@ -256,7 +254,7 @@ def variable(parameters: Admittance, alpha: float | None = None) -> Controller:
 def controllers(
     parameters: Admittance, kind: str | None = None, alphas: Sequence[float] = ()
 ) -> tuple[Controller, ...]:
-    """The controllers of a comparison, the traditional one first; only those of one kind."""
+    """Controllers of a comparison, the traditional one first; of one kind if given."""
     every = [variable(parameters, alpha) for alpha in dict.fromkeys(alphas) or (None,)]
     return tuple(c for c in (traditional(parameters), *every) if kind in {None, c.kind})
 
@@ -284,7 +282,7 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
 
 
 def printed_energy(controller: Controller, x: Array, v: Array) -> Array:
-    """V = ½M_dva v² + ½K_dva x² of (52), axis by axis: its proof drops Ṁ and K̇. (…, 6) [J]"""
+    """V = ½M_dva v² + ½K_dva x² of (52), per axis; its proof drops Ṁ, K̇. (…, 6) [J]"""
     p = controller.parameters
     swell = np.exp(abs(v) * controller.rate)
     kinetic = 0.5 * p.mass / (controller.alpha * swell) * v**2
@@ -330,11 +328,10 @@ def escape_factor(xi: float) -> float:
 def check_stable(
     controllers: Sequence[Controller], *, anyway: bool = False, release: Array | None = None
 ) -> tuple[Remark, ...]:
-    """All that is wrong with controllers before they run; what is unstable is refused.
+    """Remarks on controllers before they run; unstable ones are refused.
 
-    An axis that starts a release (6,) [m, rad] inside the escape bound needs no speed limit.
+    A `release` (6,) [m, rad] inside the escape bound needs no speed limit.
     """
-    # Under a hand any deviation can come about; only a release has a size.
     size = np.inf if release is None else abs(release)
     grave = [remark for controller in controllers for remark in controller.complaints(size)]
     if grave and not anyway:

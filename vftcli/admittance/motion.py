@@ -1,4 +1,4 @@
-"""Algorithm 1: an axis is dragged or recovers, what force enters, and the recursion (48)–(51).
+"""Algorithm 1: drag and recovery phases, the force that enters, motion (48)–(51).
 
 A motion is judged by axis and drag: peak, its time, overshoot, return, idle time, work.
 """
@@ -29,17 +29,17 @@ def phases(wrench: Array, parameters: Admittance, before: Mask | bool = False) -
     """Split a record (T, 6) [N, N·m] into drag and recovery phases, axis by axis.
 
     An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i, those
-    of `before` (6,) from the start. An unknown (NaN) force counts as none.
+    of `before` (6,) from the start. NaN counts as no force.
 
-    By the threshold's mode "hard" the whole force of a dragged axis enters (49), by
-    "soft" F − F_tsd·sign(F), which starts from zero; an axis that recovers has none.
-    "literal" is Algorithm 1 as printed: all always enters.
+    In mode "hard" the whole force of a dragged axis enters (49), in "soft" F −
+    F_tsd·sign(F), and none of an axis that recovers. "literal" is Algorithm 1 as printed:
+    all force always enters.
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = abs(wrench)
     on = size > parameters.threshold
     off = size <= parameters.threshold * (1.0 - parameters.hysteresis)
-    # The last row that switched tells the state, without a loop.
+    # The last row that switched gives the state, without a loop.
     last = np.maximum.accumulate(np.where(on | off, np.arange(len(on))[:, None], -1), axis=0)
     dragged = np.where(last < 0, before, np.take_along_axis(on, np.maximum(last, 0), axis=0))
     if parameters.threshold_mode == "literal":
@@ -61,12 +61,12 @@ class AxisMotion(NamedTuple):
 
     @property
     def escaped(self) -> Mask:
-        """Controllers with motion that is not finite any more: finite-time escape. (N,)"""
+        """Controllers with an infinite motion: finite-time escape. (N,)"""
         return np.asarray(~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2)))
 
 
 class Recursion:
-    """The state of N controllers and one step of their motion, semi-implicit Euler (49)–(51).
+    """State of N controllers, and one semi-implicit Euler step of it (49)–(51).
 
     Deviations x [m, rad] and velocities v [m/s, rad/s] are (N, 6); all have one period.
     """
@@ -90,7 +90,7 @@ class Recursion:
         self.turns = self.x[:, 3:].any() or self.v[:, 3:].any()
 
     def step(self, force: Array, dragged: Mask) -> None:
-        """Move on under the force that enters (6,) [N, N·m]; axes are `dragged` (6,) or not."""
+        """Move one period under a force (6,) [N, N·m]; axes are `dragged` (6,) or not."""
         x, v, period = self.x, self.v, self.period
         swell = np.exp(abs(v) * self.rate) * self.alpha
         swell[:, dragged] = 1.0
@@ -116,7 +116,7 @@ def run(
     """The motion under one force record, each axis in the phase the record puts it in.
 
     Force (T, 6) [N, N·m] and phases (T, 6) are those of `Phases`, the start that of
-    `Recursion`. `AxisMotion.escaped` tells where a law ends in infinities.
+    `Recursion`. A law may end in infinities: see `AxisMotion.escaped`.
     """
     state = Recursion(controllers, x, v)
     rows = [(state.x, state.v)]
@@ -131,13 +131,13 @@ def run(
 def release(
     controllers: Sequence[Controller], x: Array, duration: float, v: Array | float = 0.0
 ) -> AxisMotion:
-    """Let go at deviation `x`, at rest unless `v` is given, and watch for `duration` [s]."""
+    """Motion for `duration` [s] after release at deviation `x`, at rest or with `v`."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))
     return run(controllers, np.zeros((steps, 6)), np.zeros((steps, 6), bool), x, v)
 
 
 class Drag(NamedTuple):
-    """One drag of one axis, from where its force passes the threshold to the next drag."""
+    """One drag of one axis, from passing its force threshold to the next drag."""
 
     axis: int  #: Index of the axis.
     number: int  #: Count of the drags of that axis, from 1.
@@ -158,7 +158,7 @@ def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
 
 
 def releases_of(x: Array, rows: int) -> tuple[Drag, ...]:
-    """The released axes of a release from deviation `x` (6,), as drags that are over at row 0."""
+    """Axes released at deviation `x` (6,), each as a drag that ended at row 0."""
     return tuple(Drag(axis, 1, 0, 0, rows) for axis in np.flatnonzero(x).tolist())
 
 
@@ -213,7 +213,7 @@ def row_of(
 
 
 def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
-    """Time from the release to the last sample beyond `share` of the deviation then. [s]
+    """Time until an axis stays within `share` of its deviation at release. [s]
 
     None if the axis is still outside when the record ends or the next drag begins.
     """
@@ -228,13 +228,13 @@ def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
 
 
 def overshoot(x: Array, drag: Drag) -> float | None:
-    """Largest deviation to the other side after the release, as a share of that at the release."""
+    """Overshoot to the other side after release, as a share of the deviation then."""
     after = recovery_of(x, drag)
     return max(np.max(-after / after[0]), 0.0) if len(after) else None
 
 
 def recovery_of(x: Array, drag: Drag) -> Array:
-    """Deviations from a drag's release on; none where they escape or the release is at zero."""
+    """Deviations from a drag's release on; empty if they escape or start at zero."""
     after = x[drag.release : drag.end]
     return after if np.isfinite(after).all() and after[0] != 0.0 else after[:0]
 

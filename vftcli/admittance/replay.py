@@ -1,4 +1,4 @@
-"""Replay: one force record, or one release, through several controllers, and what came of it.
+"""Replay: one force record or one release through several controllers.
 
 The wrench that drives it is an observer's, the log's own sensor's, or a truth file's.
 """
@@ -123,10 +123,10 @@ def replay(
     source: Remark,
     anyway: bool = False,
 ) -> Replay:
-    """Motions of controllers that hold the arm at a log's first pose, by the log's wrench.
+    """Motions of controllers that hold a log's first pose, driven by its wrench.
 
-    The wrench is in base axes about the flange point, and counts as none where it is not
-    known; q are the log's joint positions on its clock. (T, n) [rad]
+    The wrench is in base axes about the flange point, none where unknown; q are the log's
+    joint positions on its clock. (T, n) [rad]
     """
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
@@ -160,9 +160,9 @@ def replay_release(
     duration: float | None = None,
     anyway: bool = False,
 ) -> Replay:
-    """Let go of the arm at rest at deviation `x` (6,) [m, rad] from the pose `start` (n,) [rad].
+    """Motions after release at rest at `x` (6,) [m, rad] from pose `start` (n,) [rad].
 
-    It is watched for `duration` [s], None for as long as it takes; else as `replay`.
+    `duration` [s] is None for as long as it takes; else as `replay`.
     """
     if not x.any():
         raise ParameterError(
@@ -200,7 +200,7 @@ def release_deviation(assignments: Sequence[str]) -> Array:
 
 
 def settling(controllers: Sequence[Controller], x: Array) -> float:
-    """A time after which every controller is back to less than 1 % of a release. [s]"""
+    """Time after which every controller is within 1 % of a release. [s]"""
     rates = []
     for controller in controllers:
         p, xi = controller.parameters, np.maximum(controller.xi, 1e-3)
@@ -218,7 +218,7 @@ def on_control_clock(t: Array, period: float) -> tuple[Array, Indices]:
 
 
 def deviation_of(robot: Robot, start: Array, q: Array) -> Array:
-    """Where the log's own arm was, as a deviation from the start pose. (T, 6) [m, rad]"""
+    """The log's own flange, as a deviation from the start pose. (T, 6) [m, rad]"""
     R, p = (part[:, -1] for part in link_poses(robot.chain, np.vstack([start, q])))
     return np.hstack([p[1:] - p[0], log_matrix(R[1:] @ R[0].T)])
 
