@@ -1,4 +1,4 @@
-"""A copy of a dataset with forces: its episodes on the engine, then its files, then the rest."""
+"""A copy of a dataset with forces: first its episodes, then its files."""
 
 import hashlib
 from collections import Counter
@@ -39,19 +39,19 @@ from vftcli.readers.reading import FORMATS
 from vftcli.signals.errors import LogError
 from vftcli.signals.progress import stage
 
-TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
-#: Files to write for which no processes are started again: that takes seconds.
+TOGETHER = 16  #: Episodes of one task, and of one file of rows.
+#: Up to so many files are written without new processes, which take seconds to start.
 FEW = 32
 HERE = WorkersChoice(jobs=0)  #: This process alone.
-Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes that a copy is made of.
+Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes to copy.
 
 
 class FileTask(NamedTuple):
     """A data file that is written."""
 
     file: DataFile  #: The data file.
-    rows: tuple[Path, ...]  #: The files in which its episodes' columns are.
-    target: Path  #: Where it is written.
+    rows: tuple[Path, ...]  #: The files of its episodes' columns.
+    target: Path  #: The file to write.
 
 
 def annotate(
@@ -66,9 +66,9 @@ def annotate(
 ) -> Record:
     """Write a copy of a dataset with the forces of every frame.
 
-    Frames without an estimate stop the run, or are filled with zeros and marked where the
-    choice goes on anyway; `force` is whether an earlier copy may be replaced. What comes
-    back is the content of ``meta/vftcli.json``.
+    Frames without an estimate stop the run; with `anyway` of the choice they are zero and
+    marked. `force`: an earlier copy may be replaced. Returns the content of
+    ``meta/vftcli.json``.
     """
     dataset = open_dataset(path, choice.read.columns)
     check_copy(path, copy, force=force)
@@ -121,7 +121,7 @@ def annotate(
 
 
 def open_dataset(path: Path, columns: str | None = None) -> Dataset:
-    """The dataset in a folder or HDF5 file; `columns` is what ``--columns`` says of it."""
+    """The dataset in a folder or HDF5 file; `columns` is the value of ``--columns``."""
     file = open_log(path)
     if FORMATS["lerobot"].recognises(file):
         return LeRobotDataset(path)
@@ -143,10 +143,9 @@ def planned(
     rows: dict[DataFile, list[Path]],
     sources: dict[str, str],
 ) -> Iterator[list[EpisodesTask]]:
-    """The episodes in groups that go to a worker together, while workers do the first of them.
+    """Groups of episodes, one group a task, found while workers run.
 
-    Puts down in `rows` the files in which a data file's columns are, in `sources` its
-    sha256.
+    Adds the files of a data file's columns to `rows`, its sha256 to `sources`.
     """
     group: list[EpisodesTask] = []
     for file in dataset.files():
@@ -213,7 +212,7 @@ def refuse_missing(record: Record) -> None:
 
 
 def joint_names(made: Record) -> list[str]:
-    """The names of the joints, of the first episode that tells any; all must have as many."""
+    """Joint names, of the first episode with any; all need as many joints."""
     episodes = made["episodes"]
     known = [one for one in episodes if one["status"] != "missing"]
     if not episodes:
@@ -231,7 +230,7 @@ def joint_names(made: Record) -> list[str]:
 def write_file(
     dataset: Dataset, columns: list[ForceColumn], suffix: str, task: FileTask
 ) -> Record:
-    """Write a data file with its columns; return its place and the statistics of its episodes."""
+    """Write a data file with its columns; its place and its episodes' statistics."""
     begin("writing")
     rows: dict[str, Any] = {}
     for path in filter(Path.is_file, task.rows):

@@ -1,4 +1,4 @@
-"""Forces of a dataset's episodes: what is asked, and each episode's columns, on the engine."""
+"""Forces of a dataset's episodes: the request, and the columns of each episode."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ from vftcli.signals.wrench import AXES
 from vftcli.wrench.choice import WrenchChoice
 from vftcli.wrench.frames import FRAMES
 
-USUAL = "kfo-zoh"  #: The observer where none is named: it needs no sample that comes later.
+USUAL = "kfo-zoh"  #: The observer if none is named: it needs no later sample.
 Record = dict[str, Any]  #: What is recorded of episodes, by name.
 SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 
@@ -94,7 +94,7 @@ class EpisodesTask(NamedTuple):
 
 
 def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
-    """Records of some episodes, with robot and observer of the first; forces into a file."""
+    """Records of some episodes, robot and observer of the first; writes the forces."""
     if task.rows.is_file():
         return dict(json.loads(str(stored_rows(task.rows)["record"])))
     library, examiner = Library([task.file.log]), Examiner(anyway=choice.anyway)
@@ -185,7 +185,7 @@ def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
 
 
 def by_row(values: Array, samples: Indices | None) -> Single:
-    """Values of samples (T, k) as those of the file's rows, NaN for a row that is no sample."""
+    """Sample values (T, k) by row of the file; NaN for a row that is no sample."""
     if samples is None:
         return values.astype(np.float32)
     return np.where(samples[:, None] >= 0, values[samples], np.nan).astype(np.float32)

@@ -1,4 +1,4 @@
-"""WorkersChoice: where many pieces of work are done."""
+"""WorkersChoice: processes or cluster for many pieces of work."""
 
 import re
 from importlib.util import find_spec
@@ -9,7 +9,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Choice, Option
 
 ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")  #: tcp://host:8786
-MEMORY = 1.5e9  #: What a worker needs of the machine's memory at least. [B]
+MEMORY = 1.5e9  #: Least memory of a worker. [B]
 MOST_WORKERS = 8  #: Workers that are started unasked.
 EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 
@@ -75,11 +75,11 @@ class WorkersChoice(Choice):
 
     @property
     def tls(self) -> tuple[Path, ...]:
-        """The files of the authority's certificate, the own certificate and its key, or none."""
+        """Files of the authority's certificate, the own certificate and its key, or none."""
         return tuple(path for path in (self.ca, self.cert, self.key) if path is not None)
 
     def check_closed(self, *, anyway: bool) -> None:
-        """Refuse a cluster that does not ask who connects to it, unless the user accepts that."""
+        """Refuse a cluster open to anyone on the network, unless the user accepts that."""
         if self.address is not None and self.address.startswith("tcp") and not anyway:
             raise ParameterError(
                 f"cluster.address={self.address}: anyone who reaches a tcp:// cluster can run code "
@@ -96,5 +96,5 @@ class WorkersChoice(Choice):
 
 
 def is_installed() -> bool:
-    """Whether Dask is there, and what makes the certificates of its workers."""
+    """Whether Dask and cryptography, for its workers' certificates, are installed."""
     return all(find_spec(module) is not None for module in ("distributed", "cryptography"))

@@ -1,9 +1,9 @@
-"""Pieces of work here or on a Dask cluster, each reported at its end; an error is an outcome too.
+"""Outcomes of pieces of work here or on a Dask cluster; an error is one, too.
 
-What is done is the caller's: a function of one task, at the top of a module, that writes
-its result itself (a temporary file, then a rename) before it returns. Results that only
-live in the engine are lost with a worker, and Dask then does the task again: the function
-looks first whether its result is there. A task is small, and can be pickled.
+The caller gives a function of one task, at the top of a module. It writes its result
+itself (a temporary file, then a rename) before it returns: a worker that dies loses all
+else, and Dask does its tasks again. So the function first looks for a result. A task is
+small, and can be pickled.
 """
 
 import hashlib
@@ -29,14 +29,14 @@ from vftcli.signals.version import VERSION
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-LITTLE = 20.0  #: Work of this process before workers are started, who take some seconds. [s]
-ANSWER = 10.0  #: A scheduler has to answer within this time, and to have a worker. [s]
-SETTLED = 0.5  #: A worker's nanny knows of it so long after it takes its first task. [s]
-LOOK = 5.0  #: How often the workers are counted while nothing ends. [s]
-SHORT = 15.0  #: A cluster of this machine that lacks workers for so long is given others. [s]
-WITHOUT = 60.0  #: A cluster that has no worker for so long is given up. [s]
-REPLACED = 10  #: How often a cluster of this machine is given other workers.
-DEATHS = 3  #: A task that ended its worker so often is not done again.
+LITTLE = 20.0  #: Work of this process before workers start, which takes seconds. [s]
+ANSWER = 10.0  #: Time for a scheduler to answer and to have a worker. [s]
+SETTLED = 0.5  #: Time from a worker's first task until its nanny knows of it. [s]
+LOOK = 5.0  #: Time between counts of the workers while nothing ends. [s]
+SHORT = 15.0  #: A local cluster gets new workers after lacking some so long. [s]
+WITHOUT = 60.0  #: A cluster is given up after so long without a worker. [s]
+REPLACED = 10  #: Most times a local cluster gets new workers.
+DEATHS = 3  #: A task is given up after ending its worker so often.
 #: A worker has one core: threads of a library would wait for each other.
 THREADS = {
     f"{library}_THREADS": "1"
@@ -55,12 +55,12 @@ CONFIG: Mapping[str, object] = {
 
 #: Packages that make the numbers, or write them.
 PACKAGES = ("numpy", "scipy", "polars", "pin")
-HEAD = 4096  #: Bytes by which workers compare their files with ours. [B]
+HEAD = 4096  #: First bytes of a file that are compared. [B]
 
 
 Task = TypeVar("Task")
 
-#: What is done with each task; what it returns is small, and can be pickled.
+#: Function of one task; it returns something small that can be pickled.
 Work = Callable[[Task], Any]
 Tell = Callable[[str], None]  #: Receives a sentence on each step.
 KILLED = "KilledWorker"  #: Error type of a task if its worker died each time.
@@ -75,7 +75,7 @@ class EngineError(VftError):
 class Failure(NamedTuple):
     """Reason of a task's failure."""
 
-    stage: str  #: What was being done, as the work called it with `begin`.
+    stage: str  #: Stage of the work, as named by `begin`.
     type: str  #: Name of the error's class.
     line: str  #: What it says, on one line.
 
@@ -83,7 +83,7 @@ class Failure(NamedTuple):
 class Effort(NamedTuple):
     """Cost and place of a task."""
 
-    started: float  #: When it began, on the clock of where it ran. [s since 1970]
+    started: float  #: Begin, by the clock of its host. [s since 1970]
     seconds: float  #: Time from then to its end. [s]
     cpu_seconds: float  #: Time of its thread on a processor. [s]
     place: str  #: Host and process.
@@ -104,7 +104,7 @@ def begin(stage: str) -> None:
 
 
 def perform(work: Work[Task], task: Task) -> Outcome[Task]:
-    """Do the work on one task: what it returned, why it failed or None, what it took."""
+    """Outcome of the work on one task: value, failure, effort."""
     begin("starting")
     started, wall, cpu = time.time(), time.monotonic(), time.thread_time()
     value, failure = None, None
@@ -125,7 +125,7 @@ def failure_of(error: BaseException) -> Failure:
 
 
 def dask_setup(_worker: object) -> None:
-    """Leave Ctrl-C, which every process of a terminal gets, to the one that ends the others."""
+    """Ignore Ctrl-C, which a terminal sends to every process: the main one ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -136,10 +136,10 @@ def run_tasks(
     tell: Tell,
     seen: Sequence[str] = (),
 ) -> Iterator[Outcome[Task]]:
-    """Do some work on every task and tell how each ended, in the order in which they end.
+    """Outcomes of some work on every task, in the order in which they end.
 
-    An error of the work is an outcome like any other. If its worker dies a task runs
-    again, three times in all. Closing the iterator ends what has not begun.
+    An error of the work is an outcome, too. A task runs again if its worker dies, three
+    times in all. Closing the iterator ends what has not begun.
     """
     rest, begun = iter(groups), time.monotonic()
     if choice.in_process or (choice.jobs is None and choice.address is None):
@@ -228,7 +228,7 @@ def standing(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
 
 
 def check_workers(client: "Client", seen: Sequence[str]) -> None:
-    """Check that every worker computes with this process's code and sees its files."""
+    """Check that every worker has this process's code and sees its files."""
     here = surroundings(seen)
     for address, there in client.run(surroundings, seen, on_error="return").items():
         if not isinstance(there, dict):
@@ -250,7 +250,7 @@ def check_workers(client: "Client", seen: Sequence[str]) -> None:
 
 
 def surroundings(paths: Sequence[str]) -> dict[str, str | None]:
-    """Versions of Python and of the packages that take part, and the state of each path.
+    """Versions of Python and of the packages used, and the state of each path.
 
     That is the digest of size and first bytes, "folder", or "nothing".
     """
@@ -273,7 +273,7 @@ def surroundings(paths: Sequence[str]) -> dict[str, str | None]:
 def outcomes(
     client: "Client", groups: Iterable[Sequence[Task]], work: Work[Task], *, standing: bool
 ) -> Iterator[Outcome[Task]]:
-    """Do the work on a cluster; no more groups are sent than its workers do next."""
+    """Outcomes on a cluster; only the workers' next groups are sent."""
     sent: dict[Future[Any], Sequence[Task]] = {}
     waiting, again, number = iter(groups), list[Sequence[Task]](), count()
     most, workers = 2 * sum(client.nthreads().values()) + 2, Workers(client)
@@ -308,7 +308,7 @@ def outcomes(
 
 
 def perform_there(work: Work[Task], tasks: Sequence[Task]) -> list[Outcome[Task]]:
-    """Do the work on each task of a group; this is what runs in a worker."""
+    """Outcomes of a group's tasks; runs in a worker."""
     settle()
     return [perform(work, task) for task in tasks]
 
@@ -317,16 +317,16 @@ def perform_there(work: Work[Task], tasks: Sequence[Task]) -> list[Outcome[Task]
 def settle() -> None:
     """Once in a worker, wait for its nanny.
 
-    Dask sends tasks before the nanny has looked, which it does every 50 ms, whether the
-    process started; one that ends before is not started again.
+    The nanny looks every 50 ms whether its process started; Dask does not start one again
+    that ended before.
     """
     time.sleep(SETTLED)
 
 
 class Workers:
-    """Sees that a cluster has workers; on this machine as many as it began with.
+    """Count of a cluster's workers; on this machine kept at the initial one.
 
-    A worker that dies before its nanny knows of its start is not started again by Dask.
+    Dask does not start a worker again that died before its nanny knew of it.
     """
 
     def __init__(self, client: "Client") -> None:
@@ -335,7 +335,7 @@ class Workers:
         self._looked = self._enough = self._some = time.monotonic()
 
     def look(self) -> None:
-        """Count them, but not more often than every `LOOK`, and start those that are missing."""
+        """Count them, at most once every `LOOK` seconds, and start missing ones."""
         now = time.monotonic()
         if now - self._looked < LOOK:
             return

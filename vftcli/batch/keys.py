@@ -1,7 +1,7 @@
-"""Keys: what a result is made from, by which a second run knows that it is there.
+"""Keys of results, by which a second run finds them.
 
-A key is the sha256 of the log's bytes, of the options, of every file that these name
-(robot, gains, free runs, reference) and of the program's version.
+A key is the sha256 of the log's bytes, the options, the files they name (robot, gains,
+free runs, reference) and the program's version.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ FILE = "file:"  #: What goes before the path in the name of a reference.
 
 @cache
 def digest_of(path: Path) -> str:
-    """The sha256 of a file, or of the files in a folder and their names; each is read once."""
+    """The sha256 of a file, or of a folder's files and their names; read once."""
     if not path.is_dir():
         return digest(path)
     lines = (f"{file.relative_to(path).as_posix()} {digest(file)}" for file in files_of(path))
@@ -41,7 +41,7 @@ def options_digest(options: Any) -> str:  # noqa: ANN401 - choices of every room
 
 
 def key_of(content: str, options: str, part: object = None) -> str:
-    """The key of one log's result: by content, options, and which part of the file it is."""
+    """The key of one log's result, from its content, options and part of the file."""
     return sha256("\n".join((content, options, "" if part is None else str(part))))
 
 
@@ -51,7 +51,7 @@ def sha256(text: str) -> str:
 
 
 def with_files(value: Any, change: Callable[[Path], Path]) -> Any:  # noqa: ANN401
-    """Options with every file that they name changed: paths, ``file:PATH``, and robot files."""
+    """Options with every file name changed: paths, ``file:PATH``, robot files."""
     match value:
         case Path():
             return change(value)
@@ -74,7 +74,7 @@ def with_files(value: Any, change: Callable[[Path], Path]) -> Any:  # noqa: ANN4
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401
-    """What JSON has no form for, equal in every process: sets in order, classes by name."""
+    """A form for JSON, equal in every process: sets in order, classes by name."""
     match value:
         case frozenset() | set():
             return sorted(map(str, value))

@@ -38,10 +38,8 @@ class LogJob:
 
     do: str  #: One of `COMMANDS`.
     choice: AnalysisChoice  #: What is asked of each log.
-    anyway: bool = (
-        False  #: Whether results are wanted even where a finding makes them meaningless.
-    )
-    written: OutputChoice = PLAIN  #: What is written of each log besides what always is.
+    anyway: bool = False  #: Whether to go on where a finding makes results meaningless.
+    written: OutputChoice = PLAIN  #: Extra files of each log.
 
     def __post_init__(self) -> None:
         check_known(self.do, COMMANDS, f"--do {self.do!r}")
@@ -86,7 +84,7 @@ def work_on_log(task: LogTask) -> None:
 
 
 def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
-    """Write what the command of that name writes of a log; of `compare` the errors are the rows."""
+    """Write the files of a command's result; `compare` has its rows alone."""
     job = task.job
     if job.do == "estimate":
         from vftcli.outputs.estimates import write_estimate_folder
@@ -105,12 +103,12 @@ def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
 
 
 def for_estimates(choice: AnalysisChoice) -> AnalysisChoice:
-    """The choice where estimates are written: contacts are listed with the wrench of `best`."""
+    """A choice for writing estimates: contacts are listed if `best` runs."""
     return replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
 
 
 def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
-    """The choice where errors are printed: contacts are listed for the wrench, and to be judged."""
+    """A choice for printing errors: contacts are listed for a wrench or a score."""
     judged = choice.reference is not None and choice.reference.contacts
     return replace(choice, contacts=choice.contacts and (choice.wrench is not None or judged))
 
@@ -132,7 +130,7 @@ OF_LOG: Kinds = {
     "hardest_s": Float64,
     "detectable_N": Float64,
 }
-#: Which estimate, and its size: root mean square, and what 99 % of |τ̂| stay below.
+#: Which estimate, and its size: root mean square, and 99 % quantile of |τ̂|.
 OF_ESTIMATE: Kinds = {
     "observer": String,
     "joint": Int64,
@@ -151,11 +149,11 @@ OF_ERROR: Kinds = {
 }
 #: Columns of a log's rows.
 SCHEMA: Kinds = {"key": String, **OF_LOG, **OF_ESTIMATE, **OF_ERROR}
-JOINED = ("observer", "joint", "axis")  #: By which an estimate and its error belong together.
+JOINED = ("observer", "joint", "axis")  #: Key of an estimate and its error.
 
 
 def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
-    """The rows of one log; a single one without an observer where none ran."""
+    """The rows of one log; one row without an observer if none ran."""
     rows = pl.DataFrame([*estimate_sizes(analysis)], schema=OF_ESTIMATE)
     empty = pl.DataFrame(schema=SCHEMA)
     if analysis.errors is not None:
@@ -214,7 +212,7 @@ def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:
 
 
 def size_of(values: Array) -> tuple[float | None, float | None]:
-    """Root mean square, and the 99 % quantile of the size, of what is known; None of nothing."""
+    """Root mean square and 99 % quantile of |values| that are known, None if none."""
     known = np.abs(values[np.isfinite(values)])
     if not len(known):
         return None, None

@@ -1,4 +1,4 @@
-"""Nodes of a cluster of this machine: Dask's own, without the HTTP server that each would have."""
+"""Dask nodes for a cluster of this machine, without Dask's HTTP servers."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import distributed
 
 
 class Closed:
-    """A node that listens for those with the run's certificate and nobody else."""
+    """A node that answers only to the run's certificate."""
 
     def start_http_server(self, *_routes: object, **_where: object) -> None:
         """Start none: it answers whoever asks."""
@@ -21,7 +21,7 @@ class Worker(Closed, distributed.Worker):  # type: ignore[misc, unused-ignore]
 
 
 def closed_cluster(workers: int, memory: int, security: Any, silence: int) -> Any:  # noqa: ANN401
-    """Workers with so much memory [B] each, reached with the run's certificate alone."""
+    """Cluster of workers with `memory` [B] each, open to the run's certificate alone."""
     where = {"host": "127.0.0.1", "protocol": "tls://", "security": security}
     worker = {
         "cls": distributed.Nanny,

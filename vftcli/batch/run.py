@@ -1,4 +1,4 @@
-"""A batch: every log of a collection done once, on an engine, and gathered in one table."""
+"""A batch: every log of a collection done once and gathered in one table."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -20,9 +20,9 @@ from vftcli.outputs.run_record import envelope, versions
 from vftcli.readers.library import LogEntry, absolute, labelled
 from vftcli.signals.progress import stage
 
-SMALL = 300_000  #: Logs of fewer bytes go to a worker together. [B]
+SMALL = 300_000  #: Logs of fewer bytes share a task. [B]
 TOGETHER = 64  #: At most so many.
-SHARES = 8  #: Least groups of a worker: all end at about one time.
+SHARES = 8  #: Least groups of a worker, so that all end at about one time.
 
 
 class BatchCount(NamedTuple):
@@ -36,7 +36,7 @@ class BatchCount(NamedTuple):
 
 @dataclass(kw_only=True)
 class BatchRun:
-    """A batch and one run of it: which logs are done, which failed, what each took."""
+    """A batch and one run of it: logs done, failures, efforts."""
 
     logs: Sequence[LogEntry]  #: The logs.
     job: LogJob  #: What is done with each.
@@ -61,7 +61,7 @@ class BatchRun:
         self.done: set[str] = set()
 
     def groups(self) -> Iterator[list[LogTask]]:
-        """The logs that are to be done, those of equal bytes once; small ones go together."""
+        """Groups of logs to do, those of equal bytes once, small ones together."""
         there, begun = self.folder.keys(), set[str]()
         workers = max(1, self.workers.jobs or 4)
         most = max(1, min(TOGETHER, len(self.logs) // (SHARES * workers)))
@@ -101,9 +101,9 @@ class BatchRun:
             yield group
 
     def run(self, *, force: bool) -> "tuple[pl.DataFrame, BatchCount]":
-        """Why logs failed (log, key, stage, error, line) and how many, once all is done.
+        """Failures (log, key, stage, error, line) and counts, once all is done.
 
-        `force` is whether a batch with other options may be gone on with.
+        `force`: a batch with other options may go on.
         """
         record = {"command": self.command, "do": self.job.do, "versions": versions()}
         with self.folder.opened(self.options, record, force=force):
@@ -134,7 +134,7 @@ class BatchRun:
                 stage(f"{over}/{every} logs, {failed} failed", over / every)
 
     def take(self, outcome: Outcome[LogTask]) -> None:
-        """Keep what a log came to: why it failed, what it took."""
+        """Keep a log's failure and effort."""
         task = outcome.task
         if outcome.effort is not None:
             self.efforts[task.key] = outcome.effort
@@ -148,7 +148,7 @@ class BatchRun:
             self.failures[number] = failure
 
     def gather(self) -> "tuple[pl.DataFrame, BatchCount]":
-        """Write the tables, the page and the record of what every log took."""
+        """Write the tables, the page and the record of efforts."""
         there = self.folder.keys()
         # Logs of equal bytes that were found after one of them had failed.
         ended = {self.keys[n]: f for n, f in self.failures.items() if n in self.keys}
@@ -182,7 +182,7 @@ class BatchRun:
         return failures, count
 
     def record(self, count: BatchCount) -> dict[str, Any]:
-        """Content of `run.json`: facts of the time and place of each log's work."""
+        """Content of `run.json`: time and place of each log's work."""
         label_of = {key: self.labels[n] for n, key in self.keys.items()}
         efforts = self.efforts.values()
         last = max((e.started + e.seconds for e in efforts), default=0.0)

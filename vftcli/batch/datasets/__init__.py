@@ -1,4 +1,4 @@
-"""Datasets: episodes of LeRobot, DROID and other HDF5, written back with forces in them."""
+"""Datasets of episodes (LeRobot, DROID and other HDF5), written back with forces."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -31,7 +31,7 @@ class DataFile(NamedTuple):
     """One file of a dataset with the episodes in it."""
 
     place: Path  #: Its path in the dataset's folder.
-    log: Path  #: What is read to get an episode: the file, or the folder of the whole dataset.
+    log: Path  #: The log to read for an episode: the file, or the dataset's folder.
     episodes: tuple[int, ...]  #: Their numbers, as ``--episode`` takes them.
 
 

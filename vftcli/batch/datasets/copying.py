@@ -14,9 +14,9 @@ from vftcli.outputs.files import unwritable
 from vftcli.outputs.partial import check_writable, held
 from vftcli.signals.errors import LogError, OutputError
 
-RECORD = Path("meta", "vftcli.json")  #: What a copy tells of how it was made.
-WORK = ".vftcli"  #: Folder, in an unfinished copy, of what is done so far.
-#: Endings of files that are large, and that nobody edits in place: they are linked.
+RECORD = Path("meta", "vftcli.json")  #: The record of a copy.
+WORK = ".vftcli"  #: Folder of finished work in an unfinished copy.
+#: Endings of large files, linked since nobody edits them in place.
 FILMS = frozenset({".mp4", ".svo", ".svo2", ".mkv", ".webm", ".avi", ".png", ".jpg", ".jpeg"})
 
 
@@ -26,7 +26,7 @@ def partial_of(copy: Path) -> Path:
 
 
 def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
-    """See before anything is computed that a copy may be made at a path."""
+    """Raise an OutputError before any work if no copy may be made at a path."""
     source, target = dataset.resolve(), copy.resolve()
     if source == target or source in target.parents or target in source.parents:
         how = "are the same folder" if source == target else "are one inside the other"
@@ -51,10 +51,10 @@ def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
 
 @contextmanager
 def unfinished(copy: Path, key: str) -> Iterator[Path]:
-    """The folder in which a copy is made: an earlier run's, if its key is equal, goes on.
+    """The folder for a new copy: an earlier run's goes on if its key is equal.
 
-    It stays if the block fails after something was done, to go on from; if the block ends
-    well it takes the copy's place, whatever was there before.
+    If the block fails after some work the folder stays, for the next run; if it ends well
+    the folder takes the copy's place and replaces an earlier copy.
     """
     partial = partial_of(copy)
     work = partial / WORK
@@ -82,7 +82,7 @@ def unfinished(copy: Path, key: str) -> Iterator[Path]:
 
 
 def emptied(folder: Path, keep: Path) -> None:
-    """Remove all of a folder that an earlier run left, one folder stays but is emptied too."""
+    """Empty a folder of an earlier run and its folder `keep`, which remains."""
     for path in (*folder.iterdir(), *keep.iterdir()):
         if path == keep:
             continue
@@ -129,7 +129,7 @@ def stored_rows(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def copy_others(folder: Path, partial: Path, done: Collection[Path]) -> None:
-    """Bring everything else of a dataset into a copy; films are linked where that can be."""
+    """Copy all other files of a dataset; films are linked where possible."""
     for inside, source in files_within(folder):
         if inside in done:
             continue
@@ -144,7 +144,7 @@ def copy_others(folder: Path, partial: Path, done: Collection[Path]) -> None:
 
 
 def files_within(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Every file of a dataset by its path in the folder, and where it really is."""
+    """Every file of a dataset: its path in the folder, and its real path."""
     top = folder.resolve()
     # A hub's cache keeps the files of all snapshots once, beside these.
     tops = (top, top.parents[1] / "blobs") if top.parent.name == "snapshots" else (top,)

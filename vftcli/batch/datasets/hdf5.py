@@ -1,4 +1,4 @@
-"""HDF5 episodes written back: new data sets beside the positions, in a copy of the file."""
+"""HDF5 episodes written back to a copy: new data sets beside the positions."""
 
 import os
 import shutil
@@ -15,14 +15,14 @@ ENDINGS = (".h5", ".hdf5")  #: Names that files of episodes end with.
 
 
 def files_below(folder: Path) -> list[Path]:
-    """The files of such names in a folder, at any depth, in the order of their names."""
+    """Files with these endings in a folder, at any depth, sorted."""
     walked = os.walk(folder, followlinks=True)
     names = [Path(place) / name for place, _, each in walked for name in each]
     return sorted(path for path in names if path.suffix.lower() in ENDINGS)
 
 
 class Hdf5Dataset:
-    """HDF5 files of one episode or many: DROID's, ALOHA's, any; a folder's or one alone."""
+    """HDF5 files of one or many episodes (DROID, ALOHA, any), or a folder of them."""
 
     has_statistics = False
 
@@ -63,7 +63,7 @@ class Hdf5Dataset:
                     raise LogError(f"{path}: has {name} already; annotate the original dataset")
 
     def write(self, file: DataFile, columns: ForceColumns, forces: Forces, target: Path) -> None:
-        """Copy a file and add the data sets to the copy; the original is never opened to write."""
+        """Copy a file and add the data sets to the copy; the original stays untouched."""
         import h5py
 
         path, places = self._places(file)

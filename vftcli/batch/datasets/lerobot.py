@@ -1,6 +1,6 @@
-"""LeRobot datasets written back: columns, info.json, Parquet metadata and statistics.
+"""LeRobot datasets written back: columns, info.json, metadata and statistics.
 
-Statistics of a column are kept of each episode, and of all episodes together.
+Statistics are of each episode and of all.
 """
 
 import json
@@ -49,7 +49,7 @@ class LeRobotDataset:
             yield DataFile(place, self.folder, tuple(own))
 
     def _opened(self, file: DataFile) -> tuple[Path, Any, Column]:
-        """A data file, as pyarrow has it, and each row's episode, none where it holds one."""
+        """A data file in pyarrow, and each row's episode (empty if it holds one)."""
         path = self.folder / file.place
         table = ParquetTable(open_log(path))
         return path, table.file, table.episodes()
@@ -109,7 +109,7 @@ class LeRobotDataset:
                 )
 
     def finish(self, columns: ForceColumns, statistics: OfEpisodes, copy: Path) -> None:
-        """Write info.json with the new features, and their statistics wherever others are."""
+        """Write info.json with the new features, and their statistics beside others."""
         info = info_of(self.folder)
         third = str(info.get("codebase_version", "")).startswith("v3")
         fps = {"fps": info["fps"]} if third and "fps" in info else {}
@@ -135,7 +135,7 @@ class LeRobotDataset:
     def _finish_episodes(
         self, path: Path, columns: ForceColumns, statistics: OfEpisodes, copy: Path
     ) -> None:
-        """Write a table of episodes with the statistics of the columns, where it has those."""
+        """Write a table of episodes, with the columns' statistics if it has statistics."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -198,7 +198,7 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON hold
 
 
 def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dict[bytes, bytes]:
-    """A schema's metadata with the columns among the features that the `datasets` library reads."""
+    """A Parquet schema's metadata, with the columns among the `datasets` features."""
     try:
         library = json.loads(metadata.get(METADATA, b"null"))
         features = library["info"]["features"]
@@ -215,7 +215,7 @@ def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dic
 
 
 def statistics_of(values: Single) -> Statistics:
-    """The statistics of one episode, its quantiles exact. (frames, k) → (k,) each, count (1,)"""
+    """Statistics of one episode (frames, k), exact quantiles. (k,) each, count (1,)"""
     exact = values.astype(np.float64)
     found = {
         "min": exact.min(axis=0),
@@ -229,10 +229,10 @@ def statistics_of(values: Single) -> Statistics:
 
 
 def pooled(episodes: Sequence[Statistics]) -> Statistics:
-    """The statistics of several episodes together, as LeRobot puts them together.
+    """Statistics of several episodes together, by LeRobot's rules.
 
-    Mean and standard deviation are those of all frames (law of total variance), quantiles
-    the means of the episodes' own weighted with their frames.
+    Mean and standard deviation are of all frames (law of total variance), quantiles are
+    means of the episodes' quantiles, weighted by frames.
     """
     table = {key: np.array([one[key] for one in episodes]) for key in episodes[0]}
     count = table.pop("count")
