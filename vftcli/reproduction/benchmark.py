@@ -1,7 +1,7 @@
-"""A benchmark: every log of a manifest scored by every protocol, once, and gathered in one table.
+"""A benchmark: all logs of a manifest scored once by all protocols, in one table.
 
-First what is made: simulated logs, pushes planted into free ones, robot files from other
-days. Each task writes its rows, by which a second run knows that it is done.
+It first makes simulated logs, free logs with planted pushes, and robot files from other
+days. Each task writes its rows; a second run skips tasks with rows.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -40,14 +40,14 @@ from vftcli.simulation import load_scenario, simulate
 
 @dataclass
 class BenchmarkRun:
-    """A benchmark and one run of it: what is done, what failed, what each task took."""
+    """A benchmark and one run of it: failures and efforts of its tasks."""
 
     manifest: Manifest
     rivals: Sequence[Rival]
     output: Path  #: The folder that it writes.
     workers: WorkersChoice
     command: str  #: The command line, for the records.
-    marked: frozenset[str]  #: Names of logs that are scored in spite of a complaint.
+    marked: frozenset[str]  #: Logs scored in spite of a complaint.
     tell: Tell = field(repr=False)
     failures: list[tuple[str, Failure]] = field(default_factory=list)
     efforts: list[dict[str, Any]] = field(default_factory=list)
@@ -60,7 +60,7 @@ class BenchmarkRun:
         self.folder = BatchFolder(absolute(self.output), "scores.parquet")
 
     def run(self, *, force: bool) -> Results:
-        """What every method scores, once all is done and written."""
+        """Scores of every method, once all is done and written."""
         manifest = self.manifest
         logs = [log for log in manifest.logs if not manifest.missing(log)]
         marker = {"command": self.command, "do": "benchmark"}
@@ -90,14 +90,14 @@ class BenchmarkRun:
             return results
 
     def note(self, name: str, outcome: Outcome[Any]) -> None:
-        """Keep why a task failed and what it took."""
+        """Keep a task's failure and effort."""
         if outcome.failure is not None:
             self.failures.append((name, outcome.failure))
         if outcome.effort is not None:
             self.efforts.append({"task": name, **outcome.effort._asdict()})
 
     def make(self, name: str, path: Path, work: Callable[[Path], object]) -> bool:
-        """Whether a file is there, made now unless it was."""
+        """Whether a file is there; makes it if missing."""
         if not path.exists():
             stage(f"making {name}")
             self.note(name, perform(work, path))
@@ -139,7 +139,7 @@ class BenchmarkRun:
             self.files[log.name] = path
 
     def fit(self, robot: TrainedRobot) -> None:
-        """Make the robot file that logs show, where they are there."""
+        """Make a robot file from its training logs, if all are there."""
         if not self.files.keys() >= set(robot.train):
             return
         logs = [self.files[name] for name in robot.train]
@@ -172,7 +172,7 @@ class BenchmarkRun:
                 stage(f"{done} of {len(left)} scored", done / len(left))
 
     def tasks(self, logs: Sequence[BenchmarkLog]) -> Iterator[ScoreTask]:
-        """One a log and protocol, and one a log of an arm that outside estimates have."""
+        """Tasks: per log and protocol, and per log of an arm with outside estimates."""
         for log in logs:
             for protocol in log.protocols:
                 is_fit = protocol == "identified"
@@ -203,7 +203,7 @@ class BenchmarkRun:
         return ScoreTask(self.folder.path, key, log, protocol, choice, file, truth, rival, marked)
 
     def record(self, logs: Sequence[BenchmarkLog]) -> dict[str, Any]:
-        """Content of `run.json`: the manifest, its logs, what is left out, what each task took."""
+        """Content of `run.json`: the manifest, its logs, absent ones, each task's effort."""
         keys, manifest = ("arm", "truth", "source", "licence"), self.manifest
         entries = [
             {

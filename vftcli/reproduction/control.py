@@ -20,7 +20,7 @@ from vftcli.signals.remarks import fact
 
 #: Variant → how the sensor's Kalman filter reads R and Q.
 CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
-#: Variant → its name with a traditional controller, always driven by the whole force.
+#: Variant → its name with a traditional controller under the whole force.
 UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
 #: Axes of force and displacement, of moment and rotation.
 FORCE, MOMENT = slice(3), slice(3, 6)
@@ -33,7 +33,7 @@ FARTHEST_RELEASE = 0.5
 def closed_loop(
     seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
 ) -> Iterator[Given]:
-    """Latencies of a controller in the loop, and its force through controllers of every α."""
+    """Latencies of a controller in the loop; its force replayed with every α."""
     for variant in CONVENTIONS:
         run, found = looped(scenario, variant, alphas, seed)
         held = latencies(run)[:CONTACTS]
@@ -42,7 +42,7 @@ def closed_loop(
         yield variant, "astray", np.linalg.norm(run.moved[:, other], axis=1).max()
         for k, one in enumerate(held, start=1):
             for key in ("detection", "motion", "withdrawal", "reaction"):
-                # Motion says nothing of a contact that found the arm moving.
+                # Motion says nothing if the arm moved already.
                 shown = one.rested or key in {"detection", "withdrawal"}
                 yield variant, f"{key}/{k}", getattr(one, key) if shown else None
             yield variant, f"stop/{k}", one.turn
@@ -104,7 +104,7 @@ def return_values(variant: str, found: Replay, held: Sequence[Latency]) -> Itera
 
 
 def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
-    """Time from the release until an axis no longer goes on away from its target. [s]"""
+    """Time from release until an axis stops moving away from its target. [s]"""
     t, axis = found.motion.t, AXES.index(str(row["axis"]))
     start = int(t.searchsorted(float(str(row["release_s"])) - 1e-9))
     outward = np.sign(found.motion.x[start, n, axis]) * found.motion.v[start:, n, axis]
@@ -114,7 +114,7 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
 def latest_turns(_seed: int, *, alphas: Sequence[float]) -> Iterator[Given]:
     """Latest turn of the UR5 after a release, and the variable law's lead.
 
-    The traditional law turns after arccos(ζ)/ω_d at the latest. The advance is the largest over
+    The traditional law turns after arccos(ζ)/ω_d at the latest. The lead is the largest over
     deviations released at the speed limit.
     """
     laws = ControlChoice(alphas=tuple(alphas)).controllers(load_robot("ur5"))

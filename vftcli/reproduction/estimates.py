@@ -40,14 +40,14 @@ VARIANTS: dict[str, dict[str, Any]] = {
     DENSITY: {"settings": {"kfo.noise_convention": "density"}},
     "at 1.59 Hz": {"gains": "bandwidth=1.59"},
 }
-#: Variant → its observer, the one that the paper's virtual sensor takes.
+#: Variant → the observer of the paper's virtual sensor.
 OBSERVERS = {
     variant: ObserverChoice.parsed(observer=["kfo-fe"], **VARIANTS[variant])
     for variant in (AS_PRINTED, CORRECTED, DENSITY)
 }
-UNTOUCHED = 0.5  #: True force on the flange below which nothing touches the arm. [N]
-STEP_TIME = 3.0  #: Length of the step that response times are read from. [s]
-REACHED = 0.9  #: Share of a step at which it counts as seen.
+UNTOUCHED = 0.5  #: The arm is untouched below this true flange force. [N]
+STEP_TIME = 3.0  #: Length of the step for response times. [s]
+REACHED = 0.9  #: A step is seen from this share on.
 #: People's contacts are slower; the rest is noise. [Hz]
 FAST = 5.0
 
@@ -93,7 +93,7 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         for axis in ("mx", "my"):
             yield variant, f"{axis}/lag", rms(lag[:, AXES.index(axis)])
         if variant == CORRECTED:
-            # How far the real sensor itself is from the simulation's truth.
+            # The real sensor's own error against the simulated truth.
             turn = link_poses(made.robot.chain, q).rotation[:, -1]
             true = np.einsum("tji,tkj->tki", turn, true.reshape(-1, 2, 3)).reshape(-1, 6)
             for axis, off in zip(AXES, (real.known - true).T, strict=True):
@@ -102,7 +102,7 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
 
 
 def error_rows(made: Analysis, of: str) -> list[dict[str, Any]]:
-    """The rows of the errors that are of a joint, or of an axis."""
+    """The error rows of joints, or of axes."""
     assert made.errors is not None, "a reference was asked for"
     return list(made.errors.filter(pl.col(of).is_not_null()).iter_rows(named=True))
 
@@ -204,10 +204,10 @@ def motion_under_knocks(variant: str, found: Replay, knocked: Sequence[float]) -
 
 
 def guideline_numbers(made: Analysis) -> dict[str, dict[str, float]]:
-    """Observer with a response of its own → what the paper's guidelines (Sec. IV-A) go by.
+    """Observer of known response → numbers of the paper's guidelines (Sec. IV-A).
 
-    Of the slowest joint the time until 90 % of a step is seen and the delay behind a ramp
-    [s]; means of joints are the share of noise above 5 Hz that passes [%] and the RMSE.
+    Of the slowest joint the 90 % time of a step and the delay behind a ramp [s]; means of
+    joints are the share of noise above 5 Hz that passes [%] and the RMSE [N·m].
     """
     step, joints = made.recording.median_step, made.recording.joints
     frequency = np.linspace(0.0, 0.5 / step, 513)[1:]
@@ -236,7 +236,7 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
 
 
 def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]:
-    """Errors joint by joint, lags, free rms, and what the guidelines go by."""
+    """Errors by joint, lags, free rms, and numbers of the guidelines."""
     recording = simulate(load_scenario(scenario, ()), seed).recording
     robot, examiner = load_robot("ur5"), Examiner()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.

@@ -1,7 +1,7 @@
-"""Experiments of a paper, each once a seed, and what they gave beside its print.
+"""Experiments of a paper, each once a seed, and their results beside its print.
 
-A run has its own seed, so its numbers do not depend on the others. They are shown as a page,
-its Markdown, and figures.
+A run has its own seed, so its numbers do not depend on the others. A page, its Markdown
+and figures show them.
 """
 
 from collections import defaultdict
@@ -37,7 +37,7 @@ from vftcli.reproduction.paper import (
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.progress import stage
 
-#: Experiment → what it gives of a seed and its own arguments.
+#: Experiment → its results from a seed and its own arguments.
 RUNS: dict[str, Callable[..., Iterator[Given]]] = {
     run.__name__: run
     for run in (
@@ -66,7 +66,7 @@ class Job(NamedTuple):
     seed: int  #: Of everything drawn.
 
 
-Result = RunResult | str  #: What a job gave, or the one line on why it failed.
+Result = RunResult | str  #: A job's results, or the one line of its failure.
 
 
 def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
@@ -81,14 +81,14 @@ def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
 
 
 def run_job(job: Job) -> RunResult:
-    """What a job gives; traces are those of the first seed, the others would only be carried."""
+    """A job's results; traces of the first seed alone."""
     experiment = paper_of(job.paper).experiments[job.experiment]
     made = gathered(RUNS[experiment.run](job.seed, **experiment.given))
     return made if job.seed == experiment.seeds[0] else replace(made, charts={})
 
 
 def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> dict[Job, Result]:
-    """Run jobs, those that take the time last and by themselves; what fails is one line."""
+    """Results of jobs, timed ones last and one by one; a failure is one line."""
     stage(f"{len(jobs)} runs")
     experiments = {job: paper_of(job.paper).experiments[job.experiment] for job in jobs}
     alone = [job for job in jobs if experiments[job].alone]
@@ -183,7 +183,7 @@ def beside_print(shown: ShownItem) -> str:
 
 
 def overview(found: Mapping[str, ShownItem]) -> Grid:
-    """Every item in a row: what it shows, ours over the print, and what came of it."""
+    """Every item in a row: its title, ours over the print, and its verdict."""
     heads = "item", "what it shows", "ours / print", "ours", "reproduced"
     rows = [
         (

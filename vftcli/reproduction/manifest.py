@@ -1,7 +1,7 @@
-"""A benchmark's manifest: logs with truth, how each is scored, and what may have been seen.
+"""A benchmark's manifest: logs with truth, their scoring, and training data.
 
-One entry is one log. What an entry does not name is an option of `vftcli estimate`, in
-the same words. No log comes with the package and none is downloaded.
+One entry is one log. It may have options of `vftcli estimate`, in the same words. No log
+comes with the package and none is downloaded.
 """
 
 import re
@@ -28,10 +28,9 @@ BUILT_IN = ("sim", "field")  #: Manifests that come with the package.
 TRUTHS = ("free", "sensor", "torque", "weight", "contacts", "simulated")
 PROTOCOLS = ("alone", "free", "identified")
 PUSHED = "-pushed"  #: Ending of the name of a log with pushes planted.
-APART = 1.0  #: Least time between what is trained on and what is scored of one log. [s]
-SETTLED = 1.0  #: Scored from here on where nothing is said: causal filters settle. [s]
-#: Options that an entry may have: those of `vftcli estimate`, in its words. What it says
-#: of the arm and of free motion it says itself.
+APART = 1.0  #: Least time between trained and scored spans of one log. [s]
+SETTLED = 1.0  #: Scored from here on by default: causal filters settle. [s]
+#: Options of an entry: those of `vftcli estimate`, without its arm and free motion.
 OPTIONS = {
     word: option
     for kind in OF_ESTIMATE
@@ -54,10 +53,10 @@ class TruthError:
 class BenchmarkLog:
     """One log with truth: an entry ``[[log]]``."""
 
-    name: str  #: What it is called, by outside estimates too.
-    arm: str  #: What is pooled.
+    name: str  #: Its name, also for outside estimates.
+    arm: str  #: Logs of one arm are pooled.
     truth: str  #: One of `TRUTHS`.
-    day: str = ""  #: What may not be trained on to score this log.
+    day: str = ""  #: No log of this day may train for it.
     file: str = ""  #: Below the folder of the data.
     parts: tuple[str, ...] = ()  #: Files of numbers that are one log, as ``q=positions.txt``.
     scenario: str = ""  #: What is simulated instead.
@@ -70,9 +69,7 @@ class BenchmarkLog:
     truth_columns: str = ""  #: Its columns, as of ``--reference-columns``.
     vendor: str = ""  #: Columns of the controller's own estimate, "" for none.
     score: Spans = ((SETTLED, 1e9),)  #: What is scored, from the first sample. [s]
-    vouched: Spans = (
-        ALWAYS  #: Where a row is false if nothing touched; `score` if it is given. [s]
-    )
+    vouched: Spans = ALWAYS  #: Untouched rows are false here; `score` if given. [s]
     #: True contacts: start, end [s], peak [N] if known; by hand.
     contacts: tuple[tuple[float, ...], ...] = ()
     contact_N: float = 1.0  #: Force from which the truth is a contact. [N]
@@ -139,7 +136,7 @@ class Rival(NamedTuple):
     declared: Declaration
 
     def file(self, log: BenchmarkLog, *endings: str) -> Path | None:
-        """The file of a log with one of some endings, by default its estimates; None without."""
+        """A log's file with one of these endings, by default its estimates, or None."""
         tries = (self.folder / f"{log.name}.{end}" for end in endings or ("parquet", "csv"))
         return next(filter(Path.is_file, tries), None)
 
@@ -164,7 +161,7 @@ class Manifest:
         return [self.data / name for name in names if name]
 
     def robot(self, log: BenchmarkLog) -> str | None:
-        """Its arm: a profile, or a file below the folder of the data; None if none is named."""
+        """A log's arm: a profile, or a file below the data's folder; None if unnamed."""
         name: str | None = dict(log.options).get("robot")
         return str(self.data / name) if name and Path(name).suffix else name
 
@@ -183,9 +180,9 @@ class Manifest:
         robot: Path | None = None,
         logs: Mapping[str, Path] = MappingProxyType({}),
     ) -> AnalysisChoice:
-        """What a protocol asks of a log in `file`, `robot` the robot file of protocol 3.
+        """Choices of a protocol for a log in `file`; `robot` is protocol 3's robot file.
 
-        `logs` is where each log is by name, for free motion.
+        `logs` is name → file of each log, for free motion.
         """
         words = {w: OPTIONS[w].keyword(v) for w, v in log.options if w != "robot"}
         if file not in self.paths(log):
@@ -198,7 +195,7 @@ class Manifest:
         return cast("AnalysisChoice", with_files(made, absolute))
 
     def trains_on(self, log: BenchmarkLog, protocol: str) -> Iterator[tuple[BenchmarkLog, Spans]]:
-        """What a protocol may have seen: logs, and the spans of each that are used."""
+        """Training data of a protocol: logs, and their spans."""
         if protocol == "free":
             for word in log.free:
                 is_log = word in self.by_name
@@ -209,7 +206,7 @@ class Manifest:
             yield from ((self.by_name[name], spans) for name in robot.train)
 
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
-        """Why a log's rows of a protocol are unfair: a line for each training log that is."""
+        """Reasons why a log's rows of a protocol are unfair: a line per training log."""
         name, own = log.name.removesuffix(PUSHED), list(map(digest_of, self.paths(log)))
         for other, spans in self.trains_on(log, protocol):
             what = f"{name}, {protocol}: {other.name}"
@@ -230,7 +227,7 @@ class Manifest:
                 yield f"{what} is of the same day, {log.day}"
 
     def complaints(self, rivals: Sequence[Rival]) -> dict[str, list[str]]:
-        """Name of a log → a line on each thing that makes its rows unfair or another file's."""
+        """Name of a log → a line on each reason for unfair rows or another file."""
         found: dict[str, list[str]] = {}
         for log in self.logs:
             if self.missing(log):
@@ -253,7 +250,7 @@ class Manifest:
         return found
 
     def absent(self) -> list[str]:
-        """A line on each log that is not there: where it is had."""
+        """A line on each absent log: its source."""
         return [
             f"{log.name}: no {lacking[0]}" + (f"; source: {log.source}" if log.source else "")
             for log in self.logs
@@ -262,7 +259,7 @@ class Manifest:
 
 
 def load_manifest(name: str, data: Path | None) -> Manifest:
-    """A built-in manifest, or a user's file with its logs beside it unless `data` is given.
+    """A built-in manifest, or a user's file with its logs beside it or in `data`.
 
     Raises:
         ParameterError: If there is none, or an entry is wrong.
@@ -284,7 +281,7 @@ def load_manifest(name: str, data: Path | None) -> Manifest:
 
 
 def check_names(manifest: Manifest) -> None:
-    """Raise unless every log is named once and every name that is used is one's."""
+    """Raise unless log names are unique and all names in use are known."""
     names = [log.name for log in manifest.logs]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ParameterError(f"{manifest.path}: two logs are called {twice[0]}")
@@ -303,7 +300,7 @@ def check_names(manifest: Manifest) -> None:
 
 
 def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
-    """The log of an entry; one that nobody touches, with pushes, is a second log with these."""
+    """The log of an entry; with pushes two: the untouched log, and one with pushes."""
     words = {key: value for key, value in table.items() if key in OPTIONS}
     rest = {key: value for key, value in table.items() if key not in OPTIONS}
     for word, value in words.items():

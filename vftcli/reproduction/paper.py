@@ -1,7 +1,6 @@
 """A paper: its tables and figures, their print, and their experiments.
 
-A paper is a file of TOML beside this one; how its experiments run, and how they are
-shown, is the same for all.
+A paper is a TOML file beside this one; all run and are shown alike.
 """
 
 import tomllib
@@ -15,8 +14,8 @@ from vftcli.outputs.charts import Chart
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 
-#: Variants of a value: by the printed formulas; by the corrected ones; these with R and Q
-#: read as densities; the reference's own error.
+#: Variants of a value: printed formulas; corrected ones; these with R and Q as densities;
+#: the reference's own error.
 AS_PRINTED, CORRECTED, DENSITY, FLOOR = "as printed", "corrected", "R density", "floor"
 #: Key of a line → variant → value, None where it did not happen.
 Values = dict[str, dict[str, float | None]]
@@ -30,13 +29,12 @@ class RunResult:
     charts: dict[str, Chart] = field(default_factory=dict)  #: Name of an item → its traces.
 
 
-#: One thing that an experiment gives: a variant, a line's key and its value, or "", the
-#: name of an item, and its traces.
+#: One result: a variant, a line's key and its value; or "", an item's name, its traces.
 Given = tuple[str, str, float | Chart | None]
 
 
 def gathered(given: Iterable[Given]) -> RunResult:
-    """The results of all that an experiment gives, one thing after the other."""
+    """The results of an experiment, collected."""
     result = RunResult()
     for variant, key, value in given:
         if isinstance(value, Chart):
@@ -55,7 +53,7 @@ class Experiment:
     run: str  #: Name of the function that runs it.
     given: Mapping[str, Any] = field(default_factory=dict)  #: Its arguments beside the seed.
     seeds: Sequence[int] = (1, 2, 3, 4, 5)  #: Those of a full run; ``--fast`` takes the first.
-    alone: bool = False  #: Whether nothing may run beside it, because it takes the time.
+    alone: bool = False  #: Whether it measures time, so that nothing may run beside it.
 
 
 class PrintedLine(NamedTuple):
@@ -88,7 +86,7 @@ class PaperItem:
     lines: Sequence[PrintedLine] = ()  #: Its table.
     #: Columns of ours between the print and the floor.
     variants: Sequence[str] = (AS_PRINTED, CORRECTED)
-    #: The column of ours that is set beside the print in the overview.
+    #: The column of ours beside the print in the overview.
     nearest: str = CORRECTED
     traces: str = ""  #: What its chart shows, "" if it has none.
 

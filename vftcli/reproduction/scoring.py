@@ -1,4 +1,4 @@
-"""One log scored by one protocol: its truth, what each method answers, and the rows of that."""
+"""One log scored by one protocol: its truth, each method's answer, and rows."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -60,7 +60,7 @@ SCHEMA = {name: kind for kind, names in COLUMNS for name in names.split()}
 
 
 class ScoreTask(NamedTuple):
-    """One log by one protocol: ours, or what another program made of it."""
+    """One log by one protocol, with our estimates or another program's."""
 
     folder: Path
     key: str
@@ -70,7 +70,7 @@ class ScoreTask(NamedTuple):
     file: Path
     truth: Path | None  #: The file of the truth.
     rival: Rival | None
-    marked: bool  #: Whether it is scored in spite of a complaint.
+    marked: bool  #: Whether scored in spite of a complaint.
 
     @property
     def label(self) -> str:
@@ -80,7 +80,7 @@ class ScoreTask(NamedTuple):
 
 
 def planted(run: Run, log: BenchmarkLog) -> tuple[Recording, Array, Array]:
-    """A free log with pushes in its drive torque: τ − Jᵀ w; their wrench and joint torque.
+    """A free log with pushes in its drive torque (τ − Jᵀ w), their w and Jᵀ w.
 
     Half sines at the flange in base axes, without moments. The motion does not yield.
     """
@@ -98,7 +98,7 @@ def planted(run: Run, log: BenchmarkLog) -> tuple[Recording, Array, Array]:
 
 
 class KnownTruth(NamedTuple):
-    """What really touched a log's arm, on the log's clock; None of what is not known."""
+    """True contact of a log's arm, on the log's clock; None where unknown."""
 
     tau: Array | None  #: External torque on the robot. (T, n)
     wrench: Array | None  #: On the flange, base axes. (T, 6)
@@ -106,7 +106,7 @@ class KnownTruth(NamedTuple):
 
 
 def truth_of(task: ScoreTask, recording: Recording, robot: Robot) -> KnownTruth:
-    """The truth that a manifest states of a log, or that a file holds."""
+    """The truth of a log, from the manifest or a file."""
     log, t = task.log, recording.t
     listed: list[Any] | None = [(*c, np.nan)[:3] for c in log.contacts] or None
     if task.truth is None:
@@ -127,11 +127,11 @@ def truth_of(task: ScoreTask, recording: Recording, robot: Robot) -> KnownTruth:
 
 
 class Answer(NamedTuple):
-    """What one method says of a log."""
+    """One method's answer for a log."""
 
     torque: ExternalTorque
     wrench: Array | None = None
-    future: bool = False  #: Whether it uses what comes later.
+    future: bool = False  #: Whether it uses later samples.
     lists: Mapping[str, Sequence[ListedRow]] = {}  #: Its contacts by part, one of `LISTS`.
     #: Time on a processor a sample, of the observer alone and of the whole analysis. [µs]
     cost: Mapping[str, float] = {}
@@ -169,7 +169,7 @@ def score_log(task: ScoreTask) -> None:
 
 
 def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator[Answer]:
-    """What zero, the vendor and our observers say, `best` with its list of contacts."""
+    """Answers of zero, the vendor and our observers, `best` with its contacts."""
     t, begun, choice = recording.t, thread_time(), task.choice
     made = analyse(run_of(recording, robot, choice), choice)
     us = 1e6 / len(t)
@@ -201,12 +201,12 @@ def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator
 
 
 def outside_answer(task: ScoreTask, recording: Recording, _: Robot) -> Iterator[Answer]:
-    """What another program says of a log, at the log's stamps."""
+    """Another program's answer for a log, at the log's stamps."""
     rival = task.rival
     assert rival is not None, "it has a folder"
     path, listed = rival.file(task.log), rival.file(task.log, "contacts.csv")
     lists = {} if listed is None else {LISTS[0]: read_list(listed)}
-    # Without estimates of a log of an arm that it has it answers nothing there.
+    # Without estimates for a log it answers nothing there.
     t = recording.t
     columns: list[Any] = [np.full(recording.q.shape, np.nan), None, None]
     if path is not None:
@@ -250,7 +250,7 @@ def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[di
 def torque_rows(
     torque: ExternalTorque, truth: Array, parts: Mapping[str, Mask]
 ) -> Iterator[dict[str, Any]]:
-    """The rows of a torque: sums of each part and joint, of shifts, and where `best` is worst."""
+    """Rows of a torque: sums by part and joint, of shifts, and `best`'s worst span."""
     for part, inside in parts.items():
         if inside.any():
             score = Score.of(torque, truth, inside)
@@ -288,7 +288,7 @@ def wrench_sums(values: Array, truth: Array, w: Array) -> dict[str, float]:
 
 
 def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
-    """The mean of a carried weight [N], its rms error, and the share of time with an answer."""
+    """Mean and rms error of a carried weight [N], and the share of answered time."""
     known = np.isfinite(up)
     total = float(w[known].sum()) or np.nan
     mean = float((w * up)[known].sum()) / total

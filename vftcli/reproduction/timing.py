@@ -1,7 +1,7 @@
 """Computing times: Table II by the paper's way and by ours, and the benchmark.
 
-All are measured interleaved round by round, so that a machine's drift of speed affects
-all. Medians over the rounds are reported.
+Rounds of all are interleaved, so that a machine's drift of speed affects all. Medians
+over the rounds are reported.
 """
 
 import os
@@ -30,15 +30,15 @@ from vftcli.signals.recording import Recording
 from vftcli.wrench.smoother import smooth_wrench
 
 SAMPLES = 30_060  #: Samples of the paper's Table II.
-#: Length of the part that counts as free for the observers that the log tunes. [s]
+#: Length of the free part for observers tuned to the log. [s]
 FREE_SECONDS = 8.0
 TUNED = ("kfo-auto", "rts-auto")  #: Observers that are timed with their tuning.
 SMOOTHER = "wrench smoother"  #: Name of the smoother of the whole log's wrench.
 LOOKING_BACK = (BEST, "kfo-rts", *TUNED)  #: Observers that need a complete log.
-RNEA = "rnea loop"  #: Name of the yardstick, a loop of Pinocchio's `rnea` over the samples.
-#: What is over a loop of Pinocchio's `rnea`: dynamics and four observers, on two clocks.
+RNEA = "rnea loop"  #: Name of the yardstick, a loop of Pinocchio's `rnea`.
+#: Dynamics and four observers over a loop of `rnea`, on two clocks.
 RATIOS = ("core_over_rnea_loop", "core_over_rnea_loop_jittering")
-JITTER = 0.05  #: How far the steps of the jittering clock stray, of their mean. [1]
+JITTER = 0.05  #: Jitter of a step, as a share of the mean step. [1]
 #: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
 PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
 #: Samples of the paper's own loop; its time is scaled to all.
