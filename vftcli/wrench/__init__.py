@@ -1,1 +1,1 @@
-"""The virtual force/torque sensor: torques to wrenches, frames, zero drift, sensors, contacts."""
+"""The virtual force/torque sensor: wrenches from torques, frames, zero drift."""

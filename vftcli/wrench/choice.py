@@ -1,4 +1,4 @@
-"""What a user may choose of the virtual sensor, read from the command line and checked once."""
+"""Choices of the virtual sensor, read from the command line and checked once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ SMOOTHED = ("best",)  #: Observers with the smoother's wrench where no other sol
 
 @dataclass(frozen=True, kw_only=True)
 class ZeroChoice:
-    """The zero of a wrench; nothing where all is left at its default."""
+    """The zero of a wrench; empty by default."""
 
     #: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
     spans: tuple[tuple[float, float], ...] = ()
@@ -33,7 +33,7 @@ class ZeroChoice:
 
     @classmethod
     def parsed(cls, words: Sequence[str]) -> "ZeroChoice":
-        """The choice that ``--zero A:B|start``, which may be repeated, states."""
+        """The choice stated by ``--zero A:B|start``, which may be repeated."""
         spans = []
         for text in words:
             if text == START:
@@ -49,7 +49,7 @@ class ZeroChoice:
 
 
 class AlsoWrench(Choice):
-    """Whether a wrench is asked for, with nothing else said of it."""
+    """Whether a wrench is asked for, with default choices."""
 
     GROUP = WRENCH
 
@@ -71,8 +71,8 @@ class WrenchChoice(Choice):
             completes=names_at("wrench.frames:FRAMES"),
         ),
     ] = "flange"
-    #: A key of `vftcli.wrench.solvers.SOLVERS`, or `SMOOTHER`; None for the
-    #: smoother where it is the observer's own, and least squares for the others.
+    #: A key of `vftcli.wrench.solvers.SOLVERS` or `SMOOTHER`; None for the observer's own
+    #: smoother, else least squares.
     solver: Annotated[
         str | None,
         Option(
@@ -111,8 +111,8 @@ class WrenchChoice(Choice):
             several=True,
         ),
     ] = field(default_factory=ZeroChoice)
-    #: Torque error the covariance starts from: "own", a number or one a joint as text, or
-    #: None for the best that is known. [N·m]
+    #: Torque error behind the covariance: "own", one number or one a joint as text, None for
+    #: the best that is known. [N·m]
     torque_sd: Annotated[
         str | None,
         Option(
@@ -133,7 +133,7 @@ class WrenchChoice(Choice):
 
     @property
     def by_pose(self) -> str:
-        """The solver that takes each pose by itself: the one asked for, else least squares."""
+        """The solver of single poses: the one asked for, else least squares."""
         from vftcli.wrench.solvers import LEAST_SQUARES
 
         return LEAST_SQUARES if self.solver in {None, SMOOTHER} else str(self.solver)
@@ -148,7 +148,7 @@ class WrenchChoice(Choice):
         return self.solver == SMOOTHER or (self.solver is None and name in SMOOTHED)
 
     def mounting(self, robot: "Robot") -> "Mounting":
-        """Where tool and sensor sit: as asked, else as the robot file says."""
+        """Poses of tool and sensor: as asked, else as in the robot file."""
         from vftcli.wrench.frames import Mounting, read_pose
 
         tool, sensor = robot.tools.get(""), robot.sensors.get("")

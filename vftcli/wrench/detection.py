@@ -1,6 +1,6 @@
 """Contacts of every observer, or of a list, against the true ones, one to one.
 
-A contact is where a wrench or a joint torque leaves its free band, what is read untouched.
+A contact is where a wrench or joint torque leaves its free band, its untouched reading.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,19 +19,19 @@ from vftcli.wrench.solvers import VirtualSensor
 
 #: A contact ends where the score falls below this share of its threshold, 1: hysteresis.
 LEAVE = 0.6
-HOLD = 0.02  #: A contact must last at least this long, so that one noisy sample is none. [s]
-GAP = 0.25  #: Two contacts closer than this are one: a hand that slips has not let go. [s]
+HOLD = 0.02  #: Shortest contact, longer than one noisy sample. [s]
+GAP = 0.25  #: Contacts closer than this are one: a hand that slips. [s]
 #: The free band reaches this far beyond the largest departure seen in the free part.
 BAND = 1.3
-#: An alarm this long before a true contact, or behind its end, is
-#: false: slow observers show a contact for a while. [s]
+#: An alarm this long before a true contact, or behind its end, is false: slow observers
+#: show a contact for a while. [s]
 EARLY, LATE = 0.1, 1.0
 TRUE_TORQUE = 0.5  #: A true joint torque beyond this is a contact. [N·m]
 #: A true contact, and least half width of a free band. (6,) [N, N·m]
 WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
 LEAST_TORQUE = 0.5  #: Smallest half width of a free band of joint torques. [N·m]
-#: Contacts of an exact reference closer than this are one; those of a measured one, which
-#: has a floor, as those of an observer. [s]
+#: Contacts of an exact reference closer than this are one; a measured one has a floor and
+#: uses `GAP`. [s]
 TRUE_GAP = 0.12
 
 
@@ -45,7 +45,7 @@ class ContactInterval(NamedTuple):
 def contact_intervals(
     t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0
 ) -> tuple[ContactInterval, ...]:
-    """Stretches of a mask as `vftcli.signals.series.intervals` has them, in time."""
+    """Stretches of a mask by `vftcli.signals.series.intervals`, in time."""
     runs = intervals(t, mask, least, gap)
     return tuple(ContactInterval(t[start], t[stop - 1]) for start, stop in runs)
 
@@ -57,16 +57,16 @@ def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInte
     """
     inside = np.zeros(len(t), bool)
     for begin, end in runs_of(score > LEAVE):
-        # It starts where 1 is first exceeded, not where the lower threshold is.
+        # It starts where 1 is exceeded, not at the lower threshold.
         inside[begin:end] = np.logical_or.accumulate(score[begin:end] > 1.0)
     return contact_intervals(t, inside, HOLD, gap)
 
 
 def departure(values: Array, quiet: Array, least: Array | float) -> Array:
-    """Largest departure over the columns, in half widths of the free band; 0 if unknown. (T,)
+    """Largest departure of any column, in half widths of the free band. (T,)
 
-    The band is the median of what is read untouched (S, k) ± `BAND` × its largest
-    departure, at least so much.
+    The band is the median of the untouched readings (S, k) ± `BAND` × their largest
+    departure, at least `least`; 0 if unknown.
     """
     inside = quiet[np.isfinite(quiet).all(axis=1)]
     if len(inside) == 0:
@@ -104,7 +104,7 @@ class Detection(NamedTuple):
 
 
 def overlaps(found: Sequence[ContactInterval], true: Sequence[ContactInterval]) -> Array:
-    """How long each found contact lies on each true one, within `EARLY` of it. (F, C) [s]"""
+    """Overlap of each found contact with each true one ± `EARLY`. (F, C) [s]"""
     begin, end = np.reshape([*found], (-1, 2)).T[:, :, None]
     first, last = np.reshape([*true], (-1, 2)).T
     shared = np.minimum(end, last + EARLY) - np.maximum(begin, first - EARLY)
@@ -114,10 +114,10 @@ def overlaps(found: Sequence[ContactInterval], true: Sequence[ContactInterval]) 
 def assignment(
     found: Sequence[ContactInterval], true: Sequence[ContactInterval]
 ) -> list[int | None]:
-    """Of each true contact the number of the found one that is credited to it, None if missed.
+    """Number of the found contact credited to each true one, None if missed.
 
-    A found contact is credited to one true contact, so that as many as possible are
-    found, and of the ways to do so to that which overlaps most.
+    A found contact is credited to one true contact: as many as possible are found, with
+    the largest overlap.
     """
     given: list[int | None] = [None] * len(true)
     if found and true:
@@ -135,10 +135,10 @@ def assignment(
 def match_contacts(
     found: Sequence[ContactInterval], true: Sequence[ContactInterval], duration: float
 ) -> Detection:
-    """Match found contacts one to one with the true ones of a log that lasts `duration` [s].
+    """Found contacts, one to one with the true ones of a log of `duration` [s].
 
-    What begins within `LATE` of a true contact's end is no false alarm, but credited only
-    where it overlaps one; what begins too early is one, credited or not.
+    Beginning within `LATE` of a true contact's end is no false alarm, but gives credit only
+    with overlap; beginning too early is one, credited or not.
     """
     given, meant = assignment(found, true), [(c.start - EARLY, c.stop + LATE) for c in true]
     false = sum(not any(a <= f.start <= b for a, b in meant) for f in found)
@@ -160,16 +160,16 @@ class ContactScore(NamedTuple):
     """How well one observer detects contacts."""
 
     name: str  #: The observer.
-    signal: str  #: In what it detects them: "torque", "wrench", or "list" of contacts.
-    detection: Detection  #: Counts and delays, of the free band itself or of the list.
+    signal: str  #: Its source: "torque", "wrench", or "list" of contacts.
+    detection: Detection  #: Counts and delays.
 
 
 class KnownContacts(NamedTuple):
-    """What is known of a log's contacts before they are judged."""
+    """Knowledge of a log's contacts before they are judged."""
 
-    #: Samples of the log that are known to be free; none where nothing is. (T,)
+    #: Samples of the log that are known to be free, if any. (T,)
     untouched: Mask
-    #: What each observer reads in free runs of other logs, by name. (S, k) each
+    #: Each observer's readings in free runs of other logs, by name. (S, k) each
     beside: Mapping[str, Array] = {}
     #: Contacts of a list, by the observer that gave the wrench.
     listed: Mapping[str, Sequence[ContactInterval]] = {}
@@ -181,7 +181,7 @@ def read_in_free_runs(
     run_of: Callable[[str, Run], Run],
     sensor: VirtualSensor | None,
 ) -> dict[str, Array]:
-    """Readings of each observer in free runs once it has settled, by name: (S, 6) or (S, n)."""
+    """Settled readings in free runs by observer's name: (S, 6) or (S, n)."""
     read: dict[str, list[Array]] = {}
     for piece in pieces:
         t, q, chain = piece.run.t, piece.run.q, piece.run.robot.chain
@@ -206,9 +206,9 @@ def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
 
 
 def floor_in_motion(reference: ExternalTorque) -> Array:
-    """A reference's own error while a joint moves, zero where it states none. (n,) [N·m]
+    """A reference's own error while a joint moves, zero if not stated. (n,) [N·m]
 
-    Stiction at rest would deafen the reference to contacts in motion.
+    With stiction at rest the reference would miss contacts in motion.
     """
     floor, sd, moving = reference.floor, reference.sd, reference.moving
     if floor is None or sd is None or moving is None:
@@ -218,7 +218,7 @@ def floor_in_motion(reference: ExternalTorque) -> Array:
 
 
 def true_contacts(reference: ExternalTorque) -> tuple[ContactInterval, ...]:
-    """Contacts of a reference torque: a joint beyond `TRUE_TORQUE` and 5 × its own error."""
+    """Contacts of a reference: a joint above `TRUE_TORQUE` and 5 × its error."""
     limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
     score = np.nan_to_num(abs(reference.tau) / limits).max(axis=1)
     return find_contacts(reference.t, score, TRUE_GAP if reference.floor is None else GAP)
@@ -232,10 +232,10 @@ def judge_contacts(
 ) -> tuple[ContactScore, ...]:
     """Every observer's contacts against those of a reference torque.
 
-    An observer with a list of contacts is judged by it. The others' are found in their
-    wrenches where they were asked for, else in their joint torques, by a free band:
-    learned in the zero spans, else in the log's own free part, else in free runs, else
-    before the first true contact.
+    A list of contacts is judged if an observer has one. Otherwise contacts are found in
+    the wrenches if they were asked for, else in the joint torques, by a free band: from
+    the zero spans, else the log's free part, else free runs, else the time before the
+    first true contact.
     """
     t, true = reference.t, true_contacts(reference)
     kind, least = "torque", np.asarray(LEAST_TORQUE)

@@ -1,15 +1,15 @@
-"""Frames of a wrench: its axes and the point of its moment; a log's wrench in base axes.
+"""Frames of a wrench: axes and point of its moment; a log's wrench in base axes.
 
-A wrench moves between frames by the adjoint of a pose. With R the orientation of S in F
-and p the origin of S in F, a wrench given in S reads in F
+The adjoint of a pose moves a wrench between frames. With R the orientation of S in F and
+p its origin, a wrench given in S reads in F
 
     [F_F; N_F] = [[R, 0], [[p]×R, R]] [F_S; N_S]
 
-which is (56) in its right form (the paper prints R the wrong way round in the lower left
-block) and Pinocchio's ``SE3(R, p).act(Force)``.
+which is (56) corrected (the paper prints R transposed in the lower left block) and
+Pinocchio's ``SE3(R, p).act(Force)``.
 
 A log may state its wrench's axes, the point of its moment and its sign (`WrenchFrame`);
-what it leaves open is assumed, and the assumption is a remark.
+a remark names what is assumed instead.
 """
 
 from dataclasses import replace
@@ -58,7 +58,7 @@ def check_frame(name: str) -> str:
 
 
 def frame_pose(frame: str, mounting: Mounting) -> Pose:
-    """Pose in the flange frame of what a frame is fixed to."""
+    """Pose of a frame's origin and axes in the flange frame."""
     if frame == "tool":
         if mounting.tool is None:
             raise ParameterError(
@@ -81,7 +81,7 @@ def frame_pose(frame: str, mounting: Mounting) -> Pose:
 def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     """Matrices to a frame from base axes about a flange turned so. (T, 6, 6)"""
     if check_frame(frame) == "base":
-        # A wrench in base axes needs no pose at all, not even the tool's.
+        # Base axes need no pose, not even the tool's.
         return np.broadcast_to(np.eye(6), (len(flange), 6, 6))
     turned = flange.swapaxes(1, 2)
     X = np.zeros((len(flange), 6, 6))
@@ -92,7 +92,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
 
 
 def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
-    """A pose from the command line: numbers, or NAME of ``[section.NAME]`` in the robot file."""
+    """A pose from numbers, or from NAME of ``[section.NAME]`` in the robot file."""
     if (values := numbers(text)) is not None:
         if len(values) not in {3, 6} or not np.isfinite(values).all():
             raise ParameterError(
@@ -112,9 +112,9 @@ def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
 
 #: Of a log that states nothing: a sensor's reading, on the robot.
 UNSTATED = WrenchFrame("sensor", "sensor")
-#: One independent sample: friction's errors last as long. [s]
+#: One independent sample: errors of friction last as long. [s]
 PIECE = 1.0
-#: Evidence of three standard errors, from which currents decide. [nats]
+#: Evidence of three standard errors, enough to decide by currents. [nats]
 SURE = 4.5
 
 
@@ -176,11 +176,10 @@ def controller_point(
 ) -> tuple[str, tuple[Remark, ...]]:
     """The point of a controller's moment, "flange" or "tool", and why.
 
-    The controller knows its payload and its arm: what the measured currents have beyond
-    its target currents is what touches the arm, each joint with a factor and an offset of
-    its own. It is explained by Jᵀ of the wrench, once about the flange and once about the
-    tool's point. The one that leaves less is used if it is likelier by `SURE`; the flange
-    is used where nothing tells, as an e-Series' own sensor has it. The log's wrench is in
+    The controller knows its payload and its arm: the measured current less its target is the
+    touch, each joint with its own factor and offset. Jᵀ of the wrench explains it, once about
+    the flange and once about the tool's point. The one that leaves less is used if it is
+    likelier by `SURE`, else the flange, as of an e-Series' own sensor. The log's wrench is in
     base axes, and the tool's point in the flange frame. (3,) [m]
     """
     if recording.current is None or recording.target_current is None:
@@ -206,7 +205,7 @@ def controller_point(
 
 
 def unexplained(beyond: Array, torque: Array) -> Array:
-    """Share of each joint's variance (T, n) that a line in a torque (T, n) leaves. (n,)"""
+    """Share of each joint's variance (T, n) left by a line in torque (T, n). (n,)"""
     y, x = beyond - beyond.mean(axis=0), torque - torque.mean(axis=0)
     tiny = np.finfo(np.float64).tiny
     slope = np.sum(x * y, axis=0) / np.maximum(np.sum(x**2, axis=0), tiny)

@@ -7,11 +7,10 @@ time T. Over blocks of B seconds the spectrum of d is
 
 and the free part's periodogram P fixes the three by Whittle's likelihood, Σ ln S + P/S.
 
-The smoother of a whole log takes b so (`torque_noise`). A list of contacts is measured
-against the quiet blocks on either side, so there b is modelled closer
-(`learn_noise`, `error_process`): reversals are cut out before the spectrum is learned,
-what the spectrum misses of the tails inflates it, and a joint that comes to rest draws
-its stiction anew.
+The smoother of a whole log uses b as it is (`torque_noise`). A list of contacts compares
+with the quiet blocks on either side and models b closer (`learn_noise`,
+`error_process`): the spectrum is learned without reversals, inflated by the tails that
+it misses, and a joint that comes to rest draws its stiction anew.
 
 References:
     P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
@@ -40,33 +39,33 @@ from vftcli.signals.series import grown, near, runs_of
 from vftcli.wrench.solvers import TORQUE_SD
 
 REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]
-#: A push re-settles the stiction of a joint at rest so fast. [s]
+#: Time in which a push re-settles the stiction of a joint at rest. [s]
 PUSHED_TIME = 0.3
-#: What such a push adds to the variance of motion.
+#: Factor on the variance of rest that such a push adds to motion.
 RESETTLED = (PUSHED_SHARE / REST_SHARE) ** 2
-#: A joint that moves in less than the share `SEEN` of the free part's blocks: the model
-#: error of its motion, as a share of F_c, and its least correlation time. [s]
+#: A joint that moves in less than the share `SEEN` of the free blocks: its model error in
+#: motion as a share of F_c, and the least correlation time. [s]
 UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
 #: Prior of the correlation time T: its median [s] and the spread of ln T.
 USUAL_TIME, TIME_SPREAD = 0.5, 1.5
 LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
 #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
 LEAST_BLOCKS = 20
-ASSUMED_SHARE = 0.2  #: Model error of motion as a share of F_c, where no free part is known.
+ASSUMED_SHARE = 0.2  #: Model error of motion as a share of F_c, without a free part.
 #: Share of blocks in which a joint moves, to bridge reversals.
 MOVES = 0.3
-#: Shares of the normalised squares ν²/S, and where χ² of one degree has them.
+#: Shares of the squares ν²/S, and their χ² of one degree.
 QUANTILES = (0.9, 2.706), (0.97, 4.709)
-#: Smallest model error that is inferred where no free motion is known: this share of F_c,
-#: and so much [N·m]; its correlation time is no shorter where it is this error. [s]
+#: Smallest inferred model error without known free motion: this share of F_c, this much
+#: [N·m]; and its least correlation time there. [s]
 DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
-#: Where nothing was learned the quietest 60 % of the blocks in which a joint moves count
-#: as free; 60 % of a normal variable lie within so many standard deviations.
+#: Without learned noise the quietest 60 % of the blocks in motion count as free; 60 % of
+#: a normal variable lie within so many standard deviations.
 QUIET, QUIET_SD = 0.6, 0.8416
-#: Coming to rest draws b anew: so much of it is left.
+#: Share of b that is left when a joint comes to rest.
 STOP_DECAY = np.exp(-5.0)
-#: What a joint has just done: it stops if it moved for more than half of this time
-#: before, and for this time after a start b changes within `START_TIME`. [s]
+#: A joint stops if it moved for more than half of this time before; for this time after
+#: a start b changes within `START_TIME`. [s]
 RECENT = 0.1
 START_TIME = 0.05  #: Correlation time of b while a joint breaks away. [s]
 #: Rate of spikes within so long [s] of motion, and at rest.
@@ -81,12 +80,12 @@ class TorqueNoise(NamedTuple):
     variance: Array  #: s² of motion that the free part shows. (n,) [(N·m)²]
     time: Array  #: T, its correlation time. (n,) [s]
     dry: Array  #: F_c. (n,) [N·m]
-    #: Whether the free part moved the joint; else motion errs by its friction. (n,)
+    #: Whether the free part moved the joint; else friction adds to its error. (n,)
     seen: Mask
     at_rest: Array  #: Variance that rest adds. (n,) [(N·m)²]
     pushed: Array  #: Variance that rest under a contact adds. (n,) [(N·m)²]
-    near: float = 0.0  #: How long before and after a rest that of rest holds. [s]
-    #: How much free motion it was learned from; 0 where it is assumed. [s]
+    near: float = 0.0  #: How far rest reaches before and after itself. [s]
+    #: Length of the free motion behind it; 0 where it is assumed. [s]
     free_seconds: float = 0.0
 
     @property
@@ -121,12 +120,11 @@ def torque_noise(
 ) -> TorqueNoise:
     """Noise of a whole log: from free motion of this log or of others, else assumed.
 
-    At rest the model error is at least `REST_SHARE` of the dry friction, whatever the
-    free part shows: stiction keeps what the last motion, or the last touch, left. The
-    free part counts from its first motion to its last, since rest has a model error of
-    its own; a piece without motion counts as it is. Without any the model error is
-    assumed as shares of the dry friction, and the white noise as neighbouring blocks
-    differ.
+    At rest the model error is at least `REST_SHARE` of the dry friction: stiction keeps
+    the last motion's, or the last touch's, state. The free part counts from its first
+    motion to its last, since rest has its own model error; a piece without motion counts
+    whole. Without any, the model error is a share of the dry friction, and the white noise
+    the difference of neighbouring blocks.
     """
     dry, pieces = dry_torques(robot), []
     for run, inside in free:
@@ -157,13 +155,13 @@ def torque_noise(
 
 
 def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
-    """Noise of free pieces for a list of contacts, None where no stretch is long enough."""
+    """Noise of free pieces for a list of contacts, None without a long stretch."""
     pieces = [stretch for piece in free for stretch in long_stretches(piece)]
     if not pieces:
         return None
     share = (~np.concatenate([piece.rests for piece in pieces])).mean(axis=0)
     noise = fitted_noise([without_reversals(piece, share > MOVES) for piece in pieces], dry)
-    # The tails of the innovations may ask for more than the spectrum.
+    # The innovations' tails may exceed the spectrum.
     processes = ((piece.d, error_process(noise, piece)) for piece in pieces)
     each = [innovations(error_model(d, own), own.spikes)[0] for d, own in processes]
     squares = np.concatenate(each)
@@ -209,7 +207,7 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
 def fitted_noise(stretches: Sequence[Blocks], dry: Array) -> TorqueNoise:
     """Noise by Whittle's likelihood over all stretches together, joint by joint."""
     whole = Blocks(*map(np.concatenate, zip(*stretches, strict=True)))
-    # A block holds whole samples, so that it is not quite as long as was asked.
+    # A block holds whole samples: its length differs a little.
     seconds = median(whole.length)
     f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
     P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
@@ -228,13 +226,13 @@ def fitted_noise(stretches: Sequence[Blocks], dry: Array) -> TorqueNoise:
 
 
 def long_stretches(blocks: Blocks) -> list[Blocks]:
-    """The stretches of known blocks that a spectrum can be learned from."""
+    """The stretches of known blocks long enough for a spectrum."""
     runs = [run for run in runs_of(blocks.known) if run[1] - run[0] >= LEAST_BLOCKS]
     return [blocks.part(slice(*run)) for run in runs]
 
 
 def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
-    """The blocks with d of the given joints bridged in a straight line where they rest."""
+    """The blocks with the given joints' d bridged in a line where they rest."""
     d, moves = piece.d.copy(), ~piece.rests
     for j in np.flatnonzero(joints & moves.any(axis=0)):
         d[:, j] = np.interp(piece.t, piece.t[moves[:, j]], d[moves[:, j], j])
@@ -250,10 +248,10 @@ def periodogram(d: Array, seconds: float) -> Array:
 def fit_spectrum(
     f: Array, P: Array, seconds: float, longest: float
 ) -> tuple[float, float, float]:
-    """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
+    """R, s² and T of one joint, by a grid over ln T and ln s²/R, narrowed five times.
 
-    The level follows in closed form, so that two numbers are left to search. No
-    correlation time is longer than the longest stretch. Units are Hz, (N·m)²/Hz and s.
+    The level follows in closed form: two numbers are searched. No correlation time is
+    longer than the longest stretch. Units are Hz, (N·m)²/Hz and s.
     """
     cosine = np.cos(2.0 * np.pi * f * seconds)
     low, high = np.log([2.0 * seconds, 1e-2]), np.log([max(longest, 4.0 * seconds), 1e6])
@@ -280,18 +278,18 @@ class ErrorProcess(NamedTuple):
 
     decay: Array  #: Share of b that is kept from the block before. (K, n)
     added: Array  #: Variance that is added. (K, n) [(N·m)²]
-    white: Array  #: R, `UNKNOWN` where the block's disturbance is. (K, n) [(N·m)²]
+    white: Array  #: R, `UNKNOWN` of a hidden block. (K, n) [(N·m)²]
     spikes: Array  #: How often an innovation is a spike. (K, n)
 
     def hiding(self, hidden: Mask) -> "ErrorProcess":
-        """The process where some blocks (K,) say nothing."""
+        """The process with some blocks (K,) hidden."""
         return self._replace(white=np.where(hidden[:, None], UNKNOWN, self.white))
 
 
 def steady_process(
     noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None, starts: Mask | None = None
 ) -> ErrorProcess:
-    """B along a log without stops and spikes; joints that start (K, n) let go of it faster.
+    """Process of b without stops and spikes; `starts` (K, n) shorten its time.
 
     In the `touched` blocks (K,) a contact may re-settle stiction at rest.
     """
@@ -307,7 +305,7 @@ def steady_process(
 def error_process(
     noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None
 ) -> ErrorProcess:
-    """B along a log; in the `touched` blocks (K,) a contact may re-settle stiction at rest."""
+    """Process of b; `touched` blocks (K,) may re-settle stiction at rest."""
     rests, length = blocks.rests, np.median(blocks.length)
     # Share of the `RECENT` blocks before each in which a joint moved.
     count, k = max(round(RECENT / length), 1), np.arange(len(rests))
@@ -333,14 +331,14 @@ def error_model(d: Array, process: ErrorProcess) -> LinearModel:
 
 
 def spike_limit(spikes: Array) -> Array:
-    """ν²/S beyond which an innovation is more likely a spike, for how often it is one. (K, …, n)"""
+    """ν²/S above which an innovation is likelier a spike, by its rate. (K, …, n)"""
     with np.errstate(divide="ignore"):
         odds = np.log(spikes) - np.log1p(-spikes)
     return np.asarray((np.log(SPIKE) - 2.0 * odds) / (1.0 - 1.0 / SPIKE))
 
 
 def innovations(model: LinearModel, spikes: Array) -> tuple[Array, Array]:
-    """ν²/S of every joint's own model, and S, by how often each is a spike. (K, …, n) each"""
+    """ν²/S of every joint's own model, and S, by the rate of spikes. (K, …, n) each"""
     blocks = filtered(model, spike_limit(spikes))
     each = [(block.square, block.spread[..., 0, 0]) for block in blocks]
     squares, spreads = (np.array(series) for series in zip(*each, strict=True))
@@ -348,7 +346,7 @@ def innovations(model: LinearModel, spikes: Array) -> tuple[Array, Array]:
 
 
 def spiked_white(d: Array, process: ErrorProcess) -> Array:
-    """R of every block with its spikes in it, for d (K, n). (K, n) [(N·m)²]"""
+    """R of every block, spikes included, for d (K, n). (K, n) [(N·m)²]"""
     squares, spreads = innovations(error_model(d, process), process.spikes)
     spiked = squares > spike_limit(process.spikes)
     return process.white + np.where(spiked, (SPIKE - 1.0) * spreads, 0.0)

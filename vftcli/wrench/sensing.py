@@ -1,12 +1,11 @@
-"""From a log, its free motion and the estimates to what the virtual sensor says of it.
+"""From a log, its free motion and the estimates to the virtual sensor's reading.
 
-The joint torque error that a wrench's band starts from is stated, or measured on the log
-by the one model of every band, `vftcli.observers.spectra`: what the estimator reads while
-nothing touches the arm, at rest and in motion apart, and what its lag leaves out of the
-contacts there are. Where neither a free part nor an unloaded span is known there is no
-band: the observers' own covariance assumes a torque that wanders as fast as Q_τ says and
-a model without error, and differs a hundredfold between filters that estimate nearly
-the same.
+The joint torque error behind a wrench's band is stated, or measured on the log by the
+one model of every band, `vftcli.observers.spectra`: the estimator's reading while nothing
+touches the arm, at rest and in motion apart, and the part of the contacts that its lag
+leaves out. Without a free part or an unloaded span there is no band: the observers' own
+covariance assumes a torque that wanders at Q_τ and a model without error, and differs a
+hundredfold between filters with nearly equal estimates.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,7 +49,7 @@ from vftcli.wrench.smoother import (
 )
 from vftcli.wrench.solvers import CHUNK, VirtualSensor
 
-#: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
+#: Half the averaging time: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
 HALF = 0.05
 
 
@@ -58,28 +57,28 @@ class Gate(NamedTuple):
     """The contacts of a log, outside of which nothing touches the arm."""
 
     spans: Sequence[tuple[float, float]]  #: From and to of every contact. [s]
-    #: How their wrench moves, as the contacts themselves show it; None to choose it.
+    #: Prior of their wrench, learned from the contacts; None to choose it.
     prior: WrenchPrior | None = None
 
 
 class FreeLog(NamedTuple):
-    """A log as an observer has it, and what nobody touched."""
+    """A log as an observer has it, and its free motion."""
 
     run: Run  #: The log.
-    #: Free samples, less a load that they carry; or none.
+    #: Free samples, less a load that they carry.
     free: tuple[RunSamples, ...]
-    #: A load that the free samples carry, and with them the whole log; None without one.
+    #: A load that the free samples, hence the whole log, carry; None without one.
     load: FreeLoad | None = None
 
     def known_free(self, unloaded: Mask) -> tuple[RunSamples, ...]:
-        """The free samples; without any, the samples (T,) that a zero says are unloaded."""
+        """The free samples; without any, the zero's unloaded samples (T,)."""
         if self.free or np.count_nonzero(unloaded) < 2:
             return self.free
         return (RunSamples(self.run, unloaded),)
 
 
 def as_modelled(motion: FreeMotion) -> FreeLog:
-    """The log as the robot's model explains it, with the free part that is given or found."""
+    """The log by the robot's model, with its free part, given or found."""
     try:
         return FreeLog(motion.log, motion.known.pieces)
     except ReferenceTorqueError:
@@ -95,13 +94,12 @@ def sense(
     own: Mapping[str, FreeLog] | None = None,
     gate: Gate | None = None,
 ) -> SensorReading:
-    """Wrenches of the observers' estimates, in the same order, less their zero, and judged.
+    """Wrenches of the estimates, in their order, less their zero, with remarks.
 
-    What is asked of the log rather than of an observer (its unloaded start, its sensor's
-    pose, its vendor's convention) is read off the mean disturbance, so that it does not
-    depend on which observers run. The smoother needs the log with its free samples, as
-    the robot's model alone has it (`plain`, found if not given) or as an observer has its
-    own, and a gate where there is one.
+    Questions to the log (its unloaded start, its sensor's pose, its vendor's convention) are
+    answered by the mean disturbance, hence independent of the observers. The smoother needs
+    the log with its free samples, by the robot's model alone (`plain`, found if not given)
+    or as an observer has its own, and a gate if there is one.
     """
     log, q, t, chain = motion.log, motion.log.q, motion.log.t, motion.log.robot.chain
     disturbance = mean_disturbance(log.terms)
@@ -109,8 +107,7 @@ def sense(
         [torque for torque in estimates if choice.smooths(torque.name) == wanted]
         for wanted in (True, False)
     )
-    # The disturbance is solved in base axes, so that --frame moves no zero; beside it,
-    # what the pose says of the estimates that are smoothed.
+    # In base axes --frame moves no zero; beside it the poses of the smoothed estimates.
     raw, *bare = VirtualSensor(frame="base").wrenches((disturbance, *to_smooth), q, chain)
     mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
     vendor = vendor_remarks(log.recording, raw, chain)
@@ -128,7 +125,7 @@ def sense(
     made |= {w.name: smoothed_wrench(smoothed[w.name], w, sensor, log) for w in bare}
     wrenches = [made[torque.name] for torque in estimates]
     bands = [remark for name in names for remark in made[name].remarks]
-    # Remarks on torques' errors name the torques beside the smoother.
+    # Remarks on torques' errors name the torques, if some are smoothed.
     if others:
         where = Where(", ".join(torque.name for torque in others)) if smoothed else Where()
         bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in on_sds]
@@ -137,7 +134,7 @@ def sense(
     read = [pair for row in drifts for pair in zip(wrenches, row, strict=True)]
     warnings = [remark for pair in read for remark in zero_warning(*pair)]
     moved = [zero_moved(*pair) for row in drifts[1:] for pair in zip(drifts[0], row, strict=True)]
-    # Only now: the band and the warnings are about the wrench as it was read.
+    # Only now: band and warnings are about the wrench as it was read.
     if drifts:
         wrenches = [*map(without_drift, wrenches, drifts[0])]
         drifts[0] = [drift._replace(removed=True) for drift in drifts[0]]
@@ -163,7 +160,7 @@ def sense(
 def smoothed_wrench(
     smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, log: Run
 ) -> Wrench:
-    """A wrench with the smoother's values and band in the sensor's frame, nothing of it masked."""
+    """A wrench with the smoother's values and band in the sensor's frame, unmasked."""
     values, sd = np.empty((2, len(wrench.t), 6))
     for start in range(0, len(values), CHUNK):
         span = slice(start, start + CHUNK)
@@ -190,7 +187,7 @@ def smooth_all(
     unloaded: Mask,
     gate: Gate | None = None,
 ) -> dict[str, SmoothedWrench]:
-    """The smoothed wrench of each observer, computed once for all that have the same log."""
+    """The smoothed wrench of each observer, one computation a log."""
     logs = {name: own.get(name, plain) for name in names}
     each = {log.run: log for log in reversed(logs.values())}
     wrenches = {run: smooth_log(log, plain, unloaded, gate) for run, log in each.items()}
@@ -200,9 +197,8 @@ def smooth_all(
 def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) -> SmoothedWrench:
     """The smoothed wrench of one log; the arguments as of `smooth_all`.
 
-    A correction of the model's error is used where the wrench comes and goes. Where the
-    uncorrected log calls for one steady load it is left out, since a load and an error of
-    the model look alike.
+    A corrected model error is used where the wrench comes and goes. If the uncorrected log
+    implies one steady load it is left out, since load and model error look alike.
     """
     run, free, load = log.run, log.known_free(unloaded), log.load
     if gate is not None:
@@ -222,12 +218,11 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
 
 
 def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
-    """The raw disturbance, its mean over `HALF` before and after each sample. (T, n) [N·m]
+    """The raw disturbance, averaged over `HALF` around each sample. (T, n) [N·m]
 
-    What is asked of a log itself is asked of it: no option touches it and no filter
-    delays it. The mean is a difference of its integral, so an uneven clock weighs by
-    time; at the ends of the log it is over what there is. A log of one sample reads
-    nothing.
+    No option changes it and no filter delays it. The mean is a difference of its integral,
+    so an uneven clock weighs by time; at the ends of the log it is shorter. A log of one
+    sample reads zero.
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
@@ -240,7 +235,7 @@ def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
 
 
 def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
-    """Count of the samples (T,) in which the pose hides the wrench, and the smallest σ_min [m]."""
+    """A remark with the count of hidden samples (T,) and the smallest σ_min [m]."""
     count = np.count_nonzero(hidden)
     if not count or sigma is None:
         return ()
@@ -250,7 +245,7 @@ def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
 
 OWN = "own"  #: The word for the observers' own covariance as the torque error.
 #: Observer → standard deviation, (n,) or (T, n), none of those without a band [N·m]; and
-#: where it comes from, or why there is none.
+#: its source, or why there is none.
 TorqueError = tuple[dict[str, Array], list[Remark]]
 
 
@@ -297,7 +292,7 @@ def from_free_part(
     free: Mask,
     missed: Mapping[str, Array] | None,
 ) -> TorqueError:
-    """The error of the free samples (T,) and of what the lag misses, where that is known."""
+    """The error of the free samples (T,), and of the lag where it is known."""
     rests, sd, seen = run.rests, {}, True
     for torque in torques:
         inside = torque.tau[free]
@@ -316,9 +311,9 @@ def from_free_part(
 def missed_torque(
     log: Run, observers: Sequence[Observer], free: Mask
 ) -> Mapping[str, Array] | None:
-    """Observer → mean square that its lag leaves out of the contacts. (n,) [(N·m)²]
+    """Observer → mean square of contacts that its lag leaves out. (n,) [(N·m)²]
 
-    None where the part that is free, or the rest, is too short for a spectrum.
+    None if the free part or the rest is too short for a spectrum.
     """
     try:
         spectra = spectra_of(RunSamples(log, ~free), [RunSamples(log, free)])

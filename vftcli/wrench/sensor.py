@@ -1,4 +1,4 @@
-"""A real force/torque sensor beside ours: its pose on the flange, or its vendor's convention."""
+"""A real force/torque sensor beside ours: its pose or its vendor's convention."""
 
 from itertools import permutations
 from typing import NamedTuple
@@ -28,7 +28,7 @@ RESEMBLES = 0.5  #: Below this correlation no convention explains the field.
 
 
 class PoseFit(NamedTuple):
-    """A sensor's pose on the flange, estimated from what it and the virtual sensor read."""
+    """A sensor's pose on the flange, estimated from both sensors' readings."""
 
     pose: Pose  #: Orientation and origin of the sensor in the flange frame.
     force_rms: float  #: Force that the pose leaves unexplained, rms over axes and samples. [N]
@@ -37,10 +37,10 @@ class PoseFit(NamedTuple):
 
 
 def fit_pose(flange: Array, sensor: Array) -> PoseFit:
-    """R and p of (56) from two readings of a contact, flange's and sensor's. (T, 6) [N, N·m]
+    """R and p of (56) from readings of flange and sensor. (T, 6) each [N, N·m]
 
     R solves Wahba's problem on the forces (Kabsch), p the linear least squares of N_F − R
-    N_S = p × F_F, both on departures from the mean: constant offsets do not matter.
+    N_S = p × F_F, both about the mean: constant offsets do not matter.
     """
     ours, theirs = centred(flange, sensor)
     if len(ours) < 4:
@@ -53,7 +53,7 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
             "the sensor's pose cannot be found: the forces lie on one line; push in two "
             "directions, or give the pose with --set virtual-sensor.sensor=x,y,z,roll,pitch,yaw"
         )
-    # A reflection may fit better than any rotation; the smallest direction gives way.
+    # A reflection may fit better than a rotation: the smallest direction gives way.
     R = Vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
     lever = skew(-ours[:, :3]).reshape(-1, 3)
     excess = (ours[:, 3:] - theirs[:, 3:] @ R.T).ravel()
@@ -68,7 +68,7 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
 def find_mounting(
     recording: Recording, robot: Robot, disturbance: ExternalTorque, choice: WrenchChoice
 ) -> tuple[Mounting, tuple[Remark, ...]]:
-    """Tool and sensor poses as asked, and what was found: ``fit`` estimates the sensor's pose."""
+    """Tool and sensor poses as asked, with remarks; ``fit`` estimates the sensor's."""
     mounting = choice.mounting(robot)
     if choice.sensor_pose != FIT:
         return mounting, ()
@@ -96,26 +96,26 @@ class AxesFit(NamedTuple):
 
     matrix: Array  #: The signed permutation of axes that fits best. (3, 3)
     gain: float  #: Factor on top of it.
-    correlation: float  #: Correlation of theirs with it, all axes together.
+    correlation: float  #: Their correlation, all axes together.
 
     @property
     def derived(self) -> bool:
-        """Whether theirs is no measurement of its own but computed from the same torques."""
+        """Whether theirs is computed from the same torques, not measured."""
         return self.correlation >= DERIVED
 
     @property
     def words(self) -> str:
-        """Where each of their axes lies in ours, as "+x +z −y"."""
+        """Their axes in ours, as "+x +z −y"."""
         places = abs(self.matrix).argmax(axis=1)
         signs = np.where(self.matrix.sum(axis=1) > 0, "+", "−")
         return " ".join(f"{sign}{'xyz'[k]}" for sign, k in zip(signs, places, strict=True))
 
 
 def fit_axes(ours: Array, theirs: Array) -> AxesFit:
-    """Find the order and signs of axes that take our force to theirs. Offsets do not matter.
+    """Signed permutation of axes from our force to theirs; offsets do not matter.
 
-    The best orthogonal matrix (improper ones allowed, as loggers swap axes freely) is
-    rounded to the signed permutation with the largest sum of matching entries.
+    The best orthogonal matrix (improper ones allowed: loggers swap axes freely), rounded
+    to the signed permutation with the largest sum of matching entries.
     """
     x, y = centred(ours, theirs)
     U, _, Vt = np.linalg.svd(y.T @ x)
@@ -131,14 +131,14 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
 
 
 def centred(ours: Array, theirs: Array) -> tuple[Array, Array]:
-    """Departures from the mean of two readings (T, k) where both are known. (S, k) each"""
+    """Departures from the means of two readings (T, k), both known. (S, k) each"""
     known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
     x, y = ours[known], theirs[known]
     return (x - x.mean(axis=0), y - y.mean(axis=0)) if len(x) else (x, y)
 
 
 def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Remark]:
-    """Convention of the log's own wrench, fitted against ours in base and in flange axes."""
+    """Convention of the log's own wrench against ours, in base and flange axes."""
     theirs = recording.wrench
     if theirs is None:
         return []
@@ -150,7 +150,7 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
         return [caution("log-wrench-all-zero", force_N=force)]
     if share:
         remarks.append(caution("log-wrench-zero", share=share, force_N=force))
-    # Zeros may stand for "not known", and would pull every fit towards nothing.
+    # Zeros may mean "not known", and would bias every fit.
     t, usable = recording.t, ~(empty | ours.hidden)[:, None]
     if np.count_nonzero(usable) < 10:
         return [*remarks, caution("log-wrench-unlike")]

@@ -1,4 +1,4 @@
-"""Reading of a log's virtual sensor: wrenches, zero drift and its removal, masks, remarks."""
+"""A log's virtual sensor: wrenches, zero drift and its removal, masks, remarks."""
 
 from collections.abc import Mapping
 from dataclasses import field, replace
@@ -21,22 +21,21 @@ from vftcli.wrench.solvers import SCALE, VirtualSensor
 
 #: Null-space threshold, as a multiple of the free part's largest.
 MARGIN = 1.25
-#: Share of samples above the threshold up to which nothing is said: chance reaches it.
+#: Share of samples above the threshold that chance reaches, hence no remark.
 LEAST_SHARE = 0.001
 Span = tuple[float, float]  #: First and last time. [s]
-#: Start of a log that is left out of an unloaded start: observers rise from zero. [s]
+#: Start of a log left out of an unloaded start: observers rise from zero. [s]
 SETTLING = 1.0
 LEAST_SPAN = 0.5  #: Shortest unloaded start. [s]
-#: A departure from the start's own level that counts as load whatever the noise. [N, N·m]
+#: A departure from the start's level that is a load, whatever the noise. [N, N·m]
 STEPS = np.repeat([3.0, 0.6], 3)
-BACK = (
-    0.3  #: An unloaded start ends this long before the load shows: it began to rise earlier. [s]
-)
+#: An unloaded start ends this long before a load shows: it began earlier. [s]
+BACK = 0.3
 SPREADS = 6.0  #: A departure of so many robust standard deviations counts as load.
 
 
 class Drift(NamedTuple):
-    """What one virtual sensor reads over one unloaded span."""
+    """Reading of one virtual sensor over one unloaded span."""
 
     name: str  #: The observer.
     span: Span  #: First and last time. [s]
@@ -59,16 +58,16 @@ class Drift(NamedTuple):
 
 
 def null_space_limit(wrench: Wrench, free: Mask) -> float | None:
-    """`MARGIN` times the largest null-space torque in the free part (T,), None without. [N·m]"""
+    """`MARGIN` times the largest null-space torque of the free part (T,). [N·m]"""
     if (torque := wrench.null_space) is None:
         return None
     known = torque[free & np.isfinite(torque)]
-    # The largest, not a quantile: the free part holds no contact, so all of it is error.
+    # The largest, not a quantile: all of a free part is error.
     return MARGIN * known.max() if len(known) else None
 
 
 def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
-    """A remark where the torque of an arm of more than six joints is no tip wrench's."""
+    """A remark where no wrench at the tip explains the torque of over six joints."""
     limit = null_space_limit(wrench, free)
     if limit is None or wrench.null_space is None:
         return ()
@@ -80,23 +79,23 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
 
 @record
 class SensorReading(Shown):
-    """Everything the virtual sensor says of one log."""
+    """The virtual sensor's reading of one log."""
 
     sensor: VirtualSensor  #: Solver, frame and mounting used.
     wrenches: tuple[Wrench, ...]  #: One an observer, drift removed where a zero was given.
-    masked: Mask  #: Samples in which the pose cannot tell a wrench, whoever observes it. (T,)
+    masked: Mask  #: Samples in which the pose hides the wrench. (T,)
     drifts: tuple[Drift, ...] = ()  #: Zero drift, one an unloaded span and observer.
     #: Unloaded samples: of the zero spans, or of the start. (T,)
     free: Mask
     #: What the smoother found, by observer.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
-    #: The wrench the others are judged by, in the same frame, or None.
+    #: The wrench that the others are compared with, in the same frame, or None.
     reference: Wrench | None = None
     remarks: tuple[Remark, ...] = ()  #: What the reader of the numbers should know.
 
     @property
     def masked_share(self) -> float:
-        """Share of the samples in which the pose cannot tell the wrench."""
+        """Share of the samples in which the pose hides the wrench."""
         return float(self.masked.mean())
 
     @property
@@ -106,7 +105,7 @@ class SensorReading(Shown):
 
     @property
     def solver(self) -> str:
-        """Which solver made which wrench."""
+        """The solver of the wrenches, in words."""
         names = [wrench.name for wrench in self.wrenches if wrench.name in self.smoothed]
         if not names:
             return self.sensor.solver
@@ -157,7 +156,7 @@ def zero_drift(wrench: Wrench, span: Span) -> Drift:
 
 
 def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
-    """The wrench with the drift subtracted, as a constant in the wrench's own frame."""
+    """The wrench less the drift, a constant in the wrench's own frame."""
     removed = drift._replace(removed=True)
     return replace(
         wrench, values=wrench.values - drift.mean, remarks=(*wrench.remarks, removed.remark)
@@ -165,13 +164,13 @@ def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
 
 
 def without_zero(wrench: Wrench, choice: ZeroChoice) -> Wrench:
-    """A wrench less its mean over the first span of a choice, or over its own unloaded start."""
+    """A wrench less its mean over a choice's first span or its unloaded start."""
     spans, _ = zero_spans(choice, wrench)
     return without_drift(wrench, zero_drift(wrench, spans[0])) if spans else wrench
 
 
 def zero_moved(first: Drift, last: Drift) -> Remark:
-    """How far the zero moved between two unloaded spans."""
+    """The change of the zero between two unloaded spans."""
     force, moment = np.split(last.mean - first.mean, 2)
     values = {"force_N": force.tolist(), "moment_Nm": moment.tolist()}
     where = Where(first.name, span=last.span)
@@ -179,7 +178,7 @@ def zero_moved(first: Drift, last: Drift) -> Remark:
 
 
 def zero_spans(choice: ZeroChoice, wrench: Wrench) -> tuple[tuple[Span, ...], tuple[Span, ...]]:
-    """The chosen spans, the first the zero; and those known to be unloaded, else the start. [s]"""
+    """The chosen spans, zero first; and the unloaded ones, else the start. [s]"""
     if choice.spans:
         return choice.spans, choice.spans
     start = unloaded_start(wrench)
@@ -193,18 +192,18 @@ def zero_spans(choice: ZeroChoice, wrench: Wrench) -> tuple[tuple[Span, ...], tu
 
 
 def unloaded_start(wrench: Wrench) -> Span | None:
-    """The span from the start over which the wrench keeps its first level, None if too short. [s]
+    """The span at the start with the wrench at its first level, None if short. [s]
 
     That level is the median of the first half second after `SETTLING`; the span ends
-    where a median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at
-    least `STEPS`. A load that hangs from the first sample on looks like drift.
+    where a median over 0.1 s departs by `SPREADS` robust standard deviations and at least
+    `STEPS`. A load from the first sample on looks like drift.
     """
     t = wrench.t - wrench.t[0]
     known = np.isfinite(wrench.known).all(axis=1)
     first = known & (t >= SETTLING) & (t <= SETTLING + LEAST_SPAN)
     if np.count_nonzero(first) < 3:
         return None
-    # Medians, since a knock in the first half second must move neither level nor spread.
+    # Medians: a knock at first moves neither level nor spread.
     level = np.median(wrench.values[first], axis=0)
     spread = robust_sd(wrench.values[first] - level)
     away = np.any(abs(wrench.values - level) > np.maximum(STEPS, SPREADS * spread), axis=1)
@@ -219,7 +218,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
 
 
 def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
-    """A warning if a zero interval looks like a contact; none if it does not."""
+    """A warning if a zero interval looks like a contact."""
     inside, start, tried = wrench.between(*drift.span), unloaded_start(wrench), []
     if start is not None:
         level = zero_drift(wrench, start)

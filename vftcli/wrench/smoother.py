@@ -1,10 +1,10 @@
-"""The wrench smoother: one linear model of wrench and model error along a whole log.
+"""The wrench smoother: a linear model of wrench and model error along a log.
 
     d = Jᵀw + b + n: block averages, noise, prior, filter and smoother in a row.
 
-The wrench and the model error are separated by how they move: the error as the free part shows it,
-the wrench as its prior says. No pose hides anything: where a force turns no joint the estimate
-leans on its past and future, and its band grows.
+Wrench and model error are separated by how they move: the error as the free part shows it,
+the wrench as its prior says. Where a force turns no joint the estimate rests on its past
+and future, and its band grows.
 """
 
 from collections.abc import Sequence
@@ -31,32 +31,31 @@ from vftcli.wrench.model_error import (
 )
 
 COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]
-#: Length of a block where the wrench moves [s]; on a clock of which one step in ten differs by
-#: more than this share it holds so many samples.
+#: Length of a block where the wrench moves [s]; on a clock with one step in ten off by more
+#: than this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
-#: Blocks are longer in a log that would make more: each takes some 6 kB and .1 ms.
+#: Longer logs have longer blocks: each needs some 6 kB and .1 ms.
 MOST_BLOCKS = 30_000
-#: What the model's own standard deviations of force and moment are multiplied by. The error of the
-#: friction is not Gaussian; chosen once on six simulated seeds, for all logs.
+#: Factors on the model's own standard deviations of force and moment: friction's error is not
+#: Gaussian. Chosen once on six simulated seeds, for all logs.
 WIDENED = np.repeat([1.5, 2.0], 3)
-DRIVES = 0.03  #: Share of a reading that the drives' constants may be off by.
-#: Share of the bend, of a block less the mean of its neighbours, that the blocks may hide: what
-#: their mean loses of a peak and what lies between two of them.
+DRIVES = 0.03  #: Error of the drives' constants, as a share of a reading.
+#: Share of the bend, of a block less the mean of its neighbours, that the blocks may hide of
+#: a peak, or between two of them.
 BENT = 0.25
-#: Outside of the listed contacts the band is that of a contact which lasts so long, as long as
-#: those that the list makes up in free motion to find the smallest force it can see. [s]
+#: Outside the listed contacts the band is that of a contact of this length, that of the
+#: made-up contacts in free motion that give the smallest force. [s]
 UNLISTED = 0.6
-#: What the force's own standard deviation is multiplied by to measure a size: peaks are larger than
-#: the mean that it was learned from, and would be drawn to zero.
+#: Factor on the force's standard deviation to measure a size: peaks exceed the mean behind
+#: it, and would shrink.
 LOOSER = 1.5
 LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]
 #: Correlation times of a wrench that are tried. [s]
 TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 FORCES = (10.0, 30.0, 60.0)  #: Standard deviations of a force that are tried. [N]
-STEADY = 30.0  #: A wrench that keeps for at least this long is a load, … [s]
-LOAD_CHANGE = (
-    5.0  #: … if it changes by no more than this (one standard deviation) in a second. [N]
-)
+STEADY = 30.0  #: A wrench of at least this correlation time is a load, … [s]
+#: … if its change in a second is no more than this (one standard deviation). [N]
+LOAD_CHANGE = 5.0
 
 
 class WrenchPrior(NamedTuple):
@@ -64,13 +63,13 @@ class WrenchPrior(NamedTuple):
 
     time: float  #: Correlation time τ_w. [s]
     force: float  #: Standard deviation σ_f of each component of the force. [N]
-    #: That of the moment; `LEVER` times the force where none is known. [N·m]
+    #: That of the moment; None for `LEVER` times the force. [N·m]
     moment: float | None = None
 
     @property
     def is_steady(self) -> bool:
-        """Whether it is the prior of a load rather than of contacts that come and go."""
-        # What the force changes by in a second, where that is short against τ_w.
+        """Whether it is the prior of a load, not of contacts that come and go."""
+        # Change of the force in a second, short against τ_w.
         change = self.force * np.sqrt(2.0 / self.time)
         return self.time >= STEADY and change <= LOAD_CHANGE
 
@@ -86,7 +85,7 @@ class WrenchPrior(NamedTuple):
         return np.repeat([self.force**2, moment**2], 3)
 
     def process(self, inside: Mask, step: Array) -> tuple[Array, Array]:
-        """Share that is kept from the block before, and variance that is added. (K, 1), (K, 6)
+        """Share kept from the block before, and variance added. (K, 1), (K, 6)
 
         None is kept where the gate opens, and outside, where none is added either.
         """
@@ -120,14 +119,14 @@ class Lane(NamedTuple):
 
 
 def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
-    """Wrench w and model error b of lanes side by side: d = Jᵀw + b + noise. (K, L, 6 + n)
+    """Wrench w and model error b of lanes: d = Jᵀw + b + noise. (K, L, 6 + n)
 
-    Shorter lanes end in blocks that say nothing. Outside its gate the wrench is pinned to zero; the
-    first block inside starts it with the prior's own variance, independent of before.
+    Shorter lanes end in hidden blocks. Outside its gate the wrench is zero; the first block
+    inside starts it with the prior's variance, independent of before.
     """
     n, step, process = log.blocks.d.shape[1], steps(log.blocks), log.process
     longest, count = max(lane.window[1] - lane.window[0] for lane in lanes), len(lanes)
-    # What is the same in all lanes is there once: of a long log G priors would have no room.
+    # Arrays alike in all lanes are held once: G priors of a long log would not fit.
     alike = all(a is b for lane in lanes for a, b in zip(lane[:4], lanes[0][:4], strict=True))
     each = 1 if alike else count
     d, jacobian = np.zeros((longest, each, n)), np.zeros((longest, each, 6, n))
@@ -145,7 +144,7 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
             white[own] = np.where(lane.hidden[span, None], UNKNOWN, process.white[span])
             if prior is not None:
                 jacobian[own] = lane.jacobian[span]
-    # A window begins with what b is like anywhere, not with what it was before.
+    # A window begins with the stationary b.
     added[0, :, 6:] /= np.maximum(1.0 - decay[0, :, 6:] ** 2, 1e-9)
     decay[0, :, 6:] = 0.0
     return LinearModel(d, beside_errors(jacobian), white, decay, added)
@@ -161,7 +160,7 @@ class BlockModel(NamedTuple):
 
     def under(self, priors: Sequence[WrenchPrior]) -> LinearModel:
         """The model of the whole log under each of G priors. (K, G, 6 + n)"""
-        # Where the whole log may be touched nothing tells a push from what it re-settles.
+        # With the whole log a contact, a push and its re-settling look alike.
         touched = None if self.inside.all() else self.inside
         process = steady_process(self.noise, self.blocks, touched)
         lane = Lane((0, len(self.inside)), self.inside, ~self.blocks.known, self.jacobian, None)
@@ -198,26 +197,26 @@ def contact_block(t: Array) -> float:
 
 
 def block_length(t: Array, *, fine: bool) -> float:
-    """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
+    """Length of a block, fine for a moving wrench, coarse for a load. [s]"""
     length = min(COARSE, contact_block(t)) if fine and len(t) > 1 else COARSE
     return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
 
 
 def deviations(covariance: Array) -> Array:
     """Standard deviations of covariances. (T, k)"""
-    # A model error that is known has no variance, which rounding may leave on either side.
+    # A known model error has no variance, within rounding.
     return np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
 
 
 class SmoothedWrench(NamedTuple):
-    """The wrench in base axes about the flange point, block by block, and what it rests on."""
+    """The wrench in base axes about the flange point, by block, with its model."""
 
     t: Array  #: Middle of each block. (K,) [s]
     values: Array  #: Force and moment on the robot. (K, 6) [N, N·m]
-    #: Their covariance, widened by `WIDENED`, and in contacts by what the drives and the blocks may
-    #: hide; outside of the listed ones that of `unlisted`. (K, 6, 6)
+    #: Their covariance, widened by `WIDENED`, in contacts by the drives and the bend too;
+    #: outside the listed ones that of `unlisted`. (K, 6, 6)
     covariance: Array
-    #: Blocks in which there may be a wrench; zero, as far as the pose can show, in the others. (K,)
+    #: Blocks that may have a wrench; the others read zero, as far as the pose shows. (K,)
     inside: Mask
     seconds: float  #: Length of a block. [s]
     prior: WrenchPrior  #: How the wrench may move.
@@ -234,7 +233,7 @@ class SmoothedWrench(NamedTuple):
         return deviations(self.covariance)
 
     def unlisted(self, t: Array) -> Mask:
-        """Which of some times lie outside of every listed contact; none without a list. (T,)"""
+        """Which times lie outside every listed contact; none without a list. (T,)"""
         block = np.searchsorted(self.t + 0.5 * self.seconds, t)
         return ~self.inside[np.minimum(block, len(self.t) - 1)]
 
@@ -291,9 +290,9 @@ def smooth_wrench(
 ) -> SmoothedWrench:
     """The wrench at the flange from the whole log, corrected or not, by `BlockModel`.
 
-    Its noise is learned from free motion, without any from the drives' dry friction. Outside of the
-    gate, from and to of every contact [s], the wrench is zero as far as the pose can show; without
-    one the whole log is a contact. Without a prior it is chosen by the log's likelihood.
+    Its noise is learned from free motion, else from the drives' dry friction. Outside the gate,
+    from and to of every contact [s], the wrench is zero as far as the pose can show; without
+    one the whole log is a contact. None chooses the prior by the log's likelihood.
     """
     if run.recording.joints < 6:
         raise RobotError(
@@ -329,26 +328,26 @@ def prior_of(
     free: Sequence[RunSamples] = (),
     gate: Sequence[tuple[float, float]] | None = None,
 ) -> WrenchPrior:
-    """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
+    """The prior that makes a log likeliest; arguments as of `smooth_wrench`."""
     model = block_model(run, free, gate, block_length(run.t, fine=False))
     return GRID[log_likelihood(model.under(GRID)).argmax()]
 
 
 def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
-    """Covariance that a contact of `UNLISTED` seconds about each block would have. (K, 6, 6)
+    """Covariance of a contact of `UNLISTED` seconds about each block. (K, 6, 6)
 
-    The quiet blocks before it leave the model error b with the variance of a filter's steady state,
+    The quiet blocks before it leave the model error b with the variance of a filter's steady
+    state,
 
         p⁺ = p⁻R/(p⁻ + R),    p⁻ = f²p⁺ + v(1 − f²).
 
-    From there to the middle of the contact it grows to a by f and v of a contact's blocks, that of
-    the blocks behind to a′, and to u where these say nothing. Together they leave
+    From there to the middle of the contact it grows to a by f and v of a contact's blocks, that
+    of the blocks behind to a′, and to u of hidden ones. Together they leave
     c = 1/(1/a + 1/a′ − 1/u), and the wrench has
 
         (Σ⁻¹ + J (c̄ + R/m)⁻¹ Jᵀ)⁻¹,
 
-    Σ of the prior, c̄ the harmonic mean over the contact's m blocks: what some of them show holds
-    for all.
+    Σ of the prior, c̄ the harmonic mean over the contact's m blocks, valid for all of them.
     """
     blocks, J, noise, _ = model
     # A log of one sample is a block without length.
@@ -370,7 +369,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     last = np.minimum(np.arange(count) + half + 1, count)
     total = summed(known)
     known = (total[last] - total[first]) / (last - first)[:, None]
-    # In a gap of the clock nothing would be known of it.
+    # Nothing is known in a gap of the clock.
     weight = blocks.known[:, None] / (1.0 / known + R * min(length / UNLISTED, 1.0))
     information = (J * weight[:, None, :]) @ J.swapaxes(1, 2) + np.diag(1.0 / prior.variance)
     return np.linalg.inv(information)
@@ -387,7 +386,7 @@ def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
 
 
 def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
-    """Covariance of what the drives' constants and a share of the bend may hide. (K, 6, 6)"""
+    """Covariance that drive constants and a share of the bend hide. (K, 6, 6)"""
     walled = np.vstack([values[:1], values, values[-1:]])
     bend = bent * (values - 0.5 * (walled[2:] + walled[:-2]))
     drives = DRIVES * values

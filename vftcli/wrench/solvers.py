@@ -1,7 +1,7 @@
-"""The virtual force/torque sensor: τ = J_Fᵀ w turned round (46), in a named frame.
+"""The virtual force/torque sensor: τ = J_Fᵀ w inverted (46), in a named frame.
 
-Everything is solved at the flange point in base axes with lengths in units of 0.3 m, so
-that a newton and a newton-metre weigh alike: J_s = S J, S = diag(1, 1, 1, 0.3, 0.3, 0.3),
+All is solved at the flange point in base axes with lengths in units of 0.3 m, so that a
+newton and a newton-metre weigh alike: J_s = S J, S = diag(1, 1, 1, 0.3, 0.3, 0.3),
 w_s = S⁻¹w.
 """
 
@@ -59,8 +59,8 @@ def decompose(jacobian: Array) -> Decomposition:
 
 
 def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
-    """S U diag(1/λ) Uᵀ J_s; no gain in singular values of at most `left_out` [m]. (T, 6, n)"""
-    # λ is a difference of larger numbers: below its rounding it may even be negative.
+    """S U diag(1/λ) Uᵀ J_s; singular values ≤ `left_out` [m] left out. (T, 6, n)"""
+    # λ is a difference of larger numbers: rounding may make it negative.
     rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
     inverse = 1.0 / np.maximum(parts.squares, rounding)
     if left_out:
@@ -75,9 +75,9 @@ Solver = Callable[[Array], tuple[Array, Array]]
 
 
 def pinv(parts: Decomposition, X: Array) -> Solver:
-    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
+    """Least squares (46), the pseudo-inverse of Jᵀ: unbounded as σ_min → 0.
 
-    Its covariance is that of the torque, seen through it.
+    It is unbiased; its covariance is the torque's, mapped by it.
     """
     gain = X @ least_squares_gain(parts)
     return lambda sd: (gain, gain * sd[:, None, :])
@@ -86,8 +86,8 @@ def pinv(parts: Decomposition, X: Array) -> Solver:
 def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
     """The most probable wrench under a normal prior of 50 N and 10 N·m about zero.
 
-    w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares
-    where the pose is good, and next to the prior where the pose cannot tell.
+    w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: near least squares in a good
+    pose, near the prior where the pose hides the wrench.
     """
 
     def solve(sd: Array) -> tuple[Array, Array]:
@@ -101,8 +101,8 @@ def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
     return solve
 
 
-#: Name at the command line → what solves for the wrenches of poses, given their Jacobian,
-#: and X (T, 6, 6) that takes a wrench in base axes to the frame asked for.
+#: Name at the command line → solver, given the poses' Jacobian and X (T, 6, 6), which
+#: maps a wrench in base axes to the frame asked for.
 SOLVERS: dict[str, Callable[[Decomposition, Array], Solver]] = {
     "pinv": pinv,
     "map": maximum_a_posteriori,
@@ -111,12 +111,12 @@ LEAST_SQUARES = "pinv"  #: The solver where none is asked for.
 
 
 def null_space(parts: Decomposition, tau: Array) -> Array:
-    """(I − Jᵀpinv(Jᵀ))τ: the torque of τ (T, n, K) that no wrench at the flange explains. [N·m]
+    """(I − Jᵀpinv(Jᵀ))τ of τ (T, n, K), not explained by a flange wrench. [N·m]
 
-    A wrench at the flange leaves it unchanged; a contact further down the arm, or an
-    error of the model, does not. Singular directions count as explained by nothing.
+    A wrench at the flange leaves it unchanged; a contact further down the arm, or a model
+    error, does not. Singular directions count as unexplained.
     """
-    # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
+    # U is orthonormal: V = J_sᵀU/σ spans the row space; λ below 1e-12 is rounding.
     tall = parts.scaled.swapaxes(1, 2) @ parts.U
     share = np.where(parts.squares > 1e-12, 1.0 / np.maximum(parts.squares, 1e-12), 0.0)
     return tau - tall @ (share[:, :, None] * (tall.swapaxes(1, 2) @ tau))
@@ -127,11 +127,11 @@ class FlangeWrench(NamedTuple):
 
     #: Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m]
     values: Array
-    known: Mask  #: Whether the pose can tell it: σ_min is at least `LEAST_SIGMA`. (T,)
+    known: Mask  #: Whether the pose shows it: σ_min ≥ `LEAST_SIGMA`. (T,)
 
 
 def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:
-    """Least squares (46) from torques and given Jacobians, for logs and loops that hold one."""
+    """Least squares (46) from torques and given Jacobians."""
     parts = decompose(jacobian)
     values = np.squeeze(least_squares_gain(parts, left_out) @ tau[:, :, None], axis=2)
     return FlangeWrench(values, parts.sigma_min >= LEAST_SIGMA)
@@ -142,11 +142,11 @@ CHUNK = 4096  #: Samples that are solved at once: about 10 MB of 6×6 matrices.
 
 @record
 class VirtualSensor(Shown):
-    """How joint torques become a wrench."""
+    """A solver of wrenches from joint torques, in a frame."""
 
     solver: str = LEAST_SQUARES  #: A key of `vftcli.wrench.solvers.SOLVERS`.
     frame: str = "flange"  #: A key of `vftcli.wrench.frames.FRAMES`.
-    #: Where tool and sensor sit on the flange.
+    #: Poses of tool and sensor on the flange.
     mounting: Mounting = field(default_factory=Mounting)
     #: σ_min of J with angular rows × 0.3 m below which a sample is masked. [m]
     least_sigma: float = LEAST_SIGMA
@@ -166,10 +166,10 @@ class VirtualSensor(Shown):
         chain: Chain,
         sd: Mapping[str, Array] = MappingProxyType({}),
     ) -> tuple[Wrench, ...]:
-        """The wrench of every estimate at q (T, n) [rad], about the flange, tool or sensor.
+        """The wrench of each estimate at q (T, n) [rad], about flange, tool or sensor.
 
-        An estimate without a standard deviation of its torques, (n,) or (T, n) [N·m] by
-        its name, has a wrench without band.
+        An estimate without a standard deviation of its torques, (n,) or (T, n) [N·m] by its
+        name, has no band.
         """
         samples, n = q.shape
         for torque in torques:
@@ -214,7 +214,7 @@ class VirtualSensor(Shown):
         )
 
     def arrow(self, force: Array, q: Array, chain: Chain) -> "ForceArrow":
-        """Where forces (S, 3) [N] of this sensor act at q (S, n) [rad], and point."""
+        """Origin and direction of this sensor's forces (S, 3) [N] at q (S, n) [rad]."""
         poses = link_poses(chain, q)
         flange, pose = poses.rotation[:, -1], frame_pose(self.frame, self.mounting)
         origin = poses.translation[:, -1] + flange @ pose.translation
