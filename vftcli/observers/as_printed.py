@@ -1,11 +1,10 @@
 """Printed variants of the paper, run by `--as-printed` to show its errata.
 
-FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ, a
-share of the momentum that leaks into the estimate; and the filter starts from Y₂⁰ = 0,
-τ̂⁰ = ωp⁰, which forgets −ωe^{−ωt}p₀ of (26).
+FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹), a share of
+the momentum, to dᵗ; and the filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, without −ωe^{−ωt}p₀
+of (26).
 
-GMO (35): it feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = .343 and is
-unstable from 2 on.
+GMO (35): feeds back r^{i−1} + r^{i−2}: oscillates above K·Ts = .343, unstable from 2 on.
 
 KFO: u = μᵗ alone (40). The zero-order hold (44) has −A_c in its lower-right block, not
 −A_cᵀ: the noise Qᵗ = M₁₂M₁₁ᵀ comes out unsymmetric, with A_τ = 0
@@ -22,15 +21,15 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import DynamicsTerms, one_sample_earlier
 from vftcli.signals.steady_filter import filtered
 
-#: Relative change of a covariance in one sample from which on rounding moves it alone.
+#: Relative change of a covariance in one sample within rounding.
 SETTLED = 1e-14
 LONGEST = 100_000  #: Samples within which a filter settles; the paper's need some hundred.
-#: Below this a·Ts (e^{aTs} − 1 − aTs)/a² is its series, good to a tenth of a·Ts squared.
+#: Below this a·Ts, (e^{aTs} − 1 − aTs)/a² is its series, to a tenth of a·Ts squared.
 SMALL = 1e-5
 
 
 def printed_noise(model: Discrete, d: Densities) -> Array:
-    """Qᵗ = M₁₂M₁₁ᵀ of (44), entry by entry, written out. (2, 2, …)
+    """Qᵗ = M₁₂M₁₁ᵀ of (44), entry by entry. (2, 2, …)
 
         M₁₂ = [[Q_p Ts, Q_τ (cosh aTs − 1)/a² − Q_p (e^{aTs} − 1 − aTs)/a²], [0, Q_τ sinh(aTs)/a]]
 
@@ -75,7 +74,7 @@ def settled_prior(model: Discrete, d: Densities) -> Array:
 
 
 def printed_steady(model: Discrete, d: Densities) -> Gains:
-    """Gains that a constant sample time settles to, the covariance's lower left left out."""
+    """Gains at a constant sample time, without the covariance's lower left."""
     prior = settled_prior(model, d)
     (l1, l2), ((p11, p12), (_, p22)) = updated(prior, model.r)
     return Gains(l1, l2, p11, p12, p22, prior[0, 0] + model.r)
@@ -95,7 +94,7 @@ def printed_momentum(terms: DynamicsTerms, gain: Array, start: Array) -> tuple[A
     a = 0.5 * terms.dt * gain
     F, g = np.array([[1.0 - a, -a], [a**0, 0.0 * a]]), np.array([gain, 0.0 * gain])
     F, g = (F[:, :, 0], g) if terms.clock.uniform else (F, g[:, None])
-    # As printed it may well diverge: that is the result, and is shown as unknown.
+    # It may diverge: that is the result, shown as unknown.
     with np.errstate(over="ignore", invalid="ignore"):
         (tau,), end = filtered(F, g, terms.d, start, [np.array([[1.0], [0.0]])])
     return np.where(np.isfinite(tau), tau, np.nan), end
@@ -106,8 +105,8 @@ def printed_hold_steps(
 ) -> tuple[Array, Array, KalmanState]:
     """τ̂ and √P₂₂ with the noise of (44) as printed, sample by sample. (T, n) each
 
-    d (T, n) [N·m·s] is the input, each entry of the model (T, n), and the state that
-    before the block; where the log begins, its prior.
+    d (T, n) [N·m·s] is the input, each entry of the model (T, n), and `state` that before
+    the block; at the log's begin, its prior.
     """
     tau, sd = np.zeros((2, *d.shape))
     (error, torque), P = state

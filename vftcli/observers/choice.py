@@ -18,10 +18,9 @@ if TYPE_CHECKING:
     from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
     from vftcli.signals.remarks import Remark
 
-PAPER_GAINS = (
-    "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
-)
-LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.
+#: The word for the gains of the robot's file, the paper's if it has them.
+PAPER_GAINS = "paper"
+LOG_GAINS = "auto"  #: The word for gains from the spectra of the log.
 
 
 def settings_of(words: Sequence[str]) -> "Settings":
@@ -32,7 +31,7 @@ def settings_of(words: Sequence[str]) -> "Settings":
 
 
 def source_of(source: str | Path) -> "str | Path | Goal":
-    """Where gains come from: `PAPER_GAINS`, `LOG_GAINS`, a goal for every observer, or a file."""
+    """Source of gains: `PAPER_GAINS`, `LOG_GAINS`, a goal for all, or a file."""
     text = str(source)
     if text in {PAPER_GAINS, LOG_GAINS}:
         return text
@@ -57,8 +56,8 @@ class ObserverChoice(Choice):
 
     GROUP = ESTIMATE
 
-    #: Keys of `vftcli.observers.table.OBSERVERS`. None for `DEFAULT`,
-    #: or the paper's four for its formulas or one footing.
+    #: Keys of `vftcli.observers.table.OBSERVERS`. None for `DEFAULT`, or for the paper's four
+    #: with its formulas or a common goal.
     names: Annotated[
         tuple[str, ...],
         Option(
@@ -71,7 +70,7 @@ class ObserverChoice(Choice):
     ] = ()
     #: Whether to leave out what could not run while the log is being written.
     causal: Annotated[bool, Option("--causal", "", "Use only what could run online.")] = False
-    #: Parameters the user sets, which go before every file's.
+    #: The user's parameters, which override every file's.
     settings: Annotated[
         "Settings",
         Option(
@@ -94,7 +93,7 @@ class ObserverChoice(Choice):
             completes=lambda: (LOG_GAINS, PAPER_GAINS, "delay=", "bandwidth=", "false-alarms="),
         ),
     ] = PAPER_GAINS
-    #: Whether the paper's printed formulas run, and its numeric dynamics.
+    #: Whether to use the paper's printed formulas and numeric dynamics.
     as_printed: Annotated[
         bool, Option("--as-printed", "", "Use the paper's formulas as printed.")
     ] = False
@@ -129,24 +128,24 @@ class ObserverChoice(Choice):
 
     @property
     def gains_file(self) -> Path | None:
-        """A file of gains that go before the robot's own, or None."""
+        """A file of gains that override the robot's own, or None."""
         return self.gains if isinstance(self.gains, Path) else None
 
     @property
     def match(self) -> "Goal | None":
-        """What every observer is to have alike on every joint, or None."""
+        """The goal that every observer shares on every joint, or None."""
         return None if isinstance(self.gains, str | Path) else self.gains
 
     @property
     def from_spectra(self) -> bool:
-        """Whether an observer takes its gains from what the complete log shows."""
+        """Whether an observer has gains from the spectra of the complete log."""
         from vftcli.observers.table import OBSERVERS
 
         return self.gains_of_log or any(OBSERVERS[name].from_spectra for name in self.names)
 
     @property
     def gains_of_log(self) -> bool:
-        """Whether observers without gains of their own have those that the log calls for."""
+        """Whether observers without own gains have the log's."""
         return self.gains == LOG_GAINS
 
     @property
@@ -165,8 +164,7 @@ class ObserverChoice(Choice):
     ) -> "tuple[tuple[Observer, ...], tuple[Remark, ...]]":
         """Observers for one robot and sample time [s], with remarks on unset gains.
 
-        `shown` is what the complete log shows of noise and contact, None without a free
-        part.
+        `shown` holds noise and contact of the complete log, None without a free part.
 
         Raises:
             ParameterError: If a gain is out of range, or a match cannot be reached.
@@ -182,7 +180,7 @@ class ObserverChoice(Choice):
             gains = table.overlay_gains(gains, table.load_gains(self.gains_file))
         setup = table.Setup(gains, self.settings, robot.joints, step, self.as_printed, shown)
         if self.gains_of_log:
-            # what a log tunes, and so what it falls back to
+            # the convention of a log's gains, and so of their fallback
             setup = table.read_as("density", setup)
         observers, remarks = table.build_observers(self.names, setup)
         if self.gains_of_log and shown.gains is None:
@@ -200,19 +198,20 @@ class ObserverChoice(Choice):
         return observers, (*remarks, *on_match)
 
     def run(self, observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
-        """Run one of the observers over a log, from where it is to start."""
+        """Estimate of one of the observers over a log, from rest or zero."""
         return estimate_from_rest(observer, terms) if self.from_rest else observer.estimate(terms)
 
 
 LEAD = 60.0  #: Assumed rest of the arm before a log, in 1/ω_n of the slowest joint.
 LONGEST = 1 << 17  #: Samples of that time at most.
-SETTLED = 0.01  #: Share of its start that an estimate has forgotten once it counts as settled.
+SETTLED = 0.01  #: Share of its start left in a settled estimate.
 
 
 def estimate_from_rest(observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
-    """Run an observer as if the log's first sample had lasted for long: τ̂⁰ = −μ⁰ where unbiased.
+    """An estimate as if the log's first sample had lasted for long.
 
-    From zero a log that begins in contact rises over some delays; with ṗ = μ + τ_ext it is −μ⁰.
+    Then τ̂⁰ = −μ⁰ where unbiased, by ṗ = μ + τ_ext; from zero a log that begins in contact
+    rises over some delays.
     """
     import numpy as np
 
@@ -228,7 +227,7 @@ def estimate_from_rest(observer: "Observer", terms: "DynamicsTerms") -> "Externa
 
 
 def settling_samples(observer: "Observer", step: float, joints: int) -> int:
-    """Samples until `SETTLED` of a start is left at a sample time [s], 0 of a smoother."""
+    """Samples until `SETTLED` of a start is left, 0 of a smoother; step in s."""
     import numpy as np
 
     from vftcli.signals.external_torque import DynamicsTerms
@@ -242,13 +241,13 @@ def settling_samples(observer: "Observer", step: float, joints: int) -> int:
 
 
 def lead_samples(observer: "Observer", step: float, joints: int) -> int:
-    """Samples in which an observer forgets all that was before. [s] → count"""
+    """Samples in which an observer forgets its past. [s] → count"""
     slowest = float(observer.tuning(step, joints).omega_n.min())
     return min(LONGEST, max(1, ceil(LEAD / (slowest * step))))
 
 
 class GoalChoice(Choice):
-    """What gains are found for."""
+    """Goal of gains."""
 
     GROUP = ESTIMATE
 

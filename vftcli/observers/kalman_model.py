@@ -1,19 +1,17 @@
-r"""Disturbance Kalman filter: A, B, Q, R and gains L (36)–(44), settled or at every step.
+r"""Disturbance Kalman filter: A, B, Q, R and L (36)–(44), settled or at every step.
 
 For one joint: state x = [p; τ_ext], input μ, output p, ẋ = A_c x + B_c μ + w with
 A_c = [[0, 1], [0, −a]]. With diagonal R and Q an n-joint filter is n such filters.
 
-On a clock that jitters the gains follow every step. The covariance recursion is run over
-blocks of samples side by side, all blocks of a piece at once. Where a block starts
-follows exactly from what it makes of any other start: if the posterior P it starts from
-changes by Δ, the one at its end changes by
+On a clock that jitters the gains follow every step. The covariance recursion runs over
+all blocks of a piece side by side. The exact start of a block follows from the answer to
+any other start: if the posterior P it starts from changes by Δ, its end changes by
 
     Φ Δ (I + O Δ)⁻¹ Φᵀ,  Φ ← (I − LC)A Φ,  O ← O + uuᵀ/S,  u = (CAΦ)ᵀ
 
-with Φ and O from one pass from any start (the closed-loop transition, and the information
-that the block's samples have on its start). So one pass over the samples from a guess,
-some rounds over the blocks' ends, and one pass from the right starts give what the plain
-loop gives.
+with Φ and O from one pass from any start (the closed-loop transition, and the block's
+information on its start). One pass from a guess, some rounds over the blocks' ends, and
+one pass from the right starts equal the plain loop.
 
 References:
     B. D. O. Anderson, J. B. Moore, "Optimal Filtering", Prentice-Hall, 1979, Sec. 4.5, for the
@@ -30,9 +28,9 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.steady_filter import Fold, moved, run_blocks, spans
 
-#: Below this a·Ts the integrals are summed as series: their closed forms cancel there.
+#: Below this a·Ts the integrals are series: their closed forms cancel there.
 SERIES = 1e-2
-#: Relative change of the blocks' starts below which another round would change nothing.
+#: Relative change of the blocks' starts at which the rounds end.
 SETTLED = 1e-15
 
 
@@ -87,7 +85,7 @@ def zero_order_hold(step: Array, d: Densities) -> Discrete:
 
 
 SCHEMES = ("fe", "zoh")  #: Discretisations: forward Euler and zero-order hold.
-#: How R and Q are read; (42) as printed counts Ts twice, (44) does not.
+#: Reading of R and Q; (42) as printed counts Ts twice, (44) does not.
 NOISE_CONVENTIONS = {
     "density": "Q = Q̂, R = R/Ts: densities, the same filter at every rate",
     "discrete": "Q = Q̂, R = R: R is the variance of one sample (default of a file's gains)",
@@ -98,8 +96,8 @@ NOISE_CONVENTIONS = {
 def discretise(scheme: str, convention: str, step: Array, d: Densities) -> Discrete:
     """The model of one of `SCHEMES` and one of `NOISE_CONVENTIONS`.
 
-    At one sample time [s], or at one a sample as a column (T, 1). Forward Euler (41) is
-    A = I + Ts·A_c, Q̂ = Ts·diag(Q_p, Q_τ), stable for aTs ≤ 2.
+    For sample times [s], one or a column (T, 1). Forward Euler (41) is A = I + Ts·A_c,
+    Q̂ = Ts·diag(Q_p, Q_τ), stable for aTs ≤ 2.
     """
     if scheme == "zoh":
         model = zero_order_hold(step, d)
@@ -125,7 +123,7 @@ class Covariance(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """Filtered gains and what goes with them, one a joint (and sample)."""
+    """Filtered gains and their covariances, one a joint (and sample)."""
 
     l1: Array  #: L₁ of the momentum.
     l2: Array  #: L₂ of the torque. [1/s]
@@ -148,12 +146,12 @@ class KalmanState(NamedTuple):
 
 
 def steady(model: Discrete, decay: Array) -> Gains:
-    """Gains of the stationary filter: stabilising solution of the discrete Riccati equation.
+    """Gains of the stationary filter, by the discrete Riccati equation.
 
-    For A_τ = 0 in closed form, λ = Ts√(Q₂₂/R), β = (Q₁₁ − TsQ₁₂)/R,
-    y = ½(λ + √(λ² + 16 + 4β)), r = ½(y − √(y² − 4)), L₁ = 1 − r², L₂ = λr/Ts; for A_τ ≠ 0
-    by SciPy's solver, joint by joint. The prior follows from the gains: P₁₁ = R
-    L₁/(1−L₁), P₁₂ = R L₂/(1−L₁).
+    The stabilising solution. For A_τ = 0 in closed form, λ = Ts√(Q₂₂/R),
+    β = (Q₁₁ − TsQ₁₂)/R, y = ½(λ + √(λ² + 16 + 4β)), r = ½(y − √(y² − 4)), L₁ = 1 − r²,
+    L₂ = λr/Ts; for A_τ ≠ 0 by SciPy's solver, joint by joint. The prior follows from the
+    gains: P₁₁ = R L₁/(1−L₁), P₁₂ = R L₂/(1−L₁).
     """
     step, a12, a22, q11, q12, q22, R = model
     if np.any(decay > 0.0):
@@ -167,7 +165,7 @@ def steady(model: Discrete, decay: Array) -> Gains:
     else:
         lam, beta = step * np.sqrt(q22 / R), (q11 - step * q12) / R
         y = 0.5 * (lam + np.sqrt(lam**2 + 16.0 + 4.0 * beta))
-        # Near r = 1 the plain forms lose digits; these do not.
+        # Near r = 1 the plain forms lose digits.
         root = np.sqrt(np.maximum((y - 2.0) * (y + 2.0), 0.0))
         r = 2.0 / (y + root)
         l1, l2 = r * root, lam * r / step
@@ -190,7 +188,7 @@ def update(prior: Covariance, r: Array) -> Gains:
     """Gains for a measured momentum, and the covariance after it in Joseph's form."""
     S = prior.p11 + r
     l1, l2 = prior.p11 / S, prior.p12 / S
-    # Joseph's form: an error of L₂ counts squared. R L₁ is (1 − L₁)P₁₁ with every digit.
+    # Joseph's form: an error of L₂ counts squared. R L₁ = (1 − L₁)P₁₁ in every digit.
     p22 = prior.p22 - l2 * (2.0 * prior.p12 - l2 * S)
     return Gains(l1, l2, r * l1, r * l2, p22, S)
 
@@ -204,22 +202,22 @@ def closed_loop(gains: Gains, model: Discrete) -> Array:
 def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
     """Transition (2, 2, …) and input (2, …) of the filter on its error e = p − p̂.
 
-    Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves one input, `DynamicsTerms.d`:
+    Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves the input `DynamicsTerms.d`:
 
         eᵗ = (1−L₁)(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹),  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹)
 
-    from e⁰ = 0, τ̂⁰ = 0, which is x̂⁰ = [p⁰; 0]. It is the same filter without the
-    cancellation of two large momenta.
+    from e⁰ = 0, τ̂⁰ = 0, hence x̂⁰ = [p⁰; 0]: the same filter, but two large momenta do
+    not cancel.
     """
     (f11, f12), (f21, f22) = closed_loop(gains, model)
     return np.array([[f11, -f12], [-f21, f22]]), np.array([f11, gains.l2])
 
 
 def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
-    """Gains of one piece, it and its models in blocks. (length, n, blocks) each
+    """Gains of one piece, with its models in blocks. (length, n, blocks) each
 
-    `entering` is the covariance after the sample before the piece, `guess` where blocks
-    start before they know better. (n,)
+    `entering` is the covariance after the sample before the piece, `guess` the blocks'
+    first start. (n,)
     """
     blocks = model.r.shape[2]
     starts = np.stack(guess)[..., None].repeat(blocks, axis=2)
@@ -228,7 +226,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
         guessed = starts.copy()
         end, phi, information = block_response(model, Covariance(*guessed))
         (o11, o12), (_, o22) = information
-        # After k rounds the first k blocks are exact, so this ends, mostly long before.
+        # After k rounds the first k blocks are exact; it mostly ends long before.
         for _ in range(blocks):
             # A start changed by Δ: X = Δ(I + OΔ)⁻¹ in full.
             a, b, c = starts - guessed
@@ -250,7 +248,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
 
 
 def block_response(model: Discrete, P: Covariance) -> tuple[Array, Array, Array]:
-    """Posterior at each block's end from a start, Φ and O. (3, n, blocks), (2, 2, n, blocks) × 2"""
+    """Posterior at blocks' ends, Φ, O. (3, n, blocks), (2, 2, n, blocks) × 2"""
     information, phi = np.zeros((2, 2, 2, *P.p11.shape))
     phi[0, 0] = phi[1, 1] = 1.0
     for step in map(Discrete._make, zip(*model, strict=True)):
@@ -273,17 +271,17 @@ def kalman_steps(
     *,
     begins: bool,
 ) -> tuple[Array, Array, KalmanState]:
-    """τ̂ and √P₂₂ of a block with the input d [N·m·s], gains by each step's sample time. (T, n)
+    """τ̂ and √P₂₂ of a block with the input d [N·m·s], gains step by step. (T, n)
 
-    Sample times [s] and joints choose the discrete model, `guess` is the stationary posterior
-    (n,), `state` that before the block.
+    `model_of` sample times [s] and joints is the discrete model, `guess` the stationary
+    posterior (n,), `state` that before the block.
     """
     samples, n = d.shape
     tau, sd = empty_series(samples, n), empty_series(samples, n)
     error, posterior = state
     if begins:
         tau[0], sd[0] = 0.0, np.sqrt(posterior[2])
-    # Joints with equal numbers have equal gains: compute one of each kind.
+    # One of each kind: joints with equal numbers have equal gains.
     numbers = np.stack([*densities, *posterior])
     _, kept, kind = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
     kind = kind.ravel()
@@ -291,7 +289,7 @@ def kalman_steps(
     guess, entering = (Covariance(*(p[kept] for p in each)) for each in (guess, posterior))
     for span in spans(samples, begins=begins):
         fold = Fold.of(span.stop - span.start)
-        # What is one for all joints is written out: rows of one size need no iterator.
+        # Entries shared by all joints are expanded: rows of one size need no iterator.
         model = model_of(fold.fold(terms.dt[span]), own)
         model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
         gains = settle(model, entering, guess)

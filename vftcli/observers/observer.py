@@ -23,7 +23,7 @@ class Tuning(Shown):
     delay: Array  #: Lag behind a slow ramp. (n,) [s]
     bandwidth: Array  #: Frequency at which the gain has fallen by 3 dB. (n,) [Hz]
     dc_gain: Array  #: Gain to a constant torque, 1 where unbiased. (n,)
-    parameter_count: int  #: How many numbers there are to tune for an n-joint arm.
+    parameter_count: int  #: Count of numbers to tune for an n-joint arm.
 
     def __post_init__(self) -> None:
         seal(self, "omega_n", "zeta", "delay", "bandwidth", "dc_gain")
@@ -59,17 +59,17 @@ class BlockObserver(Shown):
         """Estimate of a block, and the observer's state after; None at a log's start."""
 
     def estimate(self, terms: Any) -> ExternalTorque:  # noqa: ANN401 - DynamicsTerms, or a Run
-        """The estimate of a whole log, from rest at its first sample, by its terms or its run."""
+        """The estimate of a whole log, from rest, by its terms or its run."""
         found = getattr(terms, "terms", terms)
         check_kind(found, DynamicsTerms, "run", "Run(recording=…, robot=…)")
         return self.run(found)[0]
 
     def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
-        """An estimate (T, n) [N·m] under the observer's name, its array for good."""
+        """An estimate (T, n) [N·m] under the observer's name, its array handed over."""
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), **more)
 
 
 def angular(frequency: Array) -> Array:
-    """ω of frequencies [Hz], at 0 Hz so near that quotients have their limit. (F, 1) [rad/s]"""
+    """ω of frequencies [Hz], nearly zero at 0 Hz, for limits. (F, 1) [rad/s]"""
     omega = 2.0 * np.pi * np.asarray(frequency, float)[:, None]
     return np.where(omega == 0.0, 1e-9, omega)

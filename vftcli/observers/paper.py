@@ -1,7 +1,7 @@
 r"""The paper's four observers: filtered dynamics, momentum, two Kalman filters.
 
 All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and
-μ = τ + Cᵀq̇ − g − F_f. Their one input is the momentum gained over a sample beyond the
+μ = τ + Cᵀq̇ − g − F_f. Their one input is the gain of momentum over a sample beyond the
 model:
 
     dᵗ = pᵗ − pᵗ⁻¹ − ½Ts(μᵗ + μᵗ⁻¹).
@@ -10,8 +10,8 @@ model:
     KFO        νᵗ = eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹,  eᵗ = (1−L₁)νᵗ,  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
 
 from zero at the log's first sample. `kalman_model` holds A, Q, R and L, also on a clock
-that jitters, `as_printed` the paper's printed variants. An observer runs over a block and
-returns its state; a whole log is one block.
+that jitters, `as_printed` the printed variants. An observer runs over a block, as which
+it sees a whole log, and returns its state.
 """
 
 from abc import abstractmethod
@@ -62,16 +62,16 @@ class FirstOrderState(NamedTuple):
     """State of a first-order observer after a block of a log."""
 
     states: Array  #: Its states, the estimate first. (m, n) [N·m]
-    gaps: int = 0  #: Number of gaps that it started afresh after.
+    gaps: int = 0  #: Number of gaps with a restart.
     longest: float = 0.0  #: The longest of them. [s]
 
 
 class FirstOrderObserver(BlockObserver):
     """τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a), a = K·Ts/2, common to FDO and GMO.
 
-    Past a gap (`GAP` nominal steps) so long that a > 1 the state would change its sign:
-    there the filter starts afresh, and a remark says so. Gains with a > 1 at the nominal
-    step restart nothing.
+    Past a gap (`GAP` nominal steps) with a > 1 the state would change its sign: there the
+    filter starts afresh, with a remark. Gains with a > 1 at the nominal step restart
+    nothing.
     """
 
     @abstractmethod
@@ -85,7 +85,10 @@ class FirstOrderObserver(BlockObserver):
         d: Array,
         afresh: Array | None = None,
     ) -> tuple[ExternalTorque, FirstOrderState]:
-        """A block's estimate of an input d (T, n) [N·m·s], from zero or `afresh` (T, n) [N·m]."""
+        """A block's estimate of an input (T, n) [N·m·s], from zero or `afresh` (T, n).
+
+        `afresh` is the torque after a gap. [N·m]
+        """
         before, gaps, longest = state or FirstOrderState(np.zeros((1, terms.joints)))
         rate, clock = self.rates(terms.joints), terms.clock
         a = 0.5 * (rate[:, None] * terms.dt[:, 0]).T  # columns whole
@@ -109,8 +112,7 @@ class FirstOrderObserver(BlockObserver):
         """Cutoff, delay 1/K and −3 dB frequency at a sample time. [s]
 
         The bilinear transform warps frequency: tan(ωTs/2) = K·Ts/2 at the −3 dB point of
-        the filter alone; the exact response of sampled momentum is in
-        `frequency_response`.
+        the filter alone; `frequency_response` has sampled momentum exactly.
         """
         rate = self.rates(joints)
         return Tuning(
@@ -123,7 +125,7 @@ class FirstOrderObserver(BlockObserver):
         )
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Exact gain to τ_ext = e^{jωt}, its momentum the integral, sampled. (F, n) of [Hz]"""
+        """Exact gain to τ_ext = e^{jωt} from its sampled integral. (F, n) of [Hz]"""
         rate, omega = self.rates(joints), angular(frequency)
         back, a = np.exp(-1j * omega * step), 0.5 * step * rate
         response: Complex = rate * (1.0 - back) / ((1.0 + a) - (1.0 - a) * back) / (1j * omega)
@@ -173,9 +175,10 @@ class FilteredDynamicsObserver(FirstOrderObserver):
 
 @record
 class MomentumObserver(FirstOrderObserver):
-    r"""GMO (30)–(35): residual of the momentum balance, :math:`\dot r = K(\dot p - \mu - r)`.
+    r"""GMO (30)–(35): residual of the momentum balance.
 
-    Discretised by the implicit trapezoidal rule with a = K·Ts/2, stable for every gain:
+    With :math:`\dot r = K(\dot p - \mu - r)`, discretised by the implicit trapezoidal rule,
+    a = K·Ts/2, stable for every gain:
 
         rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a) = [(1−a)rᵗ⁻¹ + K dᵗ]/(1+a),  r⁰ = 0
 
@@ -216,13 +219,15 @@ class MomentumObserver(FirstOrderObserver):
 
 @record
 class KalmanObserver(BlockObserver):
-    r"""KFO (36)–(44): Kalman filter on x = [p; τ_ext], ṗ = μ + τ_ext + w_p, τ̇_ext = A_ττ_ext + w_τ.
+    r"""KFO (36)–(44): Kalman filter on x = [p; τ_ext].
+
+    ṗ = μ + τ_ext + w_p, τ̇_ext = A_ττ_ext + w_τ.
 
     With diagonal R, Q_p and Q_τ it is n two-state filters with gains independent of data.
     The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the
-    stationary prior: a constant sample time has no transient of the gains. On an uneven
-    clock each step propagates the covariance with its own A, B, Q and R. The estimate's
-    `sd` is √P₂₂, the filter's own error.
+    stationary prior: no transient of the gains at a constant sample time. On an uneven
+    clock each step has its own A, B, Q and R. The estimate's `sd` is √P₂₂, the filter's own
+    error.
 
     For A_τ = 0, A_c² = 0 and both discretisations share A and B; only Q differs.
 
@@ -245,7 +250,7 @@ class KalmanObserver(BlockObserver):
         check_known(convention, NOISE_CONVENTIONS, f"kfo.noise_convention is {convention!r}")
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
             value = np.atleast_1d(number_array(getattr(self, name), name, self.name))
-            # The paper gives A_τ = −a, its tables a: either sign means this decay.
+            # The paper gives A_τ = −a, its tables a: either sign is this decay.
             value = abs(value) if name == "decay" else value
             object.__setattr__(self, name, frozen(value))
             allowed = (value > 0) | ((value == 0) & (name in {"q_p_diag", "decay"}))
@@ -326,7 +331,7 @@ class KalmanObserver(BlockObserver):
         return terms.d + 0.5 * terms.dt * (one_sample_earlier(terms, "mu") - terms.mu)
 
     def first_prior(self, step: float, joints: int) -> Covariance:
-        """Covariance before the first update, the stationary one at a sample time [s]. (n,)"""
+        """Covariance before the first update, stationary at a sample time [s]. (n,)"""
         return predict(self.steady(step, joints).posterior, self.model(step, joints))
 
     def tuning(self, step: float, joints: int) -> Tuning:
@@ -337,7 +342,7 @@ class KalmanObserver(BlockObserver):
         """
         d, model = self.densities(joints), self.model(step, joints)
         gains = self.steady(step, joints)
-        # The convention scales all of Q: Q₂₂/Ts (with A_τ = 0) is the effective density.
+        # The convention scales Q: Q₂₂/Ts (with A_τ = 0) is the effective density.
         literal = self.as_printed or self.noise_convention == "literal"
         scale = step if literal and self.discretisation == "fe" else 1.0
         r, q_p, q_tau = model.r * step, d.q_p * scale, d.q_tau * scale
@@ -355,7 +360,7 @@ class KalmanObserver(BlockObserver):
         )
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Exact response to τ_ext = e^{jωt}, its integral, the momentum, sampled. (F, n)"""
+        """Exact response to τ_ext = e^{jωt} from its sampled integral. (F, n) of [Hz]"""
         model, omega = self.model(step, joints), angular(frequency)
         gains = self.steady(step, joints)
         back = np.exp(-1j * omega * step)

@@ -1,15 +1,15 @@
 """Rauch–Tung–Striebel smoother on the disturbance Kalman filter: `kfo-rts`.
 
 In a complete log an estimate at t may use later samples. The smoother is the Kalman
-filter's fixed-interval answer, run backwards in Bryson and Frazier's form. It needs only
-the innovations ν and inverts only numbers:
+filter's fixed-interval answer, backwards in Bryson and Frazier's form. It needs only the
+innovations ν and inverts only numbers:
 
     λ̃ᵗ = Aᵀ[(I − LC)ᵀ λ̃ᵗ⁺¹ − Cᵀ νᵗ⁺¹/Sᵗ⁺¹],  λ̃ = 0 at the last sample,  x̂ₛᵗ = x̂ᵗ − Pᵗ λ̃ᵗ
 
 with P the filter's posterior and S its innovation variance. In the long run it is the
-two-sided filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap: it
-knows the future. Nothing is known before the first sample, as nothing is behind the last: of the
-forward filter, which starts at rest, the start is estimated too, x̂ₛ⁰ = x̂⁰ − M⁻¹λ̃⁰.
+two-sided filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap.
+The forward filter starts at rest, but nothing is known before the first sample: the start
+is estimated too, x̂ₛ⁰ = x̂⁰ − M⁻¹λ̃⁰.
 
 References:
     H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
@@ -63,7 +63,7 @@ class KalmanSmoother(Shown):
         b = -np.array([np.ones_like(a12), a12])
 
         def smoothed(d: Array, start: Array) -> tuple[Array, Array]:
-            """Torque (T, n) after e, τ̂ before the first sample, and λ̃ at that. (2, n) each"""
+            """Torque (T, n) after e, τ̂ before the first sample; λ̃ there. (2, n) each"""
             (tau, late), _ = filtered(of_error, g, d, start, wanted)
             nu = d.copy(order="K")
             nu[1:] += late[:-1]
@@ -120,7 +120,10 @@ class KalmanSmoother(Shown):
 
 
 def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, Array]:
-    """weights·y_{t+1} of y_t = F_t y_{t+1} + g_t d_t, zero at the end; y_1. (T, n), (m, n)"""
+    """weights·y_{t+1} of y_t = F_t y_{t+1} + g_t d_t, zero at the end; y_1.
+
+    (T, n), (m, n)
+    """
     if F.ndim == 4:
         F, g, weights = F[:, :, :0:-1], g[:, :0:-1], weights[:, -2::-1]
     start = np.zeros((len(F), d.shape[1]))
@@ -131,10 +134,9 @@ def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> tuple[Array, A
 
 
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """The gains and covariances of a whole log by its samples' models. (T, n) each
+    """Gains and covariances of a whole log by its samples' models. (T, n) each
 
-    `prior` is the covariance before the first sample's update, `guess` the stationary
-    one. (n,)
+    `prior` is the covariance before the first update, `guess` the stationary one. (n,)
     """
     first = update(prior, model.r[0])
     rows = [np.array(first)[:, None]]

@@ -1,26 +1,25 @@
-"""Spectra of the model's rest over the free and the loaded part of a log.
+"""Spectra of the unexplained torque of the free and the loaded part of a log.
 
 The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged
-over a sample, plus everything else: noise, friction and model error. Its spectrum over
-the free part, S_n, is the error's; what the loaded part has beyond it,
-S_τ = (S_d − S_n)₊, is the external torque's. Above 5 Hz it is so only as far as contacts
-reach: their spectra fall, and a drive that chatters under load makes a plateau there,
-which counts as noise. From the two follows the error of every linear estimator with
-frequency response H:
+over a sample, plus noise, friction and model error. Its spectrum over the free part,
+S_n, is the error's; the excess of the loaded part, S_τ = (S_d − S_n)₊, is the external
+torque's. Above 5 Hz it is so only within the falling spectra of contacts: a drive that
+chatters under load makes a plateau there, which counts as noise. From the two follows
+the error of every linear estimator with frequency response H:
 
     rms² = ∫ |1 − H|² S_τ + |H|² S_n df
 
 H is complex, so that delay counts. The spectra are one-sided and not detrended: a
 constant error is an error too.
 
-One model gives every estimate's error sample by sample, whatever its own covariance says,
+One model gives every estimate's error sample by sample, not its own covariance:
 
     sd² = e² + ∫|1 − H|² S_τ df + c²,
 
-with e² the mean square of what the estimator reads where nothing touches the arm, bias
-and model error included, a resting joint's and a moving joint's apart; and c the standard
-deviation of a subtracted correction. A resting joint holds stiction that no estimator
-sees: there e is at least the share of the dry friction that drives were measured to hold.
+with e² the mean square of the estimator's reading while nothing touches the arm, bias
+and model error included, for a resting and a moving joint apart; and c the standard
+deviation of a subtracted correction. A resting joint's stiction is hidden from every
+estimator: there e is at least the share of the dry friction measured on drives.
 """
 
 from collections.abc import Sequence
@@ -39,20 +38,20 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import welch
 from vftcli.signals.series import grown, intervals, median_step, summed
 
-SEGMENT = 4.0  #: Length of a segment: what changes more slowly counts as constant. [s]
+SEGMENT = 4.0  #: Length of a segment: slower changes are constant. [s]
 #: Fewest samples of a segment; a shorter free or loaded part has no spectrum.
 LEAST_SEGMENT = 32
-IMPACT = 1.0  #: A loaded part of which nothing lasts longer is one of impacts. [s]
-#: How far the average of neighbouring frequencies reaches, as a share of the frequency.
+IMPACT = 1.0  #: Longest contact of a loaded part of impacts. [s]
+#: Reach of the average over neighbouring frequencies, as a share of the frequency.
 NEIGHBOURS = 0.2
 SLOW = 5.0  #: Up to here the measured spectrum of the external torque holds. [Hz]
-#: Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque
-#: that jumps and the 4 of one that has no jumps and no corners.
+#: Beyond, it falls at least as f to the minus this: between the 2 of a torque that jumps
+#: and the 4 of one without jumps and corners.
 FALL = 2.5
 
-#: A free part that was found is believed if on most joints the loaded part has this share
-#: of its power below `SLOW` beyond the free one's. Reference runs show 0.96 and more,
-#: those touched in every cycle 0.86 and less.
+#: A found free part is believed if on most joints the loaded part has this share of its
+#: power below `SLOW` beyond the free one's. Reference runs show 0.96 and more, those
+#: touched in every cycle 0.86 and less.
 QUIETER = 0.9
 
 
@@ -81,10 +80,9 @@ class Spectra:
 
     @cached_property
     def excess(self) -> Array:
-        """(S_d − S_n)₊, what the loaded part has beyond the free one. (F, n) [(N·m)²/Hz]
+        """(S_d − S_n)₊, the excess of the loaded part. (F, n) [(N·m)²/Hz]
 
-        The difference is averaged over neighbouring frequencies first: chance counts both
-        ways.
+        The difference is averaged over neighbouring frequencies first: chance has both signs.
         """
         return handed_over(np.maximum(neighbour_mean(self.loaded - self.free), 0.0))
 
@@ -92,8 +90,8 @@ class Spectra:
     def external(self) -> Array:
         """S_τ, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
 
-        It is the excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times
-        the excess up to there.
+        It is the excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times the
+        excess below.
         """
         f = self.frequency[:, None]
         slow = (self.frequency > 0.0) & (self.frequency <= SLOW)
@@ -107,14 +105,14 @@ class Spectra:
 
     @cached_property
     def noise(self) -> Array:
-        """S_n, and what of the excess is no external torque. (F, n) [(N·m)²/Hz]"""
+        """S_n and the excess that is no external torque. (F, n) [(N·m)²/Hz]"""
         return handed_over(self.free + (self.excess - self.external))
 
     @property
     def floor(self) -> Array:
         """Noise S_n from its quietest octave up, below at that octave's level. (F, n)
 
-        Friction and model error make the rest of S_n at low frequencies.
+        At low frequencies the rest of S_n is friction and model error.
         """
         low, levels, tops = self.width, [], []
         while 2.0 * low <= self.frequency[-1]:
@@ -127,12 +125,12 @@ class Spectra:
         return np.where(above, neighbour_mean(self.free), np.min(levels, axis=0))
 
     def missed(self, response: NDArray[np.complex128]) -> Array:
-        """∫|1 − H|² S_τ df, what lag and bandwidth leave out, of H (F, n). (n,) [(N·m)²]"""
+        """∫|1 − H|² S_τ df of H (F, n), lost by lag and bandwidth. (n,) [(N·m)²]"""
         missed = abs(1.0 - response) ** 2 * self.external
         return np.asarray(missed.sum(axis=0) * self.width)
 
     def passed(self, response: NDArray[np.complex128]) -> Array:
-        """∫|H|² S_n df, what of the noise comes through H (F, n). (n,) [(N·m)²]"""
+        """∫|H|² S_n df, the noise that passes H (F, n). (n,) [(N·m)²]"""
         return np.asarray(np.sum(abs(response) ** 2 * self.noise, axis=0) * self.width)
 
 
@@ -149,8 +147,7 @@ def neighbour_mean(spectrum: Array) -> Array:
 def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
     """Spectra of a loaded part and a free one, by one estimator.
 
-    Short impacts are widened to a second in a row, and their excess, thinned by that, set
-    right.
+    Short impacts are widened to a second, and their excess, thinned by that, scaled back.
     """
     t = loaded.run.t
     nominal = median_step(t) if len(t) > 1 else 0.0
@@ -185,18 +182,15 @@ def looks_free(spectra: Spectra) -> bool:
     return bool(np.median(spectra.external[slow].sum(axis=0) / power) > QUIETER)
 
 
-ENOUGH = 50  #: Free samples of a resting or a moving joint that its own mean square needs.
+ENOUGH = 50  #: Fewest free samples, at rest or in motion, for a mean square.
 
-#: Share of the dry friction by which friction in motion may be off, where no free motion
-#: shows it.
-#:
-#: On a UR10e the maker's friction differs by .05 to .25 of itself from what the drives
-#: show that day.
+#: Error of friction in motion as a share of the dry friction, without free motion to show
+#: it: on a UR10e the maker's friction differs by .05 to .25 of itself from that day's.
 UNSEEN = 0.2
 
 
 class FreeError(NamedTuple):
-    """Mean square of what an estimator reads where nothing touches the arm."""
+    """Mean square of an estimator's reading while nothing touches the arm."""
 
     moving: Array  #: While the joint moves. (n,) [(N·m)²]
     resting: Array  #: While it rests. (n,) [(N·m)²]
@@ -204,14 +198,13 @@ class FreeError(NamedTuple):
 
 
 def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
-    """The mean squares of an estimator's free samples, of which there is one at least.
+    """The mean squares of an estimator's free samples, at least one.
 
-    Where a joint rests, or moves, in fewer than `ENOUGH` of them, all of them speak for
-    it: a moving joint then adds `UNSEEN` of its dry friction, because friction in motion
-    was not seen.
+    With fewer than `ENOUGH` of them at rest, or in motion, all count: a moving joint then
+    adds `UNSEEN` of its dry friction, because its friction in motion is unknown.
 
-    `read` is the estimate in them, NaN where unknown (S, n) [N·m], `resting` whether a
-    joint rests (S, n), and dry friction is 0 where nothing is known of it. (n,) [N·m]
+    `read` is the estimate, NaN where unknown (S, n) [N·m], `resting` whether a joint rests
+    (S, n); dry friction is 0 where it is unknown. (n,) [N·m]
     """
     known = np.isfinite(read)
     kinds = np.array([known, known & ~resting, known & resting])

@@ -24,22 +24,22 @@ Value = float | str | list[float]
 Gains = Mapping[str, Mapping[str, Any]]
 #: Section ("fdo", "gmo", "kfo", or one observer's own name) → parameter → value.
 Settings = dict[str, dict[str, Value]]
-#: Section → the parameters it takes; `kfo` holds for every Kalman filter.
+#: Section → its parameters; `kfo` holds for every Kalman filter.
 PARAMETERS: dict[str, tuple[str, ...]] = {
     "fdo": ("omega",),
     "gmo": ("gain",),
     "kfo": ("r_diag", "q_p_diag", "q_tau_diag", "decay", "noise_convention"),
 }
-#: Every number of every observer, as ``--set`` names it.
+#: Every number of every observer, as in ``--set``.
 NUMBERS = tuple(f"{name}.{number}" for name, each in PARAMETERS.items() for number in each)
-#: What an assignment of ``--set`` looks like.
+#: Form of an assignment of ``--set``.
 FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
 WORDS = {"noise_convention"}  #: Parameters with words as values.
 #: Parameters that are rates: no log resolves a microsecond. [1/s]
 LARGEST = {"omega": 1e6, "gain": 1e6, "decay": 1e6}
 #: Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second.
 LARGEST_VARIANCE = 1e15
-#: Smallest size of a number that is not zero: the ratio of two must stay a number.
+#: Smallest size of a number but zero: the ratio of two must stay a number.
 SMALLEST = 1e-15
 
 
@@ -68,10 +68,10 @@ def check_name(section: str, parameter: str, where: str = "") -> None:
 
 
 def check_range(parameter: str, values: float | list[float], where: str) -> None:
-    """Raise a ParameterError unless every number is one that a parameter can have."""
+    """Raise a ParameterError unless every number is possible for a parameter."""
     largest = LARGEST.get(parameter, LARGEST_VARIANCE)
     for value in values if isinstance(values, list) else [values]:
-        # What is not a number is neither zero nor between the two.
+        # NaN is neither zero nor in the range.
         if value != 0 and not SMALLEST <= abs(value) <= largest:
             raise ParameterError(
                 f"{where}: {shown(value)} is out of range; every number must be finite, "
@@ -80,7 +80,7 @@ def check_range(parameter: str, values: float | list[float], where: str) -> None
 
 
 def check_gains(gains: Gains, where: str) -> None:
-    """Raise a ParameterError on a file's ``[observers.*]`` of unknown names or wild values."""
+    """Raise a ParameterError on a file's unknown names or wild values."""
     for section, table in gains.items():
         for parameter, value in table.items():
             check_name(section, parameter, f"{where}: ")
@@ -91,7 +91,7 @@ def check_gains(gains: Gains, where: str) -> None:
 
 
 def load_gains(path: Path) -> Gains:
-    """Gains of a TOML file of their own, ``[observers.*]`` as in a robot file."""
+    """Gains of their own TOML file, ``[observers.*]`` as in a robot file."""
     if not path.exists():
         raise ParameterError(
             f"{path}: no such file of gains; --gains takes auto, paper, or a file of identify "
@@ -109,20 +109,20 @@ def load_gains(path: Path) -> Gains:
 
 
 def overlay_gains(under: Gains, over: Gains) -> Gains:
-    """Gains of one source with those of another put over them, parameter by parameter."""
+    """Gains of one source, overridden parameter by parameter by another's."""
     return {name: {**under.get(name, {}), **over.get(name, {})} for name in {**under, **over}}
 
 
 def parameters_given(setup: "Setup", section: str, name: str) -> dict[str, Any]:
-    """Parameters of one observer: the user's win over the file's, its own over the shared."""
-    # kfo-zoh.r_diag is meant for that one filter, kfo.r_diag for all of them.
+    """Parameters of an observer: the user's before the file's, own before shared."""
+    # kfo-zoh.r_diag is for that filter alone, kfo.r_diag for all.
     places = (
         (source, key) for source in (setup.gains, setup.settings) for key in (section, name)
     )
     return {key: value for source, at in places for key, value in source.get(at, {}).items()}
 
 
-FALLBACK_RATE = 10.0  #: First-order gain where a robot gives no gains at all. [1/s]
+FALLBACK_RATE = 10.0  #: First-order gain of a robot without gains. [1/s]
 BEST = "best"  #: The most accurate estimate that a log allows.
 
 
@@ -131,11 +131,11 @@ class LogSpectra(NamedTuple):
 
     plain: "Spectra | None" = None  #: Of p and μ as the robot's model gives them.
     best: "Spectra | None" = None  #: Of `best`'s, less the bias of the whole log.
-    #: The gains that `plain` calls for, as a gains file holds them.
+    #: The gains from `plain`, in the form of a gains file.
     gains: Gains | None = None
 
     def under(self, name: str) -> "Spectra | None":
-        """The spectra of what the observer of this name runs on."""
+        """The spectra of the terms that the observer of this name uses."""
         return self.best if name == BEST else self.plain
 
 
@@ -147,7 +147,7 @@ class Setup(NamedTuple):
     joints: int  #: Number of joints n.
     step: float  #: Nominal sample time. [s]
     as_printed: bool  #: Use the paper's printed formulas.
-    shown: LogSpectra = LogSpectra()  #: What the complete log shows of noise and contact.
+    shown: LogSpectra = LogSpectra()  #: Noise and contact of the complete log.
 
 
 #: An observer, and remarks on gains that nobody gave.
@@ -158,22 +158,22 @@ class Entry(NamedTuple):
     """One line of the observer table."""
 
     title: str  #: The field's name for it.
-    section: str  #: The ``--set`` section its parameters stand in.
+    section: str  #: The ``--set`` section of its parameters.
     equations: str  #: The paper's equations.
-    summary: str  #: What it does, in a sentence.
-    #: Makes it of a Setup and its name here, with remarks on gains nobody gave.
+    summary: str  #: Its work in a sentence.
+    #: Builds it from a Setup and its name, with remarks on gains that nobody gave.
     build: Callable[[Setup, str], Built]
-    from_spectra: bool = False  #: Whether it takes its gains from the log's spectra.
+    from_spectra: bool = False  #: Whether its gains come from the log's spectra.
     online: bool = True  #: Whether it could run while the log is being written.
 
 
 def build_first_order(setup: Setup, name: str) -> Built:
-    """The fdo, or gmo, its gain (n,) [1/s] given or not, which a remark says.
+    """The fdo or gmo with its gain (n,) [1/s], and a remark if nobody gave it.
 
-    If not given it is the inverse of the Kalman filter's delay, a file's R and Q read as
-    densities; `FALLBACK_RATE` where no gains are given at all; and on a slow clock at
-    most 2/Ts, which takes each sample's raw disturbance as it is: from there on the
-    observer would overshoot. Of the fdo all joints have one: the one with their mean delay.
+    Then it is the inverse of the Kalman filter's delay, a file's R and Q read as densities,
+    or `FALLBACK_RATE` without any gains; and on a slow clock at most 2/Ts, each sample's
+    raw disturbance: above, the observer would overshoot. The fdo's joints share the gain of
+    their mean delay.
     """
     (parameter,), given = PARAMETERS[name], parameters_given(setup, name, name)
     full, origin = f"{name}.{parameter}", ""
@@ -200,7 +200,7 @@ def build_first_order(setup: Setup, name: str) -> Built:
 
 
 def read_as(convention: str, setup: Setup) -> Setup:
-    """A setup with its file's R and Q under this convention unless one is named."""
+    """A setup with R and Q of its file under this convention, if none is named."""
     if "kfo" not in setup.gains:
         return setup
     file = {"noise_convention": convention, **setup.gains["kfo"]}
@@ -239,7 +239,7 @@ def build_rts(setup: Setup, _: str) -> Built:
 
 
 def build_auto(setup: Setup, name: str) -> Built:
-    """An observer with the log's gains, else with those set by hand, as densities."""
+    """An observer with the log's gains, else those set by hand, as densities."""
     from vftcli.observers.tuning import AutoTuned, tune_to_spectra
 
     if (spectra := setup.shown.under(name)) is not None:
@@ -316,9 +316,9 @@ OBSERVERS: dict[str, Entry] = {
         online=False,
     ),
 }
-#: The four of the paper, each of which runs while the log is being written.
+#: The paper's four, all of them online.
 PAPER = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
-DEFAULT = (BEST, *PAPER)  #: What runs where nobody chooses.
+DEFAULT = (BEST, *PAPER)  #: The default.
 
 
 #: The ``--set`` sections with parameters: shared, then each observer's.
@@ -331,10 +331,10 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 def build_observers(
     names: Sequence[str], setup: Setup
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
-    """Build observers by name, keys of `OBSERVERS`, with remarks on gains that nobody gave.
+    """Observers by name, keys of `OBSERVERS`, with remarks on gains not given.
 
     Raises:
-        ParameterError: If a parameter is not one there is, or is out of range.
+        ParameterError: If a parameter is unknown or out of range.
     """
     built = [OBSERVERS[name].build(setup, name) for name in names]
     # Several observers may miss one gain: remark on it once.

@@ -1,6 +1,6 @@
-"""Gains for a goal: least error by a log's spectra, one delay or bandwidth, few false alarms.
+"""Gains for a goal: least error, one delay or bandwidth, few false alarms.
 
-A Kalman filter's ω_n trades what its lag leaves out against the noise that passes. Both follow
+A Kalman filter's ω_n trades the loss by its lag against the noise that passes. Both follow
 from the spectra of the free and loaded part:
 
     ω_n = argmin ∫ |1 − H(ω_n)|² S_τ + |H(ω_n)|² S_n df,  joint by joint, ζ = 1/√2
@@ -26,14 +26,14 @@ from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.shown import Shown, record
 
 SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
-#: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the
-#: smoother passes 1/(1 + (ω/ω_n)⁴). A joint without a push may be pushed next. [rad/s]
+#: That of `best`: as the smoother passes 1/(1 + (ω/ω_n)⁴), it keeps 84 % of the peak of a
+#: half sine of .6 s. A joint without a push may be pushed next. [rad/s]
 SLOWEST_BEST = 9.0
 FASTEST = 2.0  #: Largest natural frequency to try, times the sample time. [rad]
 TRIED = 96  #: Natural frequencies to try, evenly in logarithm.
 LEAST_SHARE = 1e-3  #: Least R as a share of the noise in the free part. [1]
 FINEST = 1e-6  #: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
-HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
+HALVINGS = 70  #: Bisections of a gain's logarithm: to the digits of float64.
 #: Goal → as typed; a delay behind a ramp, a bandwidth at −3 dB.
 GOALS = {
     "auto": "auto",
@@ -41,7 +41,7 @@ GOALS = {
     "bandwidth": "bandwidth=HZ",
     "false-alarms": "false-alarms=PER_HOUR",
 }
-#: Observer → the parameter that moves its ω_n alone, the least value and the largest.
+#: Observer → the parameter that moves only its ω_n, its least and largest value.
 KNOBS: dict[type, tuple[str, float, float]] = {
     FilteredDynamicsObserver: ("omega", 1e-3, 1e6),
     MomentumObserver: ("gain", 1e-3, 1e6),
@@ -50,7 +50,7 @@ KNOBS: dict[type, tuple[str, float, float]] = {
 
 
 def momentum(rate: Array) -> Observer:
-    """A momentum observer, of the filtered dynamics observer's response."""
+    """A momentum observer, equal in response to the filtered dynamics observer."""
     return MomentumObserver(gain=rate)
 
 
@@ -67,13 +67,13 @@ def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
 
 #: Natural frequencies (n,) [rad/s], and R if not 1 → observer.
 Kind = Callable[..., Observer]
-#: Name of an observer that takes its gains from a log → what is tuned.
+#: Name of an observer with gains from a log → its kind.
 KINDS: dict[str, Kind] = {
     "best": kalman_smoother,
     "kfo-auto": kalman_filter,
     "rts-auto": kalman_smoother,
 }
-#: Kalman filter and smoother, of which R and Q_τ follow from the natural frequencies.
+#: Kalman filter and smoother: R and Q_τ follow from the natural frequencies.
 KALMAN: dict[str, Kind] = {"kfo-zoh": kalman_filter, "kfo-rts": kalman_smoother}
 
 
@@ -103,7 +103,7 @@ def natural_frequencies(step: float, slowest: float = SLOWEST) -> Array:
 def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve:
     """Expected errors of natural frequencies, and the best."""
     omega_n = natural_frequencies(spectra.step, slowest)
-    # Each natural frequency is a joint of one observer: one call gives all responses.
+    # Each natural frequency is a joint of one observer: one call for all.
     response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
     missed = (abs(1.0 - response) ** 2).T @ spectra.external
     passed = (abs(response) ** 2).T @ spectra.noise
@@ -111,7 +111,7 @@ def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve
 
 
 def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
-    """A warning on joints (n,) at a bound of the natural frequencies tried (G,), if any. [rad/s]
+    """A warning on joints (n,) at a bound of the natural frequencies (G,). [rad/s]
 
     At the slowest the spectra do not separate external torque from noise; at the fastest,
     not noise from external torque.
@@ -126,13 +126,12 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
 
 
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:
-    """R at which the innovations have the variance the filter expects. (n,)
+    """R at which the innovations have the variance that the filter expects. (n,)
 
     Gains depend on Q/R alone; R scales the covariance. The innovation is the estimate's
     jump, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may be zero, or too
-    small where few impacts extrapolate S_d, and no filter runs on R = 0: R is at least
-    `LEAST_SHARE` of S_n's R and the noise of `FINEST`, a torque that is constant over a
-    sample.
+    small from few impacts, and no filter runs on R = 0: R is at least `LEAST_SHARE` of
+    S_n's R and the noise of `FINEST`, a torque constant over a sample.
     """
     n, unit = len(omega_n), kalman_filter(omega_n)
     settled = unit.steady(spectra.step, n)
@@ -162,7 +161,7 @@ class AutoTuned(Shown):
             return replace(self.observer.estimate(terms), name=self.name)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """Meaning of the gains at a sample time; none to set if the log set them. [s]"""
+        """Meaning of the gains at a sample time, none to set if the log's. [s]"""
         meaning = self.observer.tuning(step, joints)
         return meaning if self.curve is None else replace(meaning, parameter_count=0)
 
@@ -191,7 +190,7 @@ class Goal(NamedTuple):
 def parse_goal(
     text: str, threshold: str | None = None, allowed: Iterable[str] = tuple(GOALS)
 ) -> Goal:
-    """What ``--gains`` asks for, of some `GOALS`, and ``alarm.threshold``, positive. [N·m]"""
+    """The goal in ``--gains``, of some `GOALS`, and ``alarm.threshold``. [N·m]"""
     name, equals, number = text.partition("=")
     name, level, values = name.strip(), None, numbers(number) or ()
     value = values[0] if len(values) == 1 else float("nan")
@@ -215,7 +214,7 @@ def parse_goal(
 def match_observers(
     observers: Sequence[Observer], goal: Goal, step: float, joints: int
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
-    """Observers with one delay behind a slow ramp, or −3 dB bandwidth, and remarks on it.
+    """Observers with one delay to a slow ramp, or −3 dB bandwidth, with remarks.
 
     A Kalman filter keeps R and Q_p and moves Q_τ.
     """
@@ -239,12 +238,12 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
 
     def turned(x: Array) -> Observer:
         value = np.exp(x)
-        # A cutoff is one for all joints.
+        # All joints share the cutoff.
         changed: dict[str, Any] = {knob: float(value[0]) if knob == "omega" else value}
         return replace(cast("MomentumObserver", observer), **changed)
 
     def excess(x: Array) -> Array:
-        """Delay [s], or share of a sinusoid at a bandwidth, over the goal. (n,)"""
+        """Delay [s], or share of a sinusoid at a bandwidth, less the goal. (n,)"""
         tuning = turned(x).tuning(step, joints)
         if goal.name == "delay":
             return tuning.delay - goal.value
@@ -273,10 +272,10 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
 
 
 class Tuned(NamedTuple):
-    """One observer's gains and what to expect of them."""
+    """One observer's gains and its expected errors."""
 
     observer: str  #: Its name at the command line.
-    section: str  #: Where its gains stand in a gains file.
+    section: str  #: Section of its gains in a gains file.
     gains: Mapping[str, Any]  #: Parameter → number or one a joint.
     rate: Array  #: Natural frequency, cutoff or K. (n,) [rad/s]
     delay: Array  #: Lag behind a slow ramp. (n,) [s]
@@ -347,7 +346,7 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
     if goal.name == "false-alarms" and goal.threshold is not None:
         curve = error_curve(kind, spectra)
         few = few_alarms(kind, curve.omega_n, spectra, goal.threshold, goal.value)
-        # The fastest that still raises few alarms: of the run of rates that do, its last.
+        # The fastest that still raises few alarms: the last of their run.
         fastest = curve.omega_n[len(few) - 1 - few[::-1].argmax(axis=0)]
         best_is_one = few[curve.rmse.argmin(axis=0), np.arange(n)]
         return np.where(best_is_one, curve.best, fastest)
