@@ -1,11 +1,11 @@
 """The cause of a log that its arm does not explain: the best of all tries.
 
-Each cause corrects the log in its own way, and the log is fitted again. One is named if it
-leaves much less than the log and all others.
+Each cause corrects the log in its own way, and the log is fitted again. One is named if
+it leaves much less than the log and all others.
 
 Drivers publish currents, torques, or torques less gravity under one name, some with the
-sign reversed. A reading's rest is relative to the column as logged: relative to the
-reading a slow arm's currents would pass for torques without gravity.
+sign reversed. A reading's rest is relative to the column as logged, or a slow arm's
+currents would pass for torques without gravity.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,9 +22,8 @@ from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import root_mean_square, root_mean_squares
 from vftcli.signals.recording import Recording
 
-#: Least range of gravity's torque that shows the kind of an effort. [N·m]
-#:
-#: All 105 readings of logs with 24 N·m and more were right, 3 of 10 below wrong.
+#: Least range of gravity's torque that shows the kind of an effort: right in all 105
+#: readings of logs with 24 N·m and more, wrong in 3 of 10 below. [N·m]
 RANGE = 10.0
 EXPLAINED = 0.6  #: Most of the misfit that a cause leaves.
 SLIGHT = 0.75  #: That of an offset: it lowers the misfit less than a sign.
@@ -32,21 +31,19 @@ OPEN = 0.45  #: Largest misfit that a cause leaves; no gravity beside a hand lea
 GOOD = 0.03  #: Below this misfit the costly swap of two joints is not tried.
 AMBIGUOUS = 1.25  #: A second cause nearer than this ratio of misfits is named too.
 CLEAR = 1.5  #: Ratio of misfits by which another reading beats the second best.
-#: Ratio of misfits by which another reading beats one that fits:
-#: currents read as torques leave 16 % of a UR5, read right 1.5 %.
+#: Ratio of misfits by which another reading beats one that fits: currents read as
+#: torques leave 16 % of a UR5, read right 1.5 %.
 OVERWHELMING = 5.0
-#: Misfits below which an effort is as named, and a base as in the robot file.
-#:
-#: A wrong name leaves 16 % and more on real logs; a tilt of 10° leaves 8 %.
+#: Misfits below which an effort is as named, and a base as in the robot file: a wrong
+#: name leaves 16 % and more on real logs, a tilt of 10° 8 %.
 READ_RIGHT, UPRIGHT = 0.1, 0.05
 SUSPECT = 0.35  #: Least misfit of a joint to try its sign and place.
 #: Most of the misfit after one joint's sign change, and after two joints' exchange.
 TURNED, SWAPPED = 0.5, 0.7
 #: Causes on single joints, or in the links' masses.
 ON_JOINTS = frozenset({"joint-sign", "effort-order", "effort-offset", "drive-scale"})
-#: Largest share of what errors of a rough description leave that any other cause leaves.
-#:
-#: True ones leave .02–.76 of it, those that a rough description made up .94 and more.
+#: Largest share that any other cause leaves of the rest of a rough description: true
+#: ones .02–.76 of it, those that a rough description made up .94 and more.
 EVIDENT = 0.8
 FEW = 60  #: Windows for every pair of joints: each pair evaluates the model again.
 CARRIES = 0.25  #: Least share of gravity in an effort that shows the joint's place.
@@ -54,10 +51,10 @@ OFFSET = 0.1  #: Least offset of a joint's effort, relative to the effort.
 #: Windows of a joint's motion, each way and both, for an offset beyond stiction.
 FORTH_AND_BACK, BOTH = 8, 30
 #: Angle between the fitted "up" and the robot file's of a tilted base [rad], and its
-#: weight then, relative to the robot file's.
+#: weight relative to the file's.
 TILTED, WEIGHT = np.deg2rad(10.0), (0.6, 1.7)
-#: Least deviation of a drive's factor from 1, of all joints (sound logs stay within .06)
-#: and of one, which a load moves too.
+#: Least deviation of a drive's factor from 1, of all joints (sound logs: .06) and of one,
+#: which a load moves too.
 OFF, ALONE = 0.08, 0.1
 OTHERS = 0.05  #: Largest error of the other joints' factors beside one wrong one.
 LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
@@ -176,7 +173,7 @@ def readings(windows: Windows) -> Iterator[Cause]:
     if not (mean.any() and np.isfinite(mean).all()):
         return
     gravity, unit = windows.gravity[:, :, 2], np.ones(mean.shape[1])
-    # The rest is relative to the whole torque, mostly gravity.
+    # Relative to the whole torque, mostly gravity.
     whole = root_mean_square(mean + gravity) if name == "torque_without_gravity" else 0.0
     for code in MAY_BE[name]:
         # Nothing corrects currents without gravity.

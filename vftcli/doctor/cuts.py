@@ -1,7 +1,7 @@
 """Samples that no arm makes, cut out of a log like a gap in its clock.
 
-Each rule looks at single samples or spans, within the arm's limits. Where two
-recordings meet the gap is so long that no filter runs across.
+Each rule looks at single samples or spans, within the arm's limits. Where two recordings
+meet the gap is too long for a filter to run across.
 """
 
 from collections.abc import Iterator
@@ -131,7 +131,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
 
 
 def isolated(x: Array, away: Array, step: float) -> Mask:
-    """A few samples (T, n) in a row farther than `away` (n,) from the median of nine around."""
+    """Samples (T, n), few in a row, over `away` (n,) from the median of nine."""
     found = np.zeros(x.shape, bool)
     for j, column in enumerate(x.T):
         change = abs(np.diff(column))
@@ -194,8 +194,7 @@ def frozen_rows(recording: Recording) -> Mask:
 def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     """Changes of position beyond the velocities, and the jumps among them.
 
-    The sample before each (K,), sizes (K, n) [rad] and jumps (K, n); steps of time may be
-    off.
+    The sample before each (K,), sizes (K, n) [rad] and jumps (K, n). Stamps may be off.
     """
     q, dq = recording.q, recording.require("dq")
     steps, usual = np.diff(recording.t), recording.median_step
@@ -250,7 +249,7 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
         slack = SLIPPED + np.ptp(speeds, axis=0) * lasts
         slack += abs(speeds).sum(axis=0) * max(recording.median_step, LATE)
         if last - first > 1 and (abs(over) < slack)[joints].all():
-            span, into = slice(first + 1, last), rows  # the motion continues after a few bad rows
+            span, into = slice(first + 1, last), rows  # a few bad rows, then the motion continues
         else:
             span, into = slice(*t.searchsorted([t[first] - APART, t[last] + APART])), meets
         into[span, joints], sizes[span, joints] = True, size[joints]
@@ -274,6 +273,6 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     free = heavy & (speed < REST) & (abs(share) < LET_GO)
     if not free.any() or np.count_nonzero(heavy & (share > HELD)) <= np.count_nonzero(free):
         return
-    # The drives release and grip again somewhere in the windows beside.
+    # The drives release and grip in the windows beside.
     spans = [(start, start + length) for start in first[free]]
     yield Bad("brakes", covered(spans, recording.samples, length)[:, None], None, MOST)

@@ -23,7 +23,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks, as_record, fact, filled, sentence, words
 from vftcli.signals.shown import Shown
 
-#: Findings that an arm's model is another's: what identification is for.
+#: Findings that an arm's model is another's, the case for identification.
 NO_FIT = frozenset({"other-robot", "no-robot-fits", "no-robot-fits-any", "effort-unexplained"})
 #: Findings that make every result meaningless. A load or a contact is never one of them.
 REFUSING = NO_FIT | {
@@ -36,7 +36,7 @@ REFUSING = NO_FIT | {
 }  # fmt: skip
 #: Findings on the size of a current, which a model of the arm knows better.
 SIZED = CORRECTIONS.keys() - {"torque-with-gravity"}
-#: Findings that every command says: nothing is wrong, but results rest on assumptions.
+#: Findings that every command reports: nothing is wrong, but results rest on assumptions.
 ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 
 
@@ -54,13 +54,13 @@ class Examination(Shown):
         return Remarks((*self.recording.source.remarks, *self.findings))
 
     def refusals(self, *, fitting: bool = True) -> tuple[Remark, ...]:
-        """The findings with which no result means anything.
+        """The findings that make every result meaningless.
 
         Args:
-            fitting: Whether the arm must be the one of the model; identification makes it so.
+            fitting: Whether the arm must be the model's; identification makes it so.
         """
         codes = REFUSING if fitting else REFUSING - NO_FIT
-        # At least half of the joints' effort was not measured, if all efforts agree.
+        # Half of the joints' effort or more was not measured, if all efforts agree.
         zero, log = [f for f in self.warnings if f.code == "zero-effort"], self.recording
         half = [f for f in zero if 2 * len(f.where.joints) >= log.joints]
         unmeasured = half if len(half) == len(efforts_of(log)) else []
@@ -68,7 +68,7 @@ class Examination(Shown):
 
     @property
     def assumptions(self) -> tuple[Remark, ...]:
-        """The findings on what the model assumes where the log says nothing."""
+        """The findings on assumptions of the model where the log is silent."""
         return tuple(finding for finding in self.findings if finding.code in ASSUMPTIONS)
 
     @property
@@ -88,7 +88,7 @@ class Examination(Shown):
         return next(((load["load_kg"], load["sd_kg"]) for load in loads), None)
 
 
-#: Samples at most that are examined of a log in stretches, and samples of such a stretch.
+#: Most samples that are examined of a log in stretches, and samples of a stretch.
 EXAMINED, STRETCH = 1 << 16, 1 << 10
 
 
@@ -107,10 +107,10 @@ def examine(
 
     Args:
         recording: The log.
-        robot: The arm it is from, its payload mounted; None to take the one that the log settles,
-            or to look for it among the profiles.
-        in_stretches: Whether `stretches` of a long log are examined, and all of its clock, where
-            all of it has no room.
+        robot: The arm it is from, its payload mounted; None for the log's own, or to find it
+            among the profiles.
+        in_stretches: Whether to examine `stretches` of a long log, and its whole clock, to save
+            room.
     """
     part = stretches(recording) if in_stretches else recording
     if unusable := tuple(unusable_findings(part)):
@@ -148,10 +148,10 @@ class Examiner:
     """Loads the robots of a command and examines its logs, each once.
 
     Args:
-        anyway: Whether results are wanted even where a finding makes them meaningless.
+        anyway: Whether to continue despite a finding that makes results meaningless.
         fitting: Whether the robot must be the log's; identification makes it so.
-        tell: What is done with every examination that refuses nothing, as soon as it is made: what
-            is wrong with a log is said even if nothing comes of it.
+        tell: Called at once with every examination that refuses nothing, so that its findings
+            appear whatever follows.
     """
 
     def __init__(
@@ -177,7 +177,7 @@ class Examiner:
         name, remarks = choice.name or recording.robot_hint, tuple[Remark, ...]()
         if name is None:
             name, remarks = guessed(recording)
-        # The log may be what says which load is mounted.
+        # The log may state the mounted load.
         key = (name, choice, recording.payload_mass, bool(remarks))
         if key not in self._robots:
             robot = choice.load(recording, name)
@@ -199,14 +199,13 @@ class Examiner:
     ) -> Recording:
         """A log in its robot's joints; an open effort is read by the model's best fit.
 
-        Joints go by name, endless ones are unwound, samples that no arm can have made are
-        cut out.
+        Joints are matched by name, endless ones unwound, impossible samples cut out.
 
         Raises:
             RobotError: If the names of its joints are not the robot's.
         """
         recording = unwound(paired(recording, robot), robot)
-        # Blocks of a long log say whether all of it is to be cleaned at once.
+        # Blocks of a long log show whether to clean all of it at once.
         blocks = recording.blocks(BLOCK) if in_stretches else ()
         if not in_stretches or any(without_bad_samples(b, robot) is not b for b in blocks):
             recording = without_bad_samples(recording, robot)
@@ -224,8 +223,7 @@ class Examiner:
         """The examination of a log as this arm's, made once.
 
         Raises:
-            ExaminationError: If a finding makes every result meaningless, unless results are wanted
-                anyway.
+            ExaminationError: If a finding makes every result meaningless, without `anyway`.
         """
         for known, arm, examination in self._made:
             if known is recording and arm is robot:
@@ -244,11 +242,11 @@ class Examiner:
         return tuple(made for _, _, made in self._made)
 
 
-NEAREST = 2  #: Profiles that are named where none is settled.
+NEAREST = 2  #: Profiles in the error where none is settled.
 
 
 def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
-    """The profile that the maker's own model in a log tells, and on what grounds."""
+    """The profile by the maker's own model in a log, and the grounds."""
     check_effort(recording)  # no arm would help
     found, fits = guess_robot(recording)
     if found is None:

@@ -1,9 +1,9 @@
 """The robot of a log, and findings where it does not explain the log.
 
-Every profile's dynamics are held against the torques of the log.
+Every profile's dynamics are compared with the torques of the log.
 
-The controller's own model (target_torque, or torque less the vendor's residual) tells
-most; friction leaves several per cent of a measured effort open.
+The controller's own model (target_torque, or torque less the vendor's residual) shows most;
+friction leaves several per cent of a measured effort open.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -34,36 +34,32 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
 
 CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
-#: Misfit up to which a profile fits: the maker's own model, and a measured effort.
-#:
-#: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
+#: Misfit up to which a profile fits: the maker's own model (real logs of its arm: .1–1.1 %),
+#: and a measured effort (1.3–12 %).
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
 #: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the
-#: next.
-#:
-#: UR10e logs fit their own to .1–.26 %, the next 30 times worse; FR3 and Panda are 2
-#: apart.
+#: next: UR10e logs fit their own to .1–.26 %, the next 30 times worse; FR3 and Panda are
+#: 2 apart.
 GUESSED, APART = 0.012, 5.0
-HEAVY = 5.0  #: A load from which a measured effort rather is another arm's. [kg]
-#: Torques that a model should explain, the most telling first.
+HEAVY = 5.0  #: A load from which a measured effort is another arm's. [kg]
+#: Torques that a model should explain, the clearest first.
 MAKER, RESIDUAL, MEASURED = (
     "the controller's own model",
     "torque less the vendor's residual",
     "measured effort",
 )
-#: Misfit of a measured effort that no friction of a sound log makes; they stay below .12.
-#:
-#: Load and contact are left out of it.
+#: Misfit of a measured effort that no friction of a sound log makes (below .12), load and
+#: contact left out.
 NO_FIT = 0.35
 DOUBTFUL = 0.15  #: Misfit from which other arms are compared.
 ANOTHER = 0.6  #: Share of the misfit that another profile may leave to be the log's own.
-#: A load from which another generation of the arm is looked at first. [kg]
+#: A load from which another generation of the arm is tried first. [kg]
 GENERATION = 1.5
-#: Misfit up to which a cause is believed where nobody said which arm it is.
+#: Misfit up to which a cause is believed if nobody named the arm.
 MISTAKEN = 0.1
-#: Share of what one sign leaves that the other may leave at most to be the right one.
+#: Largest share of the rest by one sign that the other, right one leaves.
 CLEARLY = 0.6
-#: Size of the vendor's torque, relative to the effort, from which it tells its sign.
+#: Size of the vendor's torque, relative to the effort, that shows its sign.
 FELT = 0.02
 NAMED = 3  #: Arms that a finding names.
 #: Findings after which a joint's effort is no evidence.
@@ -78,7 +74,7 @@ class RobotMatch(NamedTuple):
     fits: bool  #: Whether that is as good as the kind of evidence allows.
     evidence: str  #: The torque that was explained, in words.
     load: float  #: Mass fitted beyond the mounted payload, 0 if none. [kg]
-    #: Whether the maker's own model was explained rather than a measured effort.
+    #: Whether the maker's own model was explained, not a measured effort.
     by_maker: bool = False
 
     def __str__(self) -> str:
@@ -142,7 +138,7 @@ def is_judgeable(recording: Recording) -> bool:
 def match_of(
     recording: Recording, robot: Robot, ignored: Sequence[int] = ()
 ) -> RobotMatch | None:
-    """Robot's fit to the log's best torque, some joints ignored; None where nothing tells."""
+    """Robot's fit to the log's best torque without ignored joints, None without any."""
     if recording.joints != robot.joints or not is_judgeable(recording):
         return None
     windows = windows_of(recording, robot, ignored)
@@ -166,7 +162,7 @@ def match_of(
 def maker_case(windows: Windows) -> tuple[str, Case | None]:
     """The maker's model of the arm in a log, and its evidence; None without one.
 
-    A rigid-body model has no friction; torque less the residual has that before the sensor.
+    A rigid-body model has no friction; torque less the residual has it before the sensor.
     """
     log = windows.recording
     target, torque, vendor = log.target_torque, log.torque, log.tau_ext
@@ -204,7 +200,7 @@ def arm_findings(
     if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
         arms = (other for other in map(load_robot, PROFILES) if other.path != robot.path)
         others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
-        # The profile of the same name fits best: the file is rough, the arm is right.
+        # If the profile of the same name fits best, the file is rough, the arm right.
         if others and others[0].robot != robot.name and is_rather(others[0], own, diagnosis):
             best, *more = others
             # A user's own file may be nearer to the arm than its maker's model.
@@ -231,7 +227,7 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
 
 
 def explained(diagnosis: Diagnosis, robots: Sequence[RobotMatch]) -> Iterator[Remark]:
-    """Findings on the cause, or on none; then on the log once it is put right."""
+    """Findings on the cause, or on none; then on the log after its correction."""
     healed, cause = diagnosis.healed, diagnosis.cause
     robot = healed.windows.robot
     misfit = 100 * diagnosis.case.misfit
@@ -266,7 +262,7 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
         if recording.joints in counts:
             return ArmFindings()
         return ArmFindings((warning("no-profile", joint_count=recording.joints, counts=counts),))
-    # A maker's own model that fits no profile is of another arm.
+    # A maker's own model that fits no profile is another arm's.
     is_known = fits[0].fits
     tried = fits[:1] if is_known else [fit for fit in fits if not fit.by_maker]
     each = (diagnose(recording, load_robot(fit.robot), ignored) for fit in tried)
@@ -280,7 +276,7 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
         return ArmFindings(tuple(explained(best, fits)), fits)
     if is_known:
         return ArmFindings(robots=fits)
-    # Without an arm the work of its effort is all that tells its sign.
+    # Without an arm only the work of its effort shows its sign.
     remark = warning("no-robot-fits-any", ranked="; ".join(map(str, fits[:NAMED])))
     return ArmFindings((*inverted_effort(recording), remark), fits)
 
@@ -309,7 +305,7 @@ def cause_remark(diagnosis: Diagnosis, cause: Cause) -> Remark:
 
 
 def vendor_sign(case: Case) -> Iterator[Remark]:
-    """A finding if the vendor's torque fits the arm's only with its sign turned.
+    """A finding if the vendor's torque fits the arm only with its sign turned.
 
     Moving the arm takes the effort plus the torque ON the robot.
     """
@@ -321,7 +317,7 @@ def vendor_sign(case: Case) -> Iterator[Remark]:
     vendor -= np.median(vendor, axis=0)
     if root_mean_square(vendor) < FELT * case.size:
         return
-    # What the arm leaves over in all windows, contact among them.
+    # The rest in all windows, contact among them.
     straight, turned = (
         root_mean_square(replace(case, given=given).best.rest)
         for given in (case.given + vendor, case.given - vendor)

@@ -1,6 +1,6 @@
 """An effort later than the motion: the lag at which a model fits best.
 
-In short windows with Hann's weights φ the torque of the robot's model is linear in a few
+In short windows with Hann's weights φ the torque of the robot's model is linear in four
 numbers a joint: the model's own torque, dry and viscous friction, and rotor inertia,
 
     ∫φ τ(t + lag) = c₁ ∫(−φ' p − φ (Cᵀq̇ − g)) + c₂ ∫φ tanh(q̇/ε) + c₃ ∫φ q̇ − c₄ ∫φ' q̇.
@@ -34,11 +34,11 @@ KEPT = 0.8  #: Share of the differences that judge a fit: the rest may be contac
 #: Growths of a lag to try, over the part of the log. [s]
 DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 COARSE = 3  #: One lag in so many shows whether a growth is worth a closer look.
-LONG = 60.0  #: Part of a long log in use: a clock .5 % off loses 300 ms in it. [s]
+LONG = 60.0  #: Used part of a long log: a clock .5 % off loses 300 ms in it. [s]
 #: Ratio of rests by which a growing lag beats a steady one; 1.00 on sound logs.
 STEADY = 1.1
 LEAST_RATE = 30.0  #: Least sample rate that shows such a lag. [Hz]
-#: Lag that is named: friction behind a turn looks like 20 ms, simulations like 30. [s]
+#: Least lag of a finding: friction behind a turn looks like 20 ms, simulations 30. [s]
 LATE = 0.035
 BETTER = 1.45  #: Ratio of rests by which a lag beats none, mean over joints.
 #: Share and number of joints that agree on a lag, to this share.
@@ -96,7 +96,7 @@ class Lateness(NamedTuple):
     effort: Array  #: Mean effort in the window from each sample. (T', n)
 
     def rest(self, rate: float = 0.0) -> Array:
-        """Rest of each joint's effort at lags that grow by a rate [s/s]; NaN at rest. (n, L)"""
+        """Rest of each joint's effort by lag, growing by a rate [s/s]; NaN at rest. (n, L)"""
         tried = np.round(self.lags[:, None] / self.step + rate * self.when / self.step).astype(
             int
         )
@@ -193,7 +193,7 @@ def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
 
 
 def rest_of(model: Array, effort: Array) -> Array:
-    """Rest (L,) of an effort (W, L) at every lag by its parts (W, 4), of better samples."""
+    """Rest (L,) of an effort (W, L) at every lag by its parts (W, 4), better samples."""
     size = root_mean_squares(model)
     columns = model / np.where(size > 0, size, 1.0)
     keep = np.ones(len(columns), bool)

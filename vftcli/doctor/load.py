@@ -1,4 +1,4 @@
-"""Findings about what a model assumes: load, payload, drive constants, joint temperatures."""
+"""Findings on load, payload, drive constants and joint temperatures."""
 
 from collections.abc import Iterator
 
@@ -22,19 +22,17 @@ USUAL_CONSTANT = 10.0
 JOINT_CONSTANTS = np.array(
     [3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756]
 )
-SAME = 0.02  #: Constants of one joint size scatter by this much from firmware to firmware.
-#: Loads that are named, and that nobody overlooks. [kg]
-#: Hands weigh .5–1.1; constants 3 % off look like .3 on a UR10e.
+SAME = 0.02  #: Scatter of one joint size's constants between firmwares.
+#: Loads in a note, and in a warning: hands weigh .5–1.1, constants 3 % off look like .3 on
+#: a UR10e. [kg]
 HAND, LOAD = 0.4, 1.2
-SURE = 4.0  #: Standard deviations by the scatter that a load has to be.
+SURE = 4.0  #: Least load in standard deviations by the scatter.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
-#: Share of the misfit that a load which changes may leave, and by how much it must
-#: [-, kg].
-#:
-#: Sound logs leave .7 and more; 1.5 kg picked up half-way .2–.6.
+#: Share of the misfit that a changing load may leave (sound logs .7 and more, 1.5 kg picked
+#: up half-way .2–.6), and its least change. [-, kg]
 CHANGED, CHANGE = 0.6, 0.7
-#: Share that a change in the middle must leave for others to be tried, and the shares of
-#: the log between which they are: pushes last less than a third.
+#: Share that a change in the middle must leave to try others, and the shares of the log
+#: between which they are: pushes last less than a third.
 HALVES, BETWEEN = 0.9, (1 / 3, 2 / 3)
 #: A declared payload, or a difference from the mounted one, that is none. [kg]
 DECLARED = 0.1
@@ -45,8 +43,7 @@ RATIO = 0.05
 def drive_constants(recording: Recording) -> Array:
     """Controller's torque per current, target_torque/target_current. (n,) [N·m/A]
 
-    Of resting samples, as friction is fed forward in motion; NaN where they carry too
-    little.
+    Of resting samples, as friction is fed forward in motion; NaN for a small load.
     """
     current, torque = recording.target_current, recording.target_torque
     constants = np.full(recording.joints, np.nan)
@@ -72,7 +69,7 @@ def resting(recording: Recording) -> Mask:
 
 
 def load_remarks(case: Case) -> Iterator[Remark]:
-    """A load declared but not mounted; carried but not stated; or mounted but not carried."""
+    """Payload findings: declared but not mounted, carried, or not carried."""
     recording, robot = case.windows.recording, case.windows.robot
     declared = recording.payload_mass or 0.0
     missing = declared - case.mounted
@@ -114,7 +111,7 @@ def load_change(case: Case) -> Remark | None:
     count, load = len(case.given), case.windows.load
 
     def with_two_loads(split: int) -> RobustFit:
-        """Fit by friction, a load before a window and another from it on."""
+        """Fit by friction and two loads: before a window, and from it on."""
         late = (np.arange(count) >= split)[:, None, None]
         before, after = (load._replace(columns=load.columns * mask) for mask in (~late, late))
         return solve(case.given - case.needed, before, after, case.windows.friction)
@@ -160,7 +157,7 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
 def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]:
     """Drives that carry another current at rest than the controller expects.
 
-    The log's own drive constants are NaN where they are not known. (n,) [N·m/A]
+    The log's own drive constants are NaN if unknown. (n,) [N·m/A]
     """
     rest = resting(recording)
     current, expected = recording.current, recording.target_current
@@ -193,7 +190,7 @@ NOTICED = 0.2  #: Friction that is worth a finding. [N·m]
 
 
 def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]:
-    """Whether the log's joints are as warm as the model's, and the log says so."""
+    """Findings on joint temperatures far from the model's, or missing in the log."""
     if not robot.friction or recording.joints != robot.joints or recording.dq is None:
         return
     temperature = measured_temperature(recording)

@@ -1,7 +1,7 @@
-"""Findings on signals: missing ones, units, signs; those that hold, are zero, clipped or coarse.
+"""Findings on signals: missing, odd units or signs, stuck, zero, clipped, coarse.
 
-A signal is stuck where it repeats itself to the last bit for half a second while the
-joint's other signals show that it has to change.
+A signal is stuck if it repeats to the last bit for half a second while the joint's other
+signals show that it has to change.
 """
 
 from collections.abc import Iterable, Iterator
@@ -14,35 +14,33 @@ from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.rest import HELD, NONZERO
 from vftcli.signals.series import runs_of
 
-#: Net share of work from which a joint's effort counts as inverted.
-#:
-#: Through gravity joints hand energy to one another.
+#: Net share of work that shows an inverted effort: gravity moves energy between joints.
 STRONG = -0.4
 ALONE = -0.85  #: `STRONG` for a joint among sound neighbours.
 #: No measurement is this large, in whatever unit, and no time. [-, s]
 ABSURD, FARTHEST = (1e9, 1e18)
 #: Sample times between which every recorder's lies, read in whatever unit. [s]
 STEPS = (1e-13, 1e10)
-SOME = 5000  #: Samples that tell how large a signal usually is.
-#: Share of the samples at which an interpolated signal runs straight on; change of slope
-#: that is none, relative to it; and share of values that have to change.
+SOME = 5000  #: Samples for the usual size of a signal.
+#: Share of straight samples in an interpolated signal; change of slope that is none,
+#: relative to it; and share of values that have to change.
 STRAIGHT, BEND, MOVED = 0.6, 1e-3, 0.1
 #: Two turns and a little: no joint of these arms goes further from its zero. [rad]
 LARGE_ANGLE = 13.0
 LARGE_CURRENT = 60.0  #: No joint of these arms draws this much; readings in mA do. [A]
-#: Time, and steps, for which a stuck signal has to repeat itself; way within that time by
-#: which a joint surely moves, at 20 mrad/s. [s, -, rad]
+#: Time, and steps, of a stuck signal's repeat; and the way of a joint that surely moves,
+#: at 20 mrad/s. [s, -, rad]
 LONG, MANY, WAY = 0.5, 10, 0.01
-#: A signal's stuck stretch is this many times as long as nearly all its other repeats.
+#: Ratio of a stuck stretch to nearly all other repeats of its signal.
 UNUSUAL = 10.0
-#: A speed this far from constant acceleration is bent. [rad/s]
+#: Deviation from constant acceleration of a bent speed. [rad/s]
 BENT = 0.005
-TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
-#: Steps of the positions that are worth telling: .02 rad/s at 100 Hz. [rad]
+TRAVEL = 0.05  #: Least travel to judge a joint by its own data. [rad]
+#: Steps of the positions in a finding: .02 rad/s at 100 Hz. [rad]
 COARSE = 2e-4
-FEW = 2000  #: Samples that tell most of what a column is like.
-ONCE = 0.2  #: Share of a log that no effort stays at its limit in one go.
-CLIPPED = 0.1  #: Time at the very extreme from which an effort is clipped. [s]
+FEW = 2000  #: Samples for a first look at a column.
+ONCE = 0.2  #: Longest stretch of an effort at its limit, as a share of the log.
+CLIPPED = 0.1  #: Time at its extreme of a clipped effort. [s]
 #: Signals that may be stuck, and the finding then.
 STUCK = {
     "q": "stuck-position",
@@ -50,12 +48,12 @@ STUCK = {
     "current": "stuck-effort",
     "torque": "stuck-effort",
 }
-#: Signals that may be zero throughout, and what that is.
+#: Signals that may be zero throughout, and the level of the finding.
 LEVELS = {"tau_ext": warning, "wrench": warning, "target_torque": fact, "dq": fact}
 
 
 def unusable_findings(recording: Recording) -> Iterator[Remark]:
-    """Numbers that no clock and no robot gives: nothing else is examined then."""
+    """Numbers of no clock and no robot: nothing else is examined then."""
     t = recording.t
     if recording.samples < 3:
         yield warning("too-short", samples=recording.samples)
@@ -100,10 +98,9 @@ def thinly(recording: Recording, count: int) -> slice:
 
 
 def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
-    """Share of a signal's samples (T, n) in straight motion, and where any bends.
+    """Share of a signal's samples (T, n) in straight motion, and bends. (T - 2,)
 
-    The share is 0 where hardly one moves; the samples are those from the second to the
-    last but one. (T - 2,)
+    The share is 0 if hardly one moves; the bends are of samples 2 to T − 1.
     """
     slope = np.diff(value, axis=0) / np.diff(t)[:, None]
     bent = abs(np.diff(slope, axis=0)) > BEND * (abs(slope[1:]) + abs(slope[:-1]))
@@ -125,7 +122,7 @@ def work_shares(recording: Recording, effort: Array) -> Array:
     gross = abs(power).sum(axis=0)
     share = power.sum(axis=0) / np.where(gross > 0, gross, 1.0)
     travel = abs(np.diff(recording.q[rows], axis=0)).sum(axis=0)
-    # One way only, gravity alone can take or give work.
+    # In one direction gravity alone can take or give work.
     reversing = (speed.max(axis=0) > NONZERO) & (speed.min(axis=0) < -NONZERO)
     share[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
     return np.asarray(share)
@@ -139,7 +136,7 @@ def effort_of(recording: Recording) -> tuple[str, Array] | None:
 
 
 def inverted_effort(recording: Recording) -> Iterator[Remark]:
-    """Effort of a turned sign: it takes energy out of a moving arm as friction does."""
+    """Effort of a turned sign: like friction it takes energy from a moving arm."""
     effort = effort_of(recording)
     if effort is None or recording.dq is None:
         return
@@ -201,8 +198,8 @@ def travel_of(recording: Recording) -> Array:
 
 
 def repeated_rows(recording: Recording, names: Iterable[str]) -> Indices:
-    """Rows before those that repeat all of some signals, positions among them. (K,)"""
-    # One column rules most rows out, and the others are compared in what is left.
+    """Rows before those that repeat all of some signals. (K,)"""
+    # The first column excludes most rows.
     rows = np.flatnonzero(recording.q[1:, 0] == recording.q[:-1, 0])
     for name in names:
         if (value := getattr(recording, name)) is not None:
@@ -250,17 +247,17 @@ def stuck_stretches(recording: Recording, name: str) -> Iterator[tuple[int, int,
 
 
 def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, int]]:
-    """Long repeats of one joint's signal while its others change, as above."""
+    """Long repeats of one joint's signal while its others change."""
     t, value = recording.t, getattr(recording, name)
     same = value[1:] == value[:-1]
     signals = (getattr(recording, n) for n in ("q", "dq", *EFFORTS) if n != name)
     others = [x for x in signals if x is not None]
     for j in range(recording.joints):
-        # A run of steps that change nothing ends with the sample behind its last step.
+        # A run of unchanged steps ends with the sample behind it.
         first, last = edges_of(same[:, j])
         lengths = last - first
         long = (t[last] - t[first] >= LONG) & (lengths >= MANY)
-        # Repeats of a coarse signal vary in length; stuck ones stand out.
+        # Repeats of a coarse signal vary in length.
         usual = np.sort(lengths[~long])
         least = UNUSUAL * usual[int(0.95 * len(usual))] if usual.size else 0.0
         for a, b in zip(first[long].tolist(), last[long].tolist(), strict=True):
@@ -278,7 +275,7 @@ def farthest(t: Array, way: Array) -> float:
 def is_extreme(value: Array, rows: slice) -> bool:
     """Whether a stretch is at the extreme of a varying effort: saturation.
 
-    One that is long and the only time at its value is none: the effort came to stand there.
+    Not so one that is long and the only time at its value: the effort stays there.
     """
     stretch, low, high = value[rows], value.min(), value.max()
     at = stretch[0]
@@ -292,14 +289,13 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
     zeros = {}
     for name in recording.signals:
         value = getattr(recording, name)
-        # Nearly every column has another number among its first samples.
+        # Nearly every column is nonzero among its first samples.
         zeros[name] = zero = ~value[:FEW].any(axis=0)
         if zero.any():
             zero &= ~value.any(axis=0)
     for name, value in efforts_of(recording):
         zero = zeros[name]
-        # Most columns of a sensor are rougher than motion.
-        # Steps of white noise differ by √3 times their size.
+        # A sensor's columns are rougher than motion: steps of white noise differ by √3 times.
         steps = np.diff(value[:, ~zero], axis=0)
         rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
         measured = zero.all() or rough.mean() > 0.5
@@ -319,7 +315,7 @@ def is_clipped(value: Array, position: Array, least: int) -> bool:
         extreme = up.max()
         at = up == extreme
         count = np.count_nonzero(at)
-        # A drive saturates far from zero; one that often repeats a small value rests.
+        # A drive saturates far from zero.
         if size == 0 or abs(extreme) < 0.5 * size or count < least:
             continue
         # A smooth effort of coarse resolution is wide a level below too.
@@ -332,7 +328,7 @@ def is_clipped(value: Array, position: Array, least: int) -> bool:
 
 
 def coarse_positions(recording: Recording) -> Iterator[Remark]:
-    """Positions that move in steps that are large beside what encoders resolve."""
+    """Positions in steps far above the resolution of encoders."""
     sizes = {}
     for j, column in enumerate(recording.q[thinly(recording, FEW)].T):
         steps = np.diff(np.unique(column))

@@ -1,4 +1,4 @@
-"""Findings on the clock, and on logged velocity beside position: unit, order, lateness.
+"""Findings on the clock, and on the logged velocity: unit, order, lateness.
 
 Short windows fit the logged velocity as q̇(t) ≈ a·v(t) − a·τ·v̇(t): v is the derivative
 of the position, a the gain, τ the delay. Both sides get Hann's weights φ; by ∫φ v̇
@@ -26,17 +26,17 @@ LEAST_STEPS, MOST_STEPS = 8, 40
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
 #: Most windows; those of a short log; least windows with motion.
 WINDOWS, WANTED, LEAST = 600, 12, 8
-#: Least windows of a joint's motion, least turns: one or two show no error.
+#: Least windows of a joint's motion, and turns: one or two show no error.
 SPREAD, TURNS = 5.0, 3.0
 #: Least share of the position's turns in the velocity, for its lag.
 TELLING = 0.1
 #: Deviation of the gain from 1 that is named; sound logs stay within 0.004.
 GAIN = 0.02
 SURE = 4.0  #: Standard errors, too, that a deviation must exceed.
-#: Lag that is named; robots' filters take 2–3 ms, stamps 6. [s]
+#: Least lag of a finding; robots' filters have 2–3 ms, stamps 6. [s]
 LATE = 0.008
-#: Ratio of open shares at which another joint's position beats the own with a lag, and
-#: the largest gain error of the own for this.
+#: Ratio of open shares at which another joint's position beats its own with a lag, and the
+#: own's largest gain error for this.
 ANOTHER, ALIKE = 0.25, 0.3
 OPEN = 0.1  #: Largest open share of a velocity for its gain to count.
 DAMPED_MOST = 0.15  #: Below this gain a velocity is not late: its size differs.
@@ -51,8 +51,8 @@ BEYOND = 1.5
 GEARED = 10.0
 #: Gain of the derivative → unit of the stamps.
 UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns", 1e-3: "s", 1e-6: "s", 1e-9: "s"}
-#: Share of moving steps with a repeated velocity that is held: half the rate repeats one
-#: in two, sound logs up to a third.
+#: Share of moving steps with a repeated velocity that is held: half the rate repeats one in
+#: two, sound logs up to a third.
 HELD = 0.55
 TINY = 1e-300  #: Least divisor; the dividend is 0 too.
 STEPS, BLOCK = 8000, 500  #: Most steps, in blocks.
@@ -102,7 +102,7 @@ def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> Array:
     """The first seven fields of `VelocityFit`, from one joint's `weighed_means`. (7,)"""
     size, total = v @ v, logged @ logged
     rest, turn, tool = (x - v * (v @ x) / size for x in (logged, w, logged_w))
-    # Positions' noise would hide a lag; velocities' noise is independent.
+    # Positions' noise would hide a lag; velocities' is independent.
     if (tool @ turn) ** 2 < TELLING * (tool @ tool) * (turn @ turn):
         tool = turn
     common = tool @ turn
@@ -140,8 +140,8 @@ def spread_of(v: Array) -> Array:
 def weighed_means(recording: Recording) -> Array:
     """Hann-weighted means over windows spread over the log. (4, W, n)
 
-    Of the position's derivative v, the logged velocity [rad/s], then −v̇ by the first and
-    the second [rad/s²]. Windows across a gap or of tiny steps are left out.
+    Of the position's derivative v, the logged velocity [rad/s], then −v̇ by each of them
+    [rad/s²]. Windows across a gap or of tiny steps are left out.
     """
     t, dq, step = recording.t, recording.require("dq"), recording.median_step
     length = round(WINDOW / step) if USUAL[0] < step < USUAL[1] else UNUSUAL_STEPS
@@ -256,10 +256,7 @@ def exchanged(fit: VelocityFit) -> list[int]:
 
 
 def held_shares(recording: Recording) -> dict[int, float]:
-    """Joints with a velocity that holds, then jumps, while they move.
-
-    Each with the share of moving steps of a velocity held for short. [%]
-    """
+    """Joint → share of moving steps with a velocity held, then jumping. [%]"""
     t, q, dq = recording.t, recording.q, recording.require("dq")
     first = spread(recording.samples - 1, STEPS, BLOCK)
     moves = abs(q[first + 1] - q[first]) > MOVES * (t[first + 1] - t[first])[:, None]
@@ -279,25 +276,25 @@ def held_shares(recording: Recording) -> dict[int, float]:
     return found
 
 
-SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
-#: Spread of nine steps in ten over their median at which a fixed step is visibly wrong.
+SLOW_RATE = 50.0  #: Rate below which a contact of .1 s has few samples. [Hz]
+#: Relative spread of nine steps in ten at which a fixed step is visibly wrong.
 JITTER = 0.05
 GAP_STEPS = 4.0  #: A step this many times the median is a gap.
 LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]
-MISSED = (1.6, 3.4)  #: Steps over the median where one or two samples were missed.
-SHORT = 2.0  #: Shorter logs tell little of noise and nothing of repeated motion. [s]
-STALE = 0.003  #: Share of rows that repeat the one before, from which it is worth telling.
+MISSED = (1.6, 3.4)  #: Ratio of steps to the median of one or two missed samples.
+SHORT = 2.0  #: Shorter logs show little noise, no repeated motion. [s]
+STALE = 0.003  #: Least share of repeated rows in a finding.
 
 
 def clock_findings(
     recording: Recording, fit: VelocityFit | None, part: Recording | None = None
 ) -> Iterator[Remark]:
-    """Findings about the clock, and on repeated rows in a part of the log or all of it."""
+    """Findings on the clock, and on repeated rows in a part of the log."""
     common = common_cause(fit)
     if common is not None and common.code != "velocity-unit":
         yield common
         if common.code == "time-unit":
-            return  # what else is odd about its steps is this
+            return  # the cause of all odd steps
     if recording.duration < SHORT:
         yield fact("short", duration_s=recording.duration)
     if (rate := 1 / recording.median_step) < SLOW_RATE:
@@ -308,17 +305,17 @@ def clock_findings(
         share = 100 * source.duplicates / max(source.rows, 1)
         repeats, level = source.duplicates, warning if share > 10 else fact
         yield level("repeated-stamps", repeats=repeats, rows=source.rows, share_percent=share)
-    # Rows that repeat the row before under a new stamp: a packet that was late.
+    # Rows repeated under a new stamp: a late packet.
     part = part or recording
     last = repeated_rows(part, JOINT_SIGNALS)
     share = len(last) / (part.samples - 1)
-    # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
+    # Nearly all rows repeat in an arm at rest, or without velocity.
     if part.dq is not None and STALE <= share <= 0.9 and abs(part.dq[last]).max() >= NONZERO:
         yield fact("stale-rows", stale=len(last), share_percent=100 * share)
 
 
 def uneven_steps(recording: Recording) -> Iterator[Remark]:
-    """Samples that were missed, steps that vary, and gaps with the longest of them."""
+    """Missed samples, varying steps, and gaps with the longest of them."""
     t, usual, source = recording.t, recording.median_step, recording.source
     steps = np.diff(t)
     missed = np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual))

@@ -1,11 +1,11 @@
 """Model torque over short windows of a log, and least squares over them.
 
 Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, since
-ṗ = Cᵀq̇ − g + τ, and no acceleration has to be differentiated. Gravity is kept apart, as
-a matrix times the direction that is up, so that its direction can be fitted.
+ṗ = Cᵀq̇ − g + τ: no acceleration is differentiated. Gravity is a matrix times the
+direction "up", which can be fitted.
 
 Least squares set contact aside, with terms that cannot be negative. A round of trimming
-only adds up the normal equations of the windows that are kept.
+only sums the normal equations of the kept windows.
 """
 
 from collections.abc import Sequence
@@ -23,28 +23,24 @@ from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_m
 from vftcli.signals.least_squares import inverse_of
 from vftcli.signals.recording import Recording
 
-WINDOW, WINDOWS = 0.3, 200  #: Length of a window [s], and how many are looked at at most.
-#: Instants of a window at which the model is asked: 50 ms apart nothing of it is missed.
+WINDOW, WINDOWS = 0.3, 200  #: Length of a window [s], and most windows.
+#: Instants of the model in a window: 50 ms apart they miss nothing.
 POINTS = 7
-#: Those of them at which gravity is asked: between them it bends little.
+#: Those of them with gravity, which bends little between them.
 GRAVITY = [0, 3, 6]
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
 FAST = 0.8  #: Mean direction of a window in which a joint moves.
-#: Mass [kg] and first moment [kg·m] that a load may well have, before any data.
+#: Prior mass [kg] and first moment [kg·m] of a load.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
-#: Typical error of a rough description: of a link's mass, and of its centre. [-, m]
-#:
-#: Public URDFs and profiles of one arm differ by 2–12 % in gravity's torque.
+#: Typical error of a rough description of a link's mass, and of its centre: public URDFs
+#: and profiles of one arm differ by 2–12 % in gravity's torque. [-, m]
 ROUGH = 0.1, 0.025
 #: Factor on their prior from fit to fit, and most fits.
 TIGHTER, ROUGH_FITS = 0.5, 8
 LIGHT = 0.1  #: Links below are as rough as one of this mass. [kg]
-KEPT = (
-    #: Share of the windows that a fit is made from and judged by: the rest may be contact.
-    0.7
-)
-ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
+KEPT = 0.7  #: Share of the windows in a fit: the rest may be contact.
+ROUNDS = 4  #: Rounds of fitting and trimming, after which nothing changes.
 OVERLAP = 2.0  #: Windows that overlap by half count half.
 
 
@@ -52,7 +48,7 @@ class Terms(NamedTuple):
     """Torques that may explain another one, column by column."""
 
     columns: Array  #: Torque per unit of each coefficient. (W, n, k)
-    positive: bool = False  #: Whether they only make sense above zero, as friction's do.
+    positive: bool = False  #: Whether they must not be negative, as friction's.
     #: Standard deviations before any data, one for all or (k,); inf for none.
     prior: Array | float = np.inf
 
@@ -77,7 +73,7 @@ class RobustFit(NamedTuple):
 
 
 def solve(target: Array, *by: Terms) -> RobustFit:
-    """Fit of a torque (W, n) [N·m] by terms, priors beside 1 N·m, worst windows left out."""
+    """Fit of a torque (W, n) [N·m] by terms, with priors, worst windows left out."""
     columns = np.concatenate([part.columns for part in by], axis=2)
     counts = [part.columns.shape[2] for part in by]
     positive = np.repeat([part.positive for part in by], counts)
@@ -94,7 +90,7 @@ def solve(target: Array, *by: Terms) -> RobustFit:
     for _ in range(ROUNDS):
         values = np.zeros(len(used))
         values[used] = inverse() @ moment[kept].sum(axis=0)[used]
-        # Friction that would drive the arm is another error in disguise: it is left out.
+        # Friction that would drive the arm is another error: it is left out.
         wrong = positive & (values < 0)
         used &= ~wrong
         values[wrong] = 0.0
@@ -108,11 +104,11 @@ def solve(target: Array, *by: Terms) -> RobustFit:
 
 @dataclass(frozen=True, kw_only=True)
 class Windows:
-    """Windows of a log, and what a robot's model says of them."""
+    """Windows of a log, and a robot's model in them."""
 
     recording: Recording  #: The log.
     robot: Robot  #: The arm with its payload.
-    ignored: tuple[int, ...]  #: Joints of which the effort is no evidence, from zero.
+    ignored: tuple[int, ...]  #: Joints without evidence in the effort, from zero.
     first: Indices  #: First sample of each window. (W,)
     last: Indices  #: Last sample of each window. (W,)
     t: Array  #: Those instants. (W, K) [s]
@@ -163,19 +159,19 @@ class Windows:
 
     @cached_property
     def friction(self) -> Terms:
-        """Coulomb and viscous friction of every joint, which only ever take energy."""
+        """Coulomb and viscous friction of every joint, never driving."""
         each = self.motion[..., None] * np.eye(self.q.shape[2])
         return Terms(np.concatenate([*each.swapaxes(0, 1)], axis=2), positive=True)
 
     @cached_property
     def load(self) -> Terms:
-        """Torque that carries a load, by its mass and its first moment about the flange."""
+        """Torque that carries a load, by its mass and first moment at the flange."""
         middle = self.q[:, self.q.shape[1] // 2]
         return Terms(-load_regressor(self.robot.loaded_chain, middle), prior=LOAD)
 
     @cached_property
     def weights(self) -> Terms:
-        """Torque that carries every link's mass and first moment, `ROUGH` of which may be wrong."""
+        """Torque of every link's mass and first moment, wrong by `ROUGH`."""
         chain, q = self.robot.loaded_chain, self.q[:, self.q.shape[1] // 2]
         Y = torque_regressor(chain, q, 0.0 * q, 0.0 * q).reshape(*q.shape, -1, LINK)[..., :4]
         share, shift = ROUGH
@@ -232,7 +228,7 @@ def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
 def gravity_by_up(chain: Chain, q: Array) -> Array:
     """Holding torque at poses q (N, n) [rad] by components of "up". (N, n, 3) [N·m]
 
-    It is linear in "up", the third axis of which is the chain's own, −gravity.
+    It is linear in "up"; its third axis is the chain's own, −gravity.
     """
     R, origins = (each[:, :-1] for each in link_poses(chain, q))
     mass = chain.mass[:, None]
@@ -246,23 +242,23 @@ def up_axes(gravity: Array) -> Array:
     """Axes with "up" third, as columns, times the size of gravity. (3, 3) [m/s²]"""
     size = float(np.linalg.norm(gravity))
     up = -gravity / size
-    # Of an upright base the base's own axes.
+    # The base's own axes if it is upright.
     side = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     second = np.cross(up, side)
     second /= np.linalg.norm(second)
     return size * np.column_stack([np.cross(second, up), second, up])
 
 
-MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are no loads but another arm. [kg, m]
-SHED = 1.2  #: Share of the mounted payload that a fit may remove at most. [-]
-#: Share of the misfit that a load must leave at most, or it only adds freedom.
+MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are another arm. [kg, m]
+SHED = 1.2  #: Largest share of the mounted payload that a fit removes.
+#: Largest share of the misfit that a load may leave.
 TELLING = 0.9
-#: Range of gravity's torque, relative to the effort, from which the poses tell a load.
+#: Range of gravity's torque, relative to the effort, that shows a load.
 VARIED = 0.3
-#: A cause shows in a window where it makes this many times the rest;
-#: it is refuted where the rest without it is below this share.
+#: A cause shows in a window where it makes this many times the rest; it is refuted where
+#: the rest without it is below this share.
 FELT, REFUTED = 4.0, 0.6
-LASTING = 0.95  #: Share of the windows in which a cause that lasts must not be refuted.
+LASTING = 0.95  #: Share of the windows that do not refute a lasting cause.
 
 
 @dataclass(frozen=True)
@@ -271,9 +267,9 @@ class Case:
 
     windows: Windows  #: The log's windows with the arm's model.
     given: Array  #: Mean of the effort, as torque, over each window. (W, n) [N·m]
-    size: float  #: Root mean square of the column that was logged. [N·m]
-    constant: Array  #: Torque per unit of the column that was logged, joint by joint. (n,)
-    #: Direction of "up" in axes of which the third is the robot file's own. (3,)
+    size: float  #: Root mean square of the logged column. [N·m]
+    constant: Array  #: Torque per unit of the logged column. (n,)
+    #: Direction "up" in axes with the robot file's own third. (3,)
     up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     @cached_property
@@ -298,7 +294,7 @@ class Case:
 
     @cached_property
     def rough(self) -> RobustFit:
-        """Fit by a load and by errors of the links as large as a rough description's."""
+        """Fit by a load and by errors of the links in a rough description."""
         weights, load, friction = self.windows.weights, self.windows.load, self.windows.friction
         errors = np.asarray(weights.prior)
         for prior in errors * TIGHTER ** np.arange(ROUGH_FITS)[:, None]:
@@ -324,7 +320,7 @@ class Case:
 
     @property
     def carries_load(self) -> bool:
-        """Whether a load beyond the mounted one explains a part of what friction leaves."""
+        """Whether a load beyond the mounted one explains part of the rest."""
         mass, moment = self.loaded.values[0], self.loaded.values[1:4]
         if self.gravity_range < VARIED * self.size:
             return False  # in one pose any residual passes for a load
@@ -335,7 +331,7 @@ class Case:
 
     @property
     def best(self) -> RobustFit:
-        """The fit with a load where one explains something, else without."""
+        """The fit with a load if it explains something, else without."""
         return self.loaded if self.carries_load else self.bare
 
     @property
@@ -359,7 +355,7 @@ class Case:
         return float(np.ptp(self.gravity, axis=0).max())
 
     def lasts(self, cause: RobustFit, change: Array) -> bool:
-        """Whether a cause's change (W, n) [N·m] is always there, as no push and no object is."""
+        """Whether a cause's change (W, n) [N·m] is always there, unlike a push."""
         size = np.linalg.norm(change, axis=1)
         felt = size > FELT * cause.size * np.sqrt(change.shape[1])
         without = np.linalg.norm(cause.rest + change, axis=1)
