@@ -1,1 +1,1 @@
-"""Evaluation: errors of estimates against a reference, with intervals, lags and significance."""
+"""Evaluation: errors of estimates with intervals, lags and significance."""

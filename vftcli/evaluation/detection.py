@@ -1,7 +1,7 @@
 """A list of contacts against the true ones: found, split, false, onset, peak.
 
-A true contact is found if a row overlaps it within `SLACK`; further rows on it are split;
-a row that overlaps none, its middle where the truth vouches, is false.
+A true contact is found if a row overlaps it within `SLACK`; further rows on it are split.
+A row without overlap is false if its middle lies in a vouched span.
 """
 
 from collections.abc import Sequence
@@ -12,10 +12,10 @@ import numpy as np
 
 from vftcli.readers.references import ListedRow
 
-SLACK = 0.1  #: How far a row may be from a true contact that it finds. [s]
+SLACK = 0.1  #: Largest distance of a row from its true contact. [s]
 NORMAL = 1.959964  #: Quantile .975 of the normal distribution.
 
-#: Start [s], end [s], peak [N] (NaN where it is not known) of a true contact.
+#: Start [s], end [s], peak [N] (NaN if unknown) of a true contact.
 TrueContact = tuple[float, float, float]
 
 
@@ -25,10 +25,10 @@ def score_list(
     vouched: Sequence[Sequence[float]],
     duration: float,
 ) -> dict[str, Any]:
-    """How a list agrees with the true contacts of a log that lasts `duration` [s], by name.
+    """Agreement of a list with the true contacts of a log of `duration` [s], by name.
 
-    `free_h` is vouched time less true contacts [h]. Only loads overlap `found_as_load`; onset
-    is the first row's, peaks the hardest row's.
+    `free_h` is vouched time less true contacts [h]. `found_as_load` counts overlaps with loads
+    alone; onset is the first row's, peaks the hardest row's.
     """
     on = [
         (each, start, peak)

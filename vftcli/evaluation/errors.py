@@ -1,7 +1,7 @@
-"""Errors of estimates against a reference: one tidy table, the unit in each column's name.
+"""Errors of estimates against a reference: one table, units in the columns' names.
 
-Several logs of one arm are one experiment, with pooled rows below those of each log; over
-the joints of a log there is one mean, of those with a reference to be trusted.
+Several logs of one arm are one experiment, with pooled rows below each log's. A log has
+one mean over the joints with a trusted reference.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,13 +21,12 @@ from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
 
 Schema = dict[str, type[pl.DataType]]  #: Column of a table → its type.
-#: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the
-#: samples.
+#: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.
 #:
-#: `coverage_95` is the share of samples within the estimate's 95 % band, where it has
-#: one; `missing` the share without an answer, which counts as the answer 0, so that
-#: nothing hides by failing. `l1_Nm` is the mean |error|; `skill` is 1 less the RMSE over
-#: the reference's rms, 1 for the reference itself, 0 for an estimate that is always zero.
+#: `coverage_95` is the share of samples within the estimate's 95 % band, if it has one;
+#: `missing` the share without an answer, which counts as the answer 0, so that failures
+#: show. `l1_Nm` is the mean |error|; `skill` is 1 less the RMSE over the reference's rms:
+#: 1 for the reference itself, 0 for an estimate of zero.
 SCHEMA: Schema = {
     "recording": pl.String,
     "observer": pl.String,
@@ -53,9 +52,9 @@ SCHEMA: Schema = {
     "samples": pl.Int64,
 }
 
-#: A joint's reference is trusted if at least this share of its samples is.
+#: Share of trusted samples from which a joint's reference is trusted.
 TRUSTED_SHARE = 0.5
-#: Fewest samples of a coverage: fewer tell it to ±30 % only.
+#: Fewest samples of a coverage: fewer give ±30 % only.
 LEAST = 10
 POOLED = "pooled"  #: Name of the pooled rows in the column `recording`.
 
@@ -74,24 +73,24 @@ def rmse(estimate: Array, reference: Array) -> Array:
 
 
 def correlation(x: Array, y: Array) -> float:
-    """Pearson's correlation of two series, NaN where one of them does not vary."""
+    """Pearson's correlation of two series, NaN if one is constant."""
     x, y = x - x.mean(), y - y.mean()
     power = float(np.sqrt(np.sum(x**2) * np.sum(y**2)))
     return float(np.sum(x * y)) / power if power > 0 else float("nan")
 
 
 class Scored(NamedTuple):
-    """Estimates of one joint against one reference, over the samples where that is known."""
+    """Estimates of one joint beside a reference, over its known samples."""
 
     names: tuple[str, ...]  #: The observers' names.
     joint: int  #: Joint number, from 1.
     estimates: Array  #: One column an observer, 0 where it has no answer. (T, m) [N·m]
     missing: Array  #: Samples of each observer without an answer. (m,)
     reference: Array  #: (T,) [N·m]
-    moving: Mask  #: Whether the joint moves, so that the reference may be relied on. (T,)
-    floor: float  #: The reference's own error, NaN where it is not known. [N·m]
-    #: Bootstrap draws of the mean squared errors, one column an observer, all in the same
-    #: blocks: for comparing observers.
+    moving: Mask  #: Whether the joint moves: then the reference is reliable. (T,)
+    floor: float  #: The reference's own error, NaN if unknown. [N·m]
+    #: Bootstrap draws of the mean squared errors, one column an observer, in shared blocks, to
+    #: compare observers.
     paired: Resampled
     #: Draws of each observer, in blocks of its own length.
     own: tuple[Resampled, ...]
@@ -116,7 +115,7 @@ def evaluate(
     Args:
         recording: The log's name, for the first column.
         estimates: The observers' estimates, on the reference's clock.
-        reference: The torque they are judged by; its `floor` is written beside every error.
+        reference: The reference torque; its `floor` is written beside every error.
 
     Raises:
         ShapeError: If an estimate and the reference have different shapes.
@@ -177,10 +176,9 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
 
 
 def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> Array:
-    """Samples within ±1.96 `error_sd` of the estimate, and samples that were asked. (2, n)
+    """Samples within ±1.96 `error_sd` of the estimate, and all judged. (2, n)
 
-    Where the joint rests, or without a band, none counts; one without an answer is in no
-    band.
+    None counts at rest or without a band; one without an answer is in no band.
     """
     if estimate.error_sd is None:
         return np.zeros((2, estimate.joints))
@@ -194,13 +192,13 @@ def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> Arra
 
 def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFrame:
     """The tidy table of scored joints, observer by observer."""
-    # One joint after the other: of a long log not all of them have room at once.
+    # Joint by joint: all of a long log do not fit at once.
     of_joints = [rows(recording, reference, joint) for joint in joints]
     return tidy([line for observer in zip(*of_joints, strict=True) for line in observer], SCHEMA)
 
 
 def tidy(rows: Sequence[Mapping[str, object]], schema: Schema) -> pl.DataFrame:
-    """A table of rows; what is no finite number is null, which JSON can hold."""
+    """A table of rows, null for numbers that are not finite, as JSON needs."""
     number = pl.col(pl.Float64)
     return pl.DataFrame(rows, schema).with_columns(pl.when(number.is_finite()).then(number))
 
@@ -249,7 +247,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
 
 
 class PoolMember(NamedTuple):
-    """One log's estimates and what they are judged by."""
+    """One log's estimates and their reference."""
 
     robot: str  #: The arm's name.
     estimates: Sequence[ExternalTorque]  #: One an observer.
@@ -259,8 +257,7 @@ class PoolMember(NamedTuple):
 def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
     """Rows over all samples of several logs together, each log resampled on its own.
 
-    Logs of two arms, or of other observers, are not pooled, nor fewer than two: the table
-    is empty.
+    The table is empty for logs of two arms or of other observers, or fewer than two.
     """
     kinds = {(m.robot, m.reference.joints, tuple(e.name for e in m.estimates)) for m in members}
     if len(members) < 2 or len(kinds) != 1:
@@ -278,7 +275,7 @@ def together(parts: Sequence[Scored]) -> Scored:
     weight = np.array([len(p.reference) for p in parts], float)
     share = weight / max(weight.sum(), 1.0)
     lag = np.array([p.lag for p in parts])
-    # A log in which no lag fits says nothing of it: the others' shares are weighed anew.
+    # A log without a fitting lag counts for nothing; the others' shares are renormalised.
     weights = np.isfinite(lag) * share[:, None]
     total = weights.sum(axis=0)
     mean_lag = np.nansum(lag * weights, axis=0) / np.where(total > 0, total, np.nan)
@@ -301,7 +298,7 @@ def together(parts: Sequence[Scored]) -> Scored:
 
 
 def weighed(parts: Sequence[Resampled], share: Array) -> Resampled:
-    """Draws of several logs as those of one; each log has a share of the samples. (L,)"""
+    """Draws of several logs as one's, by shares of the samples. (L,)"""
     draws = sum(w * p.draws for w, p in zip(share, parts, strict=True))
     return Resampled(np.asarray(draws), sum(p.blocks for p in parts))
 
@@ -309,10 +306,10 @@ def weighed(parts: Sequence[Resampled], share: Array) -> Resampled:
 class JointMeans(NamedTuple):
     """Means over the joints of one log."""
 
-    #: Observer → mean RMSE; those of which one is known, in the table's order. [N·m]
+    #: Observer → mean RMSE of the known ones, in the table's order. [N·m]
     errors: dict[str, float]
-    floor: float  #: Mean of the reference's own error, NaN where it is not known. [N·m]
-    #: Joints that are left out, because the reference is not to be trusted there.
+    floor: float  #: Mean of the reference's own error, NaN if unknown. [N·m]
+    #: Joints that are left out for want of a trusted reference.
     without: tuple[int, ...]
     #: Observer → mean |error| [N·m], and its gain over zero, if known.
     l1: Mapping[str, float] = {}
@@ -325,7 +322,7 @@ class JointMeans(NamedTuple):
 
     @property
     def left_out(self) -> str:
-        """The joints that are left out, as " without J5"; "" for none."""
+        """The joints left out, as " without J5"; "" for none."""
         return f" without {', '.join(f'J{j}' for j in self.without)}" if self.without else ""
 
 

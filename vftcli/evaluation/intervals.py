@@ -1,6 +1,6 @@
 """Confidence intervals of an RMSE of correlated errors: block bootstrap.
 
-Paired, it also tells whether one observer is better than another, or was lucky.
+Paired draws show whether one observer is better than another or was lucky.
 """
 
 from collections.abc import Sequence
@@ -15,11 +15,11 @@ from vftcli.signals.arrays import Array, Indices, root_mean_squares
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import sliding
 
-REPETITIONS = 1000  #: Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them.
+REPETITIONS = 1000  #: Bootstrap repetitions; 25 of them lie beyond each end.
 SEED = 20250811  #: Seed of every bootstrap: a log has one interval.
-#: Most blocks in a repetition: more change nothing but the time it takes.
+#: Most blocks in a repetition: more only cost time.
 MOST_BLOCKS = 300
-#: Fewest blocks in a repetition, however long errors remember.
+#: Fewest blocks in a repetition, whatever the correlation.
 LEAST_BLOCKS = 10
 MEMORY = 5.0  #: Length of a block in correlation times of the squared error.
 #: Largest share subtracted: the upper end of an interval is at most five times the RMSE.
@@ -27,7 +27,7 @@ WIDEST = 0.96
 LEVEL = 0.95  #: Coverage of the intervals.
 #: Of Student's quantile: 1e-12 of it from 1 to 1000 degrees.
 QUADRATURE, NEWTON_STEPS = 48, 12
-FIRST_LAGS = 1024  #: Lags over which an autocorrelation is looked at first. [samples]
+FIRST_LAGS = 1024  #: First lags of an autocorrelation. [samples]
 #: Columns of the significance table: RMSE less that of `other`, 95 % interval, p.
 SIGNIFICANCE: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
@@ -46,15 +46,15 @@ class Resampled(NamedTuple):
     """Mean squares of resampled errors."""
 
     draws: Array  #: One mean square a repetition and column. (B, m)
-    blocks: int  #: Blocks in each repetition: the effective number of independent pieces.
+    blocks: int  #: Blocks in a repetition, the number of independent pieces.
 
 
 def resample(squares: Array, length: int) -> Resampled:
-    """Mean squares of moving-block bootstrap repetitions of squared errors. (T, m) [(N·m)²]
+    """Moving-block bootstrap draws of the means of squared errors. (T, m) [(N·m)²]
 
     Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from
     the series closed to a ring, so that every sample counts alike (Politis and Romano's
-    circular variant of Künsch's moving blocks); all columns share blocks of a length
+    circular variant of Künsch's moving blocks); all columns share blocks of `length`
     [samples].
     """
     samples = len(squares)
@@ -80,8 +80,8 @@ def block_lengths(squares: Array) -> Indices:
 def correlation_time(x: Array) -> Array:
     """Autocorrelation's integral up to its first value below 0.05. (m,) [samples]
 
-    1 for white noise. Lags: `FIRST_LAGS`, then fourfold until every column has fallen or
-    half of the log is reached.
+    1 for white noise. Lags: `FIRST_LAGS`, then fourfold until every column has fallen, to at
+    most half of the log.
     """
     most = max(len(x) // 2, 1)
     columns = np.ascontiguousarray((x - x.mean(axis=0)).T)
@@ -103,8 +103,8 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     """95 % interval of an RMSE from bootstrap draws of its mean square. [N·m]
 
     The scatter of a mean square is a share of the true value. With h, that share times
-    Student's quantile for the number of blocks, the true value is at most observed/(1 − h), and
-    at least observed·e^{−h}: the logarithm, as the mean square is skewed.
+    Student's quantile for the number of blocks, the true value is at most observed/(1 − h),
+    at least observed·e^{−h}: in the logarithm, as the mean square is skewed.
     """
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")
@@ -114,11 +114,11 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
 
 
 def student_quantile(p: float, freedom: int) -> float:
-    """Student's t below which a share p > 0.5 lies.
+    """Quantile of Student's t for a share p > 0.5.
 
-    With t = √ν tan θ the share between 0 and t is c ∫ cos^(ν−1) over [0, θ], which is
-    concave in θ: Newton's steps from θ = (p − ½)/c come to the root from below. SciPy has
-    it too, and its import takes as long as an analysis.
+    With t = √ν tan θ the share between 0 and t is c ∫ cos^(ν−1) over [0, θ], concave in θ:
+    Newton's steps from θ = (p − ½)/c reach the root from below. SciPy's import would cost as
+    much time as an analysis.
     """
     c = np.exp(lgamma(0.5 * (freedom + 1)) - lgamma(0.5 * freedom)) / np.sqrt(np.pi)
     nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE)
@@ -132,9 +132,9 @@ def student_quantile(p: float, freedom: int) -> float:
 def paired_significance(
     recording: str, estimates: Sequence[ExternalTorque], reference: ExternalTorque
 ) -> pl.DataFrame:
-    """Every pair of observers on every joint: difference of RMSE, its interval, and p.
+    """Difference of RMSE, interval and p of every pair of observers and joint.
 
-    Both observers' errors are drawn in the same blocks, so that what they share cancels. No
+    Both observers' errors are drawn in the same blocks, so that common errors cancel. No
     answer counts as the answer 0.
     """
     rows = []

@@ -1,4 +1,4 @@
-"""The error table that the paper prints, beside one's own log."""
+"""The paper's printed error table beside a log's errors."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, fact, on_joints
 
-#: Errors that differ by less than this share are one filter's, computed in two ways.
+#: Errors within this share are one filter's, computed in two ways.
 SAME_FILTER = 1e-6
 
 
@@ -42,7 +42,7 @@ class Comparison(NamedTuple):
 
     published: Published  #: The printed table.
     recording: str  #: The log's name.
-    #: Observer → computed RMSE of each joint, NaN where it is not known. (n,) [N·m]
+    #: Observer → computed RMSE of each joint, NaN if unknown. (n,) [N·m]
     ours: Mapping[str, Array]
     floor: Array  #: The reference's own error. (n,) [N·m]
     observers: Mapping[str, Observer]  #: The observers that ran, by name.
@@ -59,10 +59,10 @@ class Comparison(NamedTuple):
 
     @property
     def remarks(self) -> Iterator[Remark]:
-        """Differences of the two, and why a computation need not give these numbers."""
+        """Differences of the two, and reasons for them."""
         if self.names:
             yield from self.sizes()
-        # FDO and GMO of equal gain are one filter, so they agree where their gains do.
+        # FDO and GMO of equal gain are one filter: they agree on these joints.
         if {"fdo", "gmo"} <= {*self.names}:
             gap = abs(self.ours["fdo"] - self.ours["gmo"])
             if (alike := gap <= SAME_FILTER * self.ours["fdo"]).any():
@@ -79,10 +79,10 @@ class Comparison(NamedTuple):
         yield fact("print-noise-floor", least_Nm=min(last), most_Nm=max(last), floor_Nm=floor)
 
     def sizes(self) -> Iterator[Remark]:
-        """Joints on which another observer is best than in print, and ours over the print."""
+        """Joints with another best observer than in print, and ratios to the print."""
         printed = np.array([self.printed(name) for name in self.names])
         ours = np.array([self.ours[name] for name in self.names])
-        # Of a joint on which no observer is known the first is named.
+        # The first is named for a joint without a known observer.
         here = np.where(np.isfinite(ours), ours, np.inf).argmin(axis=0)
         pairs = zip(printed.argmin(axis=0), here, strict=True)
         other = [
@@ -103,7 +103,7 @@ class Comparison(NamedTuple):
 
 
 def check_published(name: str, reference: str | None) -> None:
-    """Raise unless there is such a table and a reference to make errors with."""
+    """Raise unless the table exists and a reference is chosen."""
     if name not in TABLES:
         raise ParameterError(f"no published table {name!r}; there is {', '.join(TABLES)}")
     if reference is None:
@@ -118,7 +118,7 @@ def compare_with(
     observers: Sequence[Observer],
     tunings: Mapping[str, Tuning],
 ) -> Comparison:
-    """Set a printed table beside computed errors."""
+    """A printed table beside computed errors."""
     published = TABLES[name]
     rows = errors.filter(pl.col("joint").is_not_null())
     joints = int(str(rows["joint"].max()))

@@ -1,4 +1,4 @@
-"""What a user may choose of the reference that estimates are judged by."""
+"""Choice of the reference that estimates are compared with."""
 
 from pathlib import Path
 from typing import Annotated
@@ -31,7 +31,7 @@ class ReferenceChoice(Choice):
         str | None,
         Option("--reference-columns", "SPEC", "Name the columns of a reference file."),
     ] = None
-    #: Whether each observer's contacts are judged by the reference's too.
+    #: Whether to compare each observer's contacts with the reference's too.
     contacts: bool = False
 
     def __post_init__(self) -> None:
@@ -41,5 +41,5 @@ class ReferenceChoice(Choice):
 
     @property
     def path(self) -> Path | None:
-        """The file of ``file:PATH``, None for a reference that is made from the log."""
+        """The file of ``file:PATH``, None for a reference made from the log."""
         return Path(self.name.removeprefix(FILE)) if self.name.startswith(FILE) else None

@@ -1,4 +1,4 @@
-"""Reference torques, their sources, and estimates beside them: one table of errors."""
+"""Reference torques by source, and estimates beside them: one table of errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -34,27 +34,26 @@ from vftcli.wrench.frames import NOTHING, Mounting, from_base, in_base_axes, log
 from vftcli.wrench.sensor_reading import SensorReading, with_reference
 from vftcli.wrench.solvers import VirtualSensor
 
-AHEAD = 1.05  #: The best is ahead where the paper's gains make this many times its error.
+AHEAD = 1.05  #: Least ratio of the paper's error to the best's in a remark.
 #: Cutoff of the open torque: pushes last, reversals do not. [Hz]
 CUTOFF = 2.0
-#: Multiple of a joint's median open torque from which it sticks out.
-#:
-#: Free UR10e logs reach more on joints with friction missed for a moment (13.8), but
-#: below their dry friction; logs of hands, and simulated pushes, reach 17–100.
+#: Multiple of a joint's median open torque that stands for contact: free UR10e logs reach
+#: more on joints with friction missed for a moment (13.8), but below their dry friction;
+#: logs of hands, and simulated pushes, reach 17–100.
 STANDING_OUT = 8.0
-#: Multiple of a joint's dry friction up to which friction may be what is open; free UR10e
-#: logs reach 1.15, logs of hands 1.8–7.
+#: Multiple of a joint's dry friction that friction may leave open: free UR10e logs reach
+#: 1.15, logs of hands 1.8–7.
 OF_FRICTION = 1.5
 #: No contact below this: link torques leave 1.8 open. [N·m]
 LEAST = 2.0
-#: Multiple of its limit from which open torque is plainly no model error: a free UR10
-#: reaches 1.14, hands and pushes 2.1 and more.
+#: Multiple of its limit above which open torque is no model error: a free UR10 reaches
+#: 1.14, hands and pushes 2.1 and more.
 PLAIN = 1.5
 SHORTEST = 2.0  #: Shorter logs have no quiet level. [s]
 
 
 class ShownContact(NamedTuple):
-    """A contact that a log shows."""
+    """A contact seen in a log."""
 
     joint: int  #: The joint that shows it most, from zero.
     start: float  #: When it begins. [s]
@@ -68,10 +67,10 @@ def touches(run: Run) -> tuple[ShownContact, ...]:
     """Contacts seen in a log, in order of time; unseen ones may exist.
 
     The torque that the model leaves open is low-passed and compared with its own quiet
-    level: friction that is missed spreads over a log, a contact sticks out.
+    level: missed friction spreads over a log, a contact is short.
     """
     recording, robot = run.recording, run.robot
-    # Motor friction that nobody models hides contact and looks like one.
+    # Unmodelled motor friction hides contact and looks like one.
     unknown = robot.torque_source == "current" and not robot.friction
     if unknown or recording.dq is None or recording.duration < SHORTEST:
         return ()
@@ -92,7 +91,7 @@ def touches(run: Run) -> tuple[ShownContact, ...]:
 def touched_remarks(run: Run) -> tuple[Remark, ...]:
     """A warning on contact in a supposedly free log, with its longest free span.
 
-    It may be friction as well: who says that nobody touched the arm is believed.
+    It may be friction as well: the user's word counts.
     """
     found = touches(run)
     if not found:
@@ -108,7 +107,7 @@ def touched_remarks(run: Run) -> tuple[Remark, ...]:
     begin, end = max(spans, key=lambda span: span[1] - span[0])
     values = {
         "torque_Nm": worst.torque, "quiet_Nm": worst.quiet, "spans": len(found),
-        # Inwards, so that the span holds nothing that it leaves out.
+        # Inwards, so that the span holds no contact.
         "begin_s": np.ceil(10.0 * begin) / 10.0, "end_s": np.floor(10.0 * end) / 10.0,
     }  # fmt: skip
     where = Where(joints=(worst.joint + 1,), span=(worst.start, worst.stop))
@@ -116,11 +115,11 @@ def touched_remarks(run: Run) -> tuple[Remark, ...]:
 
 
 class ReferenceLoad(NamedTuple):
-    """Torque and wrench that estimates are judged by, on the log's clock."""
+    """Reference torque and wrench on the log's clock."""
 
     torque: ExternalTorque  #: The reference torque of every joint.
-    #: The wrench it was made from, in base axes about the flange point, as force on the
-    #: robot; None where the reference is a torque to begin with.
+    #: Its wrench, in base axes about the flange point, as force on the robot; None for a
+    #: reference that is a torque.
     wrench: Wrench | None = None
 
 
@@ -137,9 +136,9 @@ def load_of(
 def make_reference(
     motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
 ) -> ReferenceLoad:
-    """The reference that is asked for, on the clock of the log that is compared.
+    """The reference asked for, on the clock of the log.
 
-    That of no contact, and the vendor's estimate in the log, are of unknown error.
+    No contact, and the vendor's estimate, have an unknown error.
     """
     name, log, robot = choice.name, motion.log.recording, motion.log.robot
     if choice.path is not None:
@@ -164,8 +163,8 @@ def file_reference(
 ) -> ReferenceLoad:
     """External torque, wrench or both from a table on the log's own clock.
 
-    A file without torques gives those of its wrench, Jᵀ w, in base axes about the flange unless
-    its columns say ``wrench[FRAME]=…``.
+    A file without torques gives those of its wrench, Jᵀ w, in base axes about the flange
+    unless its columns have ``wrench[FRAME]=…``.
     """
     table = read_reference(path, columns)
     # The recording counts from its first sample, a reference file from the log's zero.
@@ -176,14 +175,14 @@ def file_reference(
 def table_reference(
     table: RawLog, path: Path, recording: Recording, robot: Robot, mounting: Mounting
 ) -> ReferenceLoad:
-    """What a file's table gives at the log's times, its own counted from the first sample."""
+    """A file's reference at the log's times, its own from the first sample."""
     t, name = table.stamps, f"file:{path.name}"
     wrench = None
     if (values := table.signals.get("wrench")) is not None:
         values = on_the_logs_clock(t, values, recording, path)
         frame = table.wrench_frame or WrenchFrame("base", "flange")
         given = replace(recording, wrench=values, wrench_frame=frame)
-        # Zero throughout is an answer here: a truth of a log that nobody touched.
+        # Zero throughout is the truth of a log that nobody touched.
         wrench = in_base_axes(given, robot.chain, mounting)
     if (tau := table.signals.get("tau_ext")) is None:
         if wrench is None:
@@ -202,10 +201,10 @@ def table_reference(
 
 
 def since_start(t: Array, recording: Recording) -> Array:
-    """Times of a file [s] from the log's first sample, whether they count from there or not.
+    """Times of a file [s] from the log's first sample, on either clock.
 
-    They are on the log's own clock where more of the log's stamps are among them so, or
-    where they overlap it and none of its stamps is among them either way.
+    They are on the log's own clock if that matches more of the log's stamps, or if none
+    match either way and they overlap it.
     """
     zero = recording.source.t0
     stamps = np.round(recording.t, 6)
@@ -215,7 +214,7 @@ def since_start(t: Array, recording: Recording) -> Array:
 
 
 def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:
-    """Columns (M, k) at a file's times [s], interpolated to the log's, NaN beyond. (T, k)"""
+    """Columns (M, k) at times [s], interpolated to the log's, NaN beyond. (T, k)"""
     # Half a sample: two programs round one clock differently.
     slack = 0.5 * recording.median_step
     inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
@@ -256,9 +255,9 @@ def judge(
     choice: ReferenceChoice,
     known: KnownContacts | None = None,
 ) -> tuple[ExternalTorque, pl.DataFrame, SensorReading | None]:
-    """The chosen reference, and errors of estimates and of their wrenches, if any, beside it.
+    """The chosen reference, and errors of estimates and of their wrenches, if any.
 
-    Contacts are judged by what is known of them.
+    Contacts are compared by `known`.
 
     Raises:
         ReferenceTorqueError: If the reference cannot be made.
@@ -286,7 +285,7 @@ def judge(
 def reference_wrench(
     recording: Recording, robot: Robot, reference: ReferenceLoad, sensor: VirtualSensor
 ) -> Wrench:
-    """The wrench that estimates are judged by, in the virtual sensor's frame.
+    """The reference's wrench in the virtual sensor's frame.
 
     A sensor's or a file's stays; any other reference is a torque, solved by least squares.
     """

@@ -1,4 +1,4 @@
-"""Scores of external torques against truth, as sums that add up over cells and logs.
+"""Scores of external torques against truth, as sums over cells and logs.
 
 With e = τ̂ − τ, a missing τ̂ counting as 0, and weights w by the clock, all means are
 Σ w x / Σ w. Sums of cells of 2 s are kept: a block bootstrap draws whole cells.
@@ -15,8 +15,8 @@ from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.series import intervals, resample_columns, runs_of
 
 CELL = 2.0  #: Length of a cell. [s]
-DRAWS, FEWEST = 1000, 8  #: Draws of a bootstrap, and the fewest cells that it is made of.
-LONGEST_STEP = 5.0  #: Largest weight of a sample, in median steps: a gap does not vote.
+DRAWS, FEWEST = 1000, 8  #: Draws of a bootstrap, and its fewest cells.
+LONGEST_STEP = 5.0  #: Largest weight of a sample, in median steps: gaps do not count.
 GUARD = 0.5  #: Motion nearer than this to a true contact is neither free nor contact. [s]
 GAP, SHORTEST = 0.1, 0.03  #: Of true contacts. [s]
 PENALTY = 40.0  #: 2/α of the interval score of a 95 % band (Gneiting and Raftery 2007).
@@ -25,13 +25,13 @@ LAGS = 0.01 * np.arange(-10, 51)
 
 
 def weights(t: Array) -> Array:
-    """Weight of each sample by its share of time, at most `LONGEST_STEP` medians. (T,) [s]"""
+    """Each sample's share of time, at most `LONGEST_STEP` medians. (T,) [s]"""
     step = np.gradient(t)
     return np.asarray(np.clip(step, 0.0, LONGEST_STEP * np.median(step)))
 
 
 def parts_of(t: Array, scored: Mask, contacts: Sequence[Sequence[float]]) -> dict[str, Mask]:
-    """Samples of the parts by name; what is near a true contact is in `all` alone. (T,) each"""
+    """Samples by part; those near a true contact are in `all` alone. (T,) each"""
     touched = within(t, [(start, stop) for start, stop, *_ in contacts])
     near = within(t, [(start - GUARD, stop + GUARD) for start, stop, *_ in contacts])
     return {"contact": scored & touched, "free": scored & ~near, "all": scored}
@@ -40,21 +40,21 @@ def parts_of(t: Array, scored: Mask, contacts: Sequence[Sequence[float]]) -> dic
 def episodes(t: Array, size: Array, on: float, off: float) -> list[tuple[float, float, float]]:
     """True contacts of a size |f| or max |τ|: start, end [s], and peak.
 
-    One starts above `on` and ends below `off`; gaps below `GAP` are closed, what is then
-    shorter than `SHORTEST` is dropped.
+    One starts above `on` and ends below `off`; gaps below `GAP` are closed, then those shorter
+    than `SHORTEST` dropped.
     """
     inside = np.zeros(len(t), bool)
     for start, stop in runs_of(~(size < off)):
-        # The sample in which it falls below `off` is its end.
+        # Its end is the sample in which it falls below `off`.
         inside[start : stop + 1] |= np.logical_or.accumulate(size[start : stop + 1] > on)
     runs = intervals(t, inside, SHORTEST, GAP)
     return [(float(t[a]), float(t[b - 1]), float(size[a:b].max())) for a, b in runs]
 
 
 class Score(NamedTuple):
-    """Sums over the samples of each cell and joint; to pool logs is to join their cells."""
+    """Sums over each cell's samples by joint; pooled logs join their cells."""
 
-    seconds: Array  #: Σ w, the same of every joint. (C, n) [s]
+    seconds: Array  #: Σ w, equal on every joint. (C, n) [s]
     missing: Array  #: Σ w where there is no answer. (C, n) [s]
     squares: Array  #: Σ w e². (C, n) [(N·m)² s]
     sizes: Array  #: Σ w |e|. (C, n) [N·m s]
@@ -65,7 +65,7 @@ class Score(NamedTuple):
 
     @classmethod
     def of(cls, estimate: ExternalTorque, truth: Array, inside: Mask) -> Self:
-        """Sums of an estimate with bands of ±1.96 `error_sd` over some samples, one at least.
+        """Sums of an estimate with bands of ±1.96 `error_sd` over at least one sample.
 
         Args:
             estimate: The estimate on the truth's clock.
@@ -84,13 +84,13 @@ class Score(NamedTuple):
         return cls(*(np.add.reduceat(w * x, start) for x in values))
 
     def by_joint(self) -> list[dict[str, list[float]]]:
-        """Of each joint the sums of all cells, by name."""
+        """The sums of all cells by name, joint by joint."""
         joints = zip(*(sums.T.tolist() for sums in self), strict=True)
         return [dict(zip(self._fields, joint, strict=True)) for joint in joints]
 
     @classmethod
     def pooled(cls, logs: Iterable[Sequence[Mapping[str, Sequence[float]]]]) -> Self:
-        """The score of what `by_joint` gives of each log."""
+        """The score of several logs' `by_joint`."""
         sums = [
             [np.array([joint[name] for joint in log], float).T for name in cls._fields]
             for log in logs
@@ -108,7 +108,7 @@ class Score(NamedTuple):
 
     @property
     def drawn(self) -> Array:
-        """Mean RMSE over the joints in every draw of cells, NaN of too few. (1000,) [N·m]"""
+        """Mean RMSE over the joints by draw of cells, NaN of too few. (1000,) [N·m]"""
         count = len(self.seconds)
         if count < FEWEST:
             return np.full(DRAWS, np.nan)
@@ -117,9 +117,9 @@ class Score(NamedTuple):
         return np.asarray(np.sqrt(mean).mean(axis=1))
 
     def numbers(self, over: Array | float = np.nan) -> dict[str, float]:
-        """Means over the joints, with 95 % intervals of the RMSE and of it less `over`'s draws.
+        """Means over the joints, with 95 % intervals of the RMSE, and less `over`'s draws.
 
-        Skill is NaN where the truth is 0, numbers of bands are without any.
+        Skill is NaN where the truth is 0, and so are numbers of bands without any.
         """
         drawn, rmse, banded = self.drawn, self.rmse, float(self.banded.sum())
         low, high = np.quantile([drawn, drawn - over], [0.025, 0.975], axis=1).tolist()
@@ -139,7 +139,7 @@ class Score(NamedTuple):
 
 
 def skill(rmse: Array | float, level: Array | float) -> float:
-    """1 less the mean RMSE over the truth's mean rms, joint by joint; NaN where that is 0."""
+    """1 less the mean RMSE over the truth's mean rms, joint by joint; NaN at 0."""
     return 1.0 - ratio(float(np.mean(rmse)), float(np.mean(level)))
 
 
@@ -149,7 +149,7 @@ def ratio(part: float, whole: float) -> float:
 
 
 def lag_sums(estimate: ExternalTorque, truth: Array, inside: Mask) -> list[float]:
-    """Σ w e² over joints and samples with the estimate read later by each of `LAGS`. (61,)"""
+    """Σ w e² over joints and samples for each of `LAGS` of the estimate. (61,)"""
     t, w = estimate.t, weights(estimate.t)[inside, None]
     known = np.where(estimate.known, estimate.tau, 0.0)
     shifted = (resample_columns(t[inside] + lag, t, known) for lag in LAGS)

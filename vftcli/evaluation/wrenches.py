@@ -1,4 +1,4 @@
-"""Errors of wrenches and of contacts below the joints'; a log with a Jacobian of its own."""
+"""Errors of wrenches and contacts; a log with its own Jacobian."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -22,9 +22,8 @@ from vftcli.wrench.solvers import LEAST_SIGMA, decompose, wrench_of
 
 #: Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
 #:
-#: `band_share` is the share of the samples with a 95 % band that holds the reference,
-#: `missing` that without an answer where the pose can tell one, which counts as the
-#: answer 0.
+#: `band_share` is the share of samples with a 95 % band that holds the reference, `missing`
+#: that without an answer where the pose shows one: it counts as the answer 0.
 WRENCH_SCHEMA: Schema = {
     **SCHEMA,
     "axis": pl.String,
@@ -64,7 +63,7 @@ def evaluate_wrenches(
                     "missing": np.mean(~answered[known, k]),
                 }
                 if wrench.sd is not None:
-                    # An error of NaN lies in no band.
+                    # NaN lies in no band.
                     inside = abs(wrench.known[known, k] - y) <= COVERS * wrench.sd[known, k]
                     row["band_share"] = inside.mean()
             rows.append(row)
@@ -74,8 +73,8 @@ def evaluate_wrenches(
 #: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench"
 #: or "list".
 #:
-#: One to one: rows that are neither credited to a true contact nor false alarms are pieces
-#: of one, or its echo.
+#: One to one: rows neither credited to a true contact nor false alarms are pieces of one,
+#: or its echo.
 CONTACT_SCHEMA: Schema = {
     "recording": pl.String,
     "observer": pl.String,
@@ -95,7 +94,7 @@ CONTACT_SCHEMA: Schema = {
 def with_contacts(
     errors: pl.DataFrame, recording: str, reference: str, contacts: Iterable[ContactScore]
 ) -> pl.DataFrame:
-    """The errors, and below them one row an observer: how it tells contacts."""
+    """The errors, and below them one row an observer on its contacts."""
     rows = []
     for score in contacts:
         of, own = score.detection, (recording, score.name, reference, score.signal)
@@ -116,9 +115,9 @@ class JacobianJudgement(NamedTuple):
 def judge_jacobian(
     log: JacobianLog, asked: WrenchChoice | None, reference: str | None
 ) -> JacobianJudgement:
-    """Errors of the vendor's torques, of their wrench where one is asked for, by the sensor.
+    """Errors of the vendor's torques, and of their wrench if asked, by the sensor.
 
-    The wrench is in axes and about the point of the log's own Jacobian; the sensor's
+    The wrench is in the axes and about the point of the log's own Jacobian; the sensor's
     axes, their order and signs, are fitted to it.
     """
     zero = asked.zero if asked is not None else ZeroChoice()
@@ -146,7 +145,7 @@ def judge_jacobian(
         near = "logged-jacobian-near-singular"
         remarks.append(caution(near, sigma_min_m=least, limit_m=LEAST_SIGMA))
     fit = fit_axes(ours.force, log.wrench[:, :3])
-    # Offsets do not tell axes, and without a contact nothing does.
+    # Offsets do not show axes, and without a contact nothing does.
     known = fit.correlation > RESEMBLES
     turned = log.wrench.reshape(-1, 2, 3) @ (fit.matrix if known else np.eye(3))
     values = unloaded(log, turned.reshape(-1, 6), zero)
@@ -166,7 +165,7 @@ def judge_jacobian(
 
 
 def unloaded(log: JacobianLog, values: Array, zero: ZeroChoice) -> Array:
-    """A wrench less its mean over the first unloaded span, where one is given. (T, 6)"""
+    """A wrench less its mean over the first unloaded span, if given. (T, 6)"""
     if not zero.spans:
         return values
     inside = within(log.t, zero.spans[:1])
