@@ -1,1 +1,1 @@
-"""Readers: a log in any known format becomes a Recording. The content decides, never the name."""
+"""Readers: a log in any known format becomes a Recording, by content, not name."""

@@ -78,7 +78,7 @@ EFFORT_IS_CURRENT = fact("effort-is-current")
 
 
 class NamedColumns:
-    """The columns of a headed table by what their names say, or by those of a layout alone.
+    """The columns of a headed table, by their names or by a layout.
 
     Attributes:
         usual: Signal → the item that says its columns where it has any.
@@ -184,9 +184,8 @@ class NamedColumns:
     def others(self, stated: Mapping[str, Item]) -> Iterator[Item]:
         """The signals beside those that a text names.
 
-        Where it names the positions, only what it leaves out and no estimate can do
-        without: velocities, and an effort where it names none; what two groups could be
-        is left out.
+        If it names the positions, only the velocities and an effort that it leaves out,
+        and no signal that two groups could be.
         """
         if "t" not in stated and (clock := self.find("t")):
             yield clock
@@ -214,7 +213,7 @@ class NamedColumns:
 def picks_by_alias(
     table: Table, stated: Sequence[Item], layout: LogFormat, names: Names
 ) -> tuple[Picks, Names]:
-    """Find the signals of a headed table by the names of its columns, and the joints' names."""
+    """The picks of a headed table by its columns' names, and the joints' names."""
     columns = NamedColumns(table, layout)
     own = {pick.field: pick for pick in map(columns.stated, stated)}
     picks = own | {pick.field: pick for pick in columns.others(own)}
@@ -240,8 +239,7 @@ def picks_by_alias(
 def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
     """Columns that bear a signal's name beside a joint's: signal → joint → cell.
 
-    But as PlotJuggler writes them names are split only where two signals have the same
-    joints, and are no axes.
+    PlotJuggler's names are split only where two signals have the same joints, no axes.
     """
     found: dict[str, dict[str, Cell]] = {}
     sure = set[str]()
@@ -264,7 +262,7 @@ def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
 
 
 def wrench_pick(table: Table) -> Item | None:
-    """The six columns of a wrench, or its column of lists; None where one of them is missing."""
+    """The six columns of a wrench or its column of lists; None if incomplete."""
     there = enumerate(table.names)
     names = ["" if column in table.lists else name.lower() for column, name in there]
     for text in WRENCHES:
@@ -278,9 +276,9 @@ def wrench_pick(table: Table) -> Item | None:
 
 
 def clock_pick(table: Table) -> Item | None:
-    """The columns of time, None where none bears a name of it: one, or seconds and nanoseconds.
+    """The clock's column, or its seconds and nanoseconds; None if there is none.
 
-    A message's own stamp goes before the time at which a recorder took it.
+    A message's own stamp goes before a recorder's.
     """
     names = [name.lower() for name in table.names]
     found: list[tuple[int, ...]] = []  # whole seconds and nanoseconds, as ROS writes its stamps
@@ -326,9 +324,9 @@ HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}
 def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
     """Positions of the arm's joints among `names`, base to tip.
 
-    Franka and UR joints are found by name wherever they stand, prefixes and further
-    joints (a gripper's fingers) set aside; UR's words and joints called joint1, joint_2,
-    … where there are no others. Unknown names keep the file's order.
+    Franka's and UR's joints are found by name, without prefixes and further joints (a
+    gripper's fingers); UR's words and joint1, joint_2, … only alone. Unknown names keep
+    the file's order.
     """
     words = [re.sub(r"[_ ]+", " ", name.lower()).strip() for name in names]
     numbers = (NUMBERED.fullmatch(name) for name in names)
@@ -346,9 +344,9 @@ def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def along_arm(names: Names, signals: Signals) -> tuple[Names, Signals]:
-    """Joints base to tip without a gripper's fingers: their names, and signals with a column each.
+    """The arm's joint names, base to tip, and its signals with a column for each.
 
-    Of an arm of six joints the wrench has as many columns, but they are no joints.
+    The wrench of a six-joint arm has as many columns, but they are no joints.
     """
     order = list(kinematic_order(names))
     if order == list(range(len(names))):
@@ -362,7 +360,7 @@ def along_arm(names: Names, signals: Signals) -> tuple[Names, Signals]:
 
 
 def effort_of(names: Sequence[str]) -> str:
-    """The signal of a JointState's effort by its joints' names: UR's drivers publish currents."""
+    """The signal of a JointState's effort: UR's drivers publish currents."""
     of_ur = [name.endswith(UR_NAMES) for name in names].count(True)
     return "current" if of_ur == len(UR_NAMES) else "torque"
 

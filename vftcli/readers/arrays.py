@@ -1,7 +1,6 @@
-"""Named arrays: NumPy's and MATLAB's files, JSON of any shape, dictionaries of panda-py, frankapy.
+"""Named arrays: NumPy and MATLAB files, JSON, panda-py's and frankapy's logs.
 
-MATLAB's files are read by SciPy (version 5) or h5py (7.3): variables, or one level of
-structs.
+SciPy reads MATLAB's version 5, h5py its 7.3: variables, or one level of structs.
 """
 
 import warnings
@@ -41,7 +40,7 @@ SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """Read NumPy's, MATLAB's or UR's binary file, or states that libfranka printed one a line."""
+    """The log of a NumPy, MATLAB or UR binary file, or of libfranka's printed states."""
     if layout.name == "mat":
         return _read_matlab(file, request)
     if layout.name == "ur-binary":
@@ -63,10 +62,9 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
 
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
-    """The logs of JSON or a pickle: the skills of frankapy's, or the one of whichever shape.
+    """The logs of JSON or a pickle: one for each skill of frankapy, else one.
 
-    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py's
-    get_log() is one.
+    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py has one.
     """
     packed = file.head.startswith(b"\x80")
     first = file.first_line.strip()
@@ -92,7 +90,7 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
 
 
 def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes = ()) -> RawLog:
-    """Read named arrays as panda-py's log, by --columns, or by alias; or the rows of one."""
+    """The log of named arrays as panda-py's, by --columns or by alias; or of rows."""
     named = isinstance(log, dict)
     arrays = _arrays_of(file, log if named else {"rows": log})
     if not named:
@@ -165,7 +163,7 @@ BINARY_TYPES = {
 
 
 def binary_table(file: LogFile) -> ArrayTable:
-    """A binary file by UR's official client: two lines of text, then big-endian records."""
+    """The table of a UR binary file: two lines of text, then big-endian records."""
     first, second, *_ = [*bytes(file.content[: 1 << 20]).split(b"\n", 2), b"", b""]
     names, types = first.decode("ascii", errors="replace").split(), second.split()
     if len(names) != len(types) or not names:
@@ -199,9 +197,9 @@ MATLAB_NUMBERS = {
 
 
 def _read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a .mat file, a row a sample; signals of joints × samples are turned, and said.
+    """A .mat file's log, a row a sample; joints × samples are turned, with a remark.
 
-    The length of the time says which is which.
+    The length of the time decides.
     """
     variables = _matlab_73(file) if file.head.startswith(V73) else _matlab_5(file)
     if not variables:
@@ -243,7 +241,7 @@ def _matlab_73(file: LogFile) -> Columns:
 
 
 def _matlab_5(file: LogFile) -> Columns:
-    """The variables of numbers of a file of version 5, and those of its structs as struct.name."""
+    """A version 5 file's variables of numbers; those of structs as struct.name."""
     _check_matlab(file)
     from scipy.io import loadmat, whosmat
 

@@ -1,4 +1,4 @@
-"""Cleaning: what every log goes through on its way to a Recording. Nothing is repaired silently."""
+"""Cleaning: every log's way to a Recording. Nothing is repaired silently."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -41,7 +41,7 @@ def number_of(raw: RawLog, row: int) -> int:
 
 
 def without_unknown_rows(raw: RawLog) -> RawLog:
-    """Leave out rows with a value that is no number, and say so; as it is if that is every row."""
+    """The log without rows of NaN or infinity, with a remark; as it is if all are."""
     known = np.isfinite(raw.stamps)
     for value in raw.signals.values():
         known &= np.concatenate([np.isfinite(rows).all(axis=1) for rows in pieces(value)])
@@ -53,7 +53,7 @@ def without_unknown_rows(raw: RawLog) -> RawLog:
 
 
 def row_samples(raw: RawLog, rows: int) -> Indices | None:
-    """The sample that each row of a file is or repeats, −1 for none; None where each is its own."""
+    """The sample that each row of a file gives, −1 for none; None if all give one."""
     if raw.rows is None:
         return None
     sample: Indices = np.searchsorted(raw.rows, np.arange(rows), side="right") - 1
@@ -145,9 +145,9 @@ def cleaned(
 
 
 def measured(raw: RawLog, path: Path, *, examining: bool = False) -> RawLog:
-    """Samples that a robot may have given: of the segment that is asked for, without garbage.
+    """Samples of the segment asked for, without empty joints and leading garbage.
 
-    Of a file of several recordings that is only looked at it is the first, which is said.
+    A file of several recordings, if only examined, gives its first, with a remark.
     """
     if len(raw.stamps) == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
@@ -162,13 +162,13 @@ def measured(raw: RawLog, path: Path, *, examining: bool = False) -> RawLog:
 
 
 def seconds(raw: RawLog) -> Array:
-    """Time since the first sample; whole ticks are subtracted before they are scaled. (T,) [s]"""
+    """Time since the first sample; whole ticks are subtracted unscaled. (T,) [s]"""
     elapsed: Array = (raw.stamps - raw.stamps[0]).astype(np.float64)
     return elapsed if raw.tick == 1.0 else elapsed * raw.tick
 
 
 def _without_empty_joints(raw: RawLog) -> RawLog:
-    """Leave out named joints of which a signal is NaN throughout, as a gripper's effort is."""
+    """The log without named joints with a signal of NaN, as a gripper's effort."""
     names, empty = np.array(raw.joint_names), np.zeros(len(raw.joint_names), dtype=bool)
     each = raw.signals.items()
     joints = {n: v for n, v in each if n != "wrench" and v.shape[1] == names.size}
@@ -199,10 +199,9 @@ ABSURD_STAMP = 1e19  #: Nanoseconds since 1970 stay below this for some centurie
 
 
 def without_leading_garbage(raw: RawLog) -> RawLog:
-    """Drop the rows at the start that a misaligned packet left: absurd values, then a time jump.
+    """The log without a misaligned packet's first rows: absurd values, a time jump.
 
-    Without an absurd value nothing is dropped, so that a jump of the clock alone is not
-    hidden.
+    Without an absurd value all stay, so that a jump of the clock alone shows.
     """
     head = slice(0, min(GARBAGE_ROWS, len(raw.stamps)))
     absurd, tiny = np.zeros((2, head.stop), dtype=bool)
@@ -260,7 +259,7 @@ SEGMENT_ROWS = 20
 
 
 def _restarts(raw: RawLog, path: Path, *, examining: bool) -> list[int]:
-    """Rows before each restart of a clock that is only looked at; else any step back is refused."""
+    """Rows before each restart of the clock; a ClockError unless only examined."""
     restarts = np.flatnonzero(np.diff(raw.stamps) < 0) + 1
     if not restarts.size:
         return []
@@ -307,7 +306,7 @@ def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
 
 
 def _segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
-    """One of several recordings in a file, counted from 1; the clock's restarts part them."""
+    """One recording of several in a file, from 1; the clock's restarts part them."""
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(raw.stamps) < 0)), len(raw.stamps)]
     if not 1 <= number < len(edges):
         raise ClockError(
@@ -348,8 +347,7 @@ BAD_SHARE = 0.05
 def _refuse_degrees(raw: RawLog, path: Path) -> None:
     """Raise a LogError if positions of unstated unit can hardly be radians.
 
-    No joint goes further than two turns from its zero; those of arms with seven stay within
-    one.
+    No joint goes further than two turns from zero, none of seven-joint arms beyond one.
     """
     q = raw.signals["q"]
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS

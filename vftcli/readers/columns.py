@@ -1,6 +1,6 @@
-"""Which column of a table holds which signal, in which unit and sign: the --columns grammar.
+"""The --columns grammar: the signal, unit and sign of each column of a table.
 
-And what the values of a table without a header settle of it, as a text of that grammar.
+And a guess, as a text of that grammar, from the values of a table without a header.
 """
 
 import re
@@ -100,7 +100,7 @@ class ColumnSpec(NamedTuple):
 
 
 def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
-    """Parse a --columns text, of a log unless it is of a reference, which has no positions."""
+    """A parsed --columns text, of a log or of a reference, which has no positions."""
     parts = [part.strip() for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
     if not parts:
         raise LogError(
@@ -165,7 +165,7 @@ def _parse_item(part: str) -> Item:
 
 
 def _unit_factor(signal: str, unit: str | None) -> float:
-    """Factor from a unit in brackets to SI; the bracket of a wrench names its frame instead."""
+    """Factor from a unit in brackets to SI; 1 for a wrench, where they hold a frame."""
     if unit is None or signal in {"wrench", "_"}:
         return 1.0
     units = UNITS[signal.removeprefix("target_")]
@@ -175,10 +175,9 @@ def _unit_factor(signal: str, unit: str | None) -> float:
 
 
 def tick_of(stamps: Array, name: str) -> tuple[float, str]:
-    """Length of a tick of unstated unit: from the name, else from the size of stamps and steps.
+    """Length and unit of a tick: by name, else by the size of stamps and steps.
 
-    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their
-    size; everything else is seconds.
+    Whole numbers one apart are ms of a 1 kHz log, epoch stamps show by size, others are s.
     """
     units = UNITS["t"]
     if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
@@ -204,9 +203,8 @@ STEPS = (1, 4, 16, 64)
 OPEN = 0.35
 STILL = 0.02  #: Travel below which a joint need not show which velocity is its own. [rad]
 EVEN = 20.0  #: How much longer than the median a twentieth of a clock's steps are at most.
-#: Misfit of a current to a torque divided by its drive constant, friction left free.
-#:
-#: Of a UR10e's target current .02 to .09, of its measured current .06 to .6.
+#: Misfit of a current to a torque divided by its drive constant, friction left free: of a
+#: UR10e's target current .02 to .09, of its measured current .06 to .6.
 DRIVEN = 0.12
 CLEAR = 1.3  #: How much better than another current it must fit.
 CONSTANTS = (3.0, 400.0)  #: Drive constants of geared joints. [N·m/A]
@@ -224,11 +222,11 @@ class Guess(NamedTuple):
 
 
 def guess_columns(columns: Sequence[Array]) -> Guess | None:
-    """What the columns (T,) of a table without a header are by their values, in file order.
+    """The columns (T,) of a table without a header, by their values; or None.
 
-    A clock steps evenly, velocities are the derivative of positions, and a controller's
-    target torque is its target current times a constant, but for friction. None where no
-    clock, or no positions with their velocities behind them, are found.
+    A clock steps evenly, velocities are the derivative of positions, and target torque is
+    target current times a constant, but for friction. None without a clock, or positions
+    followed by their velocities.
     """
     table = np.stack([np.asarray(column[:ROWS], dtype=np.float64) for column in columns], axis=1)
     clock = np.asarray(columns[0][:ROWS])
@@ -271,7 +269,7 @@ def _blocks(table: Array, joints: int) -> list[Array]:
 
 
 def _begins_with_motion(t: Array, blocks: Sequence[Array]) -> bool:
-    """Whether the second block is the derivative of the first, and none is that of another."""
+    """Whether the second block is the derivative of the first, and no others are."""
     pairs = permutations(range(len(blocks)), 2)
     return _is_derivative(t, *blocks[:2]) and not any(
         _is_derivative(t, blocks[a], blocks[b]) for a, b in pairs if (a, b) != (0, 1)
@@ -281,7 +279,7 @@ def _begins_with_motion(t: Array, blocks: Sequence[Array]) -> bool:
 def _is_derivative(t: Array, x: Array, dx: Array) -> bool:
     """Whether all that moves in x is the integral of its own column of dx.
 
-    What the integral leaves of the change over some rows is compared.
+    Compared is what the integral leaves of the change over some rows.
     """
     areas = (dx[1:] + dx[:-1]) / 2 * np.diff(t)[:, None]
     left = x - np.vstack([np.zeros(x.shape[1]), np.cumsum(areas, axis=0)])
@@ -293,7 +291,7 @@ def _is_derivative(t: Array, x: Array, dx: Array) -> bool:
 
 
 def _efforts(parts: Sequence[Array], dq: Array) -> tuple[tuple[str, ...] | None, str]:
-    """The names of the blocks behind the velocities, None where they are open, and why."""
+    """Names of the blocks behind the velocities, None if unclear; and the reason."""
     if len(parts) != 3:
         return (None if parts else ()), ""
     current, target, torque = parts
@@ -305,7 +303,7 @@ def _efforts(parts: Sequence[Array], dq: Array) -> tuple[tuple[str, ...] | None,
 
 
 def _driven(torque: Array, current: Array, dq: Array) -> tuple[float, list[float]]:
-    """What a current's fit to a torque leaves, no end where none fits; and the drive constants."""
+    """Misfit of a current to a torque, infinite without one; and drive constants."""
     constants, left = list[float](), list[float]()
     sizes = root_mean_squares(current)
     for x, y, speed, size in zip(torque.T, current.T, dq.T, sizes, strict=True):

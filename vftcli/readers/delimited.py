@@ -1,4 +1,4 @@
-"""Text tables: comma, semicolon, tab or space separated, with every line end met in the wild."""
+"""Text tables: comma, semicolon, tab or space separated, with any line end."""
 
 import ast
 import csv
@@ -42,7 +42,7 @@ def split_cells(line: str, separator: str) -> list[str]:
 
 
 class TextTable(Table):
-    """A delimited text table; only the columns asked for are parsed, always as float64."""
+    """A delimited text table; only the columns asked for are parsed, as float64."""
 
     def __init__(self, file: LogFile) -> None:
         self.file, self.path = file, file.path
@@ -93,7 +93,7 @@ class TextTable(Table):
         return is_number(cell.replace(",", ".") if self.decimal_comma else cell)
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
-        """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
+        """Parsed columns; a clock of long whole numbers or dates comes as integers."""
         kinds = dict.fromkeys(columns, "Float64")
         if clock is not None:
             row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]
@@ -258,10 +258,9 @@ STAMP = ("sec", "nanosec", "frame_id")
 
 
 class EchoTable(TextTable):
-    """A table by ``ros2 topic echo --csv``: a message's fields in their order, without a header.
+    """A table by ``ros2 topic echo --csv``: a message's fields in order, no header.
 
-    Names, positions, velocities and efforts, as many of each or none, follow the header's
-    stamp and frame.
+    Stamp and frame, then names, positions, velocities, efforts, as many of each or none.
     """
 
     def __init__(self, file: LogFile) -> None:

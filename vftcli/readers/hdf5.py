@@ -1,7 +1,6 @@
-"""HDF5 logs, read within bounds by h5py: ALOHA's and DROID's layouts, and any other by its paths.
+"""HDF5 logs, read within bounds by h5py: ALOHA's, DROID's, or any by its paths.
 
-DROID's raw release is a folder of episodes, each a trajectory.h5 with its metadata beside
-it.
+DROID's raw release is a folder of episodes, each a trajectory.h5 beside its metadata.
 """
 
 import itertools
@@ -86,7 +85,7 @@ def opened(file: LogFile) -> Iterator[Any]:
 
 
 class Hdf5Table(ArrayTable):
-    """The datasets of numbers in an open HDF5 file, or in one group of it, each a column.
+    """The datasets of numbers in an open HDF5 file or a group of it, as columns.
 
     Images, texts, references, links to other files and what claims more than it stores
     are left out; nothing is read before it is asked for.
@@ -104,7 +103,7 @@ class Hdf5Table(ArrayTable):
         return super().blocks(columns, clock)
 
     def check_size(self, columns: Places) -> None:
-        """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
+        """Check that datasets may be read: a file of a kilobyte may claim any size."""
         each = [list(self.columns.items())[c] for c in columns]
         stored = sum(dataset.id.get_storage_size() for _, dataset in each)
         what = f"{self.path}: {listed([name for name, _ in each])}"
@@ -114,7 +113,7 @@ class Hdf5Table(ArrayTable):
 
 
 def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
-    """The datasets of numbers of an open file that have some rows, each under one of its paths."""
+    """The datasets of numbers with some rows in an open file, each under one path."""
     import h5py
 
     found, looked_at = {}, itertools.count(1)
@@ -157,7 +156,7 @@ MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
 
 
 def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
-    """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
+    """ALOHA: two arms of six joints and a gripper each, no clock, efforts in mA."""
     names = table.names
     if request.spec.item("q") or table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
         return read_any(table, request)
@@ -177,7 +176,7 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
 
 
 def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
-    """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
+    """DROID: the robot state's clock; motor_torques_measured is libfranka's tau_J."""
     if request.spec.item("q"):
         return from_table(table, request)
     remarks = (fact("computed-torque-left-out"),) if DROID_COMPUTED in table.names else ()
@@ -206,7 +205,7 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
 
 
 def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
-    """The beginning that the names of one group share, the one with positions; "" for the top."""
+    """The prefix of the group with the positions, "" for the top level."""
     levels: dict[str, str] = {}
     for name in names:
         prefix, found, last = name.rpartition(separator)
@@ -253,7 +252,7 @@ def recognises(file: LogFile, _: LogFormat) -> bool:
 
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
-    """The logs of an HDF5 file, or of DROID's folder by name, with their places if several."""
+    """The logs of an HDF5 file or of DROID's folder, with their places if several."""
     if file.is_folder:
         # By the names of their folders, which is the order in which they are walked.
         paths = sorted(file.path.rglob(TRAJECTORY), key=lambda path: path.parent.parts)
@@ -290,7 +289,7 @@ def _placed(
 
 
 def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
-    """The group, as "observations/", in which each episode of an HDF5 file has its positions."""
+    """Episode → group of its positions in an HDF5 file, as "observations/"."""
     stated = parse_columns(columns).item("q") if columns is not None else None
     with opened(file) as content:
         table = table_of(file.path, content)

@@ -1,4 +1,4 @@
-"""LeRobot datasets, versions 2 and 3: a folder of Parquet files with meta/info.json."""
+"""LeRobot datasets, versions 2 and 3: a folder with Parquet and meta/info.json."""
 
 import json
 import re
@@ -86,7 +86,7 @@ def read_episode(
 def _columns_of(
     path: Path, table: ParquetTable, described: Mapping[str, Json], request: ReadChoice
 ) -> tuple[str, Names, Notes, str]:
-    """The columns of an observation, the joints' names, what is to be said, and the arm of two."""
+    """The --columns text of an observation, the joints' names, remarks and the arm."""
     if request.spec.item("q"):
         return "t=timestamp,q=observation.state", (), (), ""
     features = {n: each.get("names") for n, each in described.items() if isinstance(each, dict)}
@@ -122,7 +122,7 @@ def _columns_of(
 
 
 def _in_order(path: Path, signal: str, elements: list[Element], names: Names) -> list[Element]:
-    """A signal's elements in the order of the joints, as they stand where they have no names."""
+    """A signal's elements in the order of the joints; as given without names."""
     by_joint = {element.joint: element for element in elements}
     if not names or "" in by_joint:
         return elements
@@ -155,7 +155,7 @@ def _elements_of(name: str, table: ParquetTable, labels: Json) -> Iterable[Eleme
 
 
 def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:
-    """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
+    """The log on its frame numbers and rate, if its stamps are these in 32 bits."""
     good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
     if not good or FRAME not in table.names or raw.clock != "column timestamp":
         return raw

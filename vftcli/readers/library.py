@@ -1,4 +1,4 @@
-"""Library: which logs a command is given, each read once and each under a label of its own."""
+"""Library: the logs of a command, each read once and under its own label."""
 
 import json
 import os
@@ -78,9 +78,8 @@ class Library:
 def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
     """Give every path, from the root, a label that no other of them has.
 
-    A label is the file's name where that is unique, else as many folders before it as
-    tell it from every other path: `a/log.csv` and `b/log.csv`. Spellings of one path have
-    one label.
+    It is the file's name, after as many folders as tell it from every other path:
+    `a/log.csv` and `b/log.csv`. Spellings of one path have one label.
     """
     # Spellings of one path count once, or no tail of it would be unique.
     parts = {path: path.parts for path in map(absolute, paths)}
@@ -93,7 +92,7 @@ def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
 
 
 def absolute(path: str | Path) -> Path:
-    """A path from the root, without `.` and `..`; links are not followed, they have names too."""
+    """A path from the root, without `.` and `..`; links are kept."""
     return Path(os.path.abspath(path))  # noqa: PTH100 - Path.absolute leaves `..` in the path
 
 
@@ -153,15 +152,14 @@ class LogCollection:
             yield LogEntry(path, number, files)
 
     def _inside(self, folder: Path) -> Iterator[LogEntry]:
-        """A folder that is a log, or the logs in it and below, in the order of their names."""
+        """The folder if it is a log, else the logs in it and below, by name."""
         place = folder.resolve()
         if folder == self._leave or place in self._searched or (folder / BATCH).is_file():
             return
         self._searched.add(place)
         try:
             reader = reading.recognise(folder, self._choice)
-            # Recorders write metadata.yaml beside the pieces of one recording: without it
-            # what reads as a bag is a folder of several.
+            # Without metadata.yaml a bag is a folder of several recordings, not pieces of one.
             several_bags = reader.name == "rosbag2" and not (folder / METADATA).is_file()
             if reader.name != "droid" and not several_bags:
                 yield from self._episodes(folder, reader)
@@ -183,7 +181,7 @@ class LogCollection:
                 yield from self._parts(path)
 
     def _may_be_log(self, path: Path) -> bool:
-        """Whether a file of a folder may be a log; a damaged one may, so that its error is seen."""
+        """Whether a folder's file may be a log, damaged ones too: their error is shown."""
         if path.name.endswith((TRUTH, RECORD)):
             return False
         try:
@@ -216,7 +214,7 @@ def matching(place: Path) -> list[Path]:
 
 
 def files_written(folder: Path) -> set[str]:
-    """Names of the files in a folder that a command of ours wrote there, by its record."""
+    """Names of the files that vftcli wrote into a folder, by its record."""
     try:
         record = json.loads((folder / RECORD).read_text("utf-8"))
         return {RECORD, *map(str, record["files"])} if "vftcli" in record["versions"] else set()

@@ -136,7 +136,7 @@ class Refused(pickle.UnpicklingError):
 
 
 class Stub:
-    """What a pickle makes of a name by NumPy's, kept as it was asked for and never executed."""
+    """A NumPy name in a pickle, kept as it was asked for and never executed."""
 
     def __init__(self, name: str, *arguments: Data) -> None:
         self.name, self.arguments = name, arguments
@@ -171,8 +171,7 @@ def dtype_of(kind: Data) -> np.dtype[Any] | None:
 class ArrayUnpickler(pickle.Unpickler):
     """An unpickler that rebuilds arrays and refuses everything else.
 
-    What it builds is bounded by the size of the pickle: a part may be named again and
-    again in two bytes each.
+    The pickle's size bounds what it builds: two bytes name a part again.
     """
 
     def __init__(self, content: bytes) -> None:
@@ -205,8 +204,7 @@ class ArrayUnpickler(pickle.Unpickler):
     def settled(self, value: Data, depth: int = 0) -> Built:
         """A value with arrays for pickled arrays, and how many numbers it has in full.
 
-        A part that is named again is not walked again: a few lists that hold one another
-        a few times over are more than any memory takes.
+        A repeated part is not walked again: a few nested lists can outgrow any memory.
         """
         if not isinstance(value, Stub | list | tuple | dict):
             return value, 1

@@ -1,4 +1,4 @@
-"""Opening files: gzip and zstd unpacked within bounds, whole files as memory, digests beside."""
+"""Opening files: gzip and zstd unpacked within bounds, memory maps, digests."""
 
 import hashlib
 import math
@@ -23,8 +23,7 @@ Wrapping = Literal["gzip", "zstd"]
 MAGICS: dict[bytes, Wrapping] = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 
 UNPACKED_LIMIT = 128 * 1024 * 1024
-#: Most that a file unpacks to, beside 128 MiB: numbers shrink 3 to
-#: 15 times; what shrinks a hundredfold is no log.
+#: Most that a file unpacks to, beside 128 MiB: numbers shrink 3 to 15 times, never 100.
 UNPACKED_RATIO = 50
 
 CHUNK = 1024 * 1024
@@ -38,7 +37,7 @@ def unpacked_limit(size: int) -> int:
 
 
 def check_unpacked(what: object, claimed: int, size: int) -> None:
-    """Raise a LogError if a file of a size claims to unpack to more than a log of it can."""
+    """Raise a LogError if a file claims to unpack to more than a log of its size."""
     if not 0 <= claimed <= unpacked_limit(size):
         raise LogError(
             f"{what}: unpacks to more than {unpacked_limit(size) >> 20} MiB, more than a log of "
@@ -57,7 +56,7 @@ DAMAGE = (
 def naming_damage(
     path: Path, what: str, *own: type[Exception], remedy: str = ""
 ) -> Iterator[None]:
-    """Turn errors of a library, some of its own kinds too, into one that names the file."""
+    """Turn a library's errors, and those of `own` kinds, into one naming the file."""
     errors: tuple[type[Exception], ...] = (*DAMAGE, *own)
     try:
         yield
@@ -101,7 +100,7 @@ class LogFile:
         return self._unwrapped[0]
 
     def release(self) -> None:
-        """Let go of the pages of a mapped file that were touched so far; they can be read again."""
+        """Release the touched pages of a mapped file; they can be read again."""
         release(self.content)
 
     @property
@@ -167,10 +166,9 @@ def open_log(path: Path) -> LogFile:
 
 
 def unpacked(path: Path, wrapping: Wrapping, enough: float = math.inf) -> tuple[bytes, bool]:
-    """What a file unpacks to, or the first bytes of it, and whether its packed data is whole.
+    """The unpacked file or its first bytes, and whether its packed data is whole.
 
-    Members of gzip, or frames of zstd, come one after another; of a cut file comes what
-    there is, a bomb is refused.
+    gzip's members and zstd's frames are joined; a cut file gives its part, a bomb is refused.
     """
     new: Callable[[], Any]
     damage: type[Exception]

@@ -1,7 +1,6 @@
 """Columns of Arrow's kind, flat or of lists as LeRobot writes them, by pyarrow.
 
-Parquet files, Feather files (version 2) and streams of record batches. On a damaged page
-of some, polars would end the whole process.
+Parquet, Feather 2 and streams of record batches; polars ends the process on some damage.
 """
 
 import json
@@ -42,7 +41,7 @@ MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 
 
 @contextmanager
 def guarded(path: Path) -> Iterator[None]:
-    """Turn the errors of pyarrow, beside Python's own, into a LogError that names the file."""
+    """Turn errors of pyarrow, and Python's own, into a LogError naming the file."""
     arrow = needed("pyarrow", f"{path}: a Parquet or Arrow file", error=LogError).ArrowException
     with naming_damage(path, "a damaged Parquet or Arrow file", arrow):
         yield
@@ -94,10 +93,9 @@ class ColumnarTable(Table):
             return found
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
-        """Decode some columns, where they may be unpacked: a few bytes may claim a billion rows.
+        """Decoded columns, their size checked: a few bytes may claim a billion rows.
 
-        The rows are asked for, not the pages: on a damaged page's description pyarrow
-        ends the whole process.
+        Rows are asked for, not pages: pyarrow ends the process on a damaged page header.
         """
         # Decoders hand over two columns of one name under that name.
         if any(self.names.count(self.names[c]) > 1 for c in columns):
@@ -144,7 +142,7 @@ class ColumnarTable(Table):
         return numbers if length is None else numbers.reshape(-1, length)
 
     def episodes(self) -> Column:
-        """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
+        """The episode of each row as LeRobot numbers them; empty elsewhere. (T,)"""
         if EPISODE not in self.names:
             return np.empty(0)
         column = self.names.index(EPISODE)
@@ -177,7 +175,7 @@ class ParquetTable(ColumnarTable):
 
 
 class ArrowTable(ColumnarTable):
-    """An Arrow file or stream; a file is a stream behind its magic, its index is not needed."""
+    """An Arrow file or stream: a file is a stream behind its magic."""
 
     def _opened(self, file: LogFile) -> tuple[Any, int]:
         import pyarrow as pa

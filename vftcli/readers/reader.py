@@ -1,4 +1,4 @@
-"""What is asked of a reader, and what it gives: a choice, a raw log, one of several episodes."""
+"""A reader's request and result: a choice, a raw log, one of several episodes."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -154,7 +154,7 @@ class ReadChoice(Choice):
 
     @property
     def whole(self) -> "ReadChoice":
-        """The same without its interval and episode: a free run is a log of its own, read whole."""
+        """This choice for a whole file: a free run is a log of its own."""
         return replace(self, interval=None, episode=None)
 
     def with_stated_effort(self, recording: "Recording") -> "Recording":
@@ -194,9 +194,9 @@ Episodes = Mapping[int, Callable[[ReadChoice], RawLog]]
 def episode_of(
     path: Path | str, request: ReadChoice, numbers: Sequence[int]
 ) -> "tuple[int, str, tuple[Remark, ...]]":
-    """The number of the episode that is read, its name as a part, and what is to be said of it.
+    """The number of the episode to read, its name as a part, and remarks.
 
-    It is the one asked for, else the first; the only one has the name "".
+    It is the one asked for, else the first; an only one has the name "".
     """
     from vftcli.signals.remarks import caution
 
@@ -216,7 +216,7 @@ def episode_of(
 def arm_of(
     path: Path | str, request: ReadChoice, arms: Sequence[str], places: str = "by name"
 ) -> "tuple[str, tuple[Remark, ...]]":
-    """The arm that is read of a log of two: the one asked for; to look at, the first, and said."""
+    """The arm to read of two: the one asked for, or the first if only examining."""
     from vftcli.signals.remarks import caution
 
     if request.arm is not None and request.arm not in arms:

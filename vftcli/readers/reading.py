@@ -1,4 +1,4 @@
-"""Reading: a file, bag or dataset becomes a Recording. The content decides, never the name."""
+"""Reading: a file, bag or dataset becomes a Recording, by content, not by name."""
 
 import re
 import shlex
@@ -164,9 +164,9 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
 
 
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
-    """Read a log as `read` does; of a file that holds several recordings or arms, the first.
+    """A log as `read` gives it, or a file's first of several recordings or arms.
 
-    For examining a log, where looking at a part and saying so tells more than refusing.
+    For examining a log: a part of it, and saying so, is better than an error.
     """
     return read_chosen(path, replace(choice or ReadChoice(), examining=True))
 
@@ -211,7 +211,7 @@ def _recognised(file: LogFile) -> LogFormat:
 
 
 def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Recording:
-    """Make a Recording of arrays: repeated stamps are dropped and counted, gaps are reported.
+    """A Recording of arrays; repeated stamps go and are counted, gaps are reported.
 
     Args:
         t: Stamps, not decreasing. (T,) [s]

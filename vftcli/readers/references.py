@@ -1,4 +1,4 @@
-"""What lies beside logs: reference torques, others' estimates and lists, torques by a Jacobian.
+"""Files beside logs: reference torques, others' estimates, torques by a Jacobian.
 
 They are tables with a clock and one external torque a joint, but no positions.
 """
@@ -159,7 +159,7 @@ def read_list(path: Path) -> list[ListedRow]:
 
 
 def read_parts(files: Mapping[str, Path]) -> dict[str, Array]:
-    """Columns t, q1… of a log in a text file a signal, t first, its numbers row after row."""
+    """Columns t, q1… of text files, one a signal, t first, numbers row after row."""
     columns: dict[str, Array] = {}
     samples = 0
     for signal, path in files.items():
@@ -235,7 +235,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
 
 
 def velocity_first(jacobian: Array, path: Path) -> Array:
-    """The Jacobian with its rows of velocity first: the axes of revolute joints have length 1."""
+    """The Jacobian with its velocity rows first: revolute axes have length 1."""
     for J in (jacobian, np.roll(jacobian, 3, axis=1)):
         if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT):
             return J
@@ -249,7 +249,7 @@ PREFIX = "tau_ext/"
 
 
 def estimates_columns(path: Path, observer: str) -> str | None:
-    """The --columns text of one observer's torque as tau_ext; None of a file that is not ours."""
+    """The --columns text of an observer's torque as tau_ext; None if not our file."""
     if not (held := stored_observers(path)):
         return None
     if observer not in held:

@@ -1,4 +1,4 @@
-"""Tables: columns of numbers under names or in file order, whatever file they come from."""
+"""Tables: columns of numbers under names or in file order, from any file."""
 
 import math
 import re
@@ -48,7 +48,7 @@ class Table(ABC):
 
     @abstractmethod
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
-        """Columns as float64, some thousand rows at a time; the clock's may stay whole numbers."""
+        """Columns as float64, some thousand rows at a time; a clock may stay integers."""
 
     def load(self, columns: Places, clock: int | None = None) -> Block:
         """All rows of some columns."""
@@ -66,7 +66,7 @@ BESIDE = {"t", OWN_STAMPS, PAYLOAD}  #: Columns that are kept as they are stored
 
 
 class JacobianError(LogError):
-    """Torques beside a Jacobian where positions were looked for: `vftcli.readers.references`."""
+    """Torques beside a Jacobian instead of positions: `vftcli.readers.references`."""
 
     def __init__(self, message: str, table: Table, picks: Picks) -> None:
         super().__init__(message)
@@ -122,7 +122,7 @@ def pick_of(item: Item, cells: Cells) -> Item:
 
 
 def named_cells(table: Table, item: Item) -> Cells:
-    """The cells that a pattern names, in the order of its indices; none of a stated rate."""
+    """The cells of a pattern, in the order of its indices; none of a stated rate."""
     if (pattern := item.pattern) is None:
         return ()
     if "{i}" not in pattern:
@@ -146,7 +146,7 @@ def named_cells(table: Table, item: Item) -> Cells:
 
 
 def _exact(table: Table, item: Item, name: str) -> Cells:
-    """The cells of one column by its name, or of some elements of its lists: name[0:7], -name."""
+    """The cells of a column, or of some elements of its lists: name[0:7], -name."""
     names = table.names
     if name not in names and name.startswith("-"):
         return tuple(cell._replace(turned=True) for cell in _exact(table, item, name[1:]))
@@ -218,13 +218,12 @@ def require_positions(table: Table, picks: Picks) -> None:
         )
 
 
-#: Bytes of a signal that wait in memory. A longer one lies in a nameless file in the
-#: system's folder for temporary files, and is an array all the same.
+#: Bytes of a signal that wait in memory; a longer one is an array in a nameless temporary file.
 HELD = 1 << 23
 
 
 class JoinedRows:
-    """The rows of a signal, part by part; beyond `HELD` bytes they wait in a file if it has room.
+    """The rows of a signal, part by part; beyond `HELD` bytes in a file if possible.
 
     Attributes:
         count: How many there are so far.
@@ -275,7 +274,7 @@ class JoinedRows:
 
 
 def joined(parts: Iterable[Signals]) -> Signals:
-    """Signals that come part by part, each as one array; all parts have the same signals."""
+    """Signals joined of parts, each as one array; all parts have the same signals."""
     found: dict[str, JoinedRows] = {}
     for part in parts:
         for name, rows in part.items():

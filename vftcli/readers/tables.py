@@ -1,4 +1,4 @@
-"""Generic tables: headed by aliases, described by --columns, or by the layout of a format."""
+"""Generic tables: by aliases, by --columns, or by the layout of a format."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -59,10 +59,9 @@ def from_table(
     names: Names = (),
     remarks: Notes = (),
 ) -> RawLog:
-    """Read a table by its --columns text, else by the columns of its layout or by aliases.
+    """The log of a table by --columns, else by the columns of its layout or aliases.
 
-    A text that names signals says something of these; what it leaves out is found by name.
-    `names` are the joints' where they are known.
+    Signals that --columns leaves out are found by name. `names` are the joints', if known.
     """
     spec = request.spec
     if any("|" in (item.pattern or "") for item in spec.items):
@@ -95,7 +94,7 @@ def from_table(
 
 
 def _by_values(table: Table) -> tuple[Table, str]:
-    """A table without a header, loaded, and what its columns are by their values, which is said."""
+    """A table without a header, loaded, and its columns by value, with a remark."""
     if table.width == 1:
         raise LogError(
             f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
@@ -159,7 +158,7 @@ class ArrayTable(Table):
 
 
 def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
-    """Frame of actual_TCP_force: base axes, about the TCP on CB3; on e-Series by its sensor.
+    """Frame of actual_TCP_force: base axes, about the TCP (CB3) or by the sensor.
 
     The sensor in an e-Series' flange gives the moment about the flange (three logs), a URCap's
     about the TCP; no field says which. Without `ft_raw_wrench`, and with stamps (T,) [s] of
@@ -172,7 +171,7 @@ def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
 
 
 def recognises(file: LogFile, layout: LogFormat) -> bool:
-    """Whether a text is of a format: a printed JointState, a table with a header or without."""
+    """Whether a text is of a format: printed JointState, table with header or not."""
     if not file.lines:
         return False
     if layout.name == "ros2-echo":

@@ -1,1 +1,1 @@
-"""Bags: ROS 1, ROS 2 and MCAP containers, bulk decoding, and several topics on one clock."""
+"""Bags: ROS 1, ROS 2 and MCAP containers, decoded in bulk, topics on one clock."""

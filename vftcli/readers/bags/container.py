@@ -1,4 +1,4 @@
-"""Containers of messages: their files on disk, and the channels and batches that each yields."""
+"""Containers of messages: their files on disk, their channels and batches."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -45,7 +45,7 @@ MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
 def batched(messages: Messages, budget: "ReadBudget") -> Iterator[Batch]:
-    """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
+    """Batches of some megabytes, one a channel, in the order of first messages."""
     found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0
     for channel, time, content in messages:
@@ -84,8 +84,7 @@ class MessageCount:
             budget.note(warning("bag-cut", kept=kept))
 
 
-#: Records that may be read of a container: no recorded message takes less than some
-#: bytes, and recorded numbers shrink by 3 to 15.
+#: Most records of a container: a message takes some bytes, numbers shrink 3 to 15 times.
 SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
 
 
@@ -133,8 +132,7 @@ STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
 def storage_files(file: LogFile) -> list[str]:
     """The storage files of a bag folder, in the order in which they were recorded.
 
-    Names in metadata.yaml are not followed: only files that lie in the folder itself are
-    read.
+    Only files in the folder itself are read; names in metadata.yaml are not followed.
     """
     names = {n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()}
     plain = {n for n in names if n.removesuffix(".zstd").removesuffix(".zst") not in names - {n}}
@@ -147,7 +145,7 @@ def printable(name: str) -> str:
 
 
 def type_name(name: str) -> str:
-    """A ROS message type without its middle part: sensor_msgs/msg/JointState → …/JointState."""
+    """A ROS type without its middle part: sensor_msgs/msg/JointState → …/JointState."""
     parts = printable(name).replace("::", "/").split("/")
     return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
 

@@ -1,4 +1,4 @@
-"""Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
+"""Bulk decoding: messages of one layout become arrays at once, others singly."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +16,7 @@ from vftcli.signals.arrays import Array
 
 
 def _paths_by_name(text: str) -> dict[str, Names]:
-    """Name → paths, of words as "q=position|q": two paths are two releases' names of one field."""
+    """Name → paths, of words as "q=position|q": a path for each release's name."""
     words = (word.split("=") for word in text.split())
     return {name: tuple(paths.split("|")) for name, paths in words}
 
@@ -71,7 +71,7 @@ TIMES = ("receive", "header", "robot")  #: What a stream has beside its signals.
 
 
 class Stream:
-    """Messages of one topic about the same joints, gathered part by part and then whole.
+    """Messages of one topic about the same joints, part by part and then whole.
 
     Attributes:
         channel: The topic.
@@ -89,7 +89,7 @@ class Stream:
 
     @cached_property
     def columns(self) -> Columns:
-        """Times and signals that every message has, of one width, in the order of recording."""
+        """Times and signals of all messages, of one width, in order of recording."""
         count = self.series["place"].count
         found = {
             name: rows.whole()
@@ -161,7 +161,7 @@ class Decoder:
         self.others: dict[str, str] = {}
 
     def take(self, batch: Batch, places: Integers) -> None:
-        """Decode messages with these places (k, 2), or remember that we hold none of their type."""
+        """Decode messages with these places (k, 2); note topics without a decoder."""
         channel = batch.channel
         if channel.type not in KINDS or channel.encoding not in {"ros1", "cdr"}:
             self.others[channel.topic] = channel.type or channel.encoding

@@ -1,4 +1,4 @@
-"""MCAP channels without ROS: JSON documents, and Foxglove's JointStates in protobuf."""
+"""MCAP channels without ROS: JSON, and Foxglove's JointStates in protobuf."""
 
 import json
 import re
@@ -36,8 +36,7 @@ Document = dict[str, Any]  #: A message, flattened: dotted path → value.
 class Documents:
     """Documents of all channels, flattened as they come in.
 
-    Those that are JointState or WrenchStamped messages go to the decoder, unless --columns
-    speaks of other fields.
+    JointState and WrenchStamped go to the decoder, unless --columns names other fields.
     """
 
     def __init__(self, path: Path, request: ReadChoice, decoder: Decoder) -> None:
@@ -77,7 +76,7 @@ class Documents:
         return True
 
     def read(self, topics: set[str]) -> RawLog:
-        """Read the channel with documents that hold joint positions; topics are all there are."""
+        """The log of the channel with joint positions; `topics` are all in the file."""
         failures: dict[int, LogError] = {}
         for channel, (rows, times) in self.found.items():
             try:
@@ -121,9 +120,9 @@ Shape = tuple[str, Names, str, bool]
 
 
 def shape_of(row: Document) -> Shape | None:
-    """What a document holds of a JointState or WrenchStamped message; None of any other.
+    """The shape of a JointState or WrenchStamped document; None of any other.
 
-    None, too, where its stamp is no whole seconds and nanoseconds.
+    None, too, if its stamp is not whole seconds and nanoseconds.
     """
     stamp, names, positions = stamp_of(row), names_of(row), row.get("position")
     if stamp is not None:
@@ -147,7 +146,7 @@ def names_of(row: Document) -> Names:
 
 
 def column_of(rows: Sequence[Document], path: str) -> Array:
-    """The numbers at a path of all documents, none where they are of several widths. (k, n)"""
+    """The numbers at a path of all documents, empty if their widths differ. (k, n)"""
     none, first = np.empty((len(rows), 0)), rows[0].get(path, "")
     if isinstance(first, str | bool) or first == []:
         return none
@@ -195,7 +194,7 @@ JOINT_FIELDS = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
 
 
 def joint_states(message: bytes) -> Document:
-    """A foxglove.JointStates message: timestamp = 1, joints = 2 {name 1, position 2, …}."""
+    """A foxglove.JointStates message: timestamp 1, joints 2 {name 1, position 2, …}."""
     document: Document = {"joints": []}
     for number, value in fields(message):
         if number == 1 and isinstance(value, bytes):

@@ -1,12 +1,11 @@
 """Records of ROS 1 bags, of MCAP files and of ROS 2's SQLite databases.
 
-ROS 1 bags (http://wiki.ros.org/Bags/Format/2.0) and MCAP files (https://mcap.dev/spec) are read
-from the start, so a cut one reads up to its last chunk. The readers of rosbags and mcap need
-the index at the end.
+ROS 1 bags (http://wiki.ros.org/Bags/Format/2.0) and MCAP files (https://mcap.dev/spec)
+are read from the start, a cut one up to its last chunk; rosbags and mcap need the index
+at the end.
 
-A database is code as much as data: a column may be computed by functions of SQLite from
-nothing. So only stored columns of plain tables are read, no function runs, and what is
-read is bounded by the size of the file.
+A database can compute a column from nothing. So only stored columns of plain tables are
+read, no function runs, and the file's size bounds the reading.
 """
 
 import sqlite3
@@ -68,9 +67,9 @@ def _fields(head: bytes) -> Header:
 def _bag_records(
     content: Content, budget: ReadBudget, counts: MessageCount | None = None
 ) -> Iterator[tuple[int, Header, bytes, int]]:
-    """Kind, header, data and place of each record of a bag, those of a chunk behind it.
+    """Kind, header, data and place of each record of a bag, and of its chunks.
 
-    Without counts of a chunk.
+    Inside a chunk there are no counts.
     """
     place = counts.end if counts else 0
     while place < len(content):
@@ -147,9 +146,9 @@ ENCODINGS = {"cdr", "ros1", "json", "protobuf"}
 def _mcap_records(
     content: Content, budget: ReadBudget, counts: MessageCount | None = None
 ) -> Iterator[tuple[int, bytes]]:
-    """Kind and content of each record of a file, those of a chunk behind it.
+    """Kind and content of each record of a file, and of its chunks.
 
-    Without counts of a chunk.
+    Inside a chunk there are no counts.
     """
     place = counts.end if counts else 0
     while place < len(content):
@@ -221,10 +220,8 @@ TABLES = {
 }
 
 STEPS = 10_000
-#: What SQLite may do for a file: some ten steps a row and topic, and rows of a few bytes
-#: or more.
-#:
-#: A tree of pages that hold one another has rows without end.
+#: Most steps of SQLite for a file, some ten a row and topic, a row having a few bytes or more:
+#: pages that hold one another have rows without end.
 SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
 
 
@@ -327,7 +324,7 @@ CONTAINERS = {
 
 
 def batches(files: Sequence[LogFile], budget: ReadBudget) -> Iterator[Batch]:
-    """The messages of files, one behind the other; what a library raises is said in one line."""
+    """The batches of the files' messages in turn; a library's error becomes one line."""
     for file in files:
         messages_of = next(
             (x for magic, x in CONTAINERS.items() if file.head.startswith(magic)), None

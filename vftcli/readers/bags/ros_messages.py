@@ -1,9 +1,9 @@
-"""ROS messages: their definitions, where the numbers of a serialised one lie, and many at once.
+"""ROS messages: definitions, layouts, and the numbers of many at once.
 
-Bags of ROS 2 Humble and older hold no definitions, and a bag that is written needs them.
-A layout is found by walking one message along its definition. Another message has the
-same layout if and only if it is as long and all its length prefixes are equal; strings
-are required to be equal too, so that joint names hold for every message of a group.
+Bags of ROS 2 Humble and older hold no definitions, and a written bag needs them. A layout
+is found by walking one message along its definition. It is another message's if and only
+if that is as long and all its length prefixes are equal; strings must be equal too, so
+that joint names hold for a group.
 """
 
 from collections.abc import Container, Mapping, Sequence
@@ -47,7 +47,7 @@ VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 
 def parts_at(paths: Sequence[str], there: Container[str]) -> list[str]:
-    """The first of some paths that is there, or the six numbers of a wrench below it; or none."""
+    """The first path that exists, or a wrench's six numbers below it; or none."""
     each = ([p] if p in there else [f"{p}.{part}" for part in VECTORS] for p in paths)
     return next((names for names in each if all(name in there for name in names)), [])
 
@@ -169,7 +169,7 @@ def types_of(definition: str, name: str, *, idl: bool) -> Types:
 
 
 def element_of(described: Any) -> tuple[str, int | None]:  # noqa: ANN401 - nested tuples of rosbags
-    """A field's type, or its elements', and their number: None for one, −1 for any number."""
+    """A field's type or its elements', and count: None for one, −1 for any number."""
     node, inner = described
     if node == 1:  # a primitive with a bound
         return str(inner[0]), None
@@ -203,7 +203,7 @@ def type_store() -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
 
 
 def schema_text(kind: str) -> str:
-    """A type's definition followed by those of the types it is made of, as bags embed them."""
+    """A type's definition, then those of the types inside it, as bags embed them."""
     text: str = type_store().generate_msgdef(long_name(kind), ros_version=2)[0]
     return text
 
@@ -232,8 +232,7 @@ Value = str | Sequence[str] | float | NDArray[Any]
 def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
     """Many messages of one type and one layout in CDR, little-endian. (T, size)
 
-    One is made and laid out; every message has the same bytes but for the numbers, which
-    are put in column by column.
+    One message is laid out; all have its bytes, but for numbers put in column by column.
     """
     template = bytes(type_store().serialize_cdr(template_of(kind, values), long_name(kind)))
     layout = MessageLayout(type_store().fielddefs, template, kind, cdr=True)
@@ -271,5 +270,5 @@ def stamped(times: NDArray[np.int64], path: str = "header.stamp") -> dict[str, V
 
 
 def in_parts(path: str, names: str, columns: NDArray[Any]) -> dict[str, Value]:
-    """The values of a vector's parts: ``in_parts("force", "xyz", …)`` gives force.x and so on."""
+    """A vector's parts: ``in_parts("force", "xyz", …)`` gives force.x and so on."""
     return {f"{path}.{name}": column for name, column in zip(names, columns.T, strict=True)}

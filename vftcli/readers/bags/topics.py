@@ -1,4 +1,4 @@
-"""Bags read: several topics on one clock. Which leads, which clock counts, what is interpolated."""
+"""Bags read: the leading topic, its clock, and the other topics interpolated."""
 
 import re
 from collections.abc import Sequence
@@ -95,7 +95,7 @@ class Gathering:
         self._settle_effort()
 
     def _settle_effort(self) -> None:
-        """Decide what effort is: what --columns says, else current for UR joints, else torque.
+        """Name the effort: as --columns says, else current for UR joints, else torque.
 
         --columns names a field or none, as in -tau=effort, current[mA]=effort, -tau.
         """
@@ -131,7 +131,7 @@ class Gathering:
                 self.interpolate(stream, signal)
 
     def _take_own(self, stream: Stream) -> None:
-        """Take a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
+        """Add a topic of an MCAP by vftcli convert, /vftcli/SIGNAL, sample by sample."""
         name, lead = stream.topic.removeprefix(OWN), self.lead
         signal = SIGNALS.get(name, name)
         value = stream.signals.get("wrench" if signal == "wrench" else "effort")
@@ -147,7 +147,7 @@ class Gathering:
         self.signals[signal] = value
 
     def take_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
-        """Take the wrench of a sensor or of the vendor; return what --columns or the bag states."""
+        """Add a sensor's or the vendor's wrench; its frame, by --columns or the bag."""
         said = next((item for item in self.items if item.signal == "wrench"), None)
         named = said is not None and said.pattern is not None
         frame = FRANKA_FRAME if self.lead.kind.franka else None
@@ -174,9 +174,9 @@ class Gathering:
         return frame if said.unit is None else WrenchFrame.parsed(said.unit)
 
     def interpolate(self, stream: Stream, signal: str) -> bool:
-        """Whether a smooth signal of another topic could be put on the leading one's times.
+        """Whether a signal of another topic was interpolated at the leading times.
 
-        It is held at the ends. A caution where the other topic does not cover that time.
+        It is held at the ends. A remark says where the topic does not cover them.
         """
         lead, topic = self.lead, stream.topic
         times, own, values = lead.host, stream.host, stream.signals[signal]
@@ -225,7 +225,7 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def same_arm(stream: Stream, lead: Stream) -> bool:
-    """Whether a stream is about the leading topic's joints, or about no joints by name."""
+    """Whether a stream is about the leading topic's joints, or names no joints."""
     if "q" not in stream.signals and "effort" not in stream.signals:
         return False
     if not stream.names or not lead.names:
@@ -236,9 +236,9 @@ def same_arm(stream: Stream, lead: Stream) -> bool:
 def leading(
     streams: Sequence[Stream], path: Path, others: dict[str, str], request: ReadChoice
 ) -> Stream:
-    """The topic of the leading positions: measured, most messages; a robot state breaks ties.
+    """The leading topic: measured positions, most messages; a robot state if tied.
 
-    One that --columns names, as in q=TOPIC.position, goes before all others.
+    One that --columns names, as in q=TOPIC.position, goes first.
     """
     measured = (s for s in streams if "q" in s.signals and not TARGETS.search(s.topic))
     found = [s for s in measured if s.messages > 1]
@@ -270,7 +270,7 @@ def leading(
 
 
 def clock_of(stream: Stream) -> dict[str, Any]:
-    """A stream's best clock, as fields of RawLog: the robot's, its header's or the recorder's."""
+    """A stream's best clock, as fields of RawLog: robot, header or recorder."""
     host, robot, topic = stream.host, stream.columns.get("robot"), stream.topic
     if robot is None or not runs(robot):
         unset = f"receive stamps of {topic} (its header stamps are unset or run back)"
