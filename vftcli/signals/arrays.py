@@ -1,4 +1,4 @@
-"""Arrays: one alias, read-only copies, and the checks every type makes at its door."""
+"""Arrays: one alias, read-only copies, and the types' checks of their arrays."""
 
 import mmap
 from typing import Any
@@ -16,7 +16,7 @@ Indices = NDArray[np.int64]  #: Numbers of rows or samples, counted from 0.
 
 
 def frozen(value: ArrayLike, kind: type = float) -> Array:
-    """A read-only array of float64, or a mask, that nobody else can write to; itself if it is."""
+    """A read-only float64 array or mask without other writers; itself if it is one."""
     if isinstance(value, np.ndarray) and value.dtype == kind and is_sealed(value):
         return value
     return handed_over(np.array(value, kind, order="K"))
@@ -63,7 +63,7 @@ def number_array(value: ArrayLike, name: str, owner: str, kind: type = float) ->
 def seal(
     owner: object, *names: str, shape: tuple[int, ...] = (), called: str = "", kind: type = float
 ) -> None:
-    """Make arrays of a frozen dataclass read-only, and check their shape; None stays None."""
+    """Make a frozen dataclass's arrays read-only, check their shape; None stays None."""
     for name in names:
         if (value := getattr(owner, name)) is not None:
             # The one way past a frozen dataclass, for its own __post_init__ only.

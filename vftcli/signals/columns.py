@@ -1,7 +1,6 @@
-"""What the columns of our tables hold, as the field metadata of Parquet files.
+"""The meaning of our tables' columns, as the field metadata of Parquet files.
 
-A reader of another language, or a person with no documentation, sees unit, meaning, sign
-and frame beside each column:
+Any reader of the file sees unit, meaning, sign and frame beside each column:
 ``pyarrow.parquet.read_schema(path).field("tau_ext/gmo/1").metadata``.
 """
 
@@ -78,7 +77,7 @@ def described_schema(
     frames: Mapping[str, StatedFrame] | None = None,
     metadata: Mapping[str, str] | None = None,
 ) -> Any:  # noqa: ANN401 - pyarrow is untyped
-    """The table's pyarrow schema with what each column holds, for ``write_parquet``.
+    """The table's pyarrow schema with each column's meaning, for ``write_parquet``.
 
     None without pyarrow: polars then writes the columns, and nothing beside them.
     """

@@ -33,7 +33,7 @@ class Instant(NamedTuple):
 
 @record
 class DynamicsTerms(Shown):
-    r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33)."""
+    r"""Momentum form of the dynamics: :math:`\dot p = \mu + \tau_{ext}` (33)."""
 
     t: Array  #: Time. (T,) [s]
     p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
@@ -50,7 +50,7 @@ class DynamicsTerms(Shown):
 
     @cached_property
     def d(self) -> Array:
-        """Change of momentum that the model leaves unexplained, every observer's one input.
+        """Change of momentum unexplained by the model, every observer's one input.
 
         dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), zero at a log's first sample. (T, n) [N·m·s]
         """
@@ -74,7 +74,7 @@ class DynamicsTerms(Shown):
 
     @cached_property
     def dt(self) -> Array:
-        """Time since the sample before: nominal at a log's first. (T, 1), (1, 1) if uniform [s]"""
+        """Time since the sample before, nominal at first: (T, 1), (1, 1) if uniform [s]"""
         if self.clock.uniform:
             return np.array([[self.clock.step]])
         first = self.t[0] - self.clock.step if self.before is None else self.before.t
@@ -117,8 +117,7 @@ class ExternalTorque(TimeSeries):
     #: One deviation of `tau`, model error and lag included, in single
     #: precision; None where no free part is known. (T, n) [N·m]
     error_sd: Array | None = None
-    #: Whether the joint moves, so that the sample may be relied on; where it rests,
-    #: stiction hides what `tau` cannot know. None where that was not looked at. (T, n)
+    #: Whether the joint moves: at rest stiction hides torque. None if not known. (T, n)
     moving: Mask | None = None
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 

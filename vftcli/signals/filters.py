@@ -1,7 +1,7 @@
-"""Filters without phase shift on clocks that may be uneven, the noise they pass, spectra.
+"""Filters without phase shift, also on uneven clocks; noise behind them; spectra.
 
-The filters are SciPy's `butter` and `sosfiltfilt` to rounding, by `steady_filter`:
-importing `scipy.signal` takes longer than all that a log of a minute asks of them.
+They equal SciPy's `butter` and `sosfiltfilt` to rounding, by `steady_filter`: importing
+`scipy.signal` takes longer than filtering a log of a minute.
 
 References:
     A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, Section 7.2, 2010 (bilinear
@@ -24,8 +24,7 @@ from vftcli.signals.steady_filter import steady_filter
 ORDER = 2
 #: Order of a pass before differentiation: no noise may be left.
 STEEP = 4
-#: Steps that differ from their median by a larger share are resampled; a clock that
-#: jitters by less is filtered as an even one.
+#: Clocks with steps off their median by a larger share are resampled, others count as even.
 UNEVEN = 0.05
 FREQUENCIES = 1024  #: Frequencies at which a filter's power is summed.
 #: An even clock this many times the log would mostly be gaps.
@@ -123,8 +122,7 @@ def refuse_mostly_gap(t: Array, step: float) -> None:
 def butterworth(step: float, cutoff: float | tuple[float, float], order: int = ORDER) -> Array:
     """Second-order sections of a Butterworth filter of even order. (S, 6)
 
-    A low pass has one cutoff, a band pass two edges [Hz]; the order is that of either
-    side. (S, 6)
+    A low pass has one cutoff, a band pass two edges [Hz]; the order is that of either side.
     """
     if not (np.all(np.asarray(cutoff) > 0) and np.all(np.asarray(cutoff) < 0.5 / step)):
         raise ParameterError(
@@ -171,9 +169,8 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
     Nothing is detrended. Each unbroken stretch (N, n) is mirrored at its ends by half a
     segment of `size` samples (even), so that its first and last samples count like all
     others: a free part is often no longer. It counts by its length, one shorter than a
-    segment also by how much of it is no mirror image: no sample that breaks a long one in
-    two leaves others to speak for all. The density at ``numpy.fft.rfftfreq(size, step)``
-    is by Hz. (size/2 + 1, n)
+    segment also by its share that is no mirror image. The density at
+    ``numpy.fft.rfftfreq(size, step)`` is by Hz. (size/2 + 1, n)
     """
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
     joints = stretches[0].shape[1]

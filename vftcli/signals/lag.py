@@ -1,7 +1,6 @@
 """By how much one series runs behind another: the shift at which they fit best.
 
-In every function the late series comes first, the early one second, and a positive lag
-says that the first runs behind.
+The late series comes first, the early one second; at a positive lag the first runs behind.
 """
 
 from collections.abc import Sequence
@@ -24,9 +23,8 @@ BLOCK = 8192
 def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
     """Delay of each column at which it fits best, NaN where nothing fits. (m, n)
 
-    Maximises the correlation with `early` over the known samples that overlap, for delays
-    from −`LEAD` to `LONGEST`, refined by a parabola. An uneven clock's is in median steps
-    [s].
+    Maximises the correlation with `early` over common known samples, for delays from
+    −`LEAD` to `LONGEST`, refined by a parabola; an uneven clock's in median steps. [s]
     """
     samples = len(early)
     first = -min(round(LEAD / step), samples // 4)
@@ -129,8 +127,7 @@ class Offset(NamedTuple):
 def time_offset(t: Array, late: Array, early: Array) -> Offset:
     """The lag of `late` behind `early` at which they correlate best.
 
-    All columns (T, k) count by their size: those of a wrench are to be in one unit.
-    Unknown samples are bridged.
+    All columns (T, k) count by size: give a wrench in one unit. Unknown samples are bridged.
     """
     step = median_step(t)
     even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
@@ -170,7 +167,7 @@ class LagFit(NamedTuple):
 
 
 def lag_fit(late: Array, early: Array, least: float) -> LagFit:
-    """How well two series (M, k), (N, k) of one step fit at every lag.
+    """Fit of two series (M, k), (N, k) of one step at every lag.
 
     At least the share `least` of the shorter one must overlap.
     """
@@ -186,7 +183,7 @@ def lag_fit(late: Array, early: Array, least: float) -> LagFit:
 
 
 def overlapping(late: Array, early: Array, at: Indices) -> tuple[Array, Array, Array]:
-    """Sums over what overlaps, all columns together: of products, of either's squares. (L,)"""
+    """Sums over the overlap, of all columns: products, squares of either. (L,)"""
     cross = sliding(late.T, early.T, at).sum(axis=0)
     return cross, overlap_energy(late, at, len(early)), overlap_energy(early, -at, len(late))
 

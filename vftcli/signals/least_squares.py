@@ -1,4 +1,4 @@
-"""Least squares: normal equations, Huber weights, robust spreads, folds and cross-validation."""
+"""Least squares: normal equations, Huber weights, spreads, cross-validation."""
 
 import itertools
 from collections.abc import Sequence
@@ -9,8 +9,7 @@ import numpy as np
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 
-#: Residuals beyond this many robust standard deviations weigh less (Huber). On normal
-#: noise that is 1.2 % of the samples.
+#: Residuals beyond so many robust deviations weigh less (Huber): 1.2 % of normal noise.
 HUBER = 2.5
 PASSES = 6  #: Reweighting passes.
 #: Eigenvalues below this share of the largest tell nothing.
@@ -82,9 +81,8 @@ def normal_equations(A: Array, y: Array, weights: Array) -> NormalEquations:
 def shown_directions(gram: Array, null: float) -> tuple[Array, Array]:
     """Eigenvalues and vectors of a scaled AᵀWA that the data shows. (s,), (k, s)
 
-    Columns are scaled to a unit diagonal, since kilograms and N·m·s need not be alike in
-    size; the scale is in the vectors V, so that V diag(1/values) Vᵀ is the inverse of
-    AᵀWA itself.
+    Columns are scaled to a unit diagonal, as their units differ. The scale is in the
+    vectors V: V diag(1/values) Vᵀ is the inverse of AᵀWA itself.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     scale[scale == 0.0] = 1.0
@@ -148,9 +146,7 @@ def folds(samples: int, count: int = FOLDS) -> list[slice]:
 def left_out(lengths: Sequence[int], use: Sequence[bool]) -> list[Array]:
     """The rows that cross-validation leaves out in turn.
 
-    Of several logs in `use` each is left out whole: another log is what a
-    model is for. A single one is cut into fifths. Rows of other logs are
-    never left out.
+    Each of several logs in `use` goes whole, a single one in fifths; rows of others stay.
     """
     edges = np.cumsum([0, *lengths])
     rows = [

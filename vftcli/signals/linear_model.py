@@ -1,13 +1,12 @@
-"""A linear model with its Kalman filter, its likelihood and its Rauch–Tung–Striebel smoother.
+"""A linear model: Kalman filter, likelihood, Rauch–Tung–Striebel smoother.
 
 States x of a size N move from block to block each on its own, and n numbers d show them:
 
     xᵏ = fᵏ xᵏ⁻¹ + noise of variance qᵏ,    dᵏ = Hᵏᵀ xᵏ + noise of variance Rᵏ.
 
 The state before the first block is zero and certain: f⁰ = 0 starts it with variance q⁰. A
-state with f = q = 0 is pinned, its mean and variance are exactly zero. A block with H = 0
-says nothing. Any axes between blocks and numbers hold models side by side, as long as
-each other.
+state with f = q = 0 has mean and variance exactly zero. A block with H = 0 says nothing.
+Axes between blocks and numbers hold models of one length side by side.
 
 References:
     H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
@@ -93,8 +92,7 @@ def log_likelihood(model: LinearModel) -> Array:
 def smoothed(model: LinearModel) -> tuple[Array, Array]:
     """Mean and covariance of every block given all of them. (K, …, N), (K, …, N, N)
 
-    The gain back C = P F (P⁻)⁻¹ is solved on the states with a predicted variance above
-    `LEAST_VARIANCE`.
+    The gain C = P F (P⁻)⁻¹ is solved on states of variance above `LEAST_VARIANCE`.
     """
     decay, size = model.decay, model.decay.shape[-1]
     mean, covariance = np.empty(decay.shape), np.empty((*decay.shape, size))

@@ -1,4 +1,4 @@
-"""Option: how a value is typed and what `--help` says of it, beside the field that holds it.
+"""Option: the command-line form of a field, and its words in `--help`.
 
 The fields of a room's choice, a dataclass, say how a user gives them, once for the command line,
 the file of options and notebooks. What few users need is a setting, given by ``--set NAME=VALUE``::
@@ -31,7 +31,7 @@ WORD = re.compile("[a-z][a-z-]+")
 
 
 def text_of(value: object, name: str) -> str:
-    """A value of TOML or Python as it would be typed: yes or no, numbers apart by commas.
+    """A value of TOML or Python as typed: yes or no, numbers apart by commas.
 
     Raises:
         ParameterError: If it is none.
@@ -135,7 +135,7 @@ NUMBERS = "numbers"
 
 @typing.dataclass_transform(frozen_default=True, kw_only_default=True)
 class Choice:
-    """What a user may choose of a room: a frozen dataclass of fields with an `Option` each."""
+    """A user's choices in a room: a frozen dataclass of fields, an `Option` each."""
 
     GROUP: ClassVar[str] = ""  #: Heading of its options.
 
@@ -245,7 +245,7 @@ def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option,
 def settings_as_typed(
     given: Mapping[str, object], choices: Iterable[type[Choice]], by: str = ""
 ) -> dict[str, str]:
-    """Name → text of settings, each one of the choices'; `by` is what they are typed behind.
+    """Name → text of the choices' settings; `by` is typed before each name.
 
     Raises:
         ParameterError: If there is no such setting, or a value is none.

@@ -1,7 +1,7 @@
-"""Packages that vftcli works without: whoever needs one asks for it here; an error says what lacks.
+"""Optional packages: loaded when needed; an error names a missing one.
 
-They are ordinary dependencies all the same, or extras. Estimation, errors, contacts and
-pages need none of them; docs/outputs.md says what each is for.
+They are dependencies or extras. Estimation, errors, contacts and pages need none of them;
+docs/outputs.md says what each is for.
 """
 
 import sys

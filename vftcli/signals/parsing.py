@@ -12,8 +12,7 @@ from vftcli.signals.errors import ParameterError
 
 #: Not UTF-8: bytes of a file name, half a letter of JSON.
 HALVES = re.compile(r"[\ud800-\udfff]")
-#: Unicode categories that a terminal would act on, or show as nothing: control
-#: characters, marks that turn the direction of writing, ends of lines.
+#: Unicode categories that a terminal acts on or hides: controls, writing direction, line ends.
 HIDDEN = {"Cc", "Cf", "Co", "Zl", "Zp"}
 
 
@@ -23,7 +22,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def whole(text: str) -> str:
-    r"""A text that UTF-8 can hold: a file name's byte that is no letter becomes ``\xff``."""
+    r"""A text in valid UTF-8: a file name's byte without a letter becomes ``\xff``."""
     return text if text.isascii() else HALVES.sub(half, text)
 
 

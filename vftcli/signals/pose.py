@@ -1,10 +1,9 @@
-"""Orientations and poses: matrices, fixed-axis angles, rotation vectors, quaternions, the adjoint.
+"""Poses: matrices, fixed-axis angles, rotation vectors, quaternions, the adjoint.
 
-Rotation vectors and quaternions are for many orientations at once. The deviation of an
-orientation is the rotation vector x̃ = log(R R_dᵀ), updated by R ← exp(ω Ts) R. A
-quaternion that is only ever multiplied changes continuously, and so does its
-logarithm: it grows through π without a jump, up to a full turn. Quaternions are
-(w, x, y, z).
+Rotation vectors and quaternions (w, x, y, z) are for many orientations at once. The
+deviation of an orientation is the rotation vector x̃ = log(R R_dᵀ), updated by R ← exp(ω
+Ts) R. Under multiplication alone a quaternion and its logarithm change continuously: the
+logarithm grows through π without a jump, up to a full turn.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Recording: one log, in SI units, on one strictly increasing clock; Source: where it is from."""
+"""Recording: one log in SI units on one strictly increasing clock; its Source."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -42,8 +42,7 @@ class Cut(NamedTuple):
 class Awaited:
     """A field that may be given as a function, called when it is first read.
 
-    A digest is computed beside everything else, and nobody waits for it before it is
-    written down.
+    A digest is computed in the background; only who writes it down waits.
     """
 
     def __set_name__(self, _owner: type, name: str) -> None:
@@ -73,8 +72,7 @@ class Source(Shown):
     label: str = ""
     format: str = "memory"  #: The reader's name.
     columns: str = ""  #: What ``--columns`` said of it, "" for nothing.
-    #: Hex digest of the file's bytes (of all files of a directory, in name order), by
-    #: which a run is known again; reading it waits until it is computed.
+    #: Hex digest of the file's bytes, of a folder's files in name order; reading it may wait.
     sha256: Awaited = Awaited()
     clock: str = "as given"  #: Which clock the stamps are from, in words.
     t0: float = 0.0  #: The log's own stamp of the first sample. [s]
@@ -85,14 +83,12 @@ class Source(Shown):
     duplicates: int = 0  #: Rows dropped because their stamp repeated the one before.
     #: Signals that were made of others here and stand in no log.
     derived: tuple[str, ...] = ()
-    #: Facts on what was dropped, turned or derived; cautions and warnings on what looks
-    #: suspicious but was left as it is.
+    #: Facts on what was dropped, turned or derived; cautions and warnings on what looks wrong.
     remarks: tuple[Remark, ...] = ()
     #: Which of several recordings, as "episode 3"; "" for the only one.
     part: str = ""
     cuts: tuple[Cut, ...] = ()  #: Samples that were cut out because no arm can have made them.
-    #: The sample that each of the rows is, or repeats; −1 for one that was dropped
-    #: otherwise. None where each row is the sample of its number. (rows,)
+    #: The sample that each row is or repeats, −1 for none; None if each is its own. (rows,)
     row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -153,8 +149,7 @@ class Recording(TimeSeries):
     dq: Array | None = None  #: Joint velocities. (T, n) [rad/s]
     current: Array | None = None  #: Motor currents. (T, n) [A]
     torque: Array | None = None  #: Measured drive torques, gravity included. (T, n) [N·m]
-    #: Drive torques less what holds the arm and its payload against gravity, as newer UR
-    #: drivers publish them. (T, n) [N·m]
+    #: Drive torques less the gravity of arm and payload, from newer UR drivers. (T, n) [N·m]
     torque_without_gravity: Array | None = None
     target_q: Array | None = None  #: Commanded positions. (T, n) [rad]
     target_dq: Array | None = None  #: Commanded velocities. (T, n) [rad/s]
@@ -278,8 +273,7 @@ class Recording(TimeSeries):
     ) -> "Recording":
         """The recording with its effort as a `kind` of `EFFORTS`, and no other.
 
-        `source` names which of the log's efforts it is; None for the one that is called
-        so, or the only one there is.
+        `source` is the log's effort to use; None for the one of that name, or the only one.
         """
         there = [name for name in EFFORTS if getattr(self, name) is not None]
         source = source or (kind if kind in there else None)
@@ -334,9 +328,8 @@ def pieces(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
 def same_run(one: Recording, other: Recording) -> bool:
     """Whether two recordings were read from equal bytes.
 
-    A span of a recording is the same run as the whole. Two recordings that one file holds
-    one after the other are two runs if its clock tells them apart, or if they are two of
-    its parts.
+    A span of a recording is the same run as the whole. Two recordings of one file are two
+    runs if its clock tells them apart, or if they are two of its parts.
     """
     if one is other:
         return True

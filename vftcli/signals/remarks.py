@@ -1,15 +1,14 @@
-"""Remark: what a reader of the numbers should know, as data; its words are made when it is shown.
+"""Remark: a finding about the numbers, as data; its words come when it is shown.
 
-A remark has a code, a level, values with their units in the names, and a place. The words stand in
-the catalogue, `words/*.toml` beside this file, one table a code::
+A remark has a code, a level, values with units in their names, and a place. The words are
+in the catalogue, `words/*.toml` beside this file, one table a code::
 
     [joint-rests]
     short = "rests in {share:.0%} of the samples and is marked"
     long = "... where it keeps its stiction, up to about {stiction_Nm:.2g} N·m rms ..."
 
-`short` is one line for the terminal; `long`, which may be left out, is for the page. Both
-are `str.format` templates over the remark's values; a format is applied to each item of a
-list.
+`short` is one line for the terminal, `long`, if any, is for the page. Both are
+`str.format` templates over the remark's values; a format applies to each item of a list.
 """
 
 import string
@@ -118,7 +117,7 @@ warning = partial(made, "warning")  #: A remark on what can make the result wron
 
 
 def sentence(remark: Remark, length: str = "short") -> str:
-    """A remark's short words, or its long ones if it has any, headed by what it is about."""
+    """A remark's words of a length, or its short ones, headed by its subject."""
     entry, about = words(remark.code), remark.where.about
     return (f"{about}: " if about else "") + filled(entry.get(length, entry["short"]), remark)
 
@@ -136,7 +135,7 @@ class ListFormatter(string.Formatter):
     """`str.format` that formats the items of a list one by one."""
 
     def format_field(self, value: Any, format_spec: str) -> str:  # noqa: ANN401 - any value
-        """A value by its format; a list's items by it, numbers apart by spaces, words by commas."""
+        """A value by its format; a list's items, numbers apart by spaces, words by commas."""
         if isinstance(value, str) or not isinstance(value, Iterable):
             return str(super().format_field(value, format_spec))
         items = [

@@ -1,8 +1,8 @@
 """Repairs of a recording: velocities that it lacks, samples that stand alone.
 
-Such a sample is a transmission error, a wrapped angle, a spike of one current reading. No
-arm moves away and back within two samples, and no drive does: it says nothing of the
-model or of noise, and one is enough to spoil a spectrum or a fit of a whole log.
+Such a sample is a transmission error, a wrapped angle, a spike of one current reading: no
+arm or drive moves away and back within two samples. One can spoil a spectrum or a fit of
+a whole log.
 
 References:
     F. R. Hampel, P. J. Rousseeuw, E. M. Ronchetti, W. A. Stahel, "Robust Statistics: The Approach
@@ -18,10 +18,9 @@ from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import caution, fact, on_joints
 
-#: Where the derivative is cut off, twice. [Hz]
-#:
-#: Positions of UR10e logs, rounded to 1e-4 rad at 100 Hz, give velocities off by .0024 to
-#: .0031 rad/s rms so, and by .10 to .44 as plain differences; 5 and 20 Hz differ little.
+#: Cutoff of the derivative, twice. [Hz] Positions of UR10e logs, rounded to 1e-4 rad at
+#: 100 Hz, give velocities off by .0024 to .0031 rad/s rms so, and by .10 to .44 as plain
+#: differences; 5 and 20 Hz differ little.
 CUTOFF = 12.0
 OF_NYQUIST = 0.4  #: The same in a slow log, as a share of half its rate.
 #: Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz.
@@ -55,18 +54,15 @@ def is_fast(recording: Recording) -> bool:
 
 #: A sample is compared with so many before it and so many behind it, by their median.
 NEAR = 2
-#: How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise.
-#: One sample in a hundred may be bad, and three bends in a hundred with it.
+#: Quantile of usual bends, 2.7 sd of white noise: 1 % of bad samples make 3 % of bad bends.
 USUAL = 0.97
 #: A sample this far off is alone: 16 sd of white noise. Of 36 sound
 #: logs a UR10e's have one, at most 11 in 1896; 24 have none.
 FAR = 6.0
-#: And beyond this share of what a velocity or an effort spans
-#: without its outer hundredths: smooth motion has no noise.
+#: And beyond this share of what a velocity or effort spans without its outer hundredths.
 SPREAD = 0.03
 
-#: Smaller steps are never alone: a gear's teeth give as much, and
-#: slower joints rest. [rad, rad/s]
+#: Smaller steps are never alone: gear teeth give as much, slower joints rest. [rad, rad/s]
 LEAST = {"q": 5e-4, "dq": 1e-2}
 
 #: Factor for first and last samples: a line of six bends.
@@ -83,7 +79,7 @@ def without_isolated(recording: Recording) -> Recording:
     """A recording without samples that stand alone, said; itself where there are none.
 
     One a little too far off is drawn to the limit, one twice as far off to its
-    neighbours' median, and it falls straight between: no sample is switched.
+    neighbours' median, linearly in between.
     """
     there = [name for name in ("q", "dq", *EFFORTS) if getattr(recording, name) is not None]
     changed = np.zeros(recording.q.shape, bool)
@@ -108,8 +104,7 @@ def without_isolated(recording: Recording) -> Recording:
 def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     """Columns without samples that stand alone, and where these are. (T, n) each
 
-    What is off by `least` (n,) never is too far; `peak` is as `PEAK`, 0 where no peak is
-    meant.
+    Up to `least` (n,) nothing is too far off; `peak` is as `PEAK`, 0 where no peak is meant.
     """
     made = np.array(x)
     if len(x) <= 6 * NEAR:
@@ -141,8 +136,7 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
 def at_an_end(x: Array, limit: Array) -> Array:
     """The first samples, drawn to a line through those of the log's end.
 
-    Slope and places are medians, so that one bad sample moves them by less than what the
-    others differ by.
+    Slope and places are medians: one bad sample moves them by less than the others' spread.
     """
     slope = np.median(np.diff(x, axis=0), axis=0)
     level = x - np.arange(len(x))[:, None] * slope

@@ -8,13 +8,11 @@ import numpy as np
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import grown, median_step, runs_of, summed
 
-#: Speeds between rest and motion, by what each decides. Above the first, more than noise
-#: and last digits, a joint has a direction, and a log's motion begins. [rad/s]
+#: Above it, more than noise and last digits, a joint has a direction: a log moves. [rad/s]
 NONZERO = 1e-3
 #: Below it a controller holds a joint: what it commands has no noise. [rad/s]
 COMMANDED = 2e-3
-#: Below it stiction holds the joint: above what sensors add to a joint that is held, up
-#: to what the steps of an encoder make over a block of 24 ms. [rad/s]
+#: Below it stiction holds the joint: above noise, up to an encoder's steps over 24 ms. [rad/s]
 REST = 0.01
 MOVES = 0.02  #: Above it, twice that, no noise is motion: friction is that of motion. [rad/s]
 SLIDES = (
@@ -59,8 +57,7 @@ def standing(t: Array, dq: Array) -> Mask:
 def resting(t: Array, dq: Array) -> Mask:
     """Where a joint is slower than `REST` in most of the time around. (T, n)
 
-    Unlike `standing` it knows no shortest stop: it tells friction at rest from friction
-    in motion.
+    Unlike `standing` it has no shortest stop: it parts friction at rest from that in motion.
     """
     first = t.searchsorted(t - AROUND, side="left")
     last = t.searchsorted(t + AROUND, side="right")

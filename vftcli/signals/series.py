@@ -1,4 +1,4 @@
-"""A time series whatever it holds: its step, its gaps, another clock, runs of a mask."""
+"""Any time series: its step, its gaps, another clock, runs of a mask."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

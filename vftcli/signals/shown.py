@@ -1,4 +1,4 @@
-"""Shown: what a notebook shows of a thing, one line and a small table instead of its arrays."""
+"""Shown: a thing in a notebook, as one line and a small table without its arrays."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -25,15 +25,14 @@ Kind = TypeVar("Kind")
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
 def record(kind: type[Kind]) -> type[Kind]:
-    """The class as a frozen dataclass of named fields that keeps the `repr` of `Shown`."""
+    """The class as a frozen dataclass of named fields, with the `repr` of `Shown`."""
     return dataclass(frozen=True, kw_only=True, repr=False)(kind)
 
 
 class Shown:
     """A thing with a `repr` of one line, which a notebook shows as a small table.
 
-    A dataclass that is one is a `record`. It says what it is by
-    `_headline`, and what is in it by `_rows`; else both are made of its fields.
+    A dataclass of this kind is a `record`; `_headline` and `_rows` come from its fields.
     """
 
     def _headline(self) -> str:

@@ -1,15 +1,13 @@
-"""Recursive filters over a whole log, block by block: s_t = F s_{t−1} + g d_t, F (m, m) a joint.
+"""Recursive filters over a whole log, by blocks: s_t = F s_{t−1} + g d_t.
 
-The states x_b at the blocks' starts obey the same kind of recursion with R, the product
-of a block's transitions, summed by doubling: x_b ← x_b + R x_{b−1}, then x_b + R²
-x_{b−2}, … until the filter has forgotten. It is the plain loop's sum in another order, to
-rounding.
+F is (m, m) a joint. The states x_b at the blocks' starts obey a like recursion with R,
+the product of a block's transitions, summed by doubling: x_b ← x_b + R x_{b−1}, then x_b
++ R² x_{b−2}, … until the filter has forgotten. To rounding it is the plain loop's sum.
 
-Where coefficients do not change along the log, a block is a triangular Toeplitz matrix of
-its impulse response times the block's inputs, plus what the state at its start still
-contributes; BLAS does that for all blocks at once. Where they do (`recursion`), the
-blocks are run side by side, each from zero; what enters a block is then run through it
-and added.
+With constant coefficients a block is a triangular Toeplitz matrix of its impulse response
+times its inputs, plus the part of the state at its start; BLAS does all blocks at once.
+With others (`recursion`) the blocks run side by side, each from zero; the state that
+enters a block is then run through it and added.
 """
 
 from collections.abc import Sequence
@@ -20,8 +18,8 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Indices, empty_series
 
-#: Samples handled at a time, so that memory does not grow with the log; blocks of a log
-#: that begin at multiples of it give the numbers of the whole log to the last bit.
+#: Samples handled at a time, to bound memory; blocks of a log that begin at multiples of it
+#: give the whole log's numbers to the last bit.
 PIECE = 1 << 14
 FORGOTTEN = 1e-20  #: Share of a state that counts as nothing: far below its last digit.
 #: Samples in a block, a power of two: more work, fewer blocks.
@@ -32,7 +30,7 @@ LENGTH = 36  #: Most samples in a block of `recursion`, the length of its Python
 def filtered(
     F: Array, g: Array, d: Array, start: Array, wanted: Sequence[Array]
 ) -> tuple[list[Array], Array]:
-    """Each wanted·s_t (T, n) of s_t = F_t s_{t−1} + g_t d_t, and the last state (m, n).
+    """Each wanted·s_t (T, n) of s_t = F_t s_{t−1} + g_t d_t; the last state (m, n).
 
     F is (m, m, n) and g (m, n) of the whole log, or (m, m, T, n) and (m, T, n) of every
     sample; the input d (T, n), the state `start` before the first sample (m, n), weights
@@ -49,7 +47,7 @@ def filtered(
 def steady_filter(
     F: Array, g: Array, d: Array, start: Array, wanted: Array
 ) -> tuple[Array, Array]:
-    """Run `filtered` with F (m, m, n) and g (m, n) of the whole log, for one combination (m, n)."""
+    """One combination (m, n) of `filtered`, with F (m, m, n), g (m, n) of the log."""
     toeplitz, ends, carry, powers = blocks_of(F.transpose(2, 0, 1), g.T, wanted.T)
     out, state, columns = empty_series(*d.shape), start.T, np.ascontiguousarray(d.T)
     for first in range(0, len(d), PIECE):
@@ -76,11 +74,11 @@ def steady_filter(
 
 
 def blocks_of(F: Array, g: Array, wanted: Array) -> tuple[Array, Array, Array, Array]:
-    """What a filter of n joints makes of one block; F (n, m, m), g and wanted (n, m).
+    """One block's matrices of a filter of n joints; F (n, m, m), g and wanted (n, m).
 
-    Of a block's inputs what is wanted at each sample (n, BLOCK, BLOCK) and the state at
-    its end (n, BLOCK, m); of the state before what is wanted (n, m, BLOCK); and Fᵏ for
-    k = 0 … BLOCK.
+    From a block's inputs to the wanted samples (n, BLOCK, BLOCK) and the state at its end
+    (n, BLOCK, m); from the state before it to the wanted samples (n, m, BLOCK); Fᵏ, k = 0
+    … BLOCK.
     """
     n, m = g.shape
     powers = np.empty((n, BLOCK + 1, m, m))
@@ -159,7 +157,7 @@ def recursion(F: Array, x: Array, start: Array) -> Array:
 
 
 def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(None)) -> Array:
-    """One piece of `recursion`, everything in blocks: the states are written over the input y.
+    """One piece of `recursion` in blocks: the states are written over the input y.
 
     F is (m, m, length, kinds, blocks), y (m, length, n, blocks), the state before the
     first sample (m, n); `kind` tells which of the kinds each joint is. (n,)

@@ -1,4 +1,4 @@
-"""Wrench: what the environment does to the robot at a point, in a frame that a log may state."""
+"""Wrench: the environment's force and moment on the robot, in a stated frame."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -56,8 +56,7 @@ class WrenchFrame:
     def of_conversion(cls, notation: object) -> "WrenchFrame | None":
         """The frame that a log converted by us holds, None of an unknown one.
 
-        Earlier versions wrote a sentence there; such a file still reads, its frame not
-        stated.
+        Earlier versions wrote a sentence there: their files read, without a stated frame.
         """
         with suppress(ParameterError):
             return cls.parsed(notation) if isinstance(notation, str) else None
@@ -80,8 +79,7 @@ class WrenchFrame:
         return f"{self.axes} axes at {point}, as force {sense}"
 
 
-#: O_F_ext_hat_K of libfranka: on an FR3 it equals
-#: pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's origin.
+#: O_F_ext_hat_K of libfranka: on an FR3 pinv(Jᵀ)·tau_ext_hat_filtered, J about the base.
 FRANKA_FRAME = WrenchFrame("base", "base", "by-robot")
 
 
@@ -103,16 +101,14 @@ class Wrench(TimeSeries):
 
     name: str  #: Short name of the observer or of the reference it comes from.
     t: Array  #: Time on the recording's clock. (T,) [s]
-    #: Force, then moment; also where the pose cannot tell them, so that a blow-up can be
-    #: seen: use `known` for numbers. (T, 6) [N, N·m]
+    #: Force, then moment, even where the pose leaves them open: see `known`. (T, 6) [N, N·m]
     values: Array
     frame: str  #: Axes and reference point: a key of `vftcli.wrench.frames.FRAMES`.
     sd: Array | None = None  #: One standard deviation of `values`. (T, 6) [N, N·m]
     #: Least singular value of J, angular rows × .3 m; None: no J. (T,) [m]
     sigma_min: Array | None = None
     masked: Mask | None = None  #: Samples in which the pose cannot tell the wrench. (T,)
-    #: Norm of the part of the joint torque that no wrench at the flange explains, None
-    #: for arms of six joints. (T,) [N·m]
+    #: Norm of the torque that no flange wrench explains; None for six joints. (T,) [N·m]
     null_space: Array | None = None
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
