@@ -1,4 +1,4 @@
-"""The arm in a description's tree of links and joints: the longest run of joints that turn.
+"""The arm in a description's tree: the longest run of turning joints.
 
 The rest is locked (fingers, a rail, a mobile base, a second arm) and merged into the link that
 carries it: a chain.
@@ -256,10 +256,7 @@ class LumpedArm:
         return run
 
     def longest(self, path: Sequence[TreeJoint]) -> tuple[TreeJoint, ...]:
-        """The longest run of joints that turn, the heavier of several.
-
-        Fixed joints break none.
-        """
+        """The longest run of turning joints, fixed ones between; the heavier of several."""
         runs: list[tuple[TreeJoint, ...]] = [()]
         for turns, joints in groupby(filter(self.moves, path), key=lambda joint: joint.turns):
             if turns:

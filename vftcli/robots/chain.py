@@ -1,9 +1,9 @@
 """The serial chain: the constants every computation on an arm starts from.
 
 Frame j has its origin *on* axis j, its z along the axis, and turns with link j, whatever
-the convention of the description was (standard DH, modified DH, xyz-rpy, URDF with any
-axis). Inertials are moved into these frames once, when a robot is loaded. The batched
-kernels, the kinematics and the Pinocchio model are all made from this one object.
+the description's convention (standard DH, modified DH, xyz-rpy, URDF with any axis).
+Inertials are moved into these frames on loading. Kernels, kinematics and the Pinocchio
+model are all made from a chain.
 
 A robot file states its kinematics in one of three ways:
 
@@ -74,8 +74,8 @@ class Chain(Shown):
     ) -> "Chain":
         """The chain of its joints' names, frames and links.
 
-        Each frame is its pose in the one before, the last the flange's; `more` are
-        `rotor_inertia` and `gravity`.
+        Frames are poses in the one before, the last the flange's; `more`:
+        `rotor_inertia`, `gravity`.
         """
         rotation, translation = map(np.array, zip(*frames, strict=True))
         return cls(
@@ -103,7 +103,7 @@ class Chain(Shown):
         return replace(self, **stacked([*others, merge_bodies([last, load])]))
 
     def to_pinocchio(self, name: str = "arm") -> Any:  # noqa: ANN401 - Pinocchio is untyped
-        """The Pinocchio model of this chain, with a frame ``flange``; rotors are `armature`."""
+        """The Pinocchio model of this chain, with a frame ``flange``; rotors: `armature`."""
         pin = needed("pinocchio", "a Pinocchio model (simulation, replay, --as-printed)")
 
         model = pin.Model()
@@ -165,9 +165,8 @@ def symmetric(entries: Sequence[float] | Array) -> Array:
 def unphysical(mass: float, inertia: Array, *, triangle: bool = True) -> str:
     """Why no body can have this mass and tensor about its centre, or "".
 
-    A tensor of a real mass distribution has non-negative principal moments, none larger
-    than the sum of the other two, the inequality of a `triangle`. Published tables are
-    rounded, so 1e-6 of the largest moment is let pass.
+    Principal moments are not negative, none larger than the sum of the other two
+    (`triangle`), but for 1e-6 of the largest: published tables are rounded.
     """
     if not np.isfinite(mass) or mass < 0:
         return f"mass is {mass:g} kg; it must be zero or positive"
@@ -188,8 +187,7 @@ def unphysical(mass: float, inertia: Array, *, triangle: bool = True) -> str:
 def nearest_tensor(inertia: Array) -> Array:
     """The nearest tensor that a body can have, itself if it can. [kg·m²]
 
-    The second moments Σ = ½ tr(I) 1 − I of a body's mass have no negative eigenvalue;
-    those that are negative become zero.
+    Negative eigenvalues of the second moments Σ = ½ tr(I) 1 − I of its mass become zero.
     """
     if not unphysical(0.0, inertia):
         return inertia
@@ -211,7 +209,7 @@ CONVENTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 def kinematics(
     convention: str, joints: Sequence[Mapping[str, Any]], document: Mapping[str, Any]
 ) -> tuple[list[Pose], list[Pose]]:
-    """Chain frames of a table, the flange's last, and the inertial frames in those of joints."""
+    """Chain frames of a table, the flange's last, and inertial frames in the joints'."""
     out = Pose(np.eye(3), np.array([0.0, 0.0, document.get("flange_d", 0.0)]))
     turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
     tip = out @ Pose(turn, np.array(document.get("ee_xyz", (0.0, 0.0, 0.0)), float))
@@ -268,15 +266,15 @@ def flange_jacobian(chain: Chain, q: Array) -> Array:
 
 
 def points_on(poses: Pose, link: Indices | int, share: Array | float) -> Array:
-    """Points along links, from their joints (0) to the next (1), in base axes. (T, …, 3) [m]"""
+    """Points along links, joint (0) to next joint (1), in base axes. (T, …, 3) [m]"""
     start, end = poses.translation[:, link - 1], poses.translation[:, link]
     return (1.0 - share) * start + share * end
 
 
 def link_jacobian(poses: Pose, link: int, share: float = 1.0) -> Array:
-    """Jacobian of a point along a link in base axes; the last link's end is the flange. (T, 6, n)
+    """Jacobian of a point along a link, in base axes. (T, 6, n)
 
-    Columns of joints that do not move it are zero.
+    The last link ends at the flange. Columns of joints that do not move the point are zero.
     """
     axes = poses.rotation[:, :-1, :, 2].transpose(2, 1, 0)
     places = poses.translation[:, :-1].transpose(2, 1, 0)

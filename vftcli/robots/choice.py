@@ -1,4 +1,4 @@
-"""What a user may choose of the robot: which arm, its friction model, what it carries."""
+"""A user's choice of robot: the arm, its friction model and its load."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated

@@ -1,11 +1,11 @@
-"""Robots from descriptions (URDF, xacro, MJCF), and from a TOML beside them what these cannot say.
+"""Robots from descriptions (URDF, xacro, MJCF), with a TOML beside them.
 
-The TOML has the description's name, its `tip` and `lock` say which arm it is and where the rest
-is held, its ``[[joints]]`` match by name.
+The TOML says what these cannot: it has the description's name, `tip` and `lock` for the
+arm and the held rest, and ``[[joints]]`` that match by name.
 
-A xacro is a program that writes a URDF: the package xacro expands it, which needs no ROS.
-Packages that it names with $(find NAME) are looked for beside the file and above it, by
-their `package.xml`. A process of its own expands it, since a program need not end.
+A xacro is a program that writes a URDF. The package xacro expands it without ROS, in a
+process of its own, since a program need not end. Packages of $(find NAME) are looked for
+beside the file and above it, by their `package.xml`.
 """
 
 import json

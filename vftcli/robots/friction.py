@@ -1,21 +1,19 @@
-"""Friction models: torque lost in a joint, by its velocity, its load and what it did before.
+"""Friction models: torque lost in a joint, by velocity, load and past motion.
 
 Each model has presliding friction a·s too, s the state of the play operator
 (`vftcli.robots.running_friction`): a and the Coulomb torque together are the dry friction
 of steady sliding. All but a constant offset follows the joint's temperature where the
-robot has a law for it: a cold gear rubs more than a warm one. The law is that of
-Universal Robots' controllers, a sum of two exponentials that falls with the temperature T
-of the joint in °C,
+robot has a law: that of Universal Robots' controllers, two exponentials that fall with
+the temperature T of the joint in °C,
 
     s(T) = p₁ e^(p₂ T) + p₃ e^(p₄ T),
 
-by joint size. Friction stated at a reference temperature T₀ is multiplied with
-s(T)/s(T₀). Logs with target current and target torque follow it within 1 % on joints that
-carry nothing, at 28 to 38 °C; the numbers themselves were measured for friction at 44 to
-45 °C.
+by joint size. Friction stated at a temperature T₀ is multiplied with s(T)/s(T₀). Logs
+with target current and target torque follow it within 1 % on unloaded joints, at 28 to 38
+°C; the numbers were measured for friction at 44 to 45 °C.
 
-A joint at rest holds any torque within its dry friction ±F_c, and nobody sees which: the
-shares of F_c that are allowed for it are at the end of this file.
+A joint at rest holds an unknown torque within its dry friction ±F_c: the shares of F_c
+allowed for it are at the end of this file.
 """
 
 from collections.abc import Callable, Sequence
@@ -192,8 +190,7 @@ def lawless(law: Sequence[float]) -> str:
 def friction_factor(friction: Sequence[JointFriction], temperature: Array) -> Array | None:
     """Factor of each joint's friction, None where none has a law. (T, n) [1]
 
-    Where a joint's temperature [°C] is NaN, not measured, it is 1, as at the reference
-    temperature.
+    It is 1 where a temperature [°C] is NaN, not measured, as at the reference temperature.
     """
     if not any(joint.temperature for joint in friction):
         return None
@@ -215,8 +212,7 @@ def friction_torque(
 ) -> Array:
     """Friction torque, opposing motion when subtracted. (T, n) [N·m]
 
-    Joint by joint, so that a chunk of one stays in the cache. Along a motion,
-    `RunningFriction` follows the presliding state.
+    Joint by joint, for the cache. `RunningFriction` follows the presliding state.
 
     Args:
         friction: One model a joint; empty for a frictionless arm.
@@ -253,7 +249,7 @@ def friction_torque(
 def steady_torque(friction: JointFriction, dq: Array) -> Array:
     """One joint's friction in steady sliding, without what fades. [N·m]
 
-    Presliding friction is fully deflected, and what the numbers hold for is the temperature.
+    Presliding friction is fully deflected, at the numbers' own temperature.
     """
     absent = dict.fromkeys({"offset", "stribeck"} & friction.parameters.keys(), 0.0)
     steady, v = (replace(friction, parameters={**friction.parameters, **absent}),), dq[:, None]
@@ -263,8 +259,8 @@ def steady_torque(friction: JointFriction, dq: Array) -> Array:
 def falling_speed(friction: JointFriction, limit: float) -> float:
     """Lowest speed up to `limit` where a friction falls, or NaN. [rad/s]
 
-    Dry friction that fades (Stribeck) falls by nature and an offset is no friction: both
-    are left out. What then rises with the velocity also opposes every motion.
+    Fading dry friction (Stribeck) and an offset are left out. What then rises with the
+    velocity also opposes every motion.
     """
     if not np.isfinite(limit):
         return float("nan")
@@ -302,8 +298,8 @@ def dry_torques(robot: Robot) -> Array:
 def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     """Half the step of a joint's friction where its velocity turns. Like `load`
 
-    It is made of the parameters: at some low speed smoothing, viscous part and fading
-    would count in it. Presliding friction is held at rest, in full or in part.
+    It is made of the parameters: at a low speed smoothing, viscosity and fading would
+    count. Presliding friction is held at rest, in full or in part.
     """
     known = joint.parameters
     coulomb = sum(known.get(key, 0.0) for key in ("coulomb", "stribeck", "presliding"))
@@ -312,13 +308,11 @@ def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     return coulomb + known.get("load_coulomb", 0.0) * np.abs(load)
 
 
-#: Standard deviation of a torque that rests anywhere within ±F_c, as a share of F_c, and
-#: of the difference of two such torques: analytic.
+#: Deviation of a uniform torque within ±F_c, and of the difference of two: analytic. [F_c]
 ONE_STOP, TWO_STOPS = np.sqrt(1.0 / 3.0), np.sqrt(2.0 / 3.0)
 
-#: The same of two torques where the whole arm rests at the same place after the same
-#: motion, as long as nobody touches it: three runs of one motion of a UR10e differ by .05
-#: to .5 of F_c, .13 in the mean.
+#: The latter where the whole arm rests at one place after one motion, untouched: three runs of
+#: one motion of a UR10e differ by .05 to .5 of F_c, .13 in the mean.
 REPEATED_STOP = 0.13
 
 #: What an observer reads on a joint at rest, rms: on real UR10e logs .31 to .61 of F_c.

@@ -18,8 +18,7 @@ out, one pass back:
 of (14) and G of (16), exactly rather than by differences; the tests hold them against
 Pinocchio's mass matrix, Coriolis matrix and gravity.
 
-The equations are recorded once for an arm (`tape`), with its constants in them, and
-replayed on chunks of samples.
+An arm's equations are recorded once (`tape`), constants included, and replayed on chunks.
 
 The torque regressor is rigid-body torque as a matrix times the inertial parameters,
 τ = Y(q, q̇, q̈) φ with ten numbers a link, in the chain's own frames and Pinocchio's
@@ -48,8 +47,7 @@ from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, constants
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import cross, skew
 
-#: Samples worked on at a time: so many that calling an operation costs little beside it;
-#: more than some 6000 gain nothing. Blocks of a long log hold whole chunks.
+#: Samples at a time: more than some 6000 gain nothing. Blocks of a long log hold whole chunks.
 CHUNK = 8192
 KEPT = 4  #: Programs that are kept, some 5 MB each: those of the arm in hand.
 #: A rotation's entry, or an inertia's share, that counts as zero.
@@ -65,7 +63,7 @@ class MomentumTerms(NamedTuple):
 
 
 def felt_bodies(chain: Chain) -> tuple[Array, Array]:
-    """Bodies that move as the arm's links do, with as few numbers as possible (base parameters).
+    """Bodies equal to the links in motion, with fewest numbers (base parameters).
 
     Returned are their inertias J about the origins of the links' frames (n, 3, 3) [kg·m²]
     and first moments h = m c (n, 3) [kg·m]. Their masses are zero.
@@ -211,7 +209,7 @@ def cosine_and_sine(q: Array, cosine: Array, sine: Array) -> None:
 
 
 def momentum_terms(chain: Chain, q: Array, dq: Array) -> MomentumTerms:
-    """Evaluate p = M q̇, Cᵀq̇ and g for every sample of `q` [rad] and `dq` [rad/s]. (T, n)"""
+    """Terms p = M q̇, Cᵀq̇ and g of each sample of `q` [rad], `dq` [rad/s]. (T, n)"""
     terms = MomentumTerms(*(empty_series(*q.shape) for _ in range(3)))
     for span, _, chunk in momentum_chunks(chain, q, dq, ("p", "coriolis", "gravity")):
         for whole, part in zip(terms, chunk, strict=True):
@@ -248,8 +246,7 @@ def link_columns(
 def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
     """The inertial regressor of every sample. (N, n, 10n)
 
-    Only the chain's geometry and gravity are used. Memory is 80 n² bytes a sample: call
-    it on a chunk of a long log.
+    Of the chain it uses geometry and gravity. It takes 80 n² bytes a sample: pass chunks.
     """
     samples, n = q.shape
     out = np.zeros((n, n, LINK, samples))
@@ -281,8 +278,7 @@ def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
 def load_wrench(chain: Chain, q: Array) -> Array:
     """Wrench of a load's weight, by its mass and moment m·c. (N, 6, 4)
 
-    A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange
-    point.
+    A mass m at c in flange axes pulls with m g₀ and turns by R m c × g₀ about the flange.
     """
     gravity = chain.gravity
     wrench = np.zeros((len(q), 6, 4))

@@ -1,4 +1,4 @@
-"""The mesh files that a URDF names: found near it, placed on the links of its arm, and read.
+"""Mesh files of a URDF: found near it, placed on its arm's links, and read.
 
 Packages that it names are looked for above the file and beside the folders there, by
 their `package.xml`, else by the name of a folder above it.
@@ -108,10 +108,9 @@ def packages_near(path: Path) -> Iterator[tuple[str, str]]:
 
 
 def read_mesh(mesh: Mesh) -> Array:
-    """Triangles of a mesh on its link, their corners counter-clockwise from outside. (F, 3, 3) [m]
+    """Triangles of a mesh on its link, counter-clockwise from outside. (F, 3, 3) [m]
 
-    Raises RobotError where its file is not there, is no STL, OBJ or DAE, or holds no
-    triangle.
+    Raises RobotError if its file is missing, no STL, OBJ or DAE, or without a triangle.
     """
     try:
         found = CORNERS[Path(mesh.name).suffix.lower()]((mesh.file or Path()).read_bytes())
@@ -147,7 +146,7 @@ def obj_corners(contents: bytes) -> Array:
 
 
 def dae_corners(contents: bytes) -> Array:
-    """Triangles of a DAE with the poses of its nodes, its axes as they are. (F, 3, 3) [m]"""
+    """Triangles of a DAE, placed by its nodes, in its own axes. (F, 3, 3) [m]"""
     root, found = ET.fromstring(contents), list[Array]()
     for each in root.iter():
         each.tag = each.tag.rpartition("}")[2]
@@ -197,7 +196,7 @@ CORNERS = {".stl": stl_corners, ".obj": obj_corners, ".dae": dae_corners}
 
 
 def collada(contents: bytes) -> tuple[bytes, float]:
-    """A mesh with z up, in metres where it is a DAE, and the unit that its numbers are in. [m]
+    """A mesh with z up, a DAE's in metres, and the unit of its numbers. [m]
 
     Robot descriptions ignore a DAE's axis and Rerun its unit; other files state neither.
     """

@@ -1,4 +1,4 @@
-"""Robot files, TOML of schema 1: read and checked, and written so that the same robot is read."""
+"""Robot files, TOML of schema 1: read, checked, and written to read alike."""
 
 import itertools
 import math

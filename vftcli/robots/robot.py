@@ -42,8 +42,7 @@ class JointFriction(Shown):
     parameters: Mapping[str, float] = field(default_factory=dict)
     speeds: tuple[float, ...] = ()  #: Speeds of the model "points", rising. [rad/s]
     torques: tuple[float, ...] = ()  #: Friction at these speeds. [N·m]
-    #: p₁ to p₄ of the law that friction follows with the joint's temperature, as in
-    #: `vftcli.robots.friction`; none where it is not known to follow one.
+    #: p₁ to p₄ of friction's temperature law (`vftcli.robots.friction`); empty without one.
     temperature: tuple[float, ...] = ()
     #: Joint temperature at which the model's numbers hold, None where nobody says. [°C]
     temperature_at: float | None = None
@@ -127,8 +126,8 @@ class Robot(Shown):
     ros_state: str = ""
     #: Names of joints that turn on and on: their positions may be logged within a turn.
     endless: tuple[str, ...] = ()
-    #: The friction that a simulator's description gives the joints, for
-    #: ``model.friction=model``; empty where there is none.
+    #: The joints' friction in a simulator's description, for ``model.friction=model``, or
+    #: empty.
     simulated_friction: tuple[JointFriction, ...] = ()
     payload: Payload | None = None  #: The load mounted on the flange, or None.
     #: Further loads by name, for ``--payload NAME``.
@@ -223,7 +222,7 @@ class Robot(Shown):
 
 
 class FlangeSolver:
-    """Joint positions that bring the flange to a pose, inside the joint limits where asked.
+    """Joint positions with the flange at a pose, inside joint limits if `limited`.
 
     A pose counts as reached when position and rotation error are below `reached`. [m, rad]
     """
@@ -240,7 +239,7 @@ class FlangeSolver:
         self.upper: Array | float = robot.limits.q_max if limited else np.nan
 
     def pose(self, q: Array) -> Pose:
-        """Orientation (3, 3) and origin (3,) [m] of the flange in the base at `q` (n,) [rad]."""
+        """Flange orientation (3, 3) and origin (3,) [m] in the base, at `q` (n,) [rad]."""
         self.pin.framesForwardKinematics(self.model, self.data, np.asarray(q, float))
         place = self.data.oMf[self.frame]
         return Pose(np.array(place.rotation), np.array(place.translation))

@@ -2,11 +2,10 @@
 
 Every complaint names the line that is wrong.
 
-Numbers beyond the bounds are a slip of the pen or of the unit. The bounds are wide on
-purpose, an order of magnitude or more beyond the largest arm built (2.3 t payload, 12 t
-of its own, 4.7 m reach) and beyond any motion an arm can make: a file inside them may
-still be wrong, one outside them cannot be right. A torque computed from numbers inside
-them is finite.
+Numbers beyond the bounds are slips, or in another unit: the bounds are an order of
+magnitude or more beyond the largest arm built (2.3 t payload, 12 t of its own, 4.7 m
+reach) and beyond any motion of an arm. A file inside them may still be wrong, but its
+torques are finite.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""A run: a log in its robot's order of joints, and what the model says of it, evaluated once."""
+"""A run: a log in its robot's order of joints, with its model's terms made once."""
 
 import re
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ BULKY = (*SERIES[1:], "smooth_gap", "smooth_model", "smooth_dq")
 class Run(Shown):
     """A recording, or a part of one, and what the robot's model says of it.
 
-    Less an error of its model it is a run again: an observer does not know the difference.
+    Less an error of its model it is a run again.
     """
 
     recording: Recording  #: The recording.
@@ -159,7 +159,7 @@ class Run(Shown):
         return replace(self, recording=motion).holding(**values)
 
     def spare(self, *others: str) -> None:
-        """Of a long recording give back what is `BULKY`, and others that can be made again."""
+        """Free `BULKY` and `others` of a long recording; they can be made again."""
         self.recording.release()
         if self.recording.samples > LONG:
             if terms := vars(self).get("terms"):
@@ -205,8 +205,7 @@ NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
 def paired(recording: Recording, robot: Robot) -> Recording:
     """A log in the robot's order of joints, positions and torques of the links.
 
-    Where both have joint names these alone decide, and joints that the robot has not are
-    left out.
+    If both have joint names, these decide, and joints unknown to the robot are left out.
     """
     named = recording.joint_names
     tables = robot.document.get("joints", ())
@@ -243,8 +242,7 @@ def paired(recording: Recording, robot: Robot) -> Recording:
 def unwound(recording: Recording, robot: Robot) -> Recording:
     """The recording without jumps of a turn in the positions of endless joints.
 
-    A position that changes by more than half a turn between two samples was wrapped into
-    one.
+    A change by more than half a turn between two samples is a wrapped position.
     """
     endless, changed = np.isin(robot.chain.names, robot.endless), {}
     if recording.joints != robot.joints:

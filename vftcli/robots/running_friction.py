@@ -1,15 +1,14 @@
-"""Friction along a log: what it remembers of the motion so far, and how warm its joints are.
+"""Friction along a log: its memory of the motion, and its joints' temperature.
 
-The teeth of a gear give before they slide, which the angle alone tells.
+The teeth of a gear give before they slide: the angle alone shows it.
 
 The play (backlash) operator follows the joint angle q at a distance of at most the
 presliding length s₀,
 
     cᵗ = clip(cᵗ⁻¹, qᵗ − s₀, qᵗ + s₀),   sᵗ = (qᵗ − cᵗ)/s₀ ∈ [−1, 1],
 
-so that s is the sign of the motion once the joint has moved 2 s₀, and holds its value
-while the joint rests. It is causal and asks for no velocity and no clock: across a gap
-only the net displacement counts.
+so that s is the sign of the motion once the joint has moved 2 s₀, and is held at rest. It
+is causal and needs no velocity or clock: across a gap only the net displacement counts.
 
 References:
     A. Visintin, "Differential Models of Hysteresis", Springer, 1994, Ch. III, for play and stop;

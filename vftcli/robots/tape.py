@@ -1,8 +1,8 @@
-"""Equations recorded once, on values instead of numbers, and replayed on arrays of samples.
+"""Equations recorded once, on values, and replayed on arrays of samples.
 
-Equations written on `Value`s leave a list of operations behind, each on whole rows of
-samples. Whatever they multiply by zero or by one, and whatever nothing asked for depends
-on, is not in it: an arm's special angles and symmetries need no case of their own.
+Equations on `Value`s leave a list of operations on whole rows of samples, without
+products by zero or one and without unused results: an arm's special angles and symmetries
+need no case of their own.
 """
 
 import math
@@ -185,7 +185,7 @@ class Program:
 
 
 def empty_rows(rows: int, samples: int) -> Array:
-    """Uninitialised rows, each from the start of a cache line (64 B) on: a fifth of the time."""
+    """Uninitialised rows, each from a cache line (64 B) on: a fifth of the time."""
     width = -(-samples // 8) * 8
     memory = np.empty(rows * width + 8)
     start = -memory.ctypes.data // 8 % 8
@@ -195,9 +195,9 @@ def empty_rows(rows: int, samples: int) -> Array:
 def in_few_rows(
     operations: Sequence[Operation], inputs: int, outputs: Sequence[int | None]
 ) -> tuple[list[Operation], int]:
-    """Operations on rows that are used anew once nothing needs them, and how many rows these are.
+    """Operations on as few rows as possible, and the number of rows.
 
-    The outputs come first, in their order, then the inputs.
+    A row is used anew once nothing needs it. Outputs come first, in order, then the inputs.
     """
     last = {row: k for k, op in enumerate(operations) for row in op.reads}
     place = {row: k for k, row in enumerate([*outputs, *range(inputs)])}

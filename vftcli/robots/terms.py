@@ -1,7 +1,6 @@
-"""Dynamics terms p and μ of a log, all an observer sees of it, and their raw disturbance.
+"""Dynamics terms p and μ of a log, the input of observers; raw disturbance.
 
-The raw disturbance is the external torque as p and μ show it unfiltered, with all their
-noise.
+The raw disturbance is the external torque by p and μ, unfiltered, with all their noise.
 """
 
 from collections.abc import Iterable
@@ -21,8 +20,7 @@ from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.rest import REST, slower
 from vftcli.signals.series import Clock, gaps_of, median_step, resample_columns, runs_of
 
-#: How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg
-#: through the constants of a UR10e's maker. [1]
+#: Deviation of drive constants and sensors: a UR10e's make 2.88 kg of a weighed 2.805 kg. [1]
 CONSTANT_SD, SENSOR_SD = 0.03, 0.01
 STEP = 1e-7  #: Δq of (10). [rad]
 
@@ -145,9 +143,9 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
 def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  # noqa: ANN401
     r"""P, Cᵀq̇ and g as the paper prints them, (7)–(16), from inverse dynamics alone.
 
-    It is slow (n + 3 calls of RNEA a sample) and good to about 5e-6 N·m, because (11)
-    differentiates numerically. It stays for three purposes: an oracle that shares no code
-    with the kernels, the ``--as-printed`` path, and the baseline of the benchmark.
+    It takes n + 3 calls of RNEA a sample and is good to about 5e-6 N·m, as (11)
+    differentiates numerically. It is an oracle without code of the kernels, the
+    ``--as-printed`` path, and the baseline of the benchmark.
 
     p = rnea(q, 0, q̇, 0) (8); Ṁq̇ ≈ Σᵢ [rnea(q+Δqᵢ, 0, q̇, 0) − p]/Δq · q̇ᵢ (11);
     Cq̇ = rnea(q, q̇, 0, 0) (12); Cᵀq̇ = Ṁq̇ − Cq̇ (14); G = rnea(q, 0, 0, g₀) (16).
@@ -178,9 +176,8 @@ GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch re
 def raw_disturbance(terms: DynamicsTerms) -> Array:
     """The unfiltered external torque d of every sample but the first. (T−1, n) [N·m]
 
-    d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times: the mean over a
-    sample of the external torque and of everything else that the model leaves
-    unexplained.
+    d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times: a sample's mean of
+    the external torque and of all else that the model leaves unexplained.
     """
     d = np.diff(terms.p, axis=0) / np.diff(terms.t)[:, None]
     d -= 0.5 * (terms.mu[1:] + terms.mu[:-1])
@@ -225,10 +222,9 @@ def disturbance_blocks(
 ) -> Blocks:
     """Block averages d = (s(e′) − s(e))/(e′ − e) with s = p − ∫μ.
 
-    A block of some seconds holds whole samples; what is left at the end of a stretch
-    joins the last block where it is less than half of one. A gap of the clock is a block
-    of its own, its disturbance unknown, and so is what lies between samples `inside`
-    (T,).
+    A block of some seconds holds whole samples; a rest of less than half a block joins
+    the last one of its stretch. A gap of the clock is a block of its own, its disturbance
+    unknown, and so is what lies between samples `inside` (T,).
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
@@ -258,8 +254,7 @@ def disturbance_blocks(
 def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> list[Array]:
     """The raw disturbance in unbroken stretches of an even clock. (N, n) each
 
-    On an uneven clock the integral of d is interpolated, which averages d over each new
-    step [s].
+    On an uneven clock the integral of d is interpolated: d averaged over each step [s].
     """
     t, whole = terms.t, inside[1:] & inside[:-1]
     if len(t) > 1 and is_uniform(t):

@@ -1,7 +1,6 @@
-"""What a process of its own does to expand a xacro: it ends when its time or its memory is used up.
+"""A xacro expanded in a process of its own, within bounds of time and memory.
 
-Run by its path with what is asked on standard input, as JSON; nothing of vftcli is loaded
-here.
+Run by its path, with the request as JSON on standard input; nothing of vftcli is loaded.
 """
 
 import io
