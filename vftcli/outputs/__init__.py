@@ -5,10 +5,9 @@ from typing import Annotated, Any
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import WRITE, Choice, Option
 
-#: What machines read: key, with its unit → value.
+#: Data for machines: key, with its unit → value.
 Record = dict[str, Any]
-#: How much of a log its recording holds: every sample, of a long one its levels, or no
-#: recording.
+#: A recording's part of its log: every sample, levels, or no recording.
 #:
 #: Levels are the lowest and highest samples of many stretches, and every sample where
 #: contacts begin.
@@ -21,7 +20,7 @@ class OutputChoice(Choice):
     GROUP = WRITE
 
     extras: tuple[str, ...] = ()  #: Names of `estimates.EXTRAS`.
-    #: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.
+    #: The recording's part of the log: `FULL`, `LEVELS` or `NONE`.
     detail: Annotated[
         str,
         Option(
@@ -43,4 +42,4 @@ class OutputChoice(Choice):
             )
 
 
-PLAIN = OutputChoice()  #: What is written where nothing is asked for.
+PLAIN = OutputChoice()  #: The default files.

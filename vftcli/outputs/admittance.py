@@ -1,4 +1,4 @@
-"""Outputs of an admittance replay: page, motion, comparison, figures, `run.json`, and lines.
+"""Outputs of an admittance replay: page, motion, comparison, figures, `run.json`.
 
 The page has Figs 6/9, 7/10, 12/13 and Tables III/IV of the paper for the user's log.
 """
@@ -62,7 +62,7 @@ CONVENTIONS = {
     "row": "a deviation follows from the force of the row before it",
     "units": "s, m, rad, N, N·m, J",
 }
-#: Key of a controller's record → its field.
+#: Key of a controller's record → field.
 CONTROLLER = {
     "name": "name", "kind": "kind", "alpha": "alpha", "xi": "xi", "recovery_damping": "damping",
     "discrete_number_drag": "drag", "discrete_number_recovery": "recovery",
@@ -100,7 +100,7 @@ def write_admittance(
 
 
 def motion_table(replay: Replay) -> pl.DataFrame:
-    """Everything along time, flat columns; what is not known is null.
+    """Everything along time, flat columns; null where unknown.
 
     ``t`` [s]; ``force/fx``… [N, N·m]; ``x/<controller>/x``… [m, rad];
     ``v/<controller>/x``…; ``q/<controller>/1``… [rad]; ``reached/<controller>`` 1 or 0;
@@ -109,7 +109,7 @@ def motion_table(replay: Replay) -> pl.DataFrame:
     motion, columns = replay.motion, {"t": replay.motion.t}
     columns |= per_axis("force", padded(replay.wrench))
     for n, controller in enumerate(replay.controllers):
-        # A slash would make one more level of the column's name.
+        # A slash would add a level to the column's name.
         label = controller.name.replace(" ", "").replace("/", "-")
         for k, axis in enumerate(AXES):
             columns[f"x/{label}/{axis}"] = motion.x[:, n, k]
@@ -122,7 +122,7 @@ def motion_table(replay: Replay) -> pl.DataFrame:
 
 
 def admittance_record(made: Replayed, command: str) -> Record:
-    """Everything that `run.json` of a replay holds."""
+    """Content of a replay's `run.json`."""
     replay, recording, run, examinations = made
     p, logs, loop = replay.parameters, [recording] if recording else [], None
     if run is not None:
@@ -174,7 +174,7 @@ def render_admittance(found: Replayed, record: Record, title: str) -> str:
         f"{lost} poses out of reach" if lost else "",
     )
     controllers = counted(len(replay.controllers), "admittance controller")
-    # A variable controller by the name that the charts' legend has for its α.
+    # A variable controller by its name in the charts' legend.
     variable = [c for c in replay.controllers if c.kind == "variable"]
     names = {(axis, c.alpha[k]): c.name for c in variable[::-1] for k, axis in enumerate(AXES)}
     named = [
@@ -201,7 +201,7 @@ def render_admittance(found: Replayed, record: Record, title: str) -> str:
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
-    """Every controller with its colour: the traditional one's is that of the page's ink."""
+    """Every controller with its colour; the traditional one has the page's ink."""
     # Colours of variable controllers, again from the first.
     spare = iter(SPARE * len(replay.controllers))
     return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
@@ -243,18 +243,18 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
 
 
 def padded(values: Array) -> Array:
-    """Rows with an unknown one more: the last deviation follows from the force before it."""
+    """Rows with an unknown one more: a deviation follows from the force before it."""
     return np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])
 
 
 def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, Drawing]:
-    """Force and deviation along the axes that were dragged; none where nothing moved."""
+    """Force and deviation along dragged axes; none if nothing moved."""
     moved = [k for k in range(len(AXES)) if np.nanmax(np.abs(replay.motion.x[:, :, k])) > 0.0]
     dragged = {row["axis"] for row in replay.rows}
     shown = [k for k in moved if AXES[k] in dragged] or moved
 
     def draw(width: float) -> "Figure":
-        """Deviations under every controller, above them the force where there is one."""
+        """Deviations under every controller, below the force if there is one."""
         deviation, force, *_ = charts(replay, run)
         columns = min(len(shown), 3 if width > NARROW else 2)
         plots = []

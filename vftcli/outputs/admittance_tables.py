@@ -16,7 +16,7 @@ TITLE = "The same force through every controller"  #: Of the comparison.
 
 
 def number_form(form: str) -> Callable[[float], str]:
-    """How a number is printed with a true minus sign."""
+    """Format of a number with a true minus sign."""
     return lambda value: minus(format(value, form))
 
 
@@ -40,7 +40,7 @@ COLUMNS = {
     "idle_s": Column("idle", "s", THIRD, seldom=True),
     "work_J": Column("work", "J", THIRD, seldom=True),
 }
-#: What is timed of a contact → its heading.
+#: Latency of a contact → its heading.
 LATENCIES = {
     "force": "force",
     "detection": "detected",
@@ -49,14 +49,14 @@ LATENCIES = {
     "reaction": "detection to motion",
     "turn": "withdrawal to turn",
 }
-#: What the headings of the LaTeX table mean.
+#: Meaning of headings in LaTeX.
 RETURNS = (
     "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there",
 )
 
 
 def comparison_grid(rows: Sequence[Record], title: str = "") -> Grid:
-    """Every controller on one force (Figs 7 and 10), below each other by axis and drag."""
+    """Every controller on one force (Figs 7 and 10), sorted by axis and drag."""
     # Sorting keeps the order of the controllers within a drag.
     ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
     return keyed_grid(COLUMNS, ordered, title, swatches=True)
@@ -75,7 +75,7 @@ def latency_rows(run: ClosedLoop) -> list[Record]:
 
 
 def latency_grid(run: ClosedLoop) -> Grid:
-    """The latencies of a closed loop, from the true force and as the paper times them."""
+    """The latencies of a closed loop, from the true force and as in the paper."""
     columns = {
         "axis": "axis",
         **{f"{name}_s": Column(head, "s", ".3f") for name, head in LATENCIES.items()},
@@ -107,7 +107,7 @@ def parameter_grid(replay: Replay) -> Grid:
 
 
 def stability_grid(replay: Replay) -> Grid:
-    """The numbers that decide before anything moves: the worst of the axes of each kind."""
+    """Stability numbers before any motion: the worst axis of each kind."""
     rows: Rows = []
     kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
     for controller in replay.controllers:
@@ -123,7 +123,7 @@ def stability_grid(replay: Replay) -> Grid:
 
 
 def latex_text(replay: Replay) -> str:
-    """The parameters (Tables III and IV of the paper) and the comparison as LaTeX tables."""
+    """Parameters (Tables III and IV of the paper) and comparison as LaTeX tables."""
     grids = [parameter_grid(replay)]
     if replay.rows:
         grids.append(replace(comparison_grid(replay.rows, TITLE), notes=RETURNS))

@@ -1,7 +1,7 @@
-"""BatchFolder: what many logs made, a file a log, and the tables that gather them.
+"""BatchFolder: results of many logs, a file a log, and tables of all.
 
-``rows/<key[:2]>/<key>.parquet`` is the last file that a log's result gets: where it is,
-the result is complete. ``logs/<key[:2]>/<key>/`` holds what else was made of the log.
+``rows/<key[:2]>/<key>.parquet`` is the last file of a log's result, and marks it as
+complete. ``logs/<key[:2]>/<key>/`` holds the log's other files.
 """
 
 import json
@@ -25,17 +25,17 @@ from vftcli.outputs.partial import check_writable, held
 from vftcli.outputs.run_record import to_json
 from vftcli.signals.errors import OutputError
 
-#: What the rows of a folder were made with; the first file of a batch to come.
+#: Command and options of a folder's rows; the first file of a batch.
 MARKER = "batch.json"
 
 TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
 
-GATHERED = (TABLE, FAILURES, PAGE, SEAL)  #: Files that are made anew by every run.
+GATHERED = (TABLE, FAILURES, PAGE, SEAL)  #: Files made anew by every run.
 PIECE = 500  #: Logs with rows in memory at a time.
 
 
 class BatchFolder:
-    """The folder of a batch; its gathered table has a name of its own where one is given."""
+    """The folder of a batch; `table` is the name of its gathered table."""
 
     def __init__(self, path: Path, table: str = TABLE) -> None:
         self.path, self.table = Path(path), table
@@ -51,14 +51,14 @@ class BatchFolder:
         return f"logs/{key[:2]}/{key}"
 
     def made(self, name: str) -> Path:
-        """A folder of its own for what is made before the work."""
+        """A folder `name` for files made before the work."""
         place = self.path / "made" / name
         place.mkdir(parents=True, exist_ok=True)
         return place
 
     @contextmanager
     def opened(self, options: str, record: Record, *, force: bool) -> Iterator[None]:
-        """Make the folder, or take up the batch in it, for a block; nobody else does meanwhile."""
+        """Make or resume the batch folder for a block, held against other runs."""
         with writing(self.path):
             check_letters(self.path)
             self._check(options, force=force)
@@ -75,7 +75,7 @@ class BatchFolder:
                 ) from None
 
     def _check(self, options: str, *, force: bool) -> None:
-        """Raise an OutputError where the folder is another's."""
+        """Raise an OutputError if the folder is another batch's."""
         if not (self.path / MARKER).is_file():
             there = [name for name in (*GATHERED, "rows", "logs") if (self.path / name).exists()]
             if there and not force:
@@ -97,7 +97,7 @@ class BatchFolder:
             )
 
     def keys(self) -> set[str]:
-        """The keys of all logs that are done."""
+        """Keys of finished logs."""
         found = self.rows.glob("*/*.parquet") if self.rows.is_dir() else ()
         return {path.stem for path in found}
 
@@ -109,7 +109,7 @@ class BatchFolder:
             rows.write_parquet(file, compression="zstd", statistics=False)
 
     def gather(self, logs: pl.DataFrame, schema: Record) -> Iterator[pl.DataFrame]:
-        """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first."""
+        """Rows of all logs in their order, `PIECE` logs at a time."""
         for part in logs.iter_slices(PIECE) if logs.height else (logs,):
             files = [self.row_file(key) for key in part["key"].unique(maintain_order=True)]
             rows = pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
@@ -122,7 +122,7 @@ class BatchFolder:
         page: Callable[[], str],
         record: Record,
     ) -> None:
-        """Write the tables, a row group a piece, and the page, and at last their seal."""
+        """Write the tables, a row group a piece, then the page, then their seal."""
         from pyarrow.parquet import ParquetWriter
 
         (self.path / SEAL).unlink(missing_ok=True)

@@ -1,8 +1,8 @@
-"""Can it be believed? What supports an answer and what limits it, each with its remedy.
+"""Grounds to believe an answer or not, each with its remedy.
 
-Everything comes from the analysis' data: the examinations, the contact list, the robot's
-friction, the clock, which joints rest, and whether anything measures the force
-independently. The terminal, the page and ``run.json`` show the same items.
+They come from the analysis: examinations, contact list, friction, clock, joints at rest,
+and an independent measurement of the force. Terminal, page and ``run.json`` show the
+same items.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,7 +26,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, sentence
 from vftcli.signals.rest import slower
 
-#: Subject → the findings that are about it; any other is about the drives' effort.
+#: Subject → its findings; any other is about the drives' effort.
 SUBJECTS = {
     "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-not-mounted",
              "payload-not-carried", "load-changes"),
@@ -48,7 +48,7 @@ SUBJECTS = {
 LOADS = {"unmodelled-load", "light-load", "payload-mismatch", "contact-is-load"}
 
 
-#: What the remarks of a list of contacts are about.
+#: Remark of a list of contacts → its subject.
 LIST_SUBJECTS = {
     "contact-is-load": "lasting contact",
     "arm-stopped-abruptly": "stop",
@@ -56,13 +56,12 @@ LIST_SUBJECTS = {
     "free-part-misses-joints": "not moved",
     "no-wrench-of-few-joints": "wrench",
 }
-#: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a
-#: sign or the effort is another.
+#: Above this unexplained share of torques the arm, a sign or the effort is wrong.
 MOST_UNEXPLAINED = 0.5
-MOST_OFF = 4  #: Rows that miss their sensor reading, at most so many are named.
-FULL_OF_REST = 0.5  #: A joint that rests in more than this share of the log is said to rest.
+MOST_OFF = 4  #: Most rows named that miss their sensor reading.
+FULL_OF_REST = 0.5  #: A joint rests if it does so in more than this share of the log.
 
-#: How far an item lets the answer be believed.
+#: An item's effect on trust in the answer.
 Standing = Literal["good", "caution", "bad", "unknown"]
 #: The sign of each standing, on page and terminal.
 MARKS = {"good": "✓", "caution": "△", "bad": "✗", "unknown": "–"}
@@ -73,12 +72,11 @@ SEVERITY: tuple[Standing, ...] = ("bad", "caution", "unknown", "good")
 class Ground(NamedTuple):
     """One reason to believe an answer, or not to."""
 
-    standing: Standing  #: What it does to the answer.
-    subject: str  #: What it is about, in one to three words.
+    standing: Standing  #: Its effect on the answer.
+    subject: str  #: Its subject, in one to three words.
     sentence: str  #: What is known of it.
-    remedy: str | None = None  #: A command that would mend it, None where there is none.
-    #: Whether it was found in this log, rather than true of every log like it: what the
-    #: one line of a log among several tells.
+    remedy: str | None = None  #: A command that mends it, or None.
+    #: Whether it was found in this log, and is not true of every log like it.
     of_log: bool = True
 
     @property
@@ -88,7 +86,7 @@ class Ground(NamedTuple):
 
 
 class LogSummary(NamedTuple):
-    """One log among several: a line of the screen, of the index or of the page over a batch."""
+    """One log among several: a line of the screen, the index or a batch's page."""
 
     name: str  #: What it is called.
     robot: str  #: Its arm.
@@ -126,7 +124,7 @@ def headline(analysis: Analysis) -> str:
 
 
 def log_line(analysis: Analysis, found: Sequence[Ground]) -> LogSummary:
-    """One log's line, by its grounds; page and error are left to whoever shows them."""
+    """One log's line, by its grounds, without page and error."""
     listed, recording, worst = analysis.contacts, analysis.recording, health(found)
     count, hardest, most = DASH, DASH, None
     if listed is not None:
@@ -147,7 +145,7 @@ def log_line(analysis: Analysis, found: Sequence[Ground]) -> LogSummary:
 
 
 def grounds(analysis: Analysis) -> tuple[Ground, ...]:
-    """Every reason to believe an analysis or not, what is wrong before what limits it."""
+    """All grounds to believe an analysis or not, the bad ones first."""
     found = [
         robot_ground(analysis),
         *finding_grounds(analysis),
@@ -166,7 +164,7 @@ def grounds(analysis: Analysis) -> tuple[Ground, ...]:
 
 
 def health(found: Sequence[Ground]) -> Ground:
-    """The worst of what was found in a log itself, the first of several equally bad."""
+    """The worst ground found in a log itself, the first of equals."""
     return min((g for g in found if g.of_log), key=lambda ground: SEVERITY.index(ground.standing))
 
 
@@ -216,7 +214,7 @@ def finding_grounds(analysis: Analysis) -> Iterator[Ground]:
 
 
 def clock_ground(recording: Recording) -> Ground:
-    """Gaps in the clock, and what was dropped, turned or derived in reading."""
+    """Gaps in the clock, and repairs in reading."""
     t, steps = recording.t, np.diff(recording.t)
     longest, at = (steps.max(), t[np.argmax(steps)]) if len(steps) else (0.0, 0.0)
     gaps = int(np.count_nonzero(steps > 0.1))
@@ -297,7 +295,7 @@ def resting(recording: Recording) -> Mask:
 
 
 def joint_words(joints: Sequence[int]) -> str:
-    """Joints given from zero as ``J1…J6``, or one by one where some between are left out."""
+    """Joints, from zero, as ``J1…J6`` if without a gap, else one by one."""
     if len(joints) > 2 and joints[-1] - joints[0] == len(joints) - 1:
         return f"J{joints[0] + 1}…J{joints[-1] + 1}"
     return ", ".join(f"J{j + 1}" for j in joints)
@@ -331,7 +329,7 @@ def reference_ground(analysis: Analysis) -> Ground:
                 subject,
                 f"{reads}{missed}" if contacts else f"the log holds {name}",
                 command("compare", analysis.recording, *options),
-                # A missed reading is in this log; no sensor is no fault of it.
+                # A missed reading is a fault of this log; no sensor is not.
                 of_log=bool(missed),
             )
     words = "no force sensor in the log: sizes are unchecked"
@@ -339,11 +337,11 @@ def reference_ground(analysis: Analysis) -> Ground:
 
 
 def missed_words(contacts: Sequence[Contact]) -> str:
-    """Rows of known size that miss their sensor reading by more than their band; "" for none."""
+    """Rows of known size that miss the sensor by more than their band; "" for none."""
     off = []
     for row in contacts:
         force, band, read = row.peak_force, row.peak_band, row.sensor_force
-        # A sensor at the flange does not feel a push on a link before it.
+        # A flange sensor does not feel a push on a link before it.
         if row.is_load or not row.size_known or (row.places and 0 not in row.places):
             continue
         if read is not None and (miss := abs((force or 0.0) - read)) > (band or 0.0):
@@ -358,7 +356,7 @@ def subject_of(code: str) -> str:
 
 
 def remedy_of(finding: Remark, log: Recording, analysis: Analysis) -> str:
-    """The command that mends what a finding tells, else the one that says more about it."""
+    """The command that mends a finding, else one that says more about it."""
     robot = robot_option(analysis)
     if finding.code in LOADS:
         return payload_command(analysis)
@@ -373,7 +371,7 @@ def remedy_of(finding: Remark, log: Recording, analysis: Analysis) -> str:
 
 
 def payload_command(analysis: Analysis) -> str:
-    """The command that finds what hangs on the flange."""
+    """The command that finds the load on the flange."""
     runs = [run.recording for run in analysis.motion.runs]
     free = ["--free", path_of(runs[0])] if runs else []
     found = ("--method", "payload", "--robot", robot_option(analysis), "-o", "loaded.toml")

@@ -1,4 +1,4 @@
-"""What a benchmark says, of its table of rows: the headline, each arm, the lists, the page."""
+"""A benchmark's results from its rows: headline, arms, lists, page."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -16,11 +16,11 @@ from vftcli.outputs.grid import Column, Grid, GridCell, Rows, keyed_grid
 from vftcli.outputs.page.shell import Box, Scales, page
 from vftcli.outputs.quantity import DASH, percent, significant
 
-SILENT = 0.05  #: Share of time without an answer from which it is said.
+SILENT = 0.05  #: Share of time without an answer from which it is mentioned.
 LISTS = {"list": "counted", "list with candidates": "all"}
 COUNTS = ("found", "true_contacts", "false", "free_h")
 BY = ("arm", "protocol", "method")
-#: What lists of several logs are pooled by: sums, all of these, the largest.
+#: Pooling of several logs' lists: sums, all values, the largest.
 POOLED = (
     pl.col(*COUNTS, "found_as_load", "split", "peaks_held").sum(),
     pl.col("onset_s", "peak_error_N", "true_peak_N").explode().drop_nulls(),
@@ -73,12 +73,12 @@ HEADLINE = {
     "contact": ("skill", Column("skill", form=".2f")),
     "free": ("l1_Nm", Column("free L1", "N·m")),
 }
-#: What a mark behind an RMSE means.
+#: Meaning of a mark behind an RMSE.
 NEAR = "~: nearer to the least RMSE than the truth's own error"
 
 
 class Results:
-    """Everything that a benchmark found, pooled by arm and never across arms."""
+    """All results of a benchmark, pooled by arm and never across arms."""
 
     def __init__(self, table: pl.DataFrame) -> None:
         self.table = table
@@ -115,7 +115,7 @@ class Results:
             row |= score.numbers(np.nan if best is None or method == BEST else best.drawn)
             if part == "free":
                 row["skill"] = np.nan  # zero is perfect there: L1 and false rows speak
-            # The shift of an estimate with the least error, and its RMSE over that at 0.
+            # The estimate's shift with the least error, and its RMSE over that at 0.
             row |= {"lag_s": np.nan, "rmse_at_lag": np.nan}
             if place in shifts:
                 sums = np.sum(shifts[place]["lag_squares"].to_list(), axis=0)
@@ -125,7 +125,7 @@ class Results:
         return found
 
     def of(self, protocol: str, part: str, *, headline: bool = False) -> list[Record]:
-        """The rows of a protocol and part; in the `headline` of an exact model only if all are."""
+        """Rows of a protocol and part; the `headline` has exact models only if all are."""
         own = [row for row in self.rows if (row["protocol"], row["part"]) == (protocol, part)]
         return [row for row in own if headline and not row["exact_model"]] or own
 
@@ -145,7 +145,7 @@ class Results:
                 own: dict[str, list[float]] = {}
                 for row in self.of(protocol, part, headline=True):
                     own.setdefault(row["method"], []).append(row[key])
-                # Of a method that lacks an arm there is no mean.
+                # A method that lacks an arm has no mean.
                 full = {name: each for name, each in own.items() if len(each) == len(arms)}
                 means.append({name: float(np.mean(each)) for name, each in full.items()})
         names = [name for name in self.methods if any(name in mean for mean in means)]
@@ -160,7 +160,7 @@ class Results:
         return pooled.partition_by("protocol", "method", maintain_order=True)
 
     def lines(self) -> Iterator[str]:
-        """Below the headline: the lists in short, the arms, which methods use the future."""
+        """Lines below the headline: lists, arms, methods that use the future."""
         for rows in self.lists:
             _, protocol, method, *_ = rows.row(0)
             named = {arm for part in HEADLINE for arm in self.arms(protocol, part)}
@@ -187,7 +187,7 @@ class Results:
             yield f"in spite of a complaint (--anyway): {', '.join(marked)}"
 
     def silences(self) -> Iterator[str]:
-        """Of each protocol and method the share of time without an answer, from `SILENT` on."""
+        """Share of time without an answer, by protocol and method, from `SILENT` on."""
         for p in self.protocols:
             spoken = [row for part in HEADLINE for row in self.of(p, part, headline=True)]
             for method in dict.fromkeys(row["method"] for row in spoken):
@@ -227,7 +227,7 @@ class Results:
 
 
 def arm_texts(rows: Sequence[Record], error: float) -> list[Record]:
-    """Rows of one table with texts; marked where the truth's own error hides a difference."""
+    """A table's rows as texts, marked if the truth's error hides a difference."""
     least = min((row["rmse_Nm"] for row in rows if row["method"] != "zero"), default=0.0)
     found = []
     for row in rows:
@@ -269,9 +269,9 @@ def list_texts(row: Record) -> Record:
 
 
 def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[Record]]:
-    """Skill in contact of every arm, with its interval: scales, names from above, dots.
+    """Skill in contact of every arm, with interval: scales, arms from above, dots.
 
-    A dot has the places of the skill and of its interval's ends, NaN without one.
+    A dot has places of the skill and its interval's ends, NaN without one.
     """
     own, colours = results.of(protocol, "contact"), results.colours
     arms, methods = list(dict.fromkeys(row["arm"] for row in own)), [*colours]
@@ -296,7 +296,7 @@ def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[Recor
 
 
 def worst_charts(results: Results) -> Iterator[Chart]:
-    """The worst 10 s of `best` in every log, by the first protocol that it is scored by."""
+    """The worst 10 s of `best` in every log, by the log's first protocol."""
     drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
     for row in drawn.iter_rows(named=True):
         t, truth, best = (np.array(row[f"worst_{k}"]) for k in ("t", "truth", "estimate"))
@@ -309,9 +309,9 @@ def worst_charts(results: Results) -> Iterator[Chart]:
 
 
 def text_of(results: Results, form: str, *, every: bool) -> str:
-    """The results as CSV, as all tables in Markdown or LaTeX, or for the terminal.
+    """The results as CSV, as Markdown or LaTeX tables, or for the terminal.
 
-    The terminal has the headline and what it is about, and `every` table where it is asked.
+    The terminal has the headline and its lines, and `every` table if asked.
     """
     headline, lines = results.headline(), tuple(results.lines())
     if form == "csv":

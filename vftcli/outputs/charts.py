@@ -1,8 +1,8 @@
-"""Charts: what page, recording and figures for papers draw, in which colours, at which samples.
+"""Charts of page, recording and paper figures, with colours and drawn samples.
 
-Every chart is drawn as SVG (`page/shell.py`), one picture a joint or axis, for print and
-for readers without a script; the page's script draws a living one in its place. Of a long
-log the lowest and the highest sample of every stretch stay.
+Every chart is an SVG (`page/shell.py`), one picture a joint or axis, for print and for
+readers without a script; the page's script replaces it. Of a long log the lowest and the
+highest sample of every stretch stay.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import gaps_of
 
-#: Okabe and Ito's hues, in tones that stand out from white and from black paper alike.
+#: Okabe and Ito's hues, in tones visible on white and on black.
 COLOURS = {
     "best": "#d3224b",
     "fdo": "#2f86d0",
@@ -26,13 +26,13 @@ COLOURS = {
     "kfo-auto": "#7a6fd6",
     "rts-auto": "#a0522d",
 }
-#: For estimates that have no colour of their own, in turn.
+#: For estimates without a colour of their own, in turn.
 SPARE = ("#2f86d0", "#dd6415", "#0c9f76", "#c95fa4", "#b98900", "#7a6fd6", "#a0522d", "#5b8c00")
 #: Colours that follow the page: its text's, and the reference's.
 INK, REFERENCE = "ink", "reference"
-OLIVE = "#77801f"  #: What the page has for a blue that is no force's.
+OLIVE = "#77801f"  #: The page's colour for a blue that is no force.
 GREY = "#8a929a"  #: Both on an unknown background.
-#: The part of the arm that was touched, in words → its colour.
+#: Touched part of the arm → its colour.
 PLACES = {
     "wrist": "#dd6415",
     "forearm": "#2f86d0",
@@ -42,7 +42,7 @@ PLACES = {
 #: Dashes of lines, the first without gaps: colour alone distinguishes none.
 DASHES = ("", "7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
 QUIET = "95 % band, no contact listed"  #: What a grey ribbon is called.
-GAP_STEPS = 10.0  #: A step this many times the median is drawn as a break in the line.
+GAP_STEPS = 10.0  #: A step of this many medians breaks the line.
 STRETCHES = 150  #: Stretches of a line in a still drawing, two samples each.
 
 LineStyle = tuple[str, str]  #: Colour and dash of a line.
@@ -55,11 +55,11 @@ class ChartLine(NamedTuple):
     name: str  #: What the legend calls it.
     values: Array  #: One column a panel. (T, n)
     colour: str = INK  #: ``#rrggbb``, `INK` or `REFERENCE`.
-    dash: str = ""  #: How it is broken, as SVG says it; "" for a line without gaps.
+    dash: str = ""  #: Dashes as in SVG; "" for a line without gaps.
     #: Half the width of a ribbon about the line, NaN where it is not known. (T, n)
     half: Array | None = None
-    leads: bool = False  #: Whether it is the line to look at: drawn thicker.
-    shown: bool = True  #: Whether it is drawn at once, rather than when asked for.
+    leads: bool = False  #: Whether it is drawn thicker.
+    shown: bool = True  #: Whether it is drawn from the start.
     x: Array | None = None  #: Its own horizontal places, None for the chart's. (T,)
     #: Where the ribbon is grey: no contact is listed. None: nowhere. (T,)
     quiet: Mask | None = None
@@ -81,7 +81,7 @@ class Chart(NamedTuple):
     panels: tuple[str, ...]  #: Their names. (n,)
     x: Array  #: Horizontal places. (T,)
     series: tuple[ChartLine, ...]  #: Its lines, the last on top.
-    #: Which panels share a scale: those of one number; none for all of one unit. (n,)
+    #: Panels of one number share a scale; () for all of one unit. (n,)
     families: tuple[int, ...] = ()
     #: Half the width of a band about zero, one a panel, or None. (n,)
     band: Array | None = None
@@ -89,9 +89,9 @@ class Chart(NamedTuple):
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
     unit: str = "s"  #: Unit of the horizontal axis.
     log: bool = False  #: Whether the horizontal axis is logarithmic.
-    #: Least end of the vertical axis, which then holds 0; None for what the lines need.
+    #: Least lower end of the vertical axis, which then holds 0; None: by the lines.
     lowest: float | None = None
-    highest: float | None = None  #: Upper end, None for what the lines need.
+    highest: float | None = None  #: Upper end; None: by the lines.
 
     @classmethod
     def of_one(
@@ -101,13 +101,13 @@ class Chart(NamedTuple):
         return cls(key, title, (unit,), (title,), x, tuple(lines))
 
     def ends(self, panel: int) -> Span:
-        """Ends of a panel's vertical axis, with some room: those of all panels of its family.
+        """Ends of a panel's vertical axis, with some room, for all panels of its family.
 
         About ±1 where no value is known.
         """
         low, high, families = np.inf, -np.inf, self.families or self.units
         for j in (j for j, family in enumerate(families) if family == families[panel]):
-            # What is drawn at once, line by line: of a long log all have no room.
+            # Visible lines, one by one: all of a long log would fill the memory.
             for line in (line for line in self.series if line.shown):
                 half = 0.0 if line.half is None else np.nan_to_num(line.half[:, j])
                 for values in (line.values[:, j] - half, line.values[:, j] + half):
@@ -116,7 +116,7 @@ class Chart(NamedTuple):
                     high = max(high, float(np.max(values, where=known, initial=-np.inf)))
             if self.band is not None and np.isfinite(self.band[j]):
                 low, high = min(low, -float(self.band[j])), max(high, float(self.band[j]))
-        # A line that does not change has no scale of its own.
+        # A constant line has no scale of its own.
         room = 0.05 * (high - low) if high > low else abs(high) or 1.0
         low, high = (low - room, high + room) if low <= high else (-1.0, 1.0)
         low = low if self.lowest is None else max(min(low, 0.0), self.lowest)
@@ -125,7 +125,7 @@ class Chart(NamedTuple):
 
 def colours_of_names(names: Sequence[str]) -> dict[str, str]:
     """One colour for each estimate's name; two share one only if none is left."""
-    # An estimate without a colour of its own does not get one that another has.
+    # Spare colours are those that no estimate has.
     own = {COLOURS.get(name) for name in names}
     spare = cycle([colour for colour in SPARE if colour not in own] or SPARE)
     return {name: COLOURS.get(name) or next(spare) for name in names}
@@ -138,13 +138,13 @@ def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
 
 
 def paint(colour: str) -> str:
-    """A line's colour in the page, where blue is the force's and `best`'s alone."""
+    """A line's colour in the page, where only the force and `best` are blue."""
     own = {COLOURS["best"]: "var(--force)", INK: "var(--ink)", REFERENCE: "var(--reference)"}
     return {**own, COLOURS["fdo"]: OLIVE}.get(colour, colour)
 
 
 def families_of(limits: Array) -> tuple[int, ...]:
-    """Joints of one drive size, by their torque limits: neighbours of one limit are a family."""
+    """Family of each joint, by torque limit: neighbours of one limit share a drive."""
     runs = groupby(limits.tolist(), lambda limit: limit if np.isfinite(limit) else None)
     return tuple(number for number, (_, run) in enumerate(runs, 1) for _ in run)
 
@@ -152,9 +152,9 @@ def families_of(limits: Array) -> tuple[int, ...]:
 def drawn_line(
     chart: Chart, line: ChartLine, panel: int, stretches: int = STRETCHES
 ) -> tuple[Array, Array, list[Array]]:
-    """A line's points in a panel, and there the half widths of its ribbon and its grey part.
+    """A line's points in a panel, and half widths of its ribbon and the grey part.
 
-    Each of these two is NaN where the ribbon is the other; none without a ribbon.
+    Each is NaN where the other applies; none without a ribbon.
     """
     x = chart.x if line.x is None else line.x
     t, y = thinned(x, line.values[:, panel], stretches, log=chart.log)
@@ -170,8 +170,8 @@ def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tu
     """A series with at most two samples a stretch, and the first and last of the log.
 
     The lowest and highest sample of every stretch keep their time and value. A log of at most
-    twice as many samples is kept whole. NaN breaks the line where nothing is known and at gaps;
-    a logarithmic axis has no clock.
+    twice as many samples stays whole. NaN breaks the line at unknown values and at gaps of
+    the clock, which a logarithmic axis lacks.
     """
     gaps = np.empty(0, dtype=np.intp) if log else gaps_of(t, GAP_STEPS)
     x, y = t, values
@@ -179,7 +179,7 @@ def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tu
         starts = even_starts(len(t), stretches)
         if log:
             starts = np.unique(np.searchsorted(t, np.geomspace(t[0], t[-1], stretches)))
-        # Samples beside a gap stay, or a line would be drawn up to the wrong place.
+        # Samples beside a gap stay, so that lines end there.
         ends = extremes(values[:, None], starts)
         kept = np.unique(np.concatenate([[0, len(t) - 1], ends, gaps, gaps + 1]))
         x, y = t[kept], values[kept]
@@ -192,9 +192,8 @@ def level_rows(
 ) -> Index | None:
     """Sample numbers of a plot with one clock for all lines, None for all. (P,)
 
-    Of every stretch the lowest and highest sample of every line stay, and the first
-    unknown one, so that no spike is lost and no gap closed; and every sample of the spans
-    `whole` [s]. A log of which that would leave out nothing is kept whole.
+    Of every stretch the lowest, highest and first unknown sample of every line stay, so
+    that no spike is lost and no gap closed; of the spans `whole` [s] every sample.
     """
     if len(t) <= 2 * values.shape[1] * stretches:
         return None
@@ -217,9 +216,9 @@ def even_starts(samples: int, stretches: int) -> Index:
 
 
 def extremes(values: Array, starts: Index) -> Index:
-    """The first lowest and highest known sample of every stretch, of an unknown one its first."""
+    """First lowest and highest known sample of every stretch, else its first one."""
     width, kept = np.diff(starts, append=len(values)), list[Index]()
-    # One column at once: of a long log all have no room.
+    # One column at a time: all of a long log would fill the memory.
     for column in values.T:
         for ends in (each.reduceat(column, starts) for each in (np.fmin, np.fmax)):
             rows = np.flatnonzero(column == np.repeat(ends, width))

@@ -1,6 +1,6 @@
-"""The contacts of a log: the answer in words, a table, JSON and CSV; read again from `run.json`.
+"""Contacts of a log: the answer, a table, JSON, CSV; also from a `run.json`.
 
-The words are the same on screen, page, index and batch.
+Screen, page, index and batch use equal words.
 """
 
 import json
@@ -30,15 +30,15 @@ from vftcli.signals.parsing import counted
 from vftcli.signals.remarks import Remark, Where, sentence
 from vftcli.wrench.smoother import WrenchPrior
 
-PART = 0.35  #: An axis that holds more than this share of a force is named in its direction.
+PART = 0.35  #: A direction names the axes with more than this share of the force.
 AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")  #: An axis' two directions, base axes.
 MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 
-#: What the numbers of a table are.
+#: Meaning of a table's numbers.
 LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
-#: Field of a list, and of its model → its key in the record, where both hold one thing.
+#: Field of a list, and of its model → its key in the record.
 LIST_KEYS = {
     "recording": "recording", "duration": "duration_s", "basis": "basis", "free_seconds": "free_s",
     "false_on_free": "false_on_free", "threshold": "evidence_threshold_nats",
@@ -52,7 +52,7 @@ MODEL_KEYS = {
 def otherwise(found: ContactList) -> str:
     """A sentence on the rest of the log without contacts; "" for nothing.
 
-    A load leaves no rest, and an arm of few joints tells no force.
+    It is "" with a load, or with too few joints to know a force.
     """
     least = found.detectable_force
     if found.smallest_force is None or any(c.is_load for c in found.contacts):
@@ -68,7 +68,7 @@ def otherwise(found: ContactList) -> str:
         )
     rest = f"{'Nothing else' if found.contacts else 'Nothing'} above {at_least_shown(least)}"
     if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
-        # Along the axes that are felt best less shows than along all.
+        # Along the best axes smaller forces show.
         return f"{rest} (less at good poses)."
     return f"{rest}. Weaker pushes would not show."
 
@@ -163,7 +163,7 @@ def hardest_words(found: ContactList) -> str:
 
 
 def direction(force: Array) -> str:
-    """A force's direction in words: every axis that holds much of it, the most first."""
+    """A force's direction in words: its main axes, the largest first."""
     size = float(np.linalg.norm(force))
     if size == 0.0:
         return DASH
@@ -258,13 +258,13 @@ def contacts_csv(lists: Sequence[ContactList]) -> str:
 
 
 def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Contact]:
-    """So many contacts with the largest force, else the most evidence, in time's order."""
+    """At most `most` contacts with the largest force, else evidence, in time order."""
     order = sorted(contacts, key=by_force, reverse=True)
     return sorted(order[:most], key=lambda contact: contact.start)
 
 
 def by_force(contact: Contact) -> tuple[bool, float, float]:
-    """By what contacts are ordered: those with a size before the others, then force, evidence."""
+    """Sort key of contacts: known size first, then force, then evidence."""
     return contact.size_known, contact.peak_force or 0.0, contact.evidence or 0.0
 
 
@@ -301,7 +301,7 @@ def contacts_latex(found: ContactList) -> str:
 
 
 def stored_record(estimates: Path) -> Record:
-    """The contacts in the ``run.json`` beside an ``estimates.parquet``, as they were written."""
+    """The stored contacts in the ``run.json`` beside an ``estimates.parquet``."""
     path = estimates.with_name(SEAL)
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
@@ -319,7 +319,7 @@ def stored_record(estimates: Path) -> Record:
 
 
 def stored_list(record: Record) -> ContactList:
-    """A list from its record; what its free motion was is not kept, but in words."""
+    """A list from its record, without its free motion."""
     model, torque, load = record["model"], record["largest_unexplained"], record["load"]
     prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
     if load is not None:

@@ -1,4 +1,4 @@
-"""Logs as files: any as a flat table or an MCAP, a simulated one with its truth beside it.
+"""Logs as files: flat tables or MCAP; simulated ones with their truth beside them.
 
 An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove; estimates become one too.
 Topics of `estimates.mcap`: `/joint_states` (positions, velocities, measured drive torque
@@ -6,8 +6,8 @@ as effort), `/vftcli/external/<observer>` and `/vftcli/external/reference`
 (external torque as effort), all sensor_msgs/JointState; `/vftcli/wrench/<observer>` and
 `/vftcli/wrench/reference` (geometry_msgs/WrenchStamped, NaN where the pose cannot tell
 it); `/vftcli/contacts/log` (foxglove_msgs/Log) where each contact begins and ends.
-Hyphens, which ROS names may not hold, become underscores. All of it is CDR: a channel of
-JSON messages in a ros2 file ends rosbags' reader.
+Hyphens, which ROS names may not hold, become underscores. All messages are CDR: JSON in a
+ros2 file stops rosbags' reader.
 """
 
 import json
@@ -59,7 +59,7 @@ class OutputTopic(NamedTuple):
 
     name: str  #: The topic's name.
     kind: str  #: The type, as package/Name.
-    #: Dotted path of a field → its value; of an array each message gets a row.
+    #: Dotted path of a field → value; an array has a row a message.
     values: Mapping[str, Value]
 
     def messages(self, stamps: Nanoseconds, span: slice) -> NDArray[np.uint8]:
@@ -80,14 +80,14 @@ def joint_topic(
     velocity: Array | None = None,
     effort: Array | None = None,
 ) -> OutputTopic:
-    """A topic of JointState messages; a signal that is None is left out of them. (T, n)"""
+    """A topic of JointState messages, without signals that are None. (T, n)"""
     signals = {"position": position, "velocity": velocity, "effort": effort}
     known = {key: values for key, values in signals.items() if values is not None}
     return OutputTopic(name, JOINT_STATE, {"name": list(joints), **known})
 
 
 def write_mcap(path: Path, analysis: Analysis) -> None:
-    """Write the log's own signals, every estimate, the reference; an existing file is replaced."""
+    """Write the log's signals, every estimate and the reference; replaces a file."""
     recording, stamps = analysis.recording, stamps_of(analysis.recording)
     names = recording.joint_names or analysis.robot.chain.names
     torque = drive_torque(recording, analysis.robot)
@@ -115,7 +115,7 @@ def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
 
 
 def events(analysis: Analysis, start: int) -> list[Event]:
-    """The contacts, and when each begins and ends, of a log with this first stamp. [ns]"""
+    """Messages at begin and end of each contact; `start` is the log's stamp. [ns]"""
     made = list[Event]()
     for contact in analysis.contacts.contacts if analysis.contacts else ():
         level = WARNING if contact.trust == "weak" else INFO
@@ -152,7 +152,7 @@ def stamps_of(recording: Recording) -> Nanoseconds:
 def write_topics(
     path: Path, stamps: Nanoseconds, found: Sequence[OutputTopic], events: Sequence[Event] = ()
 ) -> None:
-    """Write a ros2-profile MCAP with zstd chunks, sample by sample, all topics side by side.
+    """Write a ros2-profile MCAP with zstd chunks, sample by sample, topics together.
 
     An existing file is replaced. Each sample has a stamp [ns], (T,); events are in order
     of time.
@@ -172,7 +172,7 @@ def write_topics(
                 stamp, values = waiting.popleft()
                 writer.add_message(log, stamp, serialised(LOG, values, 1).tobytes(), stamp)
 
-        # In blocks: all messages of an hour at 1 kHz at once would not fit in memory.
+        # In blocks: all messages of an hour at 1 kHz would not fit in memory.
         for start in range(0, len(stamps), BLOCK):
             span = slice(start, start + BLOCK)
             bodies = [topic.messages(stamps, span) for topic in found]
@@ -198,7 +198,7 @@ def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
 
 
 def check_conversion(path: Path, force: bool) -> None:
-    """See before the log is read whether it could be written to `path`."""
+    """Raise an OutputError if a log could not be written to `path`."""
     if path.suffix.lower() not in WRITERS:
         raise OutputError(
             f"{path}: no format ends in {path.suffix or 'nothing'!r}; there is {', '.join(WRITERS)}"
@@ -209,17 +209,17 @@ def check_conversion(path: Path, force: bool) -> None:
 def flat_table(recording: Recording) -> "pl.DataFrame":
     """A log as columns: t from 0, the source's own stamps, then the signals.
 
-    The names are among the aliases of the table reader, so that the file reads back.
+    The table reader knows the names, so that the file reads back.
     """
     import polars as pl
 
-    # Whole numbers: a float of today's date in seconds is exact to 240 ns only.
+    # Whole numbers: a float of today's date [s] is exact to 240 ns only.
     clocks = {"t": recording.t, "t_src_ns": source_stamps(recording)}
     return pl.DataFrame({**clocks, **dict(recording.columns())})
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
-    """Write flat columns, zstd; what has no column (joint names, frame) is in the metadata."""
+    """Write flat columns, zstd; other facts (joint names, frame) go to the metadata."""
     frame = recording.wrench_frame
     metadata = {
         "format": recording.source.format,
@@ -240,10 +240,10 @@ def write_csv(recording: Recording, path: Path) -> None:
 
 
 def write_messages(recording: Recording, path: Path) -> None:
-    """Write the topics of a log: /joint_states, and one /vftcli/… for each further signal.
+    """Write a log's topics: /joint_states, and /vftcli/… for each further signal.
 
-    The effort of /joint_states is the torque, or of a log that has no torque the motor
-    current or the torque without gravity, as UR's driver publishes them.
+    The effort of /joint_states is the torque, else the motor current or the torque without
+    gravity, as UR's driver publishes them.
     """
     names = recording.joint_names or tuple(f"joint_{j + 1}" for j in range(recording.joints))
     efforts = (recording.torque, recording.current, recording.torque_without_gravity)
@@ -280,7 +280,7 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
     for path in paths:
         if not path.name:
             raise OutputError(f"{path} is a folder; give the name of a log file with -o")
-        # A bag is a folder: the files of the one that is there go when the new ones come.
+        # A bag is a folder: new files replace those of an earlier one.
         inside = [file for file in path.rglob("*") if not file.is_dir()]
         # A killed run may have left it without its metadata, or empty.
         if any(file.suffix not in {".mcap", ".db3", ".yaml"} for file in inside):
@@ -301,7 +301,7 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
 def save(
     runs: "Mapping[Path, Simulation]", format: str = "", force: bool = False, command: str = ""
 ) -> list[Path]:
-    """Write each log and its companions; return the paths of all files, of a bag its folder."""
+    """Write each log and its companions; the paths of all files, a bag as a folder."""
     from vftcli.simulation import writers
     from vftcli.simulation.scenario import to_toml
 

@@ -1,4 +1,4 @@
-"""Errors of torques and wrenches as tables for people, and as tidy rows for machines.
+"""Errors of torques and wrenches as tables for people and rows for machines.
 
 A row is an observer, a column a joint or an axis; forces are in newtons, moments in
 newton-metres.
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 AT_FLOOR = 1.2
 
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
-OVERRIDDEN = "overridden"  #: Column of the codes with which results were wanted anyway.
+OVERRIDDEN = "overridden"  #: Column of the codes of overridden findings.
 RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
 
 
@@ -50,31 +50,30 @@ class Block(NamedTuple):
     """RMSE of one recording, observers down, joints across."""
 
     recording: str  #: The log's label, unique in the command.
-    reference: str  #: What the estimates are judged by.
+    reference: str  #: The reference's name.
     joints: tuple[int, ...]  #: Joint numbers, from 1.
     observers: tuple[str, ...]  #: Names, in the order in which they ran.
-    rmse: Array  #: NaN where it is not known. (observers, joints) [N·m]
-    floor: Array  #: The reference's own error, NaN where it is not known. (joints,) [N·m]
+    rmse: Array  #: NaN where unknown. (observers, joints) [N·m]
+    floor: Array  #: The reference's own error, NaN if unknown. (joints,) [N·m]
     samples: tuple[int, int]  #: Fewest and most samples an entry is made of.
-    means: JointMeans  #: What the joints are in one number.
-    #: Observer → largest share of a joint's samples without its answer, where there is.
+    means: JointMeans  #: Means over the joints.
+    #: Observer → largest share of a joint's samples without its answer, if any.
     missing: dict[str, float]
     #: Joints at rest: do not trust their reference.
     untrusted: tuple[int, ...] = ()
 
     @property
     def at_floor(self) -> Mask:
-        """Where the reference cannot tell the error from its own. (observers, joints)"""
+        """Where an error may be the reference's own. (observers, joints)"""
         return np.asarray(self.rmse <= AT_FLOOR * self.floor)
 
     @property
     def best(self) -> Mask:
         """Smallest RMSE of each joint, and equals in print. (observers, joints)
 
-        None where the reference cannot tell: of a joint that rests, and of several at the
-        floor.
+        None for a joint at rest, or with several at the floor.
         """
-        # Compared as printed, so that two equal texts in one column are both bold.
+        # Compared as printed, so that equal texts are both bold.
         least = np.where(np.isfinite(self.rmse), self.rmse, np.inf).min(axis=0)
         shown = [[significant(value) for value in row] for row in self.rmse]
         best = np.array([significant(value) for value in least])
@@ -100,14 +99,14 @@ class Block(NamedTuple):
 
 
 def blocks(errors: pl.DataFrame | None) -> tuple[Block, ...]:
-    """One block for each recording and reference, in the table's order; none without errors."""
+    """One block for each recording and reference, in table order; () without errors."""
     return () if errors is None else tuple(map(block, logs_of(errors, "joint")))
 
 
 def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
-    """The rows of each log and reference that have a place: a ``joint`` or an ``axis``.
+    """Rows of each log and reference with a place: a ``joint`` or an ``axis``.
 
-    Rows of two logs stay two tables even if the caller gave both one label.
+    Two logs of one label stay two tables.
     """
     if place not in errors.columns:
         return
@@ -123,7 +122,7 @@ def block(rows: pl.DataFrame) -> Block:
     joints = rows["joint"].unique().sort()
     wide = rows.pivot("joint", index="observer", values="rmse_Nm")
     floors = dict(rows.select("joint", "reference_floor_Nm").rows())
-    # Joints may differ in how many samples have a reference.
+    # Joints may differ in samples with a reference.
     counts = rows["samples"].drop_nulls().to_list() or [0]
     doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
     missing = rows.group_by("observer", maintain_order=True).agg(pl.col("missing").max())
@@ -143,7 +142,7 @@ def block(rows: pl.DataFrame) -> Block:
 
 
 def rmse_grid(table: Block) -> Grid:
-    """One recording's RMSE: observers down, joints and their mean across, the floor last."""
+    """One recording's RMSE: observers down, joints and mean across, floor last."""
     rows: Rows = []
     # The mean |error|, and 1 less the mean RMSE over the reference's rms, where known.
     beside = {
@@ -204,7 +203,7 @@ def details(row: Record) -> tuple[str, ...]:
 
 
 def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
-    """Every further table of the RMSE table's shape that has something to say."""
+    """Further tables in the RMSE table's shape, if not empty."""
     for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
         columns = "observer", *joint_columns(group["joint"].unique().sort().to_list())
         found = {
@@ -242,7 +241,7 @@ def marks_in_words(found: Sequence[Block]) -> list[str]:
 def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Iterator[Grid]:
     """RMSE of the wrenches, one table for each recording and reference that has any.
 
-    Below an arm that the paper has are the bounds that it gives.
+    Below the paper's arm are the paper's bounds.
     """
     published = {a.recording.name: a.robot.published for a in analyses}
     for group in logs_of(errors, "axis"):
@@ -264,12 +263,12 @@ def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Ite
 
 
 def compared_samples(rows: pl.DataFrame) -> int:
-    """Most samples that an axis of a log's wrenches is compared in."""
+    """Most compared samples of an axis of a log's wrenches."""
     return int(max(rows["samples"].drop_nulls().to_list(), default=0))
 
 
 def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
-    """A line for each log and reference without a sample to compare wrenches in, and why."""
+    """A line for each log and reference without a common wrench sample, with reason."""
     for rows in logs_of(errors, "axis"):
         if not compared_samples(rows):
             yield (
@@ -280,10 +279,10 @@ def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
 
 
 def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame:
-    """The errors with a column `overridden` where results were wanted though they mean nothing.
+    """The errors, with a column `overridden` where a finding makes them meaningless.
 
-    It holds the codes of the findings, of all logs together in pooled rows; without any
-    such finding the table is as it was.
+    It holds the codes of these findings, in pooled rows those of all logs. Without any the
+    table stays as it is.
     """
     found = {a.recording.name: refused_codes(a.examinations) for a in analyses}
     codes = {name: ", ".join(each) for name, each in found.items() if each}
@@ -332,7 +331,7 @@ def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> st
 def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
     """The RMSE as LaTeX tables (needs ``booktabs``), best value of each joint bold.
 
-    Logs of arms with as many joints share a table, where the same ones rest.
+    Logs with equal joint heads share a table.
     """
     lines = [*doubts_of(errors), *nothing_to_compare(errors)]
     doubts = "".join(f"% {printable(line)}\n" for line in lines)

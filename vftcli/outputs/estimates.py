@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-#: An analysis and its rows; None where all went by in blocks.
+#: An analysis and its rows; None for the whole log, after its blocks.
 Group = tuple[Analysis, slice | None]
-#: Rows from which on a table is written as several groups, and rows of such a group.
+#: Least rows of a table written in groups, and rows of such a group.
 LONG, GROUP_ROWS = 1 << 17, 1 << 15
 
 
@@ -36,12 +36,12 @@ def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
 
     Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``…
     [N·m]; ``sd/<observer>/1``… [N·m] where the observer gives one;
-    ``tau_ext/reference/1``… [N·m]; ``contact``, the row's number in the list of contacts
-    or null, where they are listed; where a wrench is asked for, and of ``best`` where
-    contacts are listed, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
-    cannot tell it, ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and
-    ``sigma_min`` [m]; by the solver ``map``, what it says of the masked samples is apart
-    in ``wrench_masked/<observer>/fx``…. What is not known is null.
+    ``tau_ext/reference/1``… [N·m]; ``contact``, the number in the list of contacts or
+    null, where they are listed; where a wrench is asked for, and of ``best`` where contacts
+    are listed, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose hides it,
+    ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; by
+    the solver ``map`` the masked samples are in ``wrench_masked/<observer>/fx``…. Unknown
+    values are null.
     """
     return frame_of(columns(analysis, rows))
 
@@ -69,12 +69,12 @@ def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
 
 
 def wrench_columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
-    """The wrenches, their standard deviations and what the pose can tell, where asked for."""
+    """Columns of wrenches: values, deviations, null space, sigma_min, if asked for."""
     sensed = analysis.virtual_sensor
     bounded = sensed is not None and sensed.sensor.solver != "pinv"
     for wrench in analysis.wrenches:
         yield from wrench.columns(rows)
-        # By plain least squares nothing can be said there; `map` says something finite.
+        # Least squares has no answer there; `map` has a finite one.
         if bounded and wrench.hidden.any():
             said = np.where(wrench.hidden[rows, None], wrench.values[rows], np.nan)
             yield from per_axis(f"wrench_masked/{wrench.name}", said)
@@ -97,13 +97,13 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
 
 
 def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:
-    """Write the table of a long log as groups of rows; return the analysis of the last.
+    """Write a long log's table as groups of rows; the analysis of the last group.
 
-    All of it has no room beside the log.
+    The whole table would not fit in memory beside the log.
     """
     pq = needed("pyarrow.parquet", "the estimates of a long log")
 
-    # Measured numbers hardly repeat: a dictionary of them costs time and room.
+    # Measured numbers hardly repeat: a dictionary costs time and room.
     how: Any = {"compression": "zstd", "compression_level": 1, "use_dictionary": False}
     schema: Any = None
     with ExitStack() as files:
@@ -126,7 +126,7 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
 
 
 def doubts_of(analysis: Analysis) -> dict[str, str]:
-    """What is said beside the columns for who finds the table without the record beside it."""
+    """Doubts in the table's metadata, for a reader without the record beside it."""
     doubts = overridden_lines(analysis.examinations)
     return {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
 
@@ -157,8 +157,8 @@ def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
 def write_extras(
     folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
-    """Write what was asked for besides, below a place of a folder."""
-    # Without loading what writes the others: a third of the modules of a command.
+    """Write the extra files below a place of a folder."""
+    # Only the writers in use are loaded: the others are a third of a command's modules.
     for extra in choice.extras:
         path = folder / f"{place}{EXTRAS[extra]}"
         if extra == "csv":
@@ -183,10 +183,10 @@ def write_estimate_folder(
     choice: OutputChoice = PLAIN,
     force: bool = False,
 ) -> tuple[Analysis, str]:
-    """Write `estimates.parquet`, `run.json` and the extras into a folder, all or nothing.
+    """Write a folder of `estimates.parquet`, `run.json` and extras, all or nothing.
 
-    Of a long log its groups are given, with CSV as the only extra. What comes back is the
-    analysis of the whole log, and the text of `run.json`.
+    A long log comes as groups, with CSV as the only extra. Returns the analysis of the whole
+    log, and the text of `run.json`.
     """
     with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
         table = folder / "estimates.parquet"

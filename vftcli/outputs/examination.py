@@ -12,11 +12,11 @@ from vftcli.signals.parsing import counted, printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 
-MOST_FITS = 3  #: Profiles that are shown though they do not fit: the nearest.
+MOST_FITS = 3  #: Most profiles shown, the nearest, if they do not fit.
 
 
 def examination_record(examination: Examination) -> Record:
-    """Everything the doctor knows, for machines; what the reader warns of is a finding too."""
+    """All of the doctor's facts for machines; the reader's warnings are findings, too."""
     recording, source = examination.recording, examination.recording.source
     read = [remark for remark in source.remarks if remark.level == "warning"]
     return {
@@ -35,7 +35,7 @@ def examination_record(examination: Examination) -> Record:
 
 
 def recording_record(recording: Recording) -> Record:
-    """What was read of a log: its format, digest, clock, samples and signals."""
+    """A log's format, digest, clock, samples and signals."""
     source = recording.source
     return {
         "format": source.format,
@@ -63,7 +63,7 @@ def largest_step(recording: Recording) -> float | None:
 
 
 def holdings(recording: Recording) -> list[str]:
-    """What a log holds, for people: its joints, samples, clock and signals."""
+    """Lines on a log's joints, samples, clock and signals."""
     source = recording.source
     rate, gap = rate_of(recording), largest_step(recording)
     names = f" ({', '.join(recording.joint_names)})" if recording.joint_names else ""
@@ -87,7 +87,7 @@ def examination_text(examination: Examination) -> str:
     recording, source = examination.recording, examination.recording.source
     lines = holdings(recording)
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
-    # How arms miss an effort that is another than it is read as says nothing of them.
+    # With a misread effort the misfits of arms mean nothing.
     misread = examination.refusals(fitting=False)
     lines += [
         f"  fit       {fit}{'' if fit.fits else ': does not fit'}"
@@ -105,7 +105,7 @@ def examination_text(examination: Examination) -> str:
 
 
 def warnings_of(examination: Examination) -> tuple[Remark, ...]:
-    """Everything about a log that can make results wrong, its reader's warnings first."""
+    """Warnings about a log, its reader's first."""
     read = (r for r in examination.recording.source.remarks if r.level == "warning")
     return (*read, *examination.warnings)
 
@@ -124,7 +124,7 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
 
 
 def command(name: str, log: Recording | None, *words: str) -> str:
-    """A command on a log, as it is typed; on a contact-free one that is to be recorded by None."""
+    """A command on a log as you type it; None is a contact-free log to be recorded."""
     if log is None:
         return shlex.join(["vftcli", name, "free.csv", *words])
     columns = [f"--columns={log.source.columns}"] if log.source.columns else []
@@ -132,15 +132,15 @@ def command(name: str, log: Recording | None, *words: str) -> str:
 
 
 def path_of(log: Recording) -> str:
-    """A log's path as it was given, a stand-in for one made in memory."""
+    """A log's path as given, a stand-in for one made in memory."""
     return str(log.source.path or "LOG")
 
 
 def health_record(examinations: Iterable[Examination], *, fitting: bool = True) -> list[Record]:
     """Findings of a run's logs for `run.json`: the log's first, then others'.
 
-    `overridden` are the codes with which results mean little, though they were wanted
-    anyway; `fitting` is whether the robot had to be the log's.
+    `overridden` are codes of findings that make results meaningless; `fitting` is whether
+    the robot had to be the log's.
     """
     return [
         {
@@ -155,7 +155,7 @@ def health_record(examinations: Iterable[Examination], *, fitting: bool = True) 
 
 
 def refused_codes(examinations: Iterable[Examination]) -> list[str]:
-    """Codes of findings with which results mean little, each once."""
+    """Codes of findings that make results meaningless, each once."""
     codes = (finding.code for one in examinations for finding in one.refusals())
     return list(dict.fromkeys(codes))
 
@@ -163,7 +163,7 @@ def refused_codes(examinations: Iterable[Examination]) -> list[str]:
 def overridden_lines(examinations: Sequence[Examination], *, fitting: bool = True) -> list[str]:
     """Warning at the top of outputs that a finding makes meaningless.
 
-    One line a finding; none where there is no such finding.
+    One line a finding.
     """
     return [
         doubt(f"{one.recording.name}: {words}")

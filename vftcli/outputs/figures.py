@@ -1,4 +1,4 @@
-"""The figures of one log, as force, torque, wrench, errors, spectra; gains with theirs."""
+"""Figures of one log (force, torque, wrench, errors, spectra) and of gains."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -55,13 +55,13 @@ if TYPE_CHECKING:
 LOG_FIGURES = ("force", "torque", "errors", "wrench", "spectra", "tuning", "responses")
 TUNED_FIGURES = ("spectra", "tuning")  #: Those beside gains that were found.
 ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
-MOST = 8  #: Most logs in one figure of errors; of more, only their summary.
-#: Dashes of responses, which are black: the spectra beside them have colours.
+MOST = 8  #: Most logs in one figure of errors; more show only their summary.
+#: Dashes of responses, drawn in black beside coloured spectra.
 BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
 
 
 def log_figures(analysis: Analysis) -> dict[str, Drawing]:
-    """Every figure that a log has something to show in."""
+    """Every figure of a log that is not empty."""
     name, numbers = analysis.recording.name, numbers_of(analysis.listed)
     found = {}
     if analysis.contacts is not None and analysis.contacts.hardest is not None:
@@ -75,7 +75,7 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
         axes = drawn_lines(analysis, wrench)
         found["wrench"] = Drawing(
             f"{name}: force and moment on the robot, {wrench.title}",
-            # Forces above moments, or in one column's width beside them.
+            # Forces above moments, or beside them in one column's width.
             lambda width: line_figure(
                 width,
                 plots_of(axes, only=range(6) if width > NARROW else (0, 3, 1, 4, 2, 5)),
@@ -84,7 +84,7 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
         )
     if (refined := analysis.refinement) is not None:
         if (spectra := refined.baselines.plain.spectra) is not None:
-            # The |H| of one observer: those of all are a figure of their own.
+            # One observer's |H|; another figure has all.
             lead = next((o for o in analysis.observers if o.name == BEST), analysis.observers[0])
             found["spectra"] = spectra_drawing(spectra, {lead.name: lead})
         if refined.curves:
@@ -101,7 +101,7 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
     return found
 
 
-#: What a notebook plots → its chart, None where it is no chart of lines over the log.
+#: A notebook's plot → its chart, None if not of lines over the log.
 PLOTS = {"contacts": None, "torques": torque_chart, "wrench": wrench_chart, "errors": None}
 
 
@@ -111,7 +111,7 @@ def plot(
     joints: int | Sequence[int] | None,
     observers: str | Sequence[str] | None,
 ) -> "Figure":
-    """A figure for a notebook: `what` is one of `PLOTS`, joints count from 1, None for all."""
+    """A figure for a notebook: `what` of `PLOTS`, joints from 1, None for all."""
     check_known(str(what), PLOTS, f"no plot {what!r}")
     found, errors, drawing = analysis.contacts, analysis.errors, None
     numbers, names = ([] if x is None else np.atleast_1d(x).tolist() for x in (joints, observers))
@@ -147,7 +147,7 @@ def on_paper(drawing: Drawing) -> "Figure":
 
 
 def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Drawing:
-    """|F| of every contact with its 95 % band, under its number; over the log's clock. (T,) [s]"""
+    """|F| of every numbered contact with its 95 % band over the log's clock. (T,) [s]"""
     courses = [c.course for c in found.contacts if c.course is not None]
     lines = [ChartLine("|F|", c.force[:, None], half=c.band[:, None], x=c.t) for c in courses]
     spans = contact_spans(found.contacts)
@@ -164,7 +164,7 @@ def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Draw
 
 
 def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> Chart:
-    """The chart with the lines of these observers and the reference; a band only of one alone."""
+    """The chart with these observers' lines and the reference; a band on one alone."""
     estimated = [line.name for line in analysis.estimates]
     wanted = names or ([BEST] if BEST in estimated else estimated)
     kept = [x for x in chart.series if x.name in wanted or x.name not in estimated]
@@ -172,7 +172,7 @@ def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> 
     for line in kept:
         name = line.name
         if analysis.reference is not None and name == reference_name(analysis):
-            # Of a file only that it is one: its path has no room.
+            # A file's path would not fit.
             name = f"reference ({analysis.reference.name.split(':')[0]})"
         series.append(line._replace(name=name, shown=True, half=line.half if alone else None))
     return chart._replace(series=tuple(series))
@@ -186,8 +186,7 @@ def numbers_of(contacts: Iterable[Contact]) -> dict[int, float]:
 def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:
     """RMSE with its interval, joint by joint and observer by observer, a plot a log.
 
-    Empty where no joint has an error, or where more than `MOST` logs have no rows for all
-    of them.
+    Empty if no joint has an error, or if more than `MOST` logs have no pooled rows.
     """
     groups = list(logs_of(errors, "joint"))
     if len(groups) > MOST:
@@ -219,7 +218,7 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
     over = chart._replace(key="gain", title="|H|", series=tuple(lines), lowest=LOWEST)
 
     def draw(width: float) -> "Figure":
-        """The spectra with what their decibels are of."""
+        """The spectra with the unit of their decibels."""
         figure = line_figure(width, plots_of(chart, over))
         figure.supylabel("Power density (dB of 1 (N·m)²/Hz)", fontsize=8.0)
         return figure
@@ -232,7 +231,7 @@ def tuning_drawing(
 ) -> Drawing:
     """Expected error over the natural frequency, and what was chosen.
 
-    That is of an observer its rates [rad/s] and errors [N·m]. 2 × (n,)
+    `chosen` is an observer's rates [rad/s] and errors [N·m]. 2 × (n,)
     """
     chart = tuning_chart(curves, lines_of_names(list(curves)))
     marks = {name: (rate / (2.0 * np.pi), least) for name, (rate, least) in chosen.items()}
@@ -242,7 +241,7 @@ def tuning_drawing(
 
 
 def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:
-    """The spectra with |H| of every observer, and the expected error over each one's rate."""
+    """Spectra with |H| of every observer, and expected error over each one's rate."""
     running = {line.observer: line.running for line in tuned if line.running is not None}
     chosen = {line.observer: (line.rate, line.rmse) for line in tuned}
     return {

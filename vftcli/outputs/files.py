@@ -2,8 +2,8 @@
 
 New files are made in a temporary folder beside their places and renamed in the end.
 Several files that belong together have a seal: `run.json`, with the digest of every other
-one. It goes before the first of them changes and comes when the last is in its place, so
-that a folder without it is known to be incomplete, whenever a run was killed.
+one. It is removed before the first of them changes and written after the last, so that a
+folder without it is incomplete, whenever a run was killed.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ from vftcli.signals.parsing import whole
 if TYPE_CHECKING:
     import polars as pl
 
-#: The last file of a run to come and the first to go; beside other files `NAME.run.json`.
+#: A run's last file to be written, first to be removed; or `NAME.run.json`.
 SEAL = "run.json"
 
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
@@ -33,7 +33,7 @@ _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
 @contextmanager
 def protected(inputs: Iterable[Path]) -> Iterator[None]:
-    """Let nothing write over these files for a block, nor over a file of these folders."""
+    """Protect these files, and all files of these folders, from writing in a block."""
     token = _inputs.set(tuple(inputs))
     try:
         yield
@@ -43,18 +43,16 @@ def protected(inputs: Iterable[Path]) -> Iterator[None]:
 
 @contextmanager
 def atomic(path: Path, force: bool = False) -> Iterator[Path]:
-    """Yield a temporary path, which takes the place of `path` when the block ends well.
+    """Yield a temporary path that replaces `path` when the block ends well.
 
-    A device or pipe (``/dev/stdout``) is yielded as it is. If the block fails nothing is
-    left.
+    A device or pipe (``/dev/stdout``) is yielded as it is. A failed block leaves nothing.
     """
     path = Path(path)
-    # A device cannot be replaced: `-o /dev/stdout` is written to as it is.
     if path.is_char_device() or path.is_fifo():
         yield path
         return
     check_file(path, force)
-    # What a link points to is replaced, not the link.
+    # A link's target is replaced, not the link.
     target = path.resolve() if path.is_symlink() else path
     with writing(path), partial_folder(target.parent) as folder:
         yield folder / target.name
@@ -65,7 +63,7 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
 
 
 def check_file(path: Path, force: bool = False) -> None:
-    """See before anything is computed whether a file could be written."""
+    """Raise an OutputError if a file could not be written."""
     with writing(path):
         check_letters(path)
         refuse_existing(path, force)
@@ -90,7 +88,7 @@ def put_table(
     frames: Mapping[str, StatedFrame] | None = None,
     **how: Any,  # noqa: ANN401 - of `write_parquet`
 ) -> None:
-    """Write a table as Parquet, beside each column what it holds."""
+    """Write a table as Parquet, with the meaning of each column."""
     schema = described_schema(table, frames)
     with table_file(path) as file:
         table.write_parquet(file, compression="zstd", arrow_schema=schema, **how)
@@ -104,22 +102,20 @@ def write_text(path: Path, text: str, force: bool = False) -> None:
 
 def put_text(path: Path, text: str) -> None:
     """Write a text, equal bytes on every system, even with half a letter."""
-    # On Windows the same bytes as elsewhere: digests of outputs can be compared. A file
-    # name may hold bytes that are no letter, which UTF-8 refuses.
+    # Digests are equal on every system. A file name may hold bytes that UTF-8 refuses.
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
-EARLIER = "earlier"  #: Folder, in the temporary one, of the files that make room for new ones.
+EARLIER = "earlier"  #: Folder, in the temporary one, for replaced files.
 
 
 class OutputFolder:
     """A folder that gets all of its files at once, when the block ends well.
 
-    Until then they are in a temporary folder on its file system; if the block fails, it
-    goes, and with it every folder that was made for it. ``folder / "name"`` is where to
-    write a file. With `force`, those of `names` that an earlier run left and this one
-    does not write are removed, and every file that the earlier run's seal lists, so that
-    all files of the folder belong together.
+    Until then they are in a temporary folder on its file system; a failed block leaves
+    neither it nor other new folders. ``folder / "name"`` is a file's path. With `force`,
+    files of an earlier run that this one does not write are removed, those in `names` and
+    those in the earlier seal, so that all files of the folder belong together.
     """
 
     def __init__(self, path: Path, force: bool = False, names: Iterable[str] = ()) -> None:
@@ -185,14 +181,14 @@ class OutputFolder:
         finally:
             self._partial.__exit__(kind, error, trace)
             self._discard()
-        # Of an error elsewhere its own words say more.
+        # An error elsewhere explains itself.
         if isinstance(error, OSError) and (
             error.filename is None or str(error.filename).startswith(str(self.path))
         ):
             raise unwritable(self.path, error) from None
 
     def _earlier(self) -> set[Path]:
-        """Every file that an earlier run may have left and that must not outlive it."""
+        """Files of an earlier run that must be replaced or removed."""
         declared = {self.path / name for name in self.names}
         listed = [sealed_files(path) for path in declared if is_seal(path)]
         # A killed run may have moved the earlier seal away.
@@ -200,17 +196,17 @@ class OutputFolder:
         return declared.union(*listed, *(sealed_files(path, self.path) for path in killed))
 
     def _move(self) -> None:
-        """Put every file where it belongs, after a last look that nothing is in the way."""
+        """Put every file into place, after a last check that nothing is in the way."""
         files = [p for p in self.temporary.rglob("*") if not p.is_dir()]
         places = {self.path / file.relative_to(self.temporary): file for file in files}
         to_disk([*files, self.temporary])
-        # Runs into one folder move one after the other, or its files would be of several.
+        # Runs move one after the other, or a folder would mix their files.
         with held(self.path, wait=True):
             earlier = self._earlier()
             for path in places:
                 refuse_existing(path, self.force)
             (aside := self.temporary / EARLIER).mkdir()
-            # Seals come last, that of the whole folder after all, and go first.
+            # Seals are written last, the folder's own after all, and removed first.
             paths = sorted({*places, *earlier}, key=lambda p: (is_seal(p), -len(p.parts), str(p)))
             there = [p for p in paths[::-1] if p.exists() or p.is_symlink()]
             kept = [(path, aside / str(k)) for k, path in enumerate(there)]
@@ -225,7 +221,7 @@ class OutputFolder:
                     # Renaming within a file system is atomic for each file.
                     places[path].replace(path)
             except BaseException:
-                # Everything goes back to where it was, and only that.
+                # Back to the earlier state.
                 for path in (p for p in paths[::-1] if p not in there):
                     path.unlink(missing_ok=True)
                 for path, place in kept[::-1]:
@@ -234,7 +230,7 @@ class OutputFolder:
                         place.replace(path)
                 raise
             to_disk([self.path])
-            # Folders that an earlier run filled and nothing is left in.
+            # Folders of an earlier run that are now empty.
             for folder in sorted({path.parent for path in earlier} - {self.path}, reverse=True):
                 with suppress(OSError):
                     folder.rmdir()
@@ -264,9 +260,9 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:
-    """The files that an earlier run's seal lists, where they still are as that run left them.
+    """Files listed by an earlier run's seal that are still as that run left them.
 
-    A seal is a file like any other: what it lists outside its folder is not believed.
+    Paths outside its folder are ignored: anyone may edit a seal.
     """
     try:
         files = json.loads(seal.read_text(encoding="utf-8"))["files"]
@@ -291,9 +287,9 @@ def refuse_existing(path: Path, force: bool) -> None:
 
 
 def refuse_input(path: Path) -> None:
-    """Raise an OutputError if this command reads the file at `path`, whatever it is called there.
+    """Raise an OutputError if this command reads the file at `path` under any name.
 
-    Links count: what is read through one name would be lost under all.
+    Links count: the content would be lost under every name.
     """
     for given in _inputs.get() if path.exists() else ():
         is_read = False
@@ -314,7 +310,7 @@ def refuse_input(path: Path) -> None:
 
 
 def check_letters(path: Path) -> None:
-    """Raise an OutputError for a name with bytes that are no letters: libraries refuse it."""
+    """Raise an OutputError for a name that is not UTF-8, which libraries refuse."""
     if whole(str(path)) != str(path):
         raise OutputError(f"{path} is no name in UTF-8; give another -o")
 
@@ -345,7 +341,7 @@ def numbered(names: Iterable[str]) -> list[str]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Raise what the operating system refuses in a block as the one-line error on `path`."""
+    """Raise the operating system's errors in a block as one-line errors on `path`."""
     try:
         yield
     except OSError as error:
@@ -353,6 +349,6 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def unwritable(path: Path, error: OSError) -> OutputError:
-    """The one-line error for what the operating system refused."""
+    """The one-line error on an operating system's error."""
     why = error.strerror or str(error)
     return OutputError(f"{path} cannot be written: {why[0].lower()}{why[1:]}; give another -o")

@@ -1,8 +1,7 @@
-"""Grid: one table of results, shown on the terminal, in Markdown, in LaTeX or in HTML.
+"""Grid: one table of results for terminal, Markdown, LaTeX and HTML.
 
-A table to show is a Grid; how it looks is decided here and in the pages' templates, and so is
-what must be escaped: names from files may hold any letter. `csv_rows` writes numbers that are
-not rounded, and empty cells for what is not known.
+This file and the pages' templates decide on looks and on escapes: names from files may
+hold any letter. `csv_rows` writes numbers that are not rounded.
 """
 
 import csv
@@ -23,7 +22,7 @@ from vftcli.signals.parsing import printable
 
 #: A number or a bound, and its decimals with their point.
 NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
-#: Unseen filler where a number has fewer decimals than others of its column.
+#: Unseen filler for missing decimals.
 DECIMALS = "." + 20 * "0"
 #: Width of a column of the IEEE, of a letter and of the gap between two columns. [in]
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
@@ -33,10 +32,10 @@ class GridCell(NamedTuple):
     """An entry with emphasis, or with another text on the page."""
 
     text: str  #: Its text.
-    #: Whether it is the best of its column: bold wherever type can be bold.
+    #: Whether it is the best of its column: bold.
     best: bool = False
-    mark: str = ""  #: What follows it on the terminal, as a star.
-    #: What the page shows instead of `text`, escaped already; "" for the text itself.
+    mark: str = ""  #: Mark behind it on the terminal, as a star.
+    #: The page's text instead of `text`, escaped already; "" for none.
     html: str = ""
 
 
@@ -48,14 +47,14 @@ class Column(NamedTuple):
     """One column."""
 
     head: str  #: Its heading.
-    #: Unit of its numbers, in brackets behind the heading; "" where the heading says it.
+    #: Unit, in brackets behind the heading; "" if the heading says it.
     unit: str = ""
-    #: How a float is printed: a format as ``.3f``, or a function.
+    #: Format of a float as ``.3f``, or a function.
     form: str | Callable[[float], str] = significant
-    #: Whether it holds words, which are at the left; numbers are at the right.
+    #: Whether it holds words, aligned left; numbers are right.
     words: bool = False
     symbol: str = ""  #: The heading in LaTeX where it is a formula.
-    seldom: bool = False  #: Whether a terminal without room for it may leave it out.
+    seldom: bool = False  #: Whether a narrow terminal may leave it out.
 
     @property
     def heading(self) -> str:
@@ -83,13 +82,13 @@ class Grid:
     given: Sequence[Any]  #: The columns; a text alone heads a column of words.
     rows: Sequence[Sequence[Entry]]  #: One entry a column.
     title: str = ""  #: What the table is about, "" for none.
-    quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
-    unit: str = ""  #: Their unit, where it is one.
-    summaries: int = 0  #: How many rows at the end sum up those above, below a rule.
+    quantity: str = ""  #: Quantity of all numbers, as RMSE, if one.
+    unit: str = ""  #: Their unit, if one.
+    summaries: int = 0  #: Last rows that sum up the others, below a rule.
     #: Whether the terminal keeps a place for marks on numbers.
     marked: bool = False
     notes: tuple[str, ...] = ()  #: Lines on what the marks mean, footnotes in LaTeX.
-    #: Whether the page shows the colour of the observer that heads a row.
+    #: Whether the page shows the colour of a row's observer.
     swatches: bool = False
 
     @cached_property
@@ -99,7 +98,7 @@ class Grid:
 
     @property
     def caption(self) -> str:
-        """The title with what all of its numbers are, "" where there is neither."""
+        """The title with the quantity, "" without both."""
         quantity = f"{self.quantity} in {self.unit}" if self.unit else self.quantity
         return printable(", ".join(text for text in (self.title, quantity) if text))
 
@@ -107,7 +106,7 @@ class Grid:
     def cells(self) -> list[list[GridCell]]:
         """Every entry as text, row by row."""
         rows = [[c.cell(x) for c, x in zip(self.columns, row, strict=True)] for row in self.rows]
-        # A name from a file may hold an end of line, or what a terminal would obey.
+        # A name from a file may hold line ends or control codes.
         return [[cell._replace(text=printable(cell.text)) for cell in row] for row in rows]
 
 
@@ -118,7 +117,7 @@ def keyed_grid(
     *,
     swatches: bool = False,
 ) -> Grid:
-    """A table of rows for machines: of each the values of these keys, in their columns."""
+    """A table of rows for machines, with the values of these keys as columns."""
     entries = [[*map(row.get, columns)] for row in rows]
     return Grid([*columns.values()], entries, title, swatches=swatches)
 
@@ -132,8 +131,8 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
 def terminal(grid: Grid, letters: Callable[[str], str] = str) -> str:
     """A table as text, two blanks between columns, each line ended.
 
-    A table wider than the terminal breaks its headings, then leaves out columns that are
-    seldom asked for, the last first, and names them below.
+    A table wider than the terminal breaks its headings, then leaves out `seldom` columns,
+    the last first, and names them below.
     """
     width, left_out = shutil.get_terminal_size().columns, list[str]()
     lines = table_lines(grid, letters)
@@ -152,15 +151,15 @@ def terminal(grid: Grid, letters: Callable[[str], str] = str) -> str:
 
 
 def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = False) -> list[str]:
-    """Headings and rows as lines, a rule above the summaries; headings `broken` at blanks."""
+    """Lines of headings and rows, summaries below a rule; `broken` headings wrap."""
     columns, cells = list[list[str]](), grid.cells
     for k, column in enumerate(grid.columns):
-        # Where numbers may bear a mark, those without one keep its place.
+        # Numbers without a mark keep its place.
         room = " " * (grid.marked and not column.words)
         texts = [letters(row[k].text) + (row[k].mark or room) for row in cells]
         heads = [letters(column.heading)]
         if broken:
-            # The unit is not broken: of its blanks textwrap knows nothing.
+            # The unit does not break: its blanks are hidden from textwrap.
             unit = column.unit.replace(" ", "\N{NO-BREAK SPACE}")
             head = letters(column._replace(unit=unit).heading)
             least = max(1, *map(len, [*head.split(" "), *texts]))
@@ -193,10 +192,10 @@ def markdown(grid: Grid) -> str:
 
 
 def latex(*grids: Grid) -> str:
-    r"""Tables of equal columns as one ``table``, or ``table*``, of the package booktabs.
+    r"""Tables of equal columns as one ``table`` or ``table*`` of the package booktabs.
 
-    Caption, label and footnotes are inside; decimal points are below one another without
-    a further package. Of several grids each has its title above its rows.
+    Caption, label and footnotes are inside; decimal points align without a further package.
+    Each of several grids has its title above its rows.
     """
     first = grids[0]
     caption = (replace(first, title="") if len(grids) > 1 else first).caption or first.title
@@ -214,7 +213,7 @@ def latex(*grids: Grid) -> str:
     letters = re.sub("[^a-z0-9]+", "-", (first.title or caption).lower())[:40].strip("-")
     parts += [rf"\label{{tab:{letters or 'results'}}}", r"\footnotesize"]
     parts += [r"\setlength{\tabcolsep}{4pt}", rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
-    # Headings in the middle of their columns, and below them the units that they have.
+    # Centred headings, units below them.
     heads = [column.symbol or escape_latex(column.head) for column in first.columns]
     heads[0] = heads[0][:1].upper() + heads[0][1:]
     units = [f"[{escape_latex(column.unit)}]" if column.unit else "" for column in first.columns]
@@ -246,7 +245,7 @@ def latex(*grids: Grid) -> str:
 
 
 def latex_cells(column: Sequence[GridCell]) -> list[str]:
-    """The entries of a column; numbers with room for the decimals that others have more."""
+    """The entries of a column; numbers get room for missing decimals."""
     numbers = [NUMBER.fullmatch(cell.text) for cell in column]
     most = max((len(found[1] or "") for found in numbers if found), default=0)
     texts = []
@@ -265,7 +264,7 @@ def escape_markdown(text: str) -> str:
     return re.sub(r"[\\|*_`<>\[\]]", r"\\\g<0>", printable(text))
 
 
-#: Letters that LaTeX does not print as they are, or not in every encoding.
+#: Letters that LaTeX does not print as they are.
 LATEX_LETTERS = str.maketrans({
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
     "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
@@ -281,23 +280,22 @@ def escape_latex(text: str) -> str:
     text = printable(text)
     if text.startswith("-") and NUMBER.fullmatch(text):
         text = minus(text)
-    # A blank behind the sign of a bound is a thin one: "< 6" is one number.
+    # A thin blank behind the sign of a bound: "< 6" is one number.
     return text.translate(LATEX_LETTERS).replace("$<$ ", r"$<$\,")
 
 
-#: How a text begins that spreadsheets run: the list of OWASP's "CSV Injection".
+#: Begin of texts that spreadsheets run, from OWASP's "CSV Injection".
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def csv_rows(rows: Sequence[Record], keys: Iterable[str]) -> str:
-    """Rows as CSV under a line of keys; what is not known is empty, truth in small letters.
+    """Rows as CSV under a line of keys; empty if unknown, booleans in lower case.
 
-    A text that a spreadsheet would run as a formula, as a file's name may be, begins with
-    "'".
+    Texts that a spreadsheet would run as a formula begin with "'".
     """
 
     def cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
-        """A value as a cell of CSV holds it."""
+        """A value as a cell of CSV."""
         if isinstance(value, bool | np.bool):
             return str(value).lower()
         if isinstance(value, str):

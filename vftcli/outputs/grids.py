@@ -1,4 +1,4 @@
-"""Tables that belong to no page: robots, gains, times, drifts, contacts found, pairs, prints."""
+"""Tables of no page: robots, gains, times, drifts, contacts, pairs, prints."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
     from vftcli.wrench.sensor_reading import Drift
 
-SURE = 0.05  #: Below this p a difference between two observers is called sure.
-#: Columns of the contact table, and how they are headed.
+SURE = 0.05  #: A difference of two observers is sure below this p.
+#: Column of the contact table → its heading.
 CONTACTS = {
     "recording": "recording",
     "observer": "observer",
@@ -71,7 +71,7 @@ def joints_grid(robot: "Robot") -> Grid:
 
 
 def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
-    """Gains that were found for each observer and what to expect of them, joint by joint."""
+    """Gains found for each observer and their expected effects, joint by joint."""
     rows: Rows = []
     for line in tuned:
         values = {
@@ -118,7 +118,7 @@ def bench_grid(result: Record) -> Grid:
 
 
 def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
-    """How each observer tells contacts, one row a recording and observer; none if not asked."""
+    """Contact detection, one row a recording and observer; none if not asked."""
     if errors is None or "contacts" not in errors.columns:
         return
     if len(rows := errors.drop_nulls("contacts")):
@@ -138,14 +138,14 @@ def pairs_text(table: "pl.DataFrame") -> str:
     rows: Rows = []
     for row in table.iter_rows(named=True):
         names, low, high = (row["observer"], row["other"]), row["low_Nm"], row["high_Nm"]
-        # First RMSE less second: above zero the second observer is the better.
+        # First RMSE less second: above zero the second observer is better.
         if row["difference_Nm"] > 0:
             names = names[::-1]
         else:
             low, high = -high, -low
         interval = f"{significant(low)} to {significant(high)}"
         by = abs(row["difference_Nm"])
-        # A blank keeps the digits of those without a star below the others.
+        # A blank aligns digits without a star.
         sure = f"{row['p']:.3f}{'*' if row['p'] < SURE else ' '}"
         rows.append((row["recording"], f"J{row['joint']}", *names, by, interval, sure))
     heads = ("joint", "better", "than", "by [N·m]", "95 % interval", "p")

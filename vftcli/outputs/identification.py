@@ -1,4 +1,4 @@
-"""Outputs of an identification: robot file, page, figures, `run.json`, and what is printed."""
+"""Outputs of an identification: robot file, page, figures, `run.json`, tables."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -62,7 +62,7 @@ DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
 
 
 def files_beside(path: Path, form: str | None) -> list[str]:
-    """Names of a robot file and of all that goes with it; `form` is what figures are written as."""
+    """Names of a robot file and the files beside it; `form` is the figures' format."""
     if path.suffix.lower() != ".toml":
         raise OutputError(f"{path}: -o needs a name that ends in .toml, as my_robot.toml")
     drawn = figure_files(form, IDENTIFICATION_FIGURES, f"{path.stem}-")
@@ -77,9 +77,9 @@ def write_identification(
     force: bool,
     form: str | None = None,
 ) -> str:
-    """Write all files or none, figures in a form, or none; return the text of `run.json`.
+    """Write all files or none, with figures if `form`; the text of `run.json`.
 
-    `logs` are the examinations of all that were read, also of those that no fit used.
+    `logs` are the examinations of all logs, also of those outside the fit.
     """
     record = identification_record(found, logs, command)
     heading = [
@@ -157,11 +157,11 @@ def render_identification(
 def velocity_plot(
     coloured: Sequence[tuple[Trace, str]], j: int
 ) -> tuple[str, Scales, list[tuple[str, str]]]:
-    """A joint's residual over velocity: its name, scales, and each log's colour and dots."""
-    # One scale for all logs of a joint, or their dots could not be compared.
+    """A joint's residual over velocity: name, scales, colour and dots of each log."""
+    # One scale for all logs of a joint.
     speed = max(float(np.max(np.abs(t.motion.dq[:, j]))) for t, _ in coloured) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
-    # A few samples at reversals are far off; they are drawn at the edge.
+    # Outliers at reversals are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
     scales, drawn = Scales(Box(height=180), Span(-speed, speed), Span(-high, high)), []
     for trace, colour in coloured:
@@ -176,12 +176,12 @@ def velocity_plot(
 
 def shown_trace(found: Identification) -> Trace:
     """The log that is drawn over time: the first held-out one, else the first."""
-    # A log that the fit has not seen shows how well it predicts.
+    # A log outside the fit shows how well it predicts.
     return next((t for t in found.traces if t.role == "held-out"), found.traces[0])
 
 
 def torque_charts(found: Identification) -> tuple[Chart, ...]:
-    """Measured and predicted torque of one log, and what is left."""
+    """Measured and predicted torque of one log, and their difference."""
     if not found.traces:
         return ()
     trace, units = shown_trace(found), ("N·m",) * found.robot.joints
@@ -196,7 +196,7 @@ def torque_charts(found: Identification) -> tuple[Chart, ...]:
 
 
 def identification_figures(found: Identification) -> dict[str, Drawing]:
-    """Torque measured and predicted, and what is left of each log; none where no log was used."""
+    """Measured and predicted torque, and residuals of each log; none without logs."""
     drawings = {}
     if found.traces:
         name = shown_trace(found).motion.recording.name
@@ -234,7 +234,7 @@ def residual_grid(found: Identification) -> Grid:
 
 
 def parameter_grid(found: Identification) -> Grid:
-    """The identified numbers with their spread, and what the profile had."""
+    """The identified numbers with their spread, and the profile's."""
     rows = (
         row | {"unit": row["unit"] + ("" if row["determined"] else "  (not determined)")}
         for row in found.parameters.iter_rows(named=True)

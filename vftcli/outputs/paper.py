@@ -1,4 +1,4 @@
-"""Figures for a paper: their look and files, lines of the page's charts, dots of many numbers.
+"""Figures for a paper: style, files, lines of the page's charts, dots.
 
 Nothing here loads matplotlib before a figure is drawn; it is an extra (``vftcli[figures]``).
 """
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 WIDTHS = {"single": 3.5, "double": 7.16}  #: One and two columns of the IEEE's journals. [in]
-RESOLUTION = 600  #: Of PNG: what the IEEE asks of drawings in black and white. [dots/in]
+RESOLUTION = 600  #: Of PNG, as the IEEE asks for line drawings. [dots/in]
 
-#: A Times-like type of matplotlib itself: equal bytes everywhere.
-#: PDF embeds it, SVG holds paths. A dollar sign is a dollar sign.
+#: Matplotlib's own Times-like type, for equal bytes everywhere.
+#: PDF embeds it, SVG holds paths.
 STYLE: dict[str, Any] = {
     "font.family": ["STIXGeneral", "DejaVu Sans"],
     "font.size": 8.0,
@@ -55,7 +55,7 @@ STYLE |= {f"{axis}tick.{key}": value for axis in "xy" for key, value in TICKS.it
 
 #: Legend: width of a letter and a line's sample, line height. [in]
 LETTER, SAMPLE, LINE = 0.043, 0.41, 0.15
-LONGEST = 44  #: Letters of a name in a figure; the end of a longer one is cut off.
+LONGEST = 44  #: Most letters of a name in a figure.
 #: Stretches of a line in a plot of two inches, two samples each.
 STRETCHES = 500
 #: Below it a figure has one column; height of a row, by width. [in]
@@ -65,8 +65,8 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 #: Width of a contact number's digit; least gap to the next. [in]
 DIGIT, BETWEEN = 0.046, 0.02
 SPREAD = 0.66  #: Share of a joint's room that its dots take.
-RANGE = 10.0  #: Numbers that differ by more than this factor have a logarithmic axis.
-PLOTTED = 0.75  #: About which share of a plot's room its axes take.
+RANGE = 10.0  #: A larger ratio of numbers has a logarithmic axis.
+PLOTTED = 0.75  #: Rough share of a plot's room for its axes.
 #: Unit of a horizontal axis → what it is called.
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
 
@@ -74,12 +74,12 @@ Look = dict[str, Any]  #: What matplotlib draws with.
 BAND_LOOK: Look = {
     "color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0)), "zorder": 1.9,
 }  # fmt: skip
-#: Where the number of a contact is, above a plot.
+#: Place of a contact's number, above a plot.
 ABOVE: Look = {
     "xycoords": ("data", "axes fraction"), "xytext": (0, 1), "textcoords": "offset points",
     "ha": "center", "va": "bottom", "fontsize": 6.5,
 }  # fmt: skip
-#: Where the label of an axis hangs in a place without a plot.
+#: Place of an axis label without a plot.
 BELOW: Look = {
     "xycoords": "axes fraction", "xytext": (0, -12), "textcoords": "offset points",
     "ha": "center", "va": "top",
@@ -95,13 +95,13 @@ PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
 class Drawing(NamedTuple):
     """A figure that can be drawn in both widths."""
 
-    title: str  #: What it shows, with sign and frame, as its file says.
-    #: Its width [in] → the figure; called where the style of a paper holds.
+    title: str  #: Its content, with sign and frame, in the file's metadata.
+    #: Its width [in] → the figure; called in the style of a paper.
     draw: "Callable[[float], Figure]"
 
 
 def figure_files(form: str | None, names: Sequence[str], before: str = "figures/") -> list[str]:
-    """The files of these figures in both widths; none where no form is asked for."""
+    """The files of these figures in both widths; none without a form."""
     each = product(names, WIDTHS) if form else ()
     return [f"{before}{name}-{width}.{form}" for name, width in each]
 
@@ -112,7 +112,7 @@ def write_figures(
     form: str,
     before: str = "figures/",
 ) -> None:
-    """Write figures in both widths, without date and machine, so that their bytes stay equal."""
+    """Write figures in both widths, without date and machine, for equal bytes."""
     maker = f"vftcli {VERSION}"
     own: dict[str, dict[str, str | None]] = {
         "pdf": {"Creator": maker, "CreationDate": None},
@@ -128,17 +128,17 @@ def write_figures(
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Let matplotlib draw as a paper asks, whatever its user's own settings are."""
+    """Set matplotlib's style for a paper, in place of the user's settings."""
     from matplotlib import style
 
     with style.context(["default", STYLE]), warnings.catch_warnings():
-        # A log's name may hold letters that no font of a paper has.
+        # A log's name may hold letters that the fonts lack.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
 
 
 def sheet(width: float, cells: int, columns: int, height: float) -> "tuple[Figure, NDArray[Any]]":
-    """A figure with room for so many plots, row by row; width and a row's height in inches."""
+    """A figure with room for `cells` plots, row by row; width and row height [in]."""
     from matplotlib.figure import Figure
 
     rows = -(-cells // columns)
@@ -147,7 +147,7 @@ def sheet(width: float, cells: int, columns: int, height: float) -> "tuple[Figur
 
 
 def add_legend(figure: "Figure", handles: "Mapping[str, Artist]") -> None:
-    """Add one legend above all plots, a handle a name: the figure grows by its lines."""
+    """Add one legend above all plots; the figure grows by its lines."""
     width, height = figure.get_size_inches()
     widest = SAMPLE + LETTER * max(map(len, handles))
     lines = -(-len(handles) // max(int(width / widest), 1))
@@ -158,7 +158,7 @@ def add_legend(figure: "Figure", handles: "Mapping[str, Artist]") -> None:
 
 
 def shortened(name: str) -> str:
-    """A name as a figure has room for it."""
+    """A name, cut to fit a figure."""
     text = printable(name)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
@@ -168,7 +168,7 @@ class Plot(NamedTuple):
 
     chart: Chart  #: What it is a panel of.
     panel: int  #: Which, from 0.
-    #: A chart with the same panel, drawn over it with an axis of its own, or None.
+    #: A chart over it with an axis of its own, or None.
     over: Chart | None = None
 
 
@@ -190,9 +190,9 @@ def line_figure(
 ) -> "Figure":
     """Plots row by row under one legend, in this width. [in]
 
-    Above the first row are numbers at their times [s]; a name has a mark in each plot, across and
-    up, 2 × (n,). `columns` plots are beside one another, None for what fits; `below` is the name of
-    the horizontal axis, None for what its unit says.
+    Above the first row are numbers at their times [s]; a name has a mark in each plot, x and
+    y, 2 × (n,). A row has `columns` plots, None for what fits; `below` is the name of the
+    horizontal axis, None for its unit's.
     """
     wide = width > NARROW
     columns = min(len(plots), columns or (2 if not wide else 4 if len(plots) > 6 else 3))
@@ -219,13 +219,13 @@ def line_figure(
                 end = at + half + BETWEEN * inch
         for n, (name, (x, y)) in enumerate(marks.items()):
             axes.plot(x[plot.panel], y[plot.panel], label=f"{name}, chosen", **dot_look(n))
-    # A place without a plot has the numbers and the label of the axis above it.
+    # An empty place has the numbers and label of the axis above it.
     for axes, plot in zip(grid[len(plots) :], plots[len(plots) - columns :], strict=False):
         set_scale(axes, plot.chart)
         axes.patch.set_visible(False)
         axes.spines[:].set_visible(False)
         axes.yaxis.set_visible(False)
-        # Numbers inside of the empty place take no room of their own.
+        # Numbers inside the empty place need no room.
         axes.tick_params(which="both", bottom=False, labelbottom=False)
         axes.tick_params(labeltop=True, pad=-10.0)
         axes.annotate(below or AXES[plot.chart.unit], (0.5, 1.0), **BELOW)
@@ -284,7 +284,7 @@ def dot_look(k: int, paint: str = "black", edge: float = 0.7, fill: str = "white
 
 
 def ribbon_looks(series: ChartLine) -> list[Look]:
-    """Looks of the band about a line: itself, and where no contact is listed, if anywhere."""
+    """Looks of a line's band: its own, and grey where no contact is listed, if any."""
     own = {"facecolor": look(series)["color"], "alpha": 0.25, "linewidth": 0.0}
     grey = own | {"facecolor": "0.4", "label": QUIET}
     return [own | {"label": "95 % band"}, *[grey] * (series.quiet is not None)]
@@ -314,9 +314,9 @@ class DotPlot(NamedTuple):
 def dot_figure(
     width: float, plots: Sequence[DotPlot], paints: Mapping[str, str], label: str
 ) -> "Figure":
-    """Plots under one legend, their logs' names above them where there are several.
+    """Plots under one legend, with the logs' names if several.
 
-    `paints` has the colour of every row by its name; `label` is the vertical axis with its unit.
+    `paints` is name → colour of every row; `label` is the vertical axis with its unit.
     """
     from matplotlib.lines import Line2D
 

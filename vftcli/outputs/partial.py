@@ -1,4 +1,4 @@
-"""Temporary folders: each belongs to a living process, and what dead ones left is cleared."""
+"""Temporary folders, each of a living process; those of dead ones are cleared."""
 
 import os
 import re
@@ -13,23 +13,22 @@ if sys.platform != "win32":
     import fcntl
 
 PARTIAL = ".vftcli-*.partial"  #: Every temporary folder's name, as a pattern of paths.
-#: What a temporary folder is called; the number is that of the process that made it.
+#: Name of a temporary folder, with the number of its process.
 NAME = re.compile(r"\.vftcli-(\d+)-[0-9a-f]{8}\.partial")
-#: A folder that nobody holds is cleared at this age even if its process number is in use,
-#: which by then is another program's. [s]
+#: Age at which an unheld folder is cleared though its process number is in use again. [s]
 UNSURE = 60.0
 
 
 @contextmanager
 def partial_folder(parent: Path) -> Iterator[Path]:
-    """Make a folder in `parent` for a block; it goes with all that is still in it.
+    """Make a folder in `parent` for a block; it is removed with its content.
 
-    When the block ends well, what killed runs left in `parent` goes too.
+    After a block that ends well, folders of killed runs in `parent` are removed, too.
     """
     path = parent / f".vftcli-{os.getpid()}-{os.urandom(4).hex()}.partial"
     path.mkdir()
     try:
-        # Held as long as the process lives, however it ends: so others know that it does.
+        # Held as long as the process lives, so that others know.
         with held(path, wait=False):
             yield path
     finally:
@@ -53,7 +52,7 @@ def partial_folder(parent: Path) -> Iterator[Path]:
 
 @contextmanager
 def held(folder: Path, *, wait: bool) -> Iterator[None]:
-    """Hold a folder for a block against others that hold it; the system lets go of the dead's."""
+    """Hold a folder for a block against others; a dead process holds nothing."""
     if sys.platform == "win32":
         yield
         return
@@ -71,7 +70,7 @@ def held(folder: Path, *, wait: bool) -> Iterator[None]:
 
 
 def to_disk(paths: Iterable[Path]) -> None:
-    """Have files and folders on the disk itself, so that a later rename cannot outrun them."""
+    """Flush files and folders to the disk, so that a later rename cannot overtake."""
     for path in paths:
         # A folder cannot be opened everywhere, nor flushed on every file system.
         with suppress(*([OSError] if path.is_dir() else [])):

@@ -8,12 +8,12 @@ DASH = "–"  #: Sign for an unknown number.
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number with three significant digits and no exponent where one can do without."""
+    """A number with three significant digits, with an exponent only below 1e-4."""
     if not np.isfinite(value):
         return DASH
     if value == 0.0:
         return "0"
-    # Rounding comes first: 9.996 has its three digits as 10.0.
+    # Rounded first: 9.996 is 10.0.
     exponent = int(np.floor(np.log10(abs(float(f"{value:.{digits - 1}e}")))))
     if exponent < -4:
         return f"{value:.{digits - 1}e}"
@@ -46,12 +46,12 @@ def ranged(low: float, high: float, unit: str = " N") -> str:
 
 
 def vector(values: Iterable[float]) -> str:
-    """Numbers with one digit behind the point, none of them a negative nought."""
+    """Numbers with one decimal, without a negative zero."""
     return ", ".join(minus(f"{x + 0.0:.1f}") for x in np.round(list(values), 1))
 
 
 def percent(share: float) -> str:
-    """A share in per cent, with one digit behind the point, or one that is not zero."""
+    """A share in per cent, with one decimal, or one significant digit."""
     value = 100.0 * share
     if 0.0 < value < 0.001:
         return "<0.001 %"

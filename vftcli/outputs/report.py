@@ -24,21 +24,21 @@ from vftcli.signals.recording import trim
 ERROR_TABLES = ("errors.csv", "errors.json", "errors.md", "errors.tex")
 CONTACTS = ("contacts.json", "contacts.csv")  #: The list of contacts, where it is made.
 CONTACT_TABLE = "figures/contacts.tex"  #: The list for a paper, beside its figures.
-#: What a report of one log may hold; the error tables only where there is a reference.
+#: Files of a report of one log; error tables only with a reference.
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
 #: Head above the sub-folders of several logs.
 SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
 
 
 def places_of(labels: Sequence[str]) -> list[str]:
-    """The sub-folder of each of several logs: called as its file without the ending."""
+    """The sub-folder of each of several logs: its file's name without the ending."""
     return numbered(Path(label).stem or "log" for label in labels)
 
 
 def report_files(
     labels: Sequence[str], extras: Sequence[str], form: str | None, *, several: bool
 ) -> list[str]:
-    """Names of all files that a report of logs with these labels may hold, with these extras.
+    """Names of all files that a report of these logs may hold, with these extras.
 
     `several` is whether there is a sub-folder a log.
     """
@@ -60,10 +60,10 @@ def write_report(
     form: str | None = None,
     failed: Mapping[str, str] = {},
 ) -> str:
-    """Write the report of one log, or a sub-folder a log and above them an index and all errors.
+    """Write a report of one log, or a sub-folder a log below an index and all errors.
 
-    All files are written or none. What comes back is the text of `run.json`, of several
-    logs one record with their own in it.
+    All files are written or none. Returns the text of `run.json`, of several logs one record
+    with theirs in it.
     """
     from vftcli.outputs.page.pages import render_index
 
@@ -100,7 +100,7 @@ def fill(
     from vftcli.outputs.page.pages import render  # templates, which no answer needs
 
     record = run_record(analysis, command)
-    # The page shows the record that is written beside it, not one of its own.
+    # The page shows the record beside it.
     analysis = replace(analysis, run=record)
     # Without the package `left_out` says how to get it.
     recorded = choice.detail != NONE and installed("rerun")
@@ -131,7 +131,7 @@ def fill(
 def put_contacts(
     folder: OutputFolder, place: str, analyses: Sequence[Analysis], command: str
 ) -> None:
-    """Write the lists of contacts, if there are any: as `vftcli contacts` prints them."""
+    """Write the lists of contacts, if any, as `vftcli contacts` prints them."""
     if lists := [each.contacts for each in analyses if each.contacts is not None]:
         folder.write(f"{place}contacts.json", to_json(contacts_envelope(analyses, command)))
         folder.write(f"{place}contacts.csv", contacts_csv(lists))
@@ -140,7 +140,7 @@ def put_contacts(
 def contacts_envelope(
     analyses: Sequence[Analysis], command: str, failed: Mapping[str, str] = {}
 ) -> Record:
-    """What touched the arm along logs, for machines; what `failed` is left out."""
+    """Contacts of logs, for machines, without those that `failed`."""
     logs = [log_entry(a.recording, contacts_record(a.contacts)) for a in analyses if a.contacts]
     return envelope(command, logs, found={"left_out": dict(failed)} if failed else {})
 

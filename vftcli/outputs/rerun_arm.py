@@ -1,8 +1,8 @@
-"""The arm and forces in a Rerun recording: shapes, poses and colours over time, arrows.
+"""The arm and forces in a Rerun recording: shapes, poses, colours, arrows.
 
-The arm is made of the meshes that its description names, and where they are not found of
-capsules, from the chain's own geometry. A contact's arrow is there while it lasts, at its
-place, below `/contacts`, and the links that it touched have its colour.
+The arm is drawn with the meshes of its description, else with capsules from the chain's
+geometry. A contact's arrow is at its place while it lasts, below `/contacts`, and the
+touched links have its colour.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,21 +21,21 @@ from vftcli.robots.robot import Mesh, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
-Stream = rr.RecordingStream  #: A recording that is being made.
-Packed = NDArray[np.uint32]  #: Colours as Rerun takes them.
+Stream = rr.RecordingStream  #: A recording in the making.
+Packed = NDArray[np.uint32]  #: Colours in Rerun's form.
 #: When a link's colour changes [s] → that colour ``#rrggbb``, "" for its own.
 Changes = Mapping[float, str]
 
 ROBOT, CONTACTS = "/robot", "/contacts"  #: Roots of the arm and of the contacts, by number.
-RATE = 50.0  #: Poses a second that are drawn. [Hz]
-MOST_POSES = 20_000  #: Poses that are drawn, however long the log is.
-NEWTON_PER_METRE = 200.0  #: Length of a force arrow where nothing else is said: 200 N are 1 m.
+RATE = 50.0  #: Drawn poses a second. [Hz]
+MOST_POSES = 20_000  #: Most drawn poses.
+NEWTON_PER_METRE = 200.0  #: Default scale of a force arrow: 200 N are 1 m.
 #: Colours of links, joints and the force arrow.
 LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
 #: Lengths that a force arrow may have. [N/m]
 SCALES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
 SHAFT = 0.012  #: Radius of a force arrow. [m]
-LONGEST = 0.5  #: The hardest force's arrow is as long at most. [m]
+LONGEST = 0.5  #: Longest arrow, that of the hardest force. [m]
 
 
 class ArmPoses(NamedTuple):
@@ -48,13 +48,13 @@ class ArmPoses(NamedTuple):
 
 
 def rgba(*colours: str) -> Packed:
-    """Colours ``#rrggbb`` as 0xRRGGBBAA: Rerun 0.30 takes three numbers for three colours."""
+    """Colours ``#rrggbb`` as 0xRRGGBBAA: [r, g, b] is three colours to Rerun 0.30."""
     return np.array([int(f"{colour[1:]}ff", 16) for colour in colours], dtype=np.uint32)
 
 
 def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:
-    """Poses of all links at about `RATE` samples a second, `MOST_POSES` of them at most."""
-    # At least each sample: a slow log is drawn as it is.
+    """Poses of all links at about `RATE` samples a second, at most `MOST_POSES`."""
+    # A slow log is drawn as it is.
     every = max(1, int(len(t) / max(float(t[-1] - t[0]) * RATE, 1.0)), -(-len(t) // MOST_POSES))
     t, q = t[::every], np.ascontiguousarray(q[::every])
     poses = link_poses(chain, q)
@@ -67,14 +67,14 @@ def xyzw(rotation: Array) -> Array:
 
 
 def arrow_scale(hardest: float) -> float:
-    """Newtons that are 1 m, so that the arrow of the hardest force can be seen. [N/m]"""
+    """Newtons of 1 m of arrow, for a visible hardest force. [N/m]"""
     return next((scale for scale in SCALES if hardest <= LONGEST * scale), SCALES[-1])
 
 
 def send_arm(
     stream: Stream, robot: Robot, poses: ArmPoses, painted: Mapping[int, Changes]
 ) -> None:
-    """Send the arm's shape once, its poses over time, and when links have another colour."""
+    """Send the arm's shape once, its poses over time, and changes of link colours."""
     time = rr.TimeColumn("t", duration=poses.t)
     for j, shapes in enumerate(capsules(robot.chain)):
         link = f"{ROBOT}/link_{j}" if j else f"{ROBOT}/base"
@@ -121,7 +121,7 @@ def send_meshes(stream: Stream, link: str, meshes: Sequence[Mesh], changes: Chan
 def send_colours(
     stream: Stream, path: str, own: Packed, changes: Changes, *, mesh: bool = False
 ) -> None:
-    """Send the colours of shapes: their own, and when they have others."""
+    """Send the colours of shapes: their own, and changes."""
     kind, field = (rr.Asset3D, "albedo_factor") if mesh else (rr.Capsules3D, "colors")
     given: dict[str, Any] = {field: own}
     if not changes:
@@ -136,7 +136,7 @@ def send_colours(
 
 
 def painted_links(found: ContactList, joints: int) -> dict[int, dict[float, str]]:
-    """Number of a link → when it is one of those that were touched, in the colour of the part."""
+    """Number of a touched link → changes of its colour, to that of the part."""
     spans: dict[int, dict[float, str]] = {}
     for c in found.contacts:
         for link in {place or joints for place in c.places}:
@@ -154,7 +154,7 @@ def send_force(
     scale: float = NEWTON_PER_METRE,
     colour: str = FORCE,
 ) -> None:
-    """Send an arrow over time; where the force is not known there is none.
+    """Send an arrow over time, none where the force is unknown.
 
     `origin` [m] and `force` [N] are in base axes, (S, 3); `scale` newtons are 1 m.
     """
@@ -172,16 +172,16 @@ def send_force(
 def send_contacts(
     stream: Stream, found: ContactList, poses: ArmPoses, force: Array | None, scale: float
 ) -> None:
-    """Send the arrow of each contact, while it lasts, at its place; `scale` newtons are 1 m.
+    """Send the arrow of each contact, while it lasts; `scale` newtons are 1 m.
 
-    On the wrist it is the force of `best` at these poses as it runs, in base axes [N],
-    (S, 3); elsewhere, where the flange's would be another, that of the contact's peak.
+    On the wrist it is `force`, that of `best` at these poses in base axes [N], (S, 3);
+    elsewhere, where the flange's would be wrong, that of the contact's peak.
     """
     for contact in found.contacts:
         if contact.wrench is None:
             continue
         first = int(np.searchsorted(poses.t, contact.start))
-        # One more: the last arrow goes with the first pose after the contact.
+        # One more: the first pose after the contact ends the arrow.
         rows = slice(first, int(np.searchsorted(poses.t, contact.stop, side="right")) + 1)
         t, origin = poses.t[rows], touched_point(contact, poses.translation[rows])
         arrows = np.tile(contact.wrench[:3], (len(t), 1))

@@ -21,7 +21,7 @@ from vftcli.outputs.charts import GREY, INK, REFERENCE, Chart, ChartLine, level_
 from vftcli.outputs.files import writing
 from vftcli.outputs.rerun_arm import CONTACTS, ROBOT, ArmPoses, Stream, rgba
 
-#: Begin of a bar's name; ends of the names of a band's edges.
+#: Begin of a bar's name; ends of band edges' names.
 BAR, EDGES = "touched: ", ("95 % upper", "95 % lower")
 
 
@@ -32,7 +32,7 @@ class LogLine(NamedTuple):
     t: float  #: When. [s]
     text: str  #: What happened.
     colour: str  #: ``#rrggbb``.
-    level: str = "INFO"  #: How much it matters: INFO, WARN or ERROR.
+    level: str = "INFO"  #: INFO, WARN or ERROR.
 
 
 class Tab(NamedTuple):
@@ -49,7 +49,7 @@ def lines_of(plot: Chart) -> list[ChartLine]:
 
 
 def thinned(plot: Chart, stretches: int, whole: Sequence[tuple[float, float]]) -> Chart:
-    """The plot with the samples that `level_rows` keeps; all of them where nothing is gained."""
+    """The plot with the samples of `level_rows`, or all if that saves nothing."""
     values = np.hstack([line.values for line in lines_of(plot)])
     rows = level_rows(plot.x, values, stretches, whole)
     if rows is None:
@@ -70,14 +70,12 @@ def rerun_file(
     poses: ArmPoses,
     space: str,
 ) -> Iterator[Stream]:
-    """Write a recording with its plots and words; yield its stream, to draw the arm into it.
+    """Write a recording with plots and words; yields its stream, to draw the arm.
 
-    The plots leave their tabs as they are sent, so that a long log's have room beside the
-    file. `words` holds the Markdown of every document by its name. The eye sees all
-    `poses` of the arm, in a space of this name.
+    Plots leave their tabs as they are sent, to save memory. `words` is name → Markdown of
+    every document. The eye sees all `poses` of the arm, in a space of this name.
     """
-    # Equal data make equal recordings: no random id, no time of writing, nor rows put
-    # together by how much time has gone by.
+    # Equal data make equal recordings: no random id, no time of writing, no batches by time.
     stream = rr.RecordingStream(
         "vftcli",
         recording_id=recording_id(title, tabs, words),
@@ -86,7 +84,7 @@ def rerun_file(
     )
     # Into memory: on a full disk Rerun's thread would never end.
     made = stream.memory_recording()
-    # Active: a viewer in a browser arranges by itself what is a default alone.
+    # Active: a viewer in a browser ignores a default.
     stream.send_blueprint(blueprint(tabs, words, poses, space))
     stream.send_recording_name(drawable(title))
     for tab in tabs:
@@ -114,9 +112,9 @@ def rerun_file(
 
 
 def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> UUID:
-    """The identity of a recording: equal for equal data and words, which hold the logs' sha256.
+    """A recording's identity: equal for equal data and words (with logs' sha256).
 
-    A viewer puts recordings of one identity into one; other gains on the log make another.
+    A viewer merges recordings of one identity; other gains make another.
     """
     found = hashlib.sha256("\0".join([title, *words, *words.values()]).encode("utf-8", "replace"))
     for plot in (plot for tab in tabs for plot in tab.plots):
@@ -129,12 +127,10 @@ def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> U
 def blueprint(
     tabs: Sequence[Tab], words: Mapping[str, str], poses: ArmPoses, space: str
 ) -> rrb.Blueprint:
-    """How the recording opens: the arm's space and words to the left, plots to the right, paused.
+    """The opening layout: the arm and words to the left, plots to the right, paused.
 
-    The eye sees the base and all places where the links have been.
-
-    Rerun lets no file say where its time cursor is: it opens at the first sample, and a
-    click on a time of the text log goes there.
+    The eye sees the base and all places of the links. No file can set Rerun's time cursor: it
+    opens at the first sample, and a click on a time of the text log goes there.
     """
     corners = poses.translation.reshape(-1, 3)
     # The base at the origin must be visible too.
@@ -162,7 +158,7 @@ def blueprint(
 
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
-    """One tab, in two columns if there are many plots; the first one's legend holds for all."""
+    """One tab, in two columns if it has many plots; the first one has the legend."""
     # Plots of a family, else of a unit, share the ends of their vertical axes.
     kinds, views = [plot.families or plot.units for plot in tab.plots], []
     ends: dict[tuple[object, ...], tuple[float, float]] = {}
@@ -173,7 +169,7 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
         low, high = ends[kind]
         # In small plots few ticks are labelled.
         span = f", {low:.3g} to {high:.3g}" if len(tab.plots) > 3 else ""
-        # It would cover a corner; of a plot with points the title says it all.
+        # A legend covers a corner; with points the title is enough.
         named = k == 0 and len(lines_of(plot)) == len(plot.series)
         view = rrb.TimeSeriesView(
             origin=plot.key,
@@ -186,7 +182,7 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
     if not tab.log:
         return plots
-    # The path says nothing that the words do not.
+    # The path repeats the words.
     shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
     columns = rrb.TextLogColumns(text_log_columns=shown)
     paths = dict.fromkeys(line.path for line in tab.log)
@@ -195,7 +191,7 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
 
 
 def send_plot(stream: Stream, plot: Chart) -> None:
-    """Send one plot: names and colours once, then all samples in one batch; then its points."""
+    """Send one plot: names and colours once, all samples in one batch, its points."""
     lines = lines_of(plot)
     # Thin edges, thick bars; then the reference, then the best.
     widths = [
@@ -231,7 +227,7 @@ def send_plot(stream: Stream, plot: Chart) -> None:
             stream.send_columns(path, [rr.TimeColumn("t", duration=points.x)], single)
 
 
-#: How to write what the viewer's font may lack.
+#: Spelling of letters that the viewer's font may lack.
 SPELLED = str.maketrans({
     "ᵀ": "^T", "⁻": "^-", "√": "sqrt ", "≤": "<=", "≥": ">=", "≈": "~", "→": "->", "−": "-",
     "–": "-", "—": "-", "…": "...", "‘": "'", "’": "'", "“": '"', "”": '"', "∂": "d",
@@ -241,7 +237,7 @@ LACKED = re.compile("[^\n -~\u00a0-\u00ff\u0391-\u03c9]")  #: Neither Latin-1 no
 
 
 def drawable(text: str) -> str:
-    """Text in Latin-1 and Greek; further accents are dropped, other letters become "?".
+    """Text in Latin-1 and Greek; other accents are dropped, other letters are "?".
 
     The viewer stops at the first letter that its font lacks.
     """

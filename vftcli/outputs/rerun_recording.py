@@ -1,12 +1,12 @@
-"""recording.rrd: contacts, torques, residuals, motion and the arm, arranged for the Rerun viewer.
+"""recording.rrd: contacts, torques, residuals, motion and the arm for Rerun.
 
 Entities: `/tau_ext/J1` … (the reference, then every observer), `/residual/J1` … (every
 estimate minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint),
 `/wrench/fx` … where wrenches are known, as in the page's charts; `/robot` with the arm.
 Where contacts are listed: `/force` with |F|, its band and the spans of the contacts,
 `/force/points` with the peaks, `/contacts/1` … with the arrow and the words of each
-contact, `/remarks` with what limits the list. Elsewhere the force of a wrench that was
-asked for is an arrow, `/robot/flange_force`.
+contact, `/remarks` with the list's limits. Else the force of a wrench, if asked for, is
+an arrow, `/robot/flange_force`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -53,17 +53,17 @@ from vftcli.wrench.solvers import ForceArrow
 
 #: Stretches of a long plot, lowest and highest sample each.
 STRETCHES = 5000
-#: Time before and after the start of a contact in which every sample is kept. [s]
+#: Every sample stays so long before and after a contact's start. [s]
 AROUND = 1.0
-WHOLE_TIME = 20.0  #: Time of which every sample is kept, all contacts together. [s]
-#: What a dagger says in a plot's title.
+WHOLE_TIME = 20.0  #: Total time with every sample, over all contacts. [s]
+#: Meaning of a dagger in a plot's title.
 DOUBT = " (the joint rests: do not trust the reference)"
-BELOW = 0.06  #: The spans of the contacts are this share of the largest force below zero.
+BELOW = 0.06  #: Contact spans are at this share of the largest force below zero.
 BAND = "#e98aa2"  #: The band of |F|: the colour of `best`, paler.
 
 
 def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
-    """Write the recording with its blueprint, so that it opens arranged."""
+    """Write the recording with its layout."""
     robot, found = analysis.robot, analysis.contacts
     tabs = tabs_of(analysis, detail)
     words, arrow, painted = {"Summary": summary(analysis)}, None, {}
@@ -87,12 +87,12 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
 
 
 def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
-    """All plots; of a long log what `STRETCHES` show, every sample where contacts begin."""
+    """All plots; of a long log `STRETCHES`, and every sample where contacts begin."""
     hardest = sorted(analysis.listed, key=lambda c: -(c.peak_force or 0.0))
     strongest, tabs = hardest[: int(0.5 * WHOLE_TIME / AROUND)], []
     whole = [(c.start - AROUND, c.start + AROUND) for c in strongest]
     for name, group in steps(list(plot_groups(analysis).items())):
-        # One plot after the other: of a long log all of them have no room at once.
+        # One plot after the other: all of a long log would fill the memory.
         shown = group if detail == FULL else (thinned(plot, STRETCHES, whole) for plot in group)
         if plots := list(shown):
             tabs.append(Tab(name, plots))
@@ -106,9 +106,9 @@ def newton_per_metre(analysis: Analysis) -> float:
 
 
 def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
-    """All plots, tab by tab: the force, torques and residuals joint by joint, then the motion."""
+    """All plots by tab: force, torques and residuals by joint, wrench, motion."""
     reference, joints = analysis.reference, range(analysis.recording.joints)
-    # One 95 % band, that of `best`, else of the last: all would hide each other.
+    # One 95 % band, of `best`, else the last: all would hide each other.
     banded = [e.name for e in analysis.estimates if e.error_sd is not None]
     last = BEST if BEST in banded else next(reversed(banded), "")
     found = estimate_lines(analysis)
@@ -137,7 +137,7 @@ def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
 
 
 def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart:
-    """One panel less something: every line is drawn at once, of a band both edges."""
+    """One panel less `minus`, with every line, a band as its two edges."""
     lines, edges = [], []
     for line in chart.series:
         values = line.values[:, j : j + 1] - minus
@@ -153,7 +153,7 @@ def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart
 
 
 def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
-    """|F| with its 95 % band, the spans of the contacts below it, their peaks as points."""
+    """|F| with its 95 % band, spans of the contacts below it, peaks as points."""
     found, sensed, t = analysis.contacts, analysis.virtual_sensor, analysis.t
     size, sd = wrench.size[:, None], wrench.size_sd
     lines = [ChartLine("|F|", size, COLOURS[BEST], leads=True)]
@@ -253,9 +253,9 @@ def summary(analysis: Analysis) -> str:
 def force_arrow(
     analysis: Analysis, poses: ArmPoses, sampled: NDArray[np.intp]
 ) -> ForceArrow | None:
-    """The force as the tables have it at the drawn poses: that of `best`, else the first's.
+    """The tables' force at the drawn poses: that of `best`, else the first's.
 
-    None without a wrench. The drawn poses are those of the log's samples `sampled`. (S,)
+    None without a wrench. `sampled` are the drawn poses' samples. (S,)
     """
     sensed = analysis.virtual_sensor
     found = () if sensed is None else sensed.wrenches

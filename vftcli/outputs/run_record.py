@@ -27,7 +27,7 @@ from vftcli.signals.remarks import Remark, as_record
 from vftcli.signals.version import VERSION
 from vftcli.wrench.frames import FRAMES
 
-#: What every number in an output means.
+#: Meaning of every number in an output.
 CONVENTIONS = {
     "sign": "tau_ext is the torque the environment exerts ON the robot: "
     "M ddq + C dq + g + friction = tau + tau_ext",
@@ -35,10 +35,10 @@ CONVENTIONS = {
     "units": "s, rad, rad/s, A, N, N·m, kg",
     "time": "seconds from the log's first sample",
 }
-#: A list without words, which is better read on one line.
+#: A list without words, written on one line.
 NUMBERS = re.compile(r"\[\n[^\[\]{}\"]*\n\s*\]")
-END = "\n}\n"  #: How an object's text ends.
-#: Package → its module; its version is recorded if loaded, none is imported for it.
+END = "\n}\n"  #: End of an object's text.
+#: Package → its module; its version is recorded if loaded.
 PACKAGES = {
     **{name: name for name in ("numpy", "scipy", "polars")},
     "pin": "pinocchio",
@@ -54,10 +54,10 @@ MEANT = {
 
 
 def run_record(analysis: Analysis, command: str) -> Record:
-    """Everything `run.json` holds, the command line as the user typed it."""
+    """Content of `run.json`; `command` is the line as typed."""
     reference, sensed = analysis.reference, analysis.virtual_sensor
     found = {
-        # Before any number: what may make all of them wrong.
+        # Findings that may make all numbers wrong come first.
         "examination": health_record(analysis.examinations),
         "input": input_record(analysis.recording),
         "robot": robot_record(analysis.robot),
@@ -65,10 +65,9 @@ def run_record(analysis: Analysis, command: str) -> Record:
             observer_record(observer, analysis.tunings.get(observer.name))
             for observer in analysis.observers
         ],
-        # What the estimates were judged by, with its own error.
+        # The reference, with its own error.
         "reference": reference
         and {"name": reference.name, "floor_Nm": reference.floor, "notes": reference.remarks},
-        # How the wrenches were made and what is known of them.
         "wrench": sensed
         and {
             "frame": sensed.sensor.frame,
@@ -100,7 +99,7 @@ def envelope(
 
     Args:
         command: The command line.
-        logs: An entry a log (`log_entry`); of one log its keys are at the top too.
+        logs: An entry a log (`log_entry`); a single one's keys are at the top, too.
         remarks: What a reader of the numbers should know.
         found: The result; a table is its `rows`.
     """
@@ -126,27 +125,26 @@ def seal(
     record: Record,
     files: Mapping[str, str] | None = None,
 ) -> str:
-    """Write a run's record with the digest of every file beside it, the last; return its text.
+    """Write a run's record last, with every file's digest; its text without digests.
 
-    That is without digests: those of recordings differ, since Rerun numbers rows by the
-    clock.
+    Digests of recordings differ, since Rerun numbers rows by the clock.
     """
     place = name.rpartition("/")[0]
     files = folder.digests(place) if files is None else files
     text, digests = to_json(record), to_json({"files": files})
-    # One object of both: to make the text of all anew would take as long again.
+    # Joined as texts: to encode all anew would double the time.
     folder.write(name, f"{text.removesuffix(END)},{digests.removeprefix('{')}")
     return text
 
 
 def to_json(record: Record | Sequence[Any]) -> str:
-    """A record, or rows, as JSON text; what is not a finite number becomes null."""
+    """A record, or rows, as JSON text; null for numbers that are not finite."""
     text = json.dumps(jsonable(record), indent=2, ensure_ascii=False, allow_nan=False)
     return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
 
 
 def jsonable(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
-    """A value in JSON's own types: arrays as lists, NaN as None, dataclasses as objects.
+    """A value in JSON types: arrays as lists, NaN as None, dataclasses as objects.
 
     A remark becomes its code, level, values, place and words.
     """
@@ -169,10 +167,9 @@ def jsonable(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
 
 
 def versions() -> dict[str, str]:
-    """Versions of the program and of the packages that took part in this run, by name.
+    """Versions of the program and of the packages loaded in this run, by name.
 
-    A package that was not imported had no part in the numbers, and looking its version up
-    would cost more than they did.
+    A package that is not loaded has no part in the numbers; to look it up is slow.
     """
     loaded = {package: sys.modules.get(module) for package, module in PACKAGES.items()}
     found = {k: str(getattr(v, "__version__", "unknown")) for k, v in loaded.items() if v}
@@ -180,14 +177,14 @@ def versions() -> dict[str, str]:
 
 
 def input_record(recording: Recording) -> Record:
-    """The log by path and digest, its signals, and which part of it was used."""
+    """The log by path and digest, its signals, and the part in use."""
     path = recording.source.path
     ends = {"start_s": float(recording.t[0]), "end_s": float(recording.t[-1])}
     return {"path": path and str(path), **recording_record(recording), **ends}
 
 
 def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
-    """What was dropped, turned or derived in reading the logs, and what looks suspicious."""
+    """Repairs in reading the logs (dropped, turned, derived), and suspicions."""
     found = [remark for log in logs for remark in log.source.remarks]
     return {
         "repairs": [remark for remark in found if remark.level == "fact"],
@@ -197,7 +194,7 @@ def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
 
 def robot_record(robot: Robot) -> Record:
     """The robot in use: a built-in profile by its name, not its path."""
-    # Its path would be another on every machine; name and digest say as much.
+    # Its path differs between machines; name and digest are enough.
     built_in = robot.path in PROFILES.values()
     return {
         "name": robot.name,
@@ -219,7 +216,7 @@ def file_sha256(path: Path | None) -> str | None:
 
 def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
     """An observer's parameters, and what they mean at the log's sample time."""
-    # What ran is the observer inside, with the gains that the log chose.
+    # The observer that ran is inside, with the log's gains.
     inner: Any = getattr(observer, "observer", observer)
     own = [field.name for field in fields(inner) if field.init] if is_dataclass(inner) else []
     parameters = {name: jsonable(getattr(inner, name)) for name in own}
@@ -230,7 +227,7 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
 def refinement_record(analysis: Analysis) -> Record | None:
     """Results of the complete log: free part, chosen gains, error budget.
 
-    `best` is what it is made of: gains, free part, and the bias that is off.
+    `best` holds its gains, free part and removed bias.
     """
     found = analysis.refinement
     if found is None:
@@ -273,7 +270,7 @@ def refinement_record(analysis: Analysis) -> Record | None:
 def all_remarks(analysis: Analysis) -> list[Remark]:
     """Remarks of the run, of every estimate and of the reference, each once."""
     found: list[Remark] = [*analysis.remarks]
-    # Compared by their words: values may be arrays, which do not compare as one truth.
+    # Compared by their words: values may be arrays.
     of_run = set(map(str, found))
     for torque in analysis.torques:
         for remark in torque.remarks:

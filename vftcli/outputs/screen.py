@@ -1,4 +1,4 @@
-"""A command's screen on its logs, and what a terminal can show of it.
+"""A command's screen on its logs, for any terminal.
 
 Facts, the answer, |F| as bars, the contacts, whether to believe it, the errors, and what was
 written: forty lines at most.
@@ -42,26 +42,25 @@ from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 
 MOST_LINES = 40  #: Lines of a screen.
-#: Of them, those that name what was written: a blank one, two of names, the page.
+#: Lines on written files: a blank one, two of names, the page.
 FILE_LINES = 4
 
-#: Lines of a ground and rows of the table, None for all; then less and less, till it
-#: fits.
+#: Lines of a ground and rows of the table, None for all; then fewer, until it fits.
 #:
-#: A good ground has a line less than the others, one at least. With none, the good
-#: grounds share a line and the others have one each.
+#: A good ground has a line less than the others, at least one. At 0 the good grounds
+#: share a line and the others have one each.
 FORMS = ((None, None), (3, 20), (2, 20), (1, 20), *((0, rows) for rows in range(20, 2, -1)))
 
-MOST_LOGS, WORST = 20, 3  #: Logs that are shown at most, findings below them.
-SUBJECT = 17  #: Columns of what a ground is about.
-#: Remarks that the other observers run on the paper's gains.
+MOST_LOGS, WORST = 20, 3  #: Most logs shown, and findings below them.
+SUBJECT = 17  #: Columns of a ground's subject.
+#: Codes of remarks that others run on the paper's gains.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 
-NARROWEST, WIDEST = 72, 100  #: Columns that a screen uses at least, and at most.
+NARROWEST, WIDEST = 72, 100  #: Least and most columns of a screen.
 ROWS = 3  #: Lines of the bars.
-#: How full a letter is, from empty to full.
+#: Letters of a bar, from empty to full.
 STEPS, ASCII_STEPS = " ▁▂▃▄▅▆▇█", " .-=#"
-LABELS = 9  #: Seconds that are written below the bars, about.
+LABELS = 9  #: Rough number of times below the bars.
 #: Style → ANSI code.
 STYLES = {"good": "32", "caution": "33", "bad": "31", "unknown": "2", "bold": "1", "bar": "36"}
 #: ASCII for a letter on a terminal without it.
@@ -85,7 +84,7 @@ class Canvas(NamedTuple):
         return cls(min(max(columns, NARROWEST), WIDEST), unicode, colour)
 
     def painted(self, text: str, style: str) -> str:
-        """A text in a style, as it is where there are no colours."""
+        """A text in a style, unchanged without colours."""
         return f"\x1b[{STYLES[style]}m{text}\x1b[0m" if self.colour and text else text
 
     def shown(self, text: str) -> str:
@@ -95,7 +94,7 @@ class Canvas(NamedTuple):
         return text.translate(PLAIN).encode("ascii", "replace").decode()
 
     def wrapped(self, text: str, indent: int, lines: int | None = None) -> list[str]:
-        """A text in lines behind an indent, cut behind so many of them; the first has none."""
+        """A text in at most `lines` lines, behind an indent from the second on."""
         found = textwrap.wrap(
             text,
             self.width - indent,
@@ -141,7 +140,7 @@ def log_screen(
 
 
 def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
-    """A list that was made earlier: its log, the answer, the rows."""
+    """An earlier list: its log, the answer, the rows."""
     head = (
         f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
     )
@@ -169,7 +168,7 @@ def facts(analysis: Analysis) -> str:
 
 
 def doubt_lines(analysis: Analysis) -> list[str]:
-    """Warning on meaningless results that are made anyway."""
+    """Warning on meaningless results made anyway."""
     codes = ", ".join(refused_codes(analysis.examinations))
     return [doubt(codes)] if codes else []
 
@@ -181,7 +180,7 @@ def written_lines(
     there = [name for name in names if (folder / name).exists()]
     there += ["one folder a log"] * several
     lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)
-    # A page that this run did not write is another run's.
+    # A page of another run is not shown.
     if "index.html" in there:
         page = printable(str(folder / "index.html"))
         lines.append(f"Open: {page}        More here: --details")
@@ -189,7 +188,7 @@ def written_lines(
 
 
 def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str]:
-    """The rows of a list, and what can be said of the rest of its log."""
+    """The rows of a list, and a sentence on the rest of its log."""
     contacts, rest = found.contacts, otherwise(found)
     if not contacts and (most is not None or not found.candidates):
         return [f"  {rest}"] if rest else []
@@ -205,7 +204,7 @@ def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str
 
 
 def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> list[str]:
-    """Whether it can be believed: some lines a ground, one if it is good; its remedy below."""
+    """Lines of grounds, some a ground, one if it is good; remedies below them."""
     lines = ["Can it be believed?"]
     good = [ground for ground in found if ground.standing == "good"]
     if most == 0 and len(good) > 1:
@@ -221,7 +220,7 @@ def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> l
 def ground_lines(
     ground: Ground, canvas: Canvas, most: int | None, about: str = ""
 ) -> Iterator[str]:
-    """One ground: its mark, what it is about, what is known of it; then its remedy."""
+    """Lines of one ground: mark, subject and sentence; then its remedy."""
     subject, indent = f"{about}: {ground.subject}" if about else ground.subject, SUBJECT + 5
     first, *more = canvas.wrapped(printable(ground.sentence), indent, most)
     mark = canvas.painted(canvas.shown(ground.mark), ground.standing)
@@ -232,7 +231,7 @@ def ground_lines(
         yield f"  {mark} {subject:<{SUBJECT}} {first}"
     yield from more
     if ground.remedy:
-        # A command is not broken into lines: it is there to be copied.
+        # A command stays on one line, to be copied.
         room = indent if indent + len(ground.remedy) <= canvas.width else 4
         yield f"{'':{room}}{printable(ground.remedy)}"
 
@@ -299,7 +298,7 @@ def log_table(
     failed: Mapping[str, str],
     canvas: Canvas,
 ) -> list[str]:
-    """One line a log: what touched the arm, and whether the log is sound."""
+    """One line a log: its contacts and its health."""
     judged = any(analysis.errors is not None for analysis, _ in found)
     heads = ("log", "span", "contacts", "hardest", "else", *["error"] * judged)
     lines: list[tuple[Sequence[str], Standing, str]] = []
@@ -333,7 +332,7 @@ def forces_of_list(found: ContactList, t: Array) -> Array:
 
 
 def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:
-    """|F| [N] over time [s] as bars, seconds and the contacts' numbers below them. (T,)"""
+    """|F| [N] over time [s] as bars, above seconds and the contacts' numbers. (T,)"""
     top = float(force.max())
     labels = [f"{top * row / (ROWS - 1):.0f}" for row in range(ROWS)]
     left = max(map(len, labels))
@@ -341,7 +340,7 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
     levels = column_peaks(t, force, columns) / max(top, 1e-9)
     steps = STEPS if canvas.unicode else ASCII_STEPS
     full = len(steps) - 1
-    # The lowest step is the line on which nothing touches.
+    # The lowest step is no contact.
     height = np.maximum(np.ceil(levels * ROWS * full), 1).astype(int)
     lines = [f"  {'N':>{left}}"]
     for row in range(ROWS - 1, -1, -1):
@@ -361,7 +360,7 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
 def column_peaks(t: Array, force: Array, columns: int) -> Array:
     """The largest |F| in each of so many equal spans of time. (columns,) [N]"""
     edges = np.linspace(t[0], t[-1], columns + 1)
-    # A span without a sample gets the line between its neighbours.
+    # A span without a sample is interpolated.
     peaks = np.interp(0.5 * (edges[1:] + edges[:-1]), t, force)
     place = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, columns - 1)
     np.maximum.at(peaks, place, force)
@@ -380,7 +379,7 @@ def seconds(t: Array, columns: int) -> str:
 
 
 def placed(texts: Iterable[tuple[int, str]], columns: int) -> str:
-    """A line with texts at their places, but for those that something is in the way of."""
+    """A line with texts at their places, without those that would overlap."""
     line = [" "] * (columns + 8)
     for at, text in texts:
         around = line[max(at - 1, 0) : at + len(text) + 1]

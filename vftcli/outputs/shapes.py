@@ -1,4 +1,4 @@
-"""The arm as it is drawn: meshes of few triangles or capsules, and where a force acts on it."""
+"""The drawn arm: meshes of few triangles or capsules, and a force's place on it."""
 
 from bisect import bisect
 from typing import NamedTuple
@@ -15,12 +15,10 @@ from vftcli.signals.errors import RobotError
 
 #: Radius of the first and of the last link, as a share of the arm's length.
 THICKNESS = (0.048, 0.030)
-SHORTEST = (
-    0.02  #: A link shorter than this share of the arm's length is not drawn: its joints are.
-)
+SHORTEST = 0.02  #: Links below this share of the arm's length are not drawn, their joints are.
 MOST_TRIANGLES = 400  #: Triangles of a link on a page.
 FINEST = 7.0  #: The finest grid has 2 to this power of cells along the longest side.
-FLAT = 1e-3  #: Where a surface bends less than this, of its most, a corner is in the middle.
+FLAT = 1e-3  #: Along directions that bend less, of the most, a corner stays in the middle.
 
 
 class Capsule(NamedTuple):
@@ -58,9 +56,9 @@ class Surface(NamedTuple):
 
 
 def link_surfaces(robot: Robot) -> tuple[dict[int, Surface], list[str]]:
-    """Link → its meshes as one surface of few triangles; names of those that cannot be read.
+    """Link → its meshes as one surface of few triangles; names of unreadable ones.
 
-    A link that lacks one of its meshes has none: it is drawn as capsules.
+    A link that lacks one of its meshes is drawn as capsules.
     """
     parts: dict[int, list[Array]] = {}
     lacking: dict[str, int] = {}
@@ -74,11 +72,11 @@ def link_surfaces(robot: Robot) -> tuple[dict[int, Surface], list[str]]:
 
 
 def fewer(corners: Array) -> Surface:
-    """A surface of `MOST_TRIANGLES` at most: the corners in each cell of a grid are one.
+    """A surface of at most `MOST_TRIANGLES`: one corner for each cell of a grid.
 
-    It is where the planes of the triangles there meet best, within the cell, so that
-    nothing moves farther than a cell's diagonal. (Lindstrom 2000, Out-of-core
-    simplification of large polygonal models, section 3)
+    It is where the planes of the cell's triangles meet best, within the cell, so that no
+    point moves farther than a cell's diagonal. (Lindstrom 2000, Out-of-core simplification
+    of large polygonal models, section 3)
     """
     long = np.ptp(corners, axis=(0, 1)).max()
     sizes = (long / 2.0 ** np.linspace(1.0, FINEST, 100)).tolist()
@@ -102,7 +100,7 @@ def fewer(corners: Array) -> Surface:
 
 
 def merged(corners: Array, size: float) -> tuple[Index, Index]:
-    """The cell of each corner, and the triangles between three cells, each once. (F, 3)"""
+    """Cell of each corner, and triangles between three cells, each once. (F, 3)"""
     places = np.floor(corners / size).astype(np.int64)
     x, y, z = np.moveaxis(places - places.min(axis=(0, 1)), -1, 0)
     _, cells = np.unique((x * (y.max() + 1) + y) * (z.max() + 1) + z, return_inverse=True)
@@ -117,13 +115,13 @@ def merged(corners: Array, size: float) -> tuple[Index, Index]:
 
 
 def spot_of(contact: Contact, joints: int) -> tuple[int, int]:
-    """Frames between which a force acts: the flange's twice, or both ends of a link."""
+    """Frames beside a force's place: the flange's twice, or both ends of a link."""
     if 0 in contact.places or not contact.places:
         return joints + 1, joints + 1
     return contact.places[-1], contact.places[-1] + 1
 
 
 def touched_point(contact: Contact, origins: Array) -> Array:
-    """Where a force acts, by the origins of links and flange. (S, 3), (S, n+1, 3) [m]"""
+    """Place of a force, by origins of links and flange (S, n+1, 3). (S, 3) [m]"""
     first, last = spot_of(contact, origins.shape[1] - 1)
     return np.asarray(0.5 * (origins[:, first - 1] + origins[:, last - 1]))

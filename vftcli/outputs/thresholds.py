@@ -1,4 +1,4 @@
-"""Thresholds as tables, as rows for machines, and as the calls of the robots' own interfaces."""
+"""Thresholds as tables, rows for machines, and calls of the robots' interfaces."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -12,9 +12,9 @@ from vftcli.outputs.quantity import DASH, significant
 from vftcli.robots.robot_file import lines_of
 from vftcli.signals.parsing import counted
 
-#: Steps a unit: no robot tells .01 N·m.
+#: Steps a unit: no robot resolves 0.01 N·m.
 SHARES = 100
-#: Columns of every threshold with its interval, and the tail it comes from.
+#: Columns of a threshold with interval and source tail.
 COLUMNS = (
     "", Column("threshold"), "", Column("95 %"), Column("tail from"),
     Column("λ", "1/h", ".0f"), Column("k"), Column("log", "h"), "needed by",
@@ -33,7 +33,7 @@ CONTACTS = {
 def thresholds_text(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> str:
-    """All of it for the terminal: the tables, and the calls by the names of their interfaces."""
+    """Tables of thresholds for the terminal, and calls under interface names."""
     parts = [terminal(thresholds_grid(thresholds))]
     if counted:
         joints = joint_columns(len(counted[0].joints))
@@ -90,7 +90,7 @@ def check_line(check: ThresholdDetection) -> str:
 def thresholds_record(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> Record:
-    """All of it for machines, the unit in the names."""
+    """Thresholds for machines, units in the names."""
     rows = []
     for shown, of, level, one in thresholds.named:
         unit, tail, joint = of.replace("·", ""), one.tail, shown.startswith("J")
@@ -144,7 +144,7 @@ def check_rows(check: ThresholdDetection) -> list[Record]:
 
 
 def calls(thresholds: Thresholds) -> dict[str, str]:
-    """Name of every interface that takes as many joints as there are → its text."""
+    """Name of every interface for so many joints → its text."""
     # An interface that needs an unknown number gets no text.
     return {
         name: write(thresholds)
@@ -160,13 +160,13 @@ def are_known(thresholds: Sequence[SignalThreshold]) -> bool:
 
 
 def lower(thresholds: Sequence[SignalThreshold]) -> list[float]:
-    """The thresholds themselves: what is beyond is a contact. [N·m, N]"""
+    """The thresholds themselves; a contact is beyond. [N·m, N]"""
     # Rounding down would raise more alarms.
     return [ceil(one.value * SHARES) / SHARES for one in thresholds]
 
 
 def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
-    """The upper ends of their intervals, where they are known: there the robot stops. [N·m, N]"""
+    """Upper ends of their intervals, if known, at which the robot stops. [N·m, N]"""
     ends = ((one, one.interval[1]) for one in thresholds)
     return lower([one if isnan(end) else one._replace(value=end) for one, end in ends])
 
@@ -187,7 +187,7 @@ def franka_text(
 
 
 def ur_script(thresholds: Thresholds) -> str:
-    """A thread in URScript that ends the program when the size of the force is beyond the limit."""
+    """A thread in URScript that ends the program at a force beyond the limit."""
     own = thresholds.logged_wrench
     head = "" if own else "# learned from gmo, not from actual_TCP_force: record that\n"
     return f"""{head}thread watch_force():
@@ -219,8 +219,8 @@ def toml_text(thresholds: Thresholds) -> str:
     return "".join(lines_of({"thresholds": table})).lstrip()
 
 
-#: Interface of a robot → how many joint torques it takes, None for any number; which
-#: thresholds must be known, "" for none; and its text.
+#: Interface of a robot → its number of joints, None for any; thresholds that must be
+#: known, "" for none; and its text.
 INTERFACES: dict[str, tuple[int | None, str, Callable[[Thresholds], str]]] = {
     # `set_collision_behavior` of pylibfranka; the C++ call has these four lists too.
     "libfranka": (7, "axes", partial(

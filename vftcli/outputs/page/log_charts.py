@@ -1,4 +1,4 @@
-"""The charts of one log: torques, wrenches, what the pose tells, responses, spectra and tuning."""
+"""Charts of one log: torques, wrenches, responses, spectra and tuning."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -24,18 +24,17 @@ from vftcli.signals.external_torque import COVERS
 from vftcli.signals.wrench import AXES, unit_of
 
 FREQUENCIES = 120  #: Points of a frequency response.
-#: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and
-#: the lowest that is shown. [–], [dB]
+#: Gain drawn at -240 dB, so that its logarithm is finite; lowest gain shown. [–], [dB]
 QUIETEST, LOWEST = 1e-12, -80.0
 #: Colours of the two spectra.
 FREE, LOADED = "#3b7ea1", "#c2410c"
 
 
 def torque_chart(analysis: Analysis) -> Chart:
-    """External torque joint by joint: the best estimate with its band, the reference below it."""
+    """External torque by joint: the best estimate with its band, the reference below."""
     n, reference, below = analysis.recording.joints, analysis.reference, list[ChartLine]()
     if reference is not None:
-        # A broad line below the others; dotted where it is not to be trusted.
+        # A broad line below the others; dotted where not to be trusted.
         tau, moving = reference.tau, reference.moving
         below = [ChartLine(reference_name(analysis), tau, REFERENCE)]
         if moving is not None and np.any(~moving & np.isfinite(tau)):
@@ -45,7 +44,7 @@ def torque_chart(analysis: Analysis) -> Chart:
                 below[0]._replace(values=np.where(moving, tau, np.nan)),
                 ChartLine(name, resting, "#8a94a0", "1.5 3"),
             ]
-    # A dagger where the reference is not to be trusted, as in the tables.
+    # A dagger, as in the tables, at references not to be trusted.
     heads = next((found.joint_heads for found in blocks(analysis.errors)), joint_panels(n))
     return Chart(
         "tau",
@@ -67,17 +66,17 @@ def observer_styles(analysis: Analysis) -> dict[str, LineStyle]:
 
 
 def contact_spans(contacts: Iterable[Contact]) -> tuple[tuple[float, float], ...]:
-    """When something touched the arm. [s]"""
+    """Times of contact. [s]"""
     return tuple((contact.start, contact.stop) for contact in contacts if not contact.is_load)
 
 
 def lines_of(
     analysis: Analysis, found: Sequence[tuple[str, Array, Array | None]], *, alike: bool
 ) -> list[ChartLine]:
-    """A line an observer; one is drawn at once, `best` where it ran, with its 95 % band.
+    """A line an observer; only `best`, else the first, is visible, with its band.
 
-    Beside `best` no other bears a band: five would hide one another. Without it every line
-    does, if they are `alike`. Given are name, values and deviation. (T, n)
+    Beside `best` no other line has its 95 % band: five would hide one another. Without `best`
+    every line has one, if they are `alike`. Given are name, values and deviation. (T, n)
     """
     styles, names = observer_styles(analysis), [name for name, *_ in found]
     first = BEST if BEST in names else next(iter(names), "")
@@ -96,13 +95,13 @@ def estimate_lines(analysis: Analysis) -> list[ChartLine]:
 
 
 def reference_name(analysis: Analysis) -> str:
-    """The reference in a legend, which says what it is."""
+    """The reference in a legend, with its kind."""
     reference = analysis.reference
     return f"reference ({reference.name})" if reference is not None else "reference"
 
 
 def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
-    """Gain, phase and delay of every observer over frequency, up to half the sample rate.
+    """Gain, phase and delay of every observer up to half the sample rate.
 
     If joints differ, an observer's first joint is drawn.
     """
@@ -111,7 +110,7 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
     styles, lines = observer_styles(analysis), []
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)[:, :1]
-        # Unwrapped, or a delay would jump by a period wherever the phase passes −180°.
+        # Unwrapped, or a delay would jump where the phase passes −180°.
         phase = np.degrees(np.unwrap(np.angle(response), axis=0))
         decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
         # A phase of −φ degrees at f is a delay of φ / (360 f).
@@ -140,7 +139,7 @@ def joint_panels(joints: int) -> tuple[str, ...]:
 
 
 def wrench_chart(analysis: Analysis) -> Chart | None:
-    """Force and moment axis by axis: the first wrench with its band, the reference below it."""
+    """Force and moment by axis: the first wrench with its band, the reference below."""
     given = {wrench.name: wrench for wrench in analysis.wrenches}
     reference = given.pop("reference", None)
     if not given:
@@ -166,7 +165,7 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
 
 
 def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
-    """|F| of every contact with its band, the log's own wrench below it; None without any."""
+    """|F| of every contact with its band, the log's own wrench below; None if empty."""
     if found.hardest is None and found.detectable_force is None:
         return None
     t = analysis.t
@@ -176,7 +175,7 @@ def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
             inside = (t >= course.t[0]) & (t <= course.t[-1])
             force[inside, 0] = np.interp(t[inside], course.t, course.force)
             half[inside, 0] = np.interp(t[inside], course.t, course.band)
-            # The peak may be between two samples: the nearest one has its size.
+            # The nearest sample shows a peak between two.
             force[np.argmin(np.abs(t - contact.peak))] = contact.peak_force
     lines = [ChartLine("best", force, COLOURS[BEST], half=half, leads=True)]
     if (own := analysis.recording.wrench) is not None and own.any():
@@ -188,11 +187,11 @@ def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
 
 
 def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
-    """Upper end of the axis: peaks with bands, the least visible force, other lines. [N]"""
+    """Upper end of the axis, by peaks with bands, the detectable force, lines. [N]"""
     tops = [0.0, 2.5 * (found.detectable_force or 0.0)]
     tops += [1.05 * float(np.nanmax(line.values, initial=0.0)) for line in others]
     for contact in found.contacts:
-        # A band wider than its force leaves the chart.
+        # A band wider than its force may leave the chart.
         if contact.peak_force is not None and contact.peak_band is not None:
             tops.append(1.12 * (contact.peak_force + min(contact.peak_band, contact.peak_force)))
         if contact.is_load and (course := contact.course) is not None:
@@ -201,7 +200,7 @@ def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
 
 
 def spectra_chart(found: Spectra) -> Chart:
-    """Spectra of the raw disturbance over both parts of the log; 0 Hz is left out."""
+    """Spectra of the raw disturbance over both parts of the log, without 0 Hz."""
     # In decibels; the least number above 0 replaces zero.
     lines = [
         ChartLine(

@@ -1,8 +1,8 @@
-"""Series of a page as one text: steps of int16, their differences, deflated, in base64.
+"""Series of a page as one text: int16 steps, differences, deflated, base64.
 
-All lines of a log share a clock on the page, so one index is one moment. A short log has every
-sample; of a long one each line keeps the lowest and highest value of every stretch, half of
-them where contacts are.
+All lines of a log share a clock on the page, so one index is one moment. A short log has
+every sample; a long one the lowest and highest value of every stretch, with half of the
+stretches near contacts.
 """
 
 import base64
@@ -20,13 +20,13 @@ from vftcli.signals.series import gaps_of
 
 #: Samples kept whole; stretches of two values of longer logs.
 WHOLE, STRETCHES = 8192, 4096
-COARSE = 4  #: Stretches in one value of a line that is not drawn at once.
-AROUND = 0.5  #: Time before and after a contact where the stretches are short. [s]
+COARSE = 4  #: Stretches in one value of a line hidden at first.
+AROUND = 0.5  #: Time of short stretches before and after a contact. [s]
 #: Unit → largest step of a value: below every band, and 2e-4 rad on 1.3 m are 0.3 mm.
 LARGEST = {"N·m": 0.01, "N": 0.1, "rad": 2e-4}
-FEWEST = 1000  #: Steps at least between zero and the largest value, where units allow less.
-MOST, UNKNOWN = 32767, -32768  #: Largest number of steps, and the number for NaN.
-TICK, WIDE = 1e-4, 32768  #: Step of times [s]; steps of it in one of the upper row.
+FEWEST = 1000  #: Least steps between zero and the largest value.
+MOST, UNKNOWN = 32767, -32768  #: Largest number of steps; number for NaN.
+TICK, WIDE = 1e-4, 32768  #: Step of times [s]; steps in one of the upper row.
 
 
 class Blob:
@@ -37,7 +37,7 @@ class Blob:
         self.rows: list[np.ndarray[Any, np.dtype[np.int16]]] = []  #: The rows in steps.
 
     def add(self, values: Array, step: float) -> int:
-        """Number of a new row; its step grows where the values would not fit."""
+        """Number of a new row; its step grows if the values do not fit."""
         step = max(step, largest(values) / MOST) or 1.0
         steps = np.where(np.isfinite(values), np.rint(values / step), UNKNOWN)
         self.rows.append(steps.astype(np.int16))
@@ -45,7 +45,7 @@ class Blob:
         return len(self.rows) - 1
 
     def data(self) -> Record:
-        """What the script unpacks: high bytes of all differences, then the low ones."""
+        """The script's packed data: high bytes of all differences, then low ones."""
         changes = [np.diff(row, prepend=np.int16(0)) for row in self.rows]
         joined = np.concatenate(changes or [np.empty(0, np.int16)])
         # Zigzag: small changes of either sign are small numbers.
@@ -75,10 +75,10 @@ class PageClock:
             even = np.arange(STRETCHES) * (ends[-1] / STRETCHES)
             first = np.unique(np.concatenate([[0], np.searchsorted(ends, even, "right"), gaps]))
             half = np.diff(first, append=len(t)) // 2
-        self.starts = first  #: First sample of each stretch, every one where all are kept. (N,)
+        self.starts = first  #: First sample of each stretch, or every sample. (N,)
         self.samples = first + half  #: A sample of each. (N,)
         ticks = np.diff(np.rint(t[self.samples] / TICK).astype(np.int64), prepend=0)
-        # Two rows hold a difference of 29 bits: a log may have a gap of an hour.
+        # Two rows hold 29 bits: a log may have a gap of an hour.
         low, high = ticks % WIDE, ticks // WIDE
         self.rows = [blob.add(low * TICK, TICK), blob.add(high * (WIDE * TICK), WIDE * TICK)]
         self.gaps = np.searchsorted(first, gaps).tolist()
@@ -131,7 +131,7 @@ class PageClock:
 
 
 def step_of(values: Array, unit: str) -> float:
-    """Step of a series: that of its unit, a smaller one for small values, 0 without a unit's."""
+    """Step of a series: its unit's, smaller for small values, 0 for other units."""
     return min(LARGEST.get(unit, 0.0), largest(values) / FEWEST)
 
 
@@ -143,7 +143,7 @@ def largest(values: Array) -> float:
 def page_data(
     charts: Sequence[Chart], stage: Callable[[PageClock], Record] | None = None
 ) -> Record:
-    """All that the script draws: charts over time, each on the clock of its own samples."""
+    """The script's data: charts over time, each on the clock of its own samples."""
     blob, clocks, drawn = Blob(), dict[int, PageClock](), []
     for chart in charts:
         # Charts of one log share its array of times.

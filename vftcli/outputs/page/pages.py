@@ -1,4 +1,4 @@
-"""The pages of one log with its details, of several logs and of a batch: what fills them."""
+"""Content of the pages of one log, of several logs and of a batch."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +37,7 @@ from vftcli.signals.parsing import counted, printable
 from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.frames import FRAMES
 
-MOST_NAMED = 6  #: Uncertain contacts that the lead names by number; of more it says how many.
+MOST_NAMED = 6  #: Most uncertain contacts that the lead names; more are counted.
 FORCE_BOX = Box(width=1120, height=250, left=44, bottom=22, top=34, right=10)  #: That of |F|.
 #: File beside the page → what it is.
 FILES = {
@@ -47,8 +47,8 @@ FILES = {
     "errors.csv": "errors by joint",
     "run.json": "settings, versions, remarks",
 }
-MOST = 40  #: Contacts in numbers at most.
-#: Keys of what has three numbers in a contact's record.
+MOST = 40  #: Most contacts in numbers.
+#: Keys of vectors in a contact's record.
 VECTORS = ("force_N", "force_sd_N", "moment_Nm", "moment_sd_Nm", "mean_force_N", "impulse_Ns")
 #: Columns of the table of contacts.
 WRENCHES = (
@@ -64,7 +64,7 @@ HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean R
 def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
     """The report of one log: self-contained, nothing is loaded from anywhere.
 
-    `sizes` are the bytes of the files beside it, None for one that is not written yet.
+    `sizes` are bytes of the files beside it, None for one still to be written.
     """
     found, record = analysis.contacts, analysis.run or run_record(analysis, "")
     log, camera = analysis.recording, view_of(analysis)
@@ -119,7 +119,7 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
 
 
 def lead_sentences(analysis: Analysis) -> list[str]:
-    """Where it was touched, which rows are uncertain, and what would not show."""
+    """Sentences on touched places, uncertain rows and hidden forces."""
     found = analysis.contacts
     if found is None:
         unlisted = [r for r in analysis.remarks if r.code == "contacts-not-listed"]
@@ -143,7 +143,7 @@ def lead_sentences(analysis: Analysis) -> list[str]:
 
 
 def errors_view(analysis: Analysis) -> Record:
-    """The tables of errors and what they come to, without tables where there is no reference."""
+    """Tables of errors and their summary; no tables without a reference."""
     table, found = analysis.errors, blocks(analysis.errors)
     if table is None or not found:
         return {"state": "none given", "first": ()}
@@ -189,7 +189,7 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
 
 
 def model_pairs(found: ContactList) -> dict[str, str]:
-    """What the list rests on."""
+    """The settings of a list."""
     model, prior = found.model, found.model.prior
 
     def each(values: Array) -> str:
@@ -213,9 +213,9 @@ def model_pairs(found: ContactList) -> dict[str, str]:
 
 
 def observers_view(analysis: Analysis) -> Record:
-    """What each observer's parameters are and mean."""
+    """Each observer's parameters and their meaning."""
     rows: Rows = []
-    # Parameters as JSON can hold them, also those of a wrapped observer.
+    # Parameters in JSON types, also of a wrapped observer.
     used = {o.name: observer_record(o, None)["parameters"] for o in analysis.observers}
     for name in used:
         what, meant = OBSERVERS[name].title if name in OBSERVERS else "", list[Any]([None] * 5)
@@ -233,7 +233,7 @@ def observers_view(analysis: Analysis) -> Record:
 
 
 def joint_values(values: Array) -> str:
-    """One number where all joints agree to three digits, else one line a run of equal joints."""
+    """One number if all joints agree to three digits, else a line a run of joints."""
     # Compared as printed: values that look equal are one.
     texts = enumerate(map(significant, values.tolist()), 1)
     runs = [(text, [j for j, _ in run]) for text, run in groupby(texts, itemgetter(1))]
@@ -241,8 +241,8 @@ def joint_values(values: Array) -> str:
 
 
 def budget_grid(budget: Budget) -> Grid:
-    """Where an observer's error comes from, cause by cause. [N·m]"""
-    # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
+    """An observer's error by cause. [N·m]"""
+    # Stiction at rest is a bound, so the sum leaves it out.
     parts = {**budget.parts, "all but stiction at rest": budget.total}
     rows: Rows = [(budget.name, cause, *map(float, values)) for cause, values in parts.items()]
     return Grid(("observer", "cause", *joint_columns(len(budget.total))), rows)
@@ -300,7 +300,7 @@ def overview(lines: Sequence[LogSummary]) -> Grid:
 
 
 def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
-    """A line of the overview: the log's name links to its own page, where it has one."""
+    """A line of the overview: the log's name links to its page, if any."""
     return (
         GridCell(line.name, html=part("parts/link", line.page, line.name) if line.page else ""),
         line.robot,
@@ -334,7 +334,7 @@ def render_batch(lines: Sequence[LogSummary], failures: pl.DataFrame) -> str:
 
 
 def batch_lines(table: pl.DataFrame, pages: Mapping[str, str]) -> Iterator[LogSummary]:
-    """The line of every log, made from the table of a batch alone."""
+    """The line of every log, from a batch's table alone."""
     if table.is_empty():
         return
     best = {str(log): least_error(joint_means(rows)) for (log,), rows in table.group_by("log")}

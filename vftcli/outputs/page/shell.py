@@ -1,7 +1,6 @@
-"""The templates of every page, their parts as functions, and what page and script draw.
+"""Templates of every page, their parts as functions, and drawing for SVG.
 
-Charts without a script are SVG: here is where values are drawn, with ticks and the text
-of paths.
+Charts without a script are SVG: places of values, ticks and the text of paths.
 """
 
 import json
@@ -33,13 +32,13 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).parent
 LEVELS = ("warning", "caution", "fact")  #: Levels of a remark, the most serious first.
-TICKS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
+TICKS = 1.0, 2.0, 5.0, 10.0  #: Leading digits of a tick's distance.
 PLAIN = re.compile(r"[a-z]+([-’'][a-z]+)*[,:;]?").fullmatch  #: A word that may have a capital.
-TICK_ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
+TICK_ROOM = 1.4  #: Factor by which a tick's distance may be too small.
 
 
 def capital(text: str) -> str:
-    """A text with a capital first, unless it begins with the name of a file or an option."""
+    """A text with a capital first, unless it begins with a file or an option."""
     first, space, rest = text.partition(" ")
     return f"{first.capitalize()}{space}{rest}" if PLAIN(first) else text
 
@@ -52,16 +51,16 @@ def worst_first(remarks: Iterable[Remark]) -> list[str]:
 
 @cache
 def templates() -> "Environment":
-    """The templates: what comes from outside is printable and escaped, what is missing an error."""
+    """The templates: they escape outside texts; an undefined name is an error."""
     from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
     from jinja2.bccache import Bucket
     from markupsafe import Markup
 
     class Kept(FileSystemBytecodeCache):
-        """Compiled templates beside their texts, as Python keeps modules."""
+        """Compiled templates beside their texts, like Python's modules."""
 
         def dump_bytecode(self, bucket: Bucket) -> None:
-            """Keep one where the package may be written to, and there is room."""
+            """Keep one if the package's folder can be written."""
             with suppress(OSError):
                 Path(self.directory).mkdir(exist_ok=True)
                 super().dump_bytecode(bucket)
@@ -71,7 +70,7 @@ def templates() -> "Environment":
         return value if hasattr(value, "__html__") else Markup(escape(printable(str(value))))
 
     def asset(name: str) -> Markup:
-        """The text of a style sheet or script that comes with the package."""
+        """The text of the package's style sheet or script."""
         return Markup((HERE / name).read_text(encoding="utf-8"))
 
     def options(text: str) -> Markup:
@@ -121,10 +120,10 @@ def page(
     about: str = "",
     **view: object,
 ) -> str:
-    """A whole HTML page with its style: self-contained, nothing is loaded from anywhere.
+    """A whole HTML page with its style: self-contained, nothing is loaded.
 
-    `stage` makes what the script needs beside the charts, by the clock of the first;
-    `about` is the first line of a CSV that the page makes.
+    `stage` makes the script's other data, by the first chart's clock; `about` is the first
+    line of the page's CSV files.
     """
     data = script_json({"about": about} | page_data(charts, stage)) if charts else ""
     frame = {"title": title, "styles": styles or {}, "data": data}
@@ -132,14 +131,14 @@ def page(
 
 
 def script_json(data: object) -> str:
-    """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
+    """JSON for a ``<script type="application/json">`` that cannot end the element."""
     # "<" could begin "</script>"; two separators end JavaScript's lines.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 
 
 class Box(NamedTuple):
-    """A chart's size and the room around its plot, in the units of the drawing."""
+    """A chart's size and margins, in units of the drawing."""
 
     width: float = 460.0  #: Whole width.
     height: float = 132.0  #: Whole height.
@@ -150,7 +149,7 @@ class Box(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """From values to places in the drawing."""
+    """Places of values in the drawing."""
 
     box: Box  #: The chart.
     x: Span  #: Ends of the horizontal axis.
@@ -167,12 +166,12 @@ class Scales(NamedTuple):
         return np.asarray(self.floor - share * (self.floor - self.box.top))
 
     def near(self, y: Array) -> Array:
-        """Vertical places; what is far outside of the chart is drawn just outside of it."""
+        """Vertical places; those far outside the chart are moved near it."""
         height = self.y.high - self.y.low
         return self.up(np.clip(y, self.y.low - height, self.y.high + height))
 
     def inside(self, span: Sequence[float]) -> Array:
-        """Horizontal places of times, those outside of the chart at its edge."""
+        """Horizontal places of times, clipped to the chart."""
         return self.across(np.clip(span, *self.x))
 
     @property
@@ -192,16 +191,16 @@ def ticks(span: Span, count: int) -> list[float]:
     if not np.isfinite(width) or width <= 0.0:
         return [span.low]
     power = 10.0 ** np.floor(np.log10(width))
-    # A few more numbers than wanted are better than too few.
+    # Rather a few numbers too many.
     step = next(s for s in TICKS if width <= TICK_ROOM * s * power) * power
     first, last = np.ceil(span.low / step - 1e-9), np.floor(span.high / step + 1e-9)
     found = [float(k * step) for k in np.arange(first, last + 1)]
-    # One number or two leave the scale unsaid.
+    # One or two numbers do not show the scale.
     return found if len(found) >= min(count, 3) else ticks(span, count + 2)
 
 
 def label(value: float) -> str:
-    """A tick's number without an exponent where one can do without."""
+    """A tick's number, with an exponent only if needed."""
     return minus(f"{value + 0.0:.6g}")
 
 
@@ -214,7 +213,7 @@ def scales_of(chart: Chart, box: Box) -> Iterator[Scales]:
 
 
 def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:
-    """A line's paths in a panel: its ribbon, the ribbon's grey part, and itself; "" for none."""
+    """A line's paths in a panel: ribbon, its grey part, line; "" for none."""
     t, y, halves = drawn_line(chart, line, panel)
     own, quiet = (
         (ribbon(scales, t, y - half, y + half) for half in halves) if halves else ("", "")
@@ -223,7 +222,7 @@ def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[
 
 
 def path_of(scales: Scales, t: Array, y: Array) -> str:
-    """A line as the text of an SVG path, broken where a value is not known."""
+    """A line as the text of an SVG path, broken at unknown values."""
     points = np.column_stack([scales.across(t), scales.near(y)])
     runs = runs_of(np.isfinite(points.sum(axis=1)))
     return "".join(polyline(points[start:stop]) for start, stop in runs)
@@ -239,14 +238,14 @@ def polyline(points: Array | Sequence[Array]) -> str:
 
 
 def tenth(number: int) -> str:
-    """A number of tenths as a path's text: its sign or point, else a space, parts it."""
+    """A number of tenths as a path's text, behind a sign or a space."""
     whole, rest = divmod(abs(number), 10)
     text = f"{whole or ''}.{rest}" if rest else f"{whole}"
     return f"-{text}" if number < 0 else f" {text}"
 
 
 def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:
-    """The area between two lines as a path, broken where either is not known."""
+    """The area between two lines as a path, broken at unknown values."""
     x = scales.across(t)
     above, below = (np.column_stack([x, scales.near(edge)]) for edge in (high, low))
     spans = (slice(*run) for run in runs_of(np.isfinite(low) & np.isfinite(high)))

@@ -1,7 +1,7 @@
-"""The stage of the page: the arm in three dimensions, its view, and the contacts beside it.
+"""The page's stage: the arm in three dimensions, its view, and its contacts.
 
-Capsules from the chain's geometry, in weak perspective from the side to which the arm reaches;
-the page's script has the same projection.
+Capsules from the chain's geometry, in weak perspective from the side to which the arm
+reaches; the page's script has an equal projection.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,9 +27,9 @@ from vftcli.signals.series import resample_columns, runs_of
 
 ASIDE, PITCH = 0.45, 0.3  #: Turn of the view from the arm's side, and downwards. [rad]
 AWAY = 4.2  #: Distance of the camera, in reaches.
-POSES = 600  #: Poses of the log that the view is fitted to.
-WIDEST = np.pi / 4  #: Half the angle of the widest cone that is drawn. [rad]
-SHARES = 0.14, 0.6  #: Length of an arrow of no force, and what the largest adds, in reaches.
+POSES = 600  #: Most poses that the view is fitted to.
+WIDEST = np.pi / 4  #: Half the angle of the widest drawn cone. [rad]
+SHARES = 0.14, 0.6  #: Length of an arrow of no force, and the largest force's extra, in reaches.
 MILLIMETRE = 1e-3  #: Step of a surface's corners. [m]
 #: Size of the still drawing, and the part it fills.
 WIDTH, HEIGHT, FILLED = 624.0, 448.0, 0.92
@@ -39,9 +39,9 @@ class View(NamedTuple):
     """The camera."""
 
     yaw: float  #: Direction to the right, from x towards y. [rad]
-    pitch: float  #: How far it looks down. [rad]
+    pitch: float  #: Angle downwards. [rad]
     centre: Array  #: Point in the middle. (3,) [m]
-    span: Array  #: Width and height that must be seen. (2,) [m]
+    span: Array  #: Visible width and height. (2,) [m]
     reach: float  #: Largest distance of the flange from the base. [m]
 
     def seen(self, points: Array) -> Array:
@@ -74,7 +74,7 @@ def axes_of(yaw: float, pitch: float) -> Array:
 
 
 def view_of(analysis: Analysis) -> View:
-    """The view that holds the arm in all its poses, and the arrows at their peaks."""
+    """The view of the arm in all its poses, with the arrows at their peaks."""
     q = analysis.recording.q
     known = q[np.isfinite(q).all(axis=1)]
     every = known[:: max(len(known) // POSES, 1)] if len(known) else np.zeros((1, q.shape[1]))
@@ -91,7 +91,7 @@ def view_of(analysis: Analysis) -> View:
         View(yaw, PITCH, mean, mean, reach),
     )
     for _ in range(3):
-        # What is near looks larger: the middle of what is seen is not the places' own.
+        # Near things look larger, which shifts the middle.
         x, y = ((places - view.centre) @ axes[:2].T * view.nearness(places)[:, None]).T
         middle = 0.5 * np.array([x.min() + x.max(), y.min() + y.max()])
         view = view._replace(centre=view.centre + middle @ axes[:2])
@@ -106,7 +106,7 @@ def pose_at(analysis: Analysis, t: float) -> Pose:
 
 
 def arrow_of(analysis: Analysis, contact: Contact, reach: float) -> Array:
-    """Tail and tip of a contact's force at its peak; the tip is where it acts. (2, 3) [m]"""
+    """Tail and tip of a contact's force at its peak; it acts at the tip. (2, 3) [m]"""
     (tip,) = touched_point(contact, pose_at(analysis, contact.peak).translation)
     share = min((contact.peak_force or 0.0) / most_force(analysis.listed), 1.0)
     return np.vstack([tip - reach * (SHARES[0] + SHARES[1] * share) * along(contact), tip])
@@ -127,7 +127,7 @@ def cone_of(contact: Contact) -> float:
     """Half the angle of the 95 % cone about a force's direction. [rad]"""
     if contact.wrench_sd is None or not contact.peak_force:
         return 0.0
-    # Two directions are across the force: the mean of their variances.
+    # Mean variance of the two directions across the force.
     across = np.sum(contact.wrench_sd[:3] ** 2 * (1.0 - along(contact) ** 2)) / 2.0
     return float(np.arctan(COVERS * np.sqrt(across) / contact.peak_force))
 
@@ -159,9 +159,9 @@ def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillA
 
 
 def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
-    """Stretches of the log that are known to be without contact. [s]"""
+    """Stretches of the log known to be without contact. [s]"""
     t, found = analysis.t, analysis.contacts
-    # There is none where only other runs are known to be free.
+    # None if only other runs are free.
     with suppress(VftError):
         if found is not None and found.basis == "free motion":
             own = runs_of(analysis.motion.known.own)
@@ -172,13 +172,13 @@ def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
 def stage_data(
     analysis: Analysis, view: View, surfaces: Mapping[int, Surface], clock: PageClock
 ) -> Record:
-    """What the script needs of arm and contacts, beside the charts; `surfaces` by link."""
+    """The script's data on arm and contacts, beside the charts; `surfaces` by link."""
     found, chain, sensed = analysis.contacts, analysis.robot.chain, analysis.virtual_sensor
     least = found.detectable_force if found is not None else None
     hardest = found.hardest if found is not None else None
     sure = found is not None and found.tells_untouched
     frame = sensed.sensor.frame if sensed is not None else ""
-    # A load lasts: what touches the arm meanwhile comes before it.
+    # A load lasts: contacts meanwhile come before it.
     ordered = sorted(analysis.listed, key=lambda contact: contact.is_load)
     turned = np.concatenate([chain.rotation, chain.flange_rotation[None]]).reshape(-1, 9)
     moved = np.vstack([chain.translation, chain.flange_translation])
@@ -197,7 +197,7 @@ def stage_data(
             + [clock.blob.add(k, 1.0) for k in surface.faces.T]
             for link in range(chain.joints + 1)
         ],
-        # Axes that the script knows; in others the direction is that of the peak.
+        # Axes known to the script; others show the peak's direction.
         "wrench": {"flange": frame == "flange"} if frame in {"base", "flange"} else None,
         "view": view._replace(centre=view.centre.tolist(), span=view.span.tolist())._asdict(),
         "contacts": [contact_data(c, chain.joints, clock) for c in ordered],
@@ -216,7 +216,7 @@ def stage_data(
 
 
 def contact_words(contact: Contact) -> str:
-    """A contact's name, place and direction, and how unsure the last is where no cone is drawn."""
+    """A contact's name, place, direction, and the angle if it is too wide for a cone."""
     said = [contact_name(contact), place_words(contact)]
     if contact.wrench is not None:
         cone = cone_of(contact)
@@ -245,10 +245,10 @@ def contact_data(contact: Contact, joints: int, clock: PageClock) -> Record:
         "weak": contact.trust == "weak",
         "load": contact.is_load,
         "sure": contact.where != "cannot tell",
-        # The frames of touched links, and the two between which the force acts.
+        # Frames of touched links, and the two beside the force's place.
         "frames": [place or joints for place in contact.places],
         "spot": spot_of(contact, joints),
         "along": np.round(along(contact), 3).tolist(),
-        # A wider one would fill the picture: it is 0 then, and the arrow dashed.
+        # A wider one would fill the picture: 0, with a dashed arrow.
         "cone": round(cone, 3) if cone <= WIDEST else 0,
     }
