@@ -97,10 +97,10 @@ class ControlChoice(Choice):
 
     @property
     def settings(self) -> Mapping[str, Mapping[str, Any]]:
-        """The parameters that the user sets, by axis."""
+        """The user's parameters, by axis."""
         from vftcli.admittance.law import parse_settings
 
-        # What is named comes later, and so goes before it.
+        # The user's own settings come later, and win.
         given = ["admittance.threshold_mode=literal"] if self.as_printed else []
         given += self.assignments
         return parse_settings(given)
@@ -126,7 +126,7 @@ class ControlChoice(Choice):
         return np.array(start, float)
 
     def controllers(self, robot: "Robot") -> "tuple[Controller, ...]":
-        """The controllers that are compared, the traditional one first.
+        """The compared controllers, the traditional one first.
 
         Their parameters are the robot's, then those that are set.
         """
@@ -137,7 +137,7 @@ class ControlChoice(Choice):
 
 
 def released_robot(choice: RobotChoice) -> "Robot":
-    """The arm of a release, which no log settles."""
+    """The arm of a release, from the options alone."""
     if choice.name is None:
         raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
     return load_robot(choice.name, tip=choice.tip)

@@ -301,12 +301,12 @@ def steps_in(interval: float, step: float, what: str) -> int:
 
 
 class Replayed(NamedTuple):
-    """A force through admittance controllers, and what it is of."""
+    """A force through admittance controllers, and its source."""
 
     replay: Replay  #: The comparison.
     recording: Recording | None = None  #: The log, None without one.
     run: ClosedLoop | None = None  #: A scenario with the controller in the loop, or None.
-    examinations: tuple[Examination, ...] = ()  #: What is wrong with the log.
+    examinations: tuple[Examination, ...] = ()  #: Findings on the log.
 
 
 class Latency(NamedTuple):

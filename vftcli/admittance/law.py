@@ -70,7 +70,7 @@ class Admittance:
     speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
     speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
     period: float  #: Control period. [s]
-    threshold_mode: str = "hard"  #: What of the force enters, see `vftcli.admittance.motion`.
+    threshold_mode: str = "hard"  #: Rule for the entering force, see `vftcli.admittance.motion`.
     source: str = ""  #: Where the numbers come from, in words.
 
     def __post_init__(self) -> None:
@@ -115,7 +115,7 @@ def from_table(
         ParameterError: If a parameter is missing for an axis, unknown or out of range.
     """
     groups = [(name, table.get(name, {})) for name in ("position", "rotation")]
-    # What has a default begins with it, all else with NaN.
+    # Parameters start at their defaults, else at NaN.
     values: dict[str, Any] = {
         name: np.full(6, getattr(Admittance, name, np.nan)) for name in PER_AXIS
     }
@@ -178,7 +178,7 @@ class Controller:
     alpha: Array  #: α; 1 for the traditional one.
     rate: Array  #: 1/v₀; 0 for the traditional one. [s/m, s/rad]
     damping: Array  #: Damping of the recovery phase. [N·s/m, N·m·s/rad]
-    parameters: Admittance  #: What it was built from.
+    parameters: Admittance  #: Its parameters.
 
     @property
     def name(self) -> str:

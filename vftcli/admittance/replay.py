@@ -224,7 +224,7 @@ def deviation_of(robot: Robot, start: Array, q: Array) -> Array:
 
 
 def drag_remarks(found: Replay) -> Iterator[Remark]:
-    """The axis of a log nearest to its threshold, where none was dragged."""
+    """The log's axis nearest to its threshold, if none was dragged."""
     if found.logged is not None and not found.drags and len(found.wrench):
         threshold = found.parameters.threshold
         share = abs(np.nan_to_num(found.wrench)).max(axis=0) / np.maximum(threshold, 1e-12)
@@ -265,14 +265,14 @@ def trouble(found: Replay) -> Iterator[Remark]:
 
 
 class DrivingForce(NamedTuple):
-    """The wrench that drives a replay."""
+    """A replay's wrench."""
 
     wrench: Wrench  #: Force on the robot, base axes, about the flange point.
     source: Remark  #: Where it comes from.
 
 
 def observed_force(reading: SensorReading) -> DrivingForce:
-    """The virtual sensor's wrench of the one observer that ran."""
+    """The virtual sensor's wrench of a run's single observer."""
     wrench = replace(reading.wrenches[0], remarks=reading.remarks)
     code = "force-smoothed" if wrench.name in reading.smoothed else "force-of-observer"
     return DrivingForce(wrench, fact(code, observer=wrench.name))

@@ -47,7 +47,7 @@ Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes to copy.
 
 
 class FileTask(NamedTuple):
-    """A data file that is written."""
+    """A data file to write."""
 
     file: DataFile  #: The data file.
     rows: tuple[Path, ...]  #: The files of its episodes' columns.
@@ -192,7 +192,7 @@ REMEDY = "--anyway writes 0 there, and a column that says so"
 
 
 def refuse_missing(record: Record) -> None:
-    """Refuse an episode of which frames are missing."""
+    """Refuse an episode with missing frames."""
     if record["status"] == "missing":
         # All files of DROID have one name.
         reason = record["reason"].removeprefix(Path(record["file"]).name).rstrip(".")

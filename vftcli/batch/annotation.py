@@ -30,7 +30,7 @@ from vftcli.wrench.choice import WrenchChoice
 from vftcli.wrench.frames import FRAMES
 
 USUAL = "kfo-zoh"  #: The observer if none is named: it needs no later sample.
-Record = dict[str, Any]  #: What is recorded of episodes, by name.
+Record = dict[str, Any]  #: Facts of episodes, by name.
 SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 
 
@@ -38,11 +38,11 @@ SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 class ForceChoice:
     """Request for every episode."""
 
-    read: ReadChoice = field(default_factory=ReadChoice)  #: How an episode is read.
-    robot: RobotChoice = field(default_factory=RobotChoice)  #: Which arm made it.
+    read: ReadChoice = field(default_factory=ReadChoice)  #: Options for reading.
+    robot: RobotChoice = field(default_factory=RobotChoice)  #: The arm.
     #: The one observer, and its gains.
     observers: ObserverChoice = field(default_factory=lambda: ObserverChoice(names=(USUAL,)))
-    #: What is asked of the virtual sensor, None for joint torques alone.
+    #: Choices for the virtual sensor, None for joint torques alone.
     wrench: WrenchChoice | None = None
     sd: bool = False  #: Whether the observer's own standard deviation is wanted.
     contact: bool = False  #: Whether it is wanted which frames lie in a contact of the list.
@@ -140,7 +140,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
 
 
 def check_signals(recording: Recording, *, anyway: bool) -> None:
-    """See that velocities and efforts are there, and that the efforts were measured."""
+    """Raise an error without velocities, without efforts, or if efforts are constant."""
     if recording.dq is None:
         raise MissingSignalError(
             f"{recording.name}: no joint velocities. --set log.derive=dq makes them of positions "
@@ -217,7 +217,7 @@ def record_of(analysis: Analysis, columns: Mapping[str, Single]) -> Record:
 def force_columns(
     choice: ForceChoice, names: Sequence[str], *, derived: bool, valid: bool
 ) -> list[ForceColumn]:
-    """The columns that are written."""
+    """The written columns."""
     online, version = choice.is_online and not derived, f"vftcli {VERSION}"
     made = {"observer": choice.observer, "causal": online, "version": version}
     joint = {"units": "N·m", "frame": "joint axes", "sign": SIGN, **made}

@@ -11,7 +11,7 @@ from vftcli.signals.option import Choice, Option
 ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")  #: tcp://host:8786
 MEMORY = 1.5e9  #: Least memory of a worker. [B]
 MOST_WORKERS = 8  #: Workers that are started unasked.
-EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
+EXTRA = "pip install 'vftcli[cluster]'"  #: Command to install Dask.
 
 
 class WorkersChoice(Choice):

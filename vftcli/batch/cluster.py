@@ -77,7 +77,7 @@ class Failure(NamedTuple):
 
     stage: str  #: Stage of the work, as named by `begin`.
     type: str  #: Name of the error's class.
-    line: str  #: What it says, on one line.
+    line: str  #: Its text, on one line.
 
 
 class Effort(NamedTuple):
@@ -93,7 +93,7 @@ class Outcome(NamedTuple, Generic[Task]):
     """End of a task."""
 
     task: Task  #: The task.
-    value: Any = None  #: What the work returned, None if it failed.
+    value: Any = None  #: Value of the work, None if it failed.
     failure: Failure | None = None  #: Why it failed, or None.
     effort: Effort | None = None  #: Its effort; None if its worker died.
 
@@ -125,7 +125,7 @@ def failure_of(error: BaseException) -> Failure:
 
 
 def dask_setup(_worker: object) -> None:
-    """Ignore Ctrl-C, which a terminal sends to every process: the main one ends it."""
+    """Ignore Ctrl-C, sent to every process: the main one ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -355,7 +355,7 @@ class Workers:
 
 
 def first_done(futures: "list[Future[Any]]", workers: Workers) -> "list[Future[Any]]":
-    """Wait until any of these ended, and return those that did."""
+    """Futures that ended, at least one; waits for it."""
     from concurrent.futures import CancelledError
 
     from distributed import wait

@@ -16,7 +16,7 @@ from vftcli.outputs.files import digest
 from vftcli.readers.opening import files_of
 from vftcli.signals.version import VERSION
 
-FILE = "file:"  #: What goes before the path in the name of a reference.
+FILE = "file:"  #: Prefix of a path in a reference's name.
 
 
 @cache
@@ -29,7 +29,7 @@ def digest_of(path: Path) -> str:
 
 
 def content_digest(files: Iterable[Path]) -> str:
-    """The sha256 of a log's file; of several files that of their digests."""
+    """The sha256 of a log's file, or of several files' digests."""
     each = [digest_of(path) for path in files]
     return each[0] if len(each) == 1 else sha256("\n".join(each))
 

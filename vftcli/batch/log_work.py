@@ -29,7 +29,7 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.wrench import AXES
 
-COMMANDS = ("estimate", "compare", "report", "contacts")  #: What may be done with a log.
+COMMANDS = ("estimate", "compare", "report", "contacts")  #: Commands for a log.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class LogJob:
     """Work on every log of a batch."""
 
     do: str  #: One of `COMMANDS`.
-    choice: AnalysisChoice  #: What is asked of each log.
+    choice: AnalysisChoice  #: Choices for each log.
     anyway: bool = False  #: Whether to go on where a finding makes results meaningless.
     written: OutputChoice = PLAIN  #: Extra files of each log.
 
@@ -48,13 +48,13 @@ class LogJob:
 class LogTask(NamedTuple):
     """One log of a batch."""
 
-    job: LogJob  #: What is done with it.
+    job: LogJob  #: Its batch's work.
     folder: Path  #: Where the batch is written, from the root.
     command: str  #: The command line, for the records.
     path: Path  #: The log's file or folder, from the root.
     episode: int | None  #: Its episode, None for a file of one recording.
-    label: str  #: What it is called.
-    key: str  #: What its result is kept under.
+    label: str  #: Its name.
+    key: str  #: Key of its result.
     sha256: str  #: Of its file's bytes; "" for several files.
 
 
@@ -130,7 +130,7 @@ OF_LOG: Kinds = {
     "hardest_s": Float64,
     "detectable_N": Float64,
 }
-#: Which estimate, and its size: root mean square, and 99 % quantile of |τ̂|.
+#: An estimate and its size: root mean square, and 99 % quantile of |τ̂|.
 OF_ESTIMATE: Kinds = {
     "observer": String,
     "joint": Int64,

@@ -28,10 +28,10 @@ SHARES = 8  #: Least groups of a worker, so that all end at about one time.
 class BatchCount(NamedTuple):
     """Progress of a batch."""
 
-    logs: int  #: How many logs there are.
-    before: int  #: How many of them an earlier run did.
-    done: int  #: How many this run did.
-    failed: int  #: How many failed.
+    logs: int  #: Number of logs.
+    before: int  #: Number done by an earlier run.
+    done: int  #: Number done by this run.
+    failed: int  #: Number failed.
 
 
 @dataclass(kw_only=True)
@@ -39,7 +39,7 @@ class BatchRun:
     """A batch and one run of it: logs done, failures, efforts."""
 
     logs: Sequence[LogEntry]  #: The logs.
-    job: LogJob  #: What is done with each.
+    job: LogJob  #: Work on each.
     folder: BatchFolder  #: Where it is written.
     workers: WorkersChoice  #: Where it is done.
     command: str  #: The command line, for the records.
@@ -111,7 +111,7 @@ class BatchRun:
             return self.gather()
 
     def work(self) -> None:
-        """Do what is left of the batch."""
+        """Do the rest of the batch."""
         groups = self.groups()
         first = next(groups, None)
         if first is None:

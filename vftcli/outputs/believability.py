@@ -74,7 +74,7 @@ class Ground(NamedTuple):
 
     standing: Standing  #: Its effect on the answer.
     subject: str  #: Its subject, in one to three words.
-    sentence: str  #: What is known of it.
+    sentence: str  #: The facts.
     remedy: str | None = None  #: A command that mends it, or None.
     #: Whether it was found in this log, and is not true of every log like it.
     of_log: bool = True
@@ -88,14 +88,14 @@ class Ground(NamedTuple):
 class LogSummary(NamedTuple):
     """One log among several: a line of the screen, the index or a batch's page."""
 
-    name: str  #: What it is called.
+    name: str  #: Its label.
     robot: str  #: Its arm.
-    duration: float  #: How long it is. [s]
-    contacts: str  #: How many, or that they are a load, or a dash.
+    duration: float  #: Its length. [s]
+    contacts: str  #: Their number, "load" or a dash.
     hardest: str  #: The hardest contact in words, or a dash.
     force: float  #: Its force, 0 without one. [N]
     least: float | None  #: Least visible force, None if unknown. [N]
-    standing: Standing  #: How healthy the log is.
+    standing: Standing  #: Health of the log.
     words: str  #: Why.
     page: str = ""  #: Its own page, relative to that of all logs; "" without one.
     error: str = DASH  #: The least mean RMSE and its observer, or a dash.

@@ -87,7 +87,7 @@ class Results:
         self.colours = colours_of_names([name for name in self.methods if name != "zero"])
 
     def seen(self, key: str, *rows: str) -> list[str]:
-        """The values of a column in order, of all rows or of those where a flag is set."""
+        """Values of a column in order, of all rows or those with a set flag."""
         return self.table.filter(*rows)[key].unique(maintain_order=True).to_list()
 
     @cached_property

@@ -41,7 +41,7 @@ PLACES = {
 }
 #: Dashes of lines, the first without gaps: colour alone distinguishes none.
 DASHES = ("", "7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
-QUIET = "95 % band, no contact listed"  #: What a grey ribbon is called.
+QUIET = "95 % band, no contact listed"  #: Name of a grey ribbon.
 GAP_STEPS = 10.0  #: A step of this many medians breaks the line.
 STRETCHES = 150  #: Stretches of a line in a still drawing, two samples each.
 
@@ -52,7 +52,7 @@ Index = NDArray[np.intp]
 class ChartLine(NamedTuple):
     """One line of a chart, for every panel."""
 
-    name: str  #: What the legend calls it.
+    name: str  #: Its name in the legend.
     values: Array  #: One column a panel. (T, n)
     colour: str = INK  #: ``#rrggbb``, `INK` or `REFERENCE`.
     dash: str = ""  #: Dashes as in SVG; "" for a line without gaps.
@@ -76,7 +76,7 @@ class Chart(NamedTuple):
     """A picture for every joint or axis."""
 
     key: str  #: Its name on the page.
-    title: str  #: What it shows, in words.
+    title: str  #: Its content, in words.
     units: tuple[str, ...]  #: Unit of each panel's vertical axis. (n,)
     panels: tuple[str, ...]  #: Their names. (n,)
     x: Array  #: Horizontal places. (T,)
@@ -85,7 +85,7 @@ class Chart(NamedTuple):
     families: tuple[int, ...] = ()
     #: Half the width of a band about zero, one a panel, or None. (n,)
     band: Array | None = None
-    band_label: str = ""  #: What the band is.
+    band_label: str = ""  #: Name of the band.
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
     unit: str = "s"  #: Unit of the horizontal axis.
     log: bool = False  #: Whether the horizontal axis is logarithmic.

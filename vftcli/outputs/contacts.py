@@ -367,5 +367,5 @@ def stored_remark(record: Record) -> Remark:
 
 
 def numbers(values: list[float | None]) -> Array:
-    """Numbers of a record, NaN for what is not known. (n,)"""
+    """Numbers of a record, NaN where unknown. (n,)"""
     return np.array([np.nan if value is None else value for value in values])

@@ -191,7 +191,7 @@ def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401
 
 
 def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
-    """Write a log in the format that the file's name ends in."""
+    """Write a log in the format of the file's ending."""
     check_conversion(path, force)
     with atomic(path, force=force) as temporary:
         WRITERS[path.suffix.lower()](recording, temporary)
@@ -234,7 +234,7 @@ def write_parquet(recording: Recording, path: Path) -> None:
 
 
 def write_csv(recording: Recording, path: Path) -> None:
-    """Write flat columns as CSV, every number with the digits that restore it exactly."""
+    """Write flat columns as CSV, with enough digits to restore every number exactly."""
     with table_file(path) as file:
         flat_table(recording).write_csv(file)
 
@@ -275,7 +275,7 @@ def companions(path: Path) -> tuple[Path, Path, Path]:
 
 
 def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
-    """The checked folder of logs that are beside one another."""
+    """The checked folder of logs beside one another."""
     names: list[str] = []
     for path in paths:
         if not path.name:

@@ -229,7 +229,7 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
 def tuning_drawing(
     curves: "Mapping[str, Curve]", chosen: "Mapping[str, tuple[Array, Array]]"
 ) -> Drawing:
-    """Expected error over the natural frequency, and what was chosen.
+    """Expected error over the natural frequency, and the chosen rates.
 
     `chosen` is an observer's rates [rad/s] and errors [N·m]. 2 × (n,)
     """

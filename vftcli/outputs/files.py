@@ -141,7 +141,7 @@ class OutputFolder:
         return digests(self.temporary / place)
 
     def check(self) -> None:
-        """Refuse what must not be overwritten, before anything is computed or made."""
+        """Raise an OutputError before any work if a file must not be overwritten."""
         with writing(self.path):
             if self.path.exists() and not self.path.is_dir():
                 raise OutputError(f"{self.path} is a file; -o needs the name of a folder")
@@ -153,7 +153,7 @@ class OutputFolder:
             check_writable(next(p for p in (self.path, *self.path.parents) if p.exists()))
 
     def __enter__(self) -> Self:
-        """Refuse what must not be overwritten, and make the temporary folder."""
+        """Check for files not to be overwritten, and make the temporary folder."""
         self.check()
         try:
             # Outermost first, to be removed again if nothing comes of it.
@@ -236,7 +236,7 @@ class OutputFolder:
                     folder.rmdir()
 
     def _discard(self) -> None:
-        """Remove the folders that were made, if they are empty."""
+        """Remove the new folders that are empty."""
         for folder in reversed(self.made):
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()

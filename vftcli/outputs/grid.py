@@ -62,7 +62,7 @@ class Column(NamedTuple):
         return f"{self.head} [{self.unit}]" if self.unit else self.head
 
     def cell(self, entry: Entry) -> GridCell:
-        """An entry as text; a dash where it is not known."""
+        """An entry as text; a dash if unknown."""
         if isinstance(entry, GridCell):
             return entry
         if entry is None or (isinstance(entry, float) and not np.isfinite(entry)):
@@ -81,7 +81,7 @@ class Grid:
 
     given: Sequence[Any]  #: The columns; a text alone heads a column of words.
     rows: Sequence[Sequence[Entry]]  #: One entry a column.
-    title: str = ""  #: What the table is about, "" for none.
+    title: str = ""  #: Title, "" for none.
     quantity: str = ""  #: Quantity of all numbers, as RMSE, if one.
     unit: str = ""  #: Their unit, if one.
     summaries: int = 0  #: Last rows that sum up the others, below a rule.

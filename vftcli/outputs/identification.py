@@ -175,7 +175,7 @@ def velocity_plot(
 
 
 def shown_trace(found: Identification) -> Trace:
-    """The log that is drawn over time: the first held-out one, else the first."""
+    """The log drawn over time: the first held-out one, else the first."""
     # A log outside the fit shows how well it predicts.
     return next((t for t in found.traces if t.role == "held-out"), found.traces[0])
 

@@ -70,7 +70,7 @@ PLOTTED = 0.75  #: Rough share of a plot's room for its axes.
 #: Unit of a horizontal axis → what it is called.
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
 
-Look = dict[str, Any]  #: What matplotlib draws with.
+Look = dict[str, Any]  #: Arguments of matplotlib.
 BAND_LOOK: Look = {
     "color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0)), "zorder": 1.9,
 }  # fmt: skip
@@ -166,8 +166,8 @@ def shortened(name: str) -> str:
 class Plot(NamedTuple):
     """One plot of a figure."""
 
-    chart: Chart  #: What it is a panel of.
-    panel: int  #: Which, from 0.
+    chart: Chart  #: Its chart.
+    panel: int  #: Number of the panel, from 0.
     #: A chart over it with an axis of its own, or None.
     over: Chart | None = None
 
@@ -238,7 +238,7 @@ def line_figure(
 
 
 def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
-    """One panel with its contacts, bands and lines, and what is drawn over it."""
+    """One panel with its contacts, bands and lines, and the chart over it."""
     from matplotlib.ticker import MaxNLocator
 
     chart, j = plot.chart, plot.panel
@@ -304,7 +304,7 @@ def look(series: ChartLine) -> Look:
 class DotPlot(NamedTuple):
     """One plot."""
 
-    title: str  #: Which log.
+    title: str  #: Its log.
     joints: Sequence[str]  #: Names below. (n,)
     #: Name, numbers (n,), ends of their intervals (2, n); NaN unknown.
     rows: Sequence[tuple[str, Array, Array | None]]

@@ -30,7 +30,7 @@ class LogLine(NamedTuple):
 
     path: str  #: The entity.
     t: float  #: When. [s]
-    text: str  #: What happened.
+    text: str  #: The event.
     colour: str  #: ``#rrggbb``.
     level: str = "INFO"  #: INFO, WARN or ERROR.
 

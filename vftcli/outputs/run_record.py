@@ -1,4 +1,4 @@
-"""run.json: what was run on what, so that every number can be made again."""
+"""run.json: command, inputs and versions, to reproduce every number."""
 
 import json
 import platform
@@ -113,7 +113,7 @@ def envelope(
 
 
 def log_entry(recording: Recording, found: Record | None = None) -> Record:
-    """A log by name, path and digest, and what was found in it."""
+    """A log by name, path and digest, and the results on it."""
     source = recording.source
     about = {"path": source.path and str(source.path), "sha256": source.sha256 or None}
     return {"recording": recording.name, **about, **(found or {})}
@@ -215,7 +215,7 @@ def file_sha256(path: Path | None) -> str | None:
 
 
 def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
-    """An observer's parameters, and what they mean at the log's sample time."""
+    """An observer's parameters, and their meaning at the log's sample time."""
     # The observer that ran is inside, with the log's gains.
     inner: Any = getattr(observer, "observer", observer)
     own = [field.name for field in fields(inner) if field.init] if is_dataclass(inner) else []

@@ -88,7 +88,7 @@ class Canvas(NamedTuple):
         return f"\x1b[{STYLES[style]}m{text}\x1b[0m" if self.colour and text else text
 
     def shown(self, text: str) -> str:
-        """A text in letters that the terminal has."""
+        """A text in the terminal's letters."""
         if self.unicode:
             return text
         return text.translate(PLAIN).encode("ascii", "replace").decode()

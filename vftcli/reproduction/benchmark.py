@@ -185,7 +185,7 @@ class BenchmarkRun:
             yield from (self.task(log, rival.declared.protocol, rival) for log in asked)
 
     def task(self, log: BenchmarkLog, protocol: str, rival: Rival | None) -> ScoreTask:
-        """The task of a log, its key made of all that it reads."""
+        """The task of a log, with a key of all its inputs."""
         file, truth, outside = self.files[log.name], None, list[object]()
         robot = self.robots[log.identified] if protocol == "identified" and not rival else None
         asked = protocol if rival is None else "alone"

@@ -108,7 +108,7 @@ def error_rows(made: Analysis, of: str) -> list[dict[str, Any]]:
 
 
 def rms(values: Array) -> float:
-    """Root mean square of what is known."""
+    """Root mean square of known values."""
     return float(np.sqrt(np.nanmean(values**2)))
 
 

@@ -51,7 +51,7 @@ RUNS: dict[str, Callable[..., Iterator[Given]]] = {
     )
 }
 PAGE, TEXT = "index.html", "reproduction.md"  #: The page, and its Markdown.
-#: What the overview compares.
+#: Note on the overview's ratios.
 RATIOS = (
     "Ours / print: the median of the lines that print a number, in brackets the range, of the "
     "column that it follows."
@@ -264,7 +264,7 @@ def write_reproduction(
     command: str,
     form: str | None = None,
 ) -> None:
-    """Write page, Markdown, figures where a form is asked for, and the seal."""
+    """Write page, Markdown, figures if a form is given, and the seal."""
     folder.write(PAGE, render_page(paper, found, jobs))
     folder.write(TEXT, render_markdown(paper, found, jobs, command))
     if form is not None:

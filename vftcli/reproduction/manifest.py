@@ -43,7 +43,7 @@ ALWAYS: Spans = ((0.0, 1e9),)  #: All of a log. [s]
 
 @dataclass(frozen=True, kw_only=True)
 class TruthError:
-    """How far the truth itself may be off."""
+    """Error of the truth itself."""
 
     tau_Nm: float = 0.0
     note: str = ""
@@ -59,7 +59,7 @@ class BenchmarkLog:
     day: str = ""  #: No log of this day may train for it.
     file: str = ""  #: Below the folder of the data.
     parts: tuple[str, ...] = ()  #: Files of numbers that are one log, as ``q=positions.txt``.
-    scenario: str = ""  #: What is simulated instead.
+    scenario: str = ""  #: Name of a simulated log's scenario.
     seed: int = 1  #: Its seed.
     changes: tuple[str, ...] = ()  #: Keys of the scenario, as ``duration=12``.
     sha256: str = ""  #: Of the file.
@@ -68,14 +68,14 @@ class BenchmarkLog:
     truth_file: str = ""  #: Where the truth is, "" for the log's own file.
     truth_columns: str = ""  #: Its columns, as of ``--reference-columns``.
     vendor: str = ""  #: Columns of the controller's own estimate, "" for none.
-    score: Spans = ((SETTLED, 1e9),)  #: What is scored, from the first sample. [s]
+    score: Spans = ((SETTLED, 1e9),)  #: Scored spans, from the first sample. [s]
     vouched: Spans = ALWAYS  #: Untouched rows are false here; `score` if given. [s]
     #: True contacts: start, end [s], peak [N] if known; by hand.
     contacts: tuple[tuple[float, ...], ...] = ()
     contact_N: float = 1.0  #: Force from which the truth is a contact. [N]
     #: Planted: start [s], length [s], peak force on the flange in base axes [N].
     pushes: tuple[tuple[float, float, Vector], ...] = ()
-    weight_N: float = 0.0  #: What is carried over `score`. [N]
+    weight_N: float = 0.0  #: Weight carried over `score`. [N]
     #: Protocols it is scored by, none of what only trains.
     protocols: tuple[str, ...] = ("alone",)
     free: tuple[str, ...] = ()  #: Motion that nobody touched: names of logs, or A:B.
@@ -113,19 +113,19 @@ class TrainedRobot:
 
     name: str
     train: tuple[str, ...]  #: Names of logs.
-    interval: str = ""  #: What of them is used, as A:B; "" for all. [s]
+    interval: str = ""  #: Span of them in use, as A:B; "" for all. [s]
     method: str = ""  #: Of `vftcli identify`, "" for its default.
     robot: str = ""  #: The arm to begin with.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Declaration:
-    """What the maker of outside estimates declares of them: ``rival.toml``."""
+    """Declaration of outside estimates by their maker: ``rival.toml``."""
 
     protocol: str = "alone"
     training: tuple[str, ...] = ()  #: sha256 of every file that was trained on.
     causal: bool = False  #: Whether it could run online.
-    inputs: str = ""  #: What it reads of a log.
+    inputs: str = ""  #: Signals that it reads.
 
 
 class Rival(NamedTuple):
@@ -143,7 +143,7 @@ class Rival(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """Logs, trained robots, and the folder that the logs lie in."""
+    """Logs, trained robots, and the folder of the logs."""
 
     path: Path
     data: Path
@@ -156,7 +156,7 @@ class Manifest:
         return {log.name: log for log in self.logs}
 
     def paths(self, log: BenchmarkLog) -> list[Path]:
-        """The files of a log that are looked for; a simulated one has none."""
+        """The files of a log, there or not; a simulated one has none."""
         names = [part.partition("=")[2] for part in log.parts] if log.parts else [log.file]
         return [self.data / name for name in names if name]
 
@@ -166,7 +166,7 @@ class Manifest:
         return str(self.data / name) if name and Path(name).suffix else name
 
     def missing(self, log: BenchmarkLog) -> list[Path]:
-        """The files of its entry that are not there."""
+        """The missing files of its entry."""
         robot = self.robot(log) or ""
         also = [log.truth_file] * bool(log.truth_file) + [robot] * ("." in robot)
         paths = (*self.paths(log), *(self.data / name for name in also))

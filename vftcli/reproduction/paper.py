@@ -47,9 +47,9 @@ def gathered(given: Iterable[Given]) -> RunResult:
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """One experiment, which several tables and figures may show."""
+    """One experiment, for one or more tables and figures."""
 
-    title: str  #: What it is, with its scenario.
+    title: str  #: Its content, with its scenario.
     run: str  #: Name of the function that runs it.
     given: Mapping[str, Any] = field(default_factory=dict)  #: Its arguments beside the seed.
     seeds: Sequence[int] = (1, 2, 3, 4, 5)  #: Those of a full run; ``--fast`` takes the first.
@@ -60,9 +60,9 @@ class PrintedLine(NamedTuple):
     """One line of an item's table."""
 
     key: str  #: Where its values stand among the measured ones.
-    label: str  #: What it is.
+    label: str  #: Its meaning.
     unit: str = ""  #: Its unit, "" for none.
-    printed: str = ""  #: What the paper prints, "" for nothing.
+    printed: str = ""  #: Number in the paper, "" for none.
     compared: bool = True  #: Whether ours over the print says anything.
 
     @property
@@ -76,10 +76,10 @@ class PrintedLine(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class PaperItem:
-    """A table or a figure of the paper, or what it concludes."""
+    """A table or a figure of the paper, or a conclusion."""
 
-    label: str  #: What the paper calls it.
-    title: str  #: What it shows.
+    label: str  #: Its name in the paper.
+    title: str  #: Its content.
     why: str  #: Why ours differs, or why nothing can be compared, in a sentence.
     verdict: str  #: Whether it is reproduced, in a few words.
     experiments: Sequence[str] = ()  #: Those that it shows; none for a picture.
@@ -88,7 +88,7 @@ class PaperItem:
     variants: Sequence[str] = (AS_PRINTED, CORRECTED)
     #: The column of ours beside the print in the overview.
     nearest: str = CORRECTED
-    traces: str = ""  #: What its chart shows, "" if it has none.
+    traces: str = ""  #: Title of its chart, "" if it has none.
 
     @property
     def answer(self) -> str:
@@ -100,12 +100,12 @@ class PaperItem:
 class Paper:
     """A paper."""
 
-    name: str  #: What it is called at the command line.
+    name: str  #: Its name at the command line.
     title: str  #: Authors, title, place.
     doi: str  #: Its identifier.
     experiments: Mapping[str, Experiment]  #: Name → experiment.
     items: Mapping[str, PaperItem]  #: Name → table or figure, in the paper's order.
-    setting: Sequence[str]  #: How it is run, in sentences.
+    setting: Sequence[str]  #: Settings, in sentences.
 
     def chosen(self, only: str | None) -> tuple[str, ...]:
         """The names of these items, all if none are named."""
@@ -121,7 +121,7 @@ class Paper:
 
 @dataclass(frozen=True)
 class ShownItem:
-    """An item with what its experiments gave."""
+    """An item with its experiments' results."""
 
     item: PaperItem  #: It.
     #: Key of a line → variant → one value a seed.
@@ -131,7 +131,7 @@ class ShownItem:
 
 
 def load_paper(name: str) -> Paper:
-    """The paper that a file beside this one declares, which explains its entries."""
+    """The paper of a TOML file beside this one, with its entries explained there."""
     text = Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
     declared = tomllib.loads(text)
     each, items = declared.pop("each"), {}
@@ -151,7 +151,7 @@ def load_paper(name: str) -> Paper:
 
 
 def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> list[PrintedLine]:
-    """The lines that a row means: one, or one for each key of the name in its braces."""
+    """The lines of a row: one, or one for each key of the name in its braces."""
     line = PrintedLine(*row)
     name = next((name for name in each if f"{{{name}}}" in line.key), None)
     if name is None:

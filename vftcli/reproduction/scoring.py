@@ -74,7 +74,7 @@ class ScoreTask(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What it is called."""
+        """Name of the task."""
         rival = f", {self.rival.name}" if self.rival else ""
         return f"{self.log.name}, {self.protocol}{rival}"
 
@@ -264,7 +264,7 @@ def torque_rows(
 
 
 def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, Any]:
-    """The `WORST` seconds with the largest Σ w e², and the joint that has most of it."""
+    """The `WORST` seconds with the largest Σ w e², and the joint with most of it."""
     t, answer = torque.t, np.where(torque.known, torque.tau, 0.0)
     squares = np.where(scored[:, None], weights(t)[:, None] * (answer - truth) ** 2, 0.0)
     total = np.concatenate([[0.0], squares.sum(axis=1).cumsum()])

@@ -111,7 +111,7 @@ def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401 - Pinocc
 
 
 def simd() -> str:
-    """The widest instructions that NumPy found on this machine, as it names them."""
+    """NumPy's name of the widest instructions on this machine."""
     found = np.show_config(mode="dicts") or {}
     return str((found.get("SIMD Extensions", {}).get("found") or ["baseline"])[-1])
 

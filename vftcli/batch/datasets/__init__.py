@@ -11,10 +11,10 @@ Single = NDArray[np.float32]  #: Values of a column, as they are written. (frame
 
 
 class ForceColumn(NamedTuple):
-    """A column that is added."""
+    """A new column."""
 
     name: str  #: Its name, as external_torque; the dataset decides its place.
-    elements: tuple[str, ...]  #: What each of its numbers is, empty for a single one.
+    elements: tuple[str, ...]  #: Names of its numbers, empty for a single one.
     #: Unit, sign, frame, observer and whether it is causal.
     about: Mapping[str, Any]
 
@@ -24,7 +24,7 @@ class ForceColumn(NamedTuple):
         return max(1, len(self.elements))
 
 
-ForceColumns = Sequence[ForceColumn]  #: The columns that are added.
+ForceColumns = Sequence[ForceColumn]  #: The new columns.
 
 
 class DataFile(NamedTuple):

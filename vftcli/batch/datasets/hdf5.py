@@ -38,7 +38,7 @@ class Hdf5Dataset:
             yield DataFile(path.relative_to(self.folder), path, numbers)
 
     def _places(self, file: DataFile) -> tuple[Path, Mapping[int, str]]:
-        """A data file, and where each episode is in it."""
+        """A data file, and the place of each episode in it."""
         path = self.folder / file.place
         return path, episode_places(open_log(path), self._columns)
 

@@ -24,7 +24,7 @@ from vftcli.readers.parquet import EPISODE, ParquetTable, guarded
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 
-PREFIX = "observation."  #: What the names of observations begin with.
+PREFIX = "observation."  #: Begin of observations' names.
 #: Key of a Parquet schema under which `datasets` keeps features.
 METADATA = b"huggingface"
 #: Keys of the quantiles.
