@@ -34,11 +34,10 @@ ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
 
 
 class Servo:
-    """τ = τ_ff + M(q) (ω² (q_d − q) + 2ζω (q̇_d − q̇)), saturated at the drives' limits.
+    """τ = τ_ff + M(q) (ω² (q_d − q) + 2ζω (q̇_d − q̇)), within the drives' limits.
 
-    With the nominal inertia as gain one number sets the stiffness, and every mode of the
-    arm has the same bandwidth; gains joint by joint would leave a redundant arm a mode
-    that chatters.
+    With the nominal inertia as gain one number sets the stiffness, and all modes have one
+    bandwidth; gains joint by joint would leave a redundant arm a mode that chatters.
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
@@ -71,7 +70,7 @@ class Servo:
         return rigid_torque(self.model, reference) + rubs
 
     def torque(self, forward: Array, q_d: Array, dq_d: Array, q: Array, dq: Array) -> Array:
-        """The commanded torque at a state (q, dq) for a target, within the limits. (n,) [N·m]"""
+        """The torque commanded at a state (q, dq), within the limits. (n,) [N·m]"""
         pull = self.omega**2 * (q_d - q) + self.rate * (dq_d - dq)
         tau: Array = forward + self.inertia(self.model, self.data, q) @ pull
         return np.minimum(np.maximum(tau, -self.limit), self.limit)
@@ -100,8 +99,8 @@ class TrueArm(NamedTuple):
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
-    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`. Of the
-    `steps` of the run so many are `made`.
+    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`. `made`
+    of the run's `steps` are done.
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
@@ -129,8 +128,8 @@ class Arm:
         contacts, lasts = scenario.contacts, self.steps * h
         self.touching = Touching(contacts, self.robot.chain, lasts, self.seeds["contacts"])
         #: Course of the run, one row an inner step; row k covers k·step to (k+1)·step,
-        #: and one more is for the state after the last. State and reference are those at
-        #: the start of a step, all else holds over it.
+        #: one more is the state after the last. State and reference are at a step's
+        #: start, all else holds over it.
         rows = self.steps + 1
         self.history = {name: np.zeros((rows, len(q))) for name in KEPT}
         #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
@@ -226,7 +225,7 @@ class Arm:
         return {name: array[: k + 1] for name, array in history.items()}
 
     def mean_torque(self, interval: float) -> Array:
-        """Mean drive torque over the last `interval` [s], as the log measures it. (n,) [N·m]"""
+        """Mean drive torque over the last `interval` [s], as a log has it. (n,) [N·m]"""
         rows = max(round(interval / self.scenario.step), 1)
         tau = self.history["tau"][max(self.made - rows, 0) : max(self.made, 1)]
         mean: Array = tau.mean(axis=0)

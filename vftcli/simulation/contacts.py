@@ -1,4 +1,4 @@
-"""Contacts mounted on the arm: where they act, what they exert, and the joint torque of it.
+"""Contacts mounted on the arm: their places, wrenches and joint torques.
 
 A contact acts ON the robot at `point` of a `link` (0: the flange), in base axes.
 """
@@ -195,7 +195,7 @@ class Mounted(NamedTuple):
 
 
 class Touching:
-    """Everything that touches the arm during a run, evaluated at the middle of each step.
+    """All contacts of a run, evaluated at the middle of each step.
 
     `wrenches` are the last ones of each mounted contact about its point, base axes. (C, 6)
     """

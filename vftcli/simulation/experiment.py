@@ -43,7 +43,7 @@ class Truth(NamedTuple):
     contacts: dict[str, Array]
 
     def columns(self) -> dict[str, Array]:
-        """The columns of the truth file, flat, in order, t from the first sample. (M,) each"""
+        """Columns of the truth file, flat, in order, t from the first sample. (M,) each"""
         table = {"t": self.t}
         table |= [*per_joint("tau_ext", self.tau_ext), *per_axis("wrench", self.wrench)]
         for name, values in self.contacts.items():
@@ -159,7 +159,7 @@ def observe(arm: Arm) -> Simulation:
 
 
 def simulate_pair(scenario: Scenario, seed: int | None = None) -> list[Simulation]:
-    """Run an experiment, and if it is one of a pair also the free run of the same arm.
+    """An experiment's run, and if it is one of a pair the free run of the same arm.
 
     The free run has the same arm and motion, no payload and no contacts; its noise differs.
     """

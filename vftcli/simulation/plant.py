@@ -1,10 +1,10 @@
-"""The arm itself: rigid-body dynamics with rotor inertia and true friction, integrated in time.
+"""The arm itself: rigid-body dynamics, rotor inertia, true friction, integrated.
 
 Friction is τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest
 (Coulomb, load and Stribeck), s the state of the play operator
-(`vftcli.robots.running_friction`) and λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: at rest a
-joint that gives holds a·s, v₀ is `CREEP`; smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a
-ln(1 + |q̇|/b) sign(q̇) + sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
+(`vftcli.robots.running_friction`) and λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: such a
+joint holds a·s at rest, v₀ is `CREEP`; smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1
++ |q̇|/b) sign(q̇) + sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
 
 Dry friction: in M̃ (v⁺ − v) = g − λ, |λ_j| ≤ ℓ_j, a sliding joint has λ_j = ℓ_j
 sign(v⁺_j), a sticking one v⁺_j = 0. M̃ is positive definite: there is one solution. (J.
@@ -37,8 +37,8 @@ WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")  #: What does: the 
 CREEP = 3e-3
 LARGEST_STEP = 1e-3  #: Largest inner step. [s]
 GUESSES = 12  #: Active-set guesses before the slower way that always converges takes over.
-#: Torque of the contacts (n,) [N·m] from the Pinocchio model and data (joint Jacobians
-#: and placements are current) and the velocities, at the middle of the step.
+#: Torque of the contacts (n,) [N·m] at the middle of a step, from the Pinocchio model and
+#: data (joint Jacobians and placements are current) and the velocities.
 External = Callable[[Any, Any, Array], Array]
 
 
@@ -85,7 +85,7 @@ class TrueFriction:
         return fading * sign, fading * (1.0 - sign**2) / CREEP, np.where(gives, 0.0, dry)
 
     def smooth(self, dq: Array) -> tuple[Array, Array]:
-        """The smooth part and its derivative at `dq` (n,) [rad/s]. (n,) [N·m], (n,) [N·m·s/rad]"""
+        """The smooth part and its slope at `dq` (n,) [rad/s]: (n,) [N·m], [N·m·s/rad]"""
         speed = abs(dq)
         torque = self.offset + (self.viscous + self.quadratic * speed) * dq
         slope = self.viscous + 2.0 * self.quadratic * speed
@@ -117,7 +117,7 @@ class TrueFriction:
 
 
 def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
-    """The profile's friction curve with what it leaves out: stiction and the Stribeck peak.
+    """The profile's friction, with the stiction and Stribeck peak that it lacks.
 
     The profile's tanh(q̇/smoothing) becomes a real dry friction. Of a sigmoid, the share
     `spec.sticking` becomes dry friction of the same plateau, half the amplitude to each
@@ -182,8 +182,8 @@ class Plant:
 
     λ is the impulse of dry friction, D the slope of the smooth one; of second order in h
     while no joint begins to stick or slide. Presliding friction is evaluated at q_m. For
-    q_mid, v_mid and a the last step's balance M a + C v + g = τ + τ_ext − τ_f holds
-    exactly; `friction` is against positive motion, `centre` the c of the play operator.
+    q_mid, v_mid and a the last step's balance M a + C v + g = τ + τ_ext − τ_f is exact;
+    `friction` is against positive motion, `centre` the c of the play operator.
     """
 
     def __init__(
@@ -222,7 +222,7 @@ class Plant:
         self.v = after
 
     def impulses(self, tau: Array, external: External | None) -> Array:
-        """Velocities after the step, v_m extrapolated with the acceleration known so far. (n,)"""
+        """Velocities after the step, v_m by the acceleration known so far. (n,) [rad/s]"""
         h, pin, model, data = self.step, self.pin, self.model, self.data
         q_mid = self.q + 0.5 * h * self.v
         v_mid = self.v + 0.5 * h * self.a
@@ -258,7 +258,7 @@ class Plant:
 def slide_or_stick(
     M: Array, impulse: Array, v: Array, limit: Array, signs: Array
 ) -> tuple[Array, Array, Array]:
-    """Velocities after the step, friction impulses, and the direction each joint slides in.
+    """Velocities after the step, friction impulses, and directions of sliding.
 
     M̃ (n, n) [kg·m²], impulse g of everything but dry friction, velocities v before the
     step, largest impulses ℓ of dry friction, directions of the step before as a guess, 0

@@ -1,4 +1,4 @@
-"""Scenarios: everything a user may set of a simulated experiment, from TOML and back."""
+"""Scenarios: all settings of a simulated experiment, from TOML and back."""
 
 import types
 from collections.abc import Mapping, Sequence
@@ -66,16 +66,15 @@ class FrictionSpec(Spec):
     presliding_length: float = 3e-4  #: Deflection at which that is full. [rad]
     #: Of the joints at the start; None: the friction's own. [°C]
     temperature_begin: float | None = None
-    #: Temperature at the end, on a straight line from the start; not given, that at the
-    #: start. Friction follows it where the robot has a law. [°C]
+    #: Temperature at the end of a straight line from the start; the start's if not given.
+    #: Friction follows it where the robot has a law. [°C]
     temperature_end: float | None = None
 
 
 class MismatchSpec(Spec):
     """Deviations of the arm from its profile: one standard deviation, relative.
 
-    Each parameter is drawn from the seed, a normal deviate cut at two standard
-    deviations. Zeros make the profile exact.
+    Each is drawn by the seed, a normal deviate cut at two deviations. 0 keeps the profile.
     """
 
     mass: float = 0.0  #: Link masses (tensors scale with them).
@@ -98,7 +97,7 @@ class PayloadSpec(Spec):
 
 
 class ForceSensorSpec(Spec):
-    """A force/torque sensor between flange and handle; what is fixed beyond it, it weighs."""
+    """A force/torque sensor between flange and handle; it weighs what lies beyond it."""
 
     position: Vector = (0.0, 0.0, 0.03)  #: Origin of the sensor frame in flange axes. (3,) [m]
     #: Fixed-axis angles of the sensor frame on the flange. (3,) [rad]
@@ -166,7 +165,7 @@ class LoadSpec(OnLink, kind="load"):
 
 
 class PushesSpec(OnLink, kind="pushes"):
-    """Pushes of random strength and direction, as a hand gives them, drawn from the seed."""
+    """Pushes of random strength and direction, like a hand's, drawn by the seed."""
 
     style: str = "slow"  #: "slow", "taps" or "mixed"; the ranges below override its own.
     begin: float = 0.0  #: No push before this. [s]
@@ -179,7 +178,7 @@ class PushesSpec(OnLink, kind="pushes"):
 
 
 class HandSpec(OnLink, kind="hand"):
-    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor."""
+    """A hand on the handle for some spans: a spring and damper to a moving anchor."""
 
     #: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
     spans: tuple[tuple[float, float], ...]
@@ -238,7 +237,7 @@ def scenario_names() -> tuple[str, ...]:
 
 
 def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
-    """Read a built-in scenario or a user's TOML file and apply `key=value` overrides.
+    """A built-in scenario or a user's TOML file, with `key=value` overrides applied.
 
     Args:
         name: Name of a built-in scenario, or a file.

@@ -45,8 +45,8 @@ class Measured(NamedTuple):
     stamp: Array  #: Time stamps, jittering. (M,) [s]
     #: Sample in each row of the log; lost ones are missing, repeated ones come twice.
     rows: Indices
-    #: Field of a recording → its signal: what the sensors and the flange's own report,
-    #: and the controller's targets and estimate of contact. (M, n) each
+    #: Field of a recording → its signal: the sensors' and the flange's own reports, and
+    #: the controller's targets and estimate of contact. (M, n) each
     signals: dict[str, Array]
 
 
@@ -99,7 +99,7 @@ def sample_run(arm: Arm) -> Samples:
 
 
 def noise_sizes(arm: Arm) -> tuple[Array, Array, Array]:
-    """Noise of positions, velocities, and torques or currents. (n,) each [rad, rad/s, N·m, A]"""
+    """Noise of positions, velocities, torques or currents (n,) [rad, rad/s, N·m, A]"""
     spec, noise = arm.scenario.sensing, arm.robot.noise
     K = drive_constants(arm.robot)
     own = noise.tau if K is None else noise.current
@@ -185,10 +185,9 @@ def controller_signals(
 
 
 def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None:
-    """Wrench in sensor axes about the sensor's origin, as force ON the robot. (M, 6) [N, N·m]
+    """Wrench about the sensor's origin in its axes, ON the robot. (M, 6) [N, N·m]
 
-    Contacts, weight and inertia of what is beyond it, offset, drift, noise; None without
-    one.
+    Contacts, weight and inertia beyond it, offset, drift, noise; None without a sensor.
     """
     import pinocchio as pin
 

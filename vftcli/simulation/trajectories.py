@@ -26,7 +26,7 @@ Number = TypeVar("Number", float, Array)
 
 
 class Reference(NamedTuple):
-    """Commanded positions, velocities and accelerations. (T, n) each [rad, rad/s, rad/s²]"""
+    """Commanded positions, velocities, accelerations (T, n) [rad, rad/s, rad/s²]"""
 
     q: Array
     dq: Array
@@ -110,7 +110,7 @@ def minimum_jerk(u: Number) -> Number:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 class Spec:
-    """A section of a scenario, a frozen dataclass; of one of several kinds that names it."""
+    """A section of a scenario, a frozen dataclass; of one kind if there are several."""
 
     kind: ClassVar[str]
 
@@ -161,10 +161,10 @@ class HoldSpec(Spec, kind="hold"):
 
 
 class OffsetsSpec(Spec, kind="offsets"):
-    """Straight lines of the flange at constant orientation between stated points, at rest there."""
+    """Straight lines of the flange between stated points, at constant orientation."""
 
-    #: Rows (start time, end time, x, y, z): by the end time the flange is displaced from
-    #: the start by (x, y, z) in base axes. [s, m]
+    #: Rows (start time, end time, x, y, z), in base axes: the displacement from the start
+    #: by the end time, then rest. [s, m]
     moves: tuple[tuple[float, float, float, float, float], ...]
     length: float  #: Length of the whole motion. [s]
     start: tuple[float, ...] = ()  #: Joint positions at the offset (0, 0, 0). (n,) [rad]
@@ -188,10 +188,10 @@ class OffsetsSpec(Spec, kind="offsets"):
 
 
 class JointMovesSpec(Spec, kind="joint-moves"):
-    """Straight moves in joint space between stated displacements from the start, at rest there."""
+    """Straight moves in joint space between stated displacements from the start."""
 
-    #: Rows (start time, end time, one displacement a joint): by the end time the joints
-    #: are displaced from the start by these. [s, rad]
+    #: Rows (start time, end time, one displacement a joint): that from the start by the
+    #: end time, then rest. [s, rad]
     moves: tuple[tuple[float, ...], ...]
     length: float  #: Length of the whole motion. [s]
     start: tuple[float, ...] = ()  #: Joint positions at no displacement. (n,) [rad]
@@ -308,9 +308,9 @@ def plan(spec: TrajectorySpec, robot: Robot, t: Array) -> Reference:
 
 
 def follow(robot: Robot, start: Array, offsets: Array, what: str) -> Array:
-    """Joint positions along flange points (K, 3) [m] about the start's, each from the last.
+    """Joint positions along flange points (K, 3) [m] about the start's. (K, n) [rad]
 
-    The flange keeps the orientation that it has at the start (n,) [rad]. (K, n) [rad]
+    The flange keeps its orientation at the start (n,) [rad]. Each is found from the last one.
     """
     solver, q, path = FlangeSolver(robot, REACHED, limited=False), start, list[Array]()
     rotation, origin = solver.pose(start)

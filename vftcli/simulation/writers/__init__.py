@@ -1,8 +1,8 @@
-"""Simulated logs in the vendors' own formats, flat Parquet tables, and the truth file.
+"""Simulated logs in the vendors' formats, flat Parquet tables, the truth file.
 
-UR's two RTDE recorders: the official client writes one header row, single spaces and CR
-LF; SDU's ur_rtde commas, LF, every double with six decimals. libfranka's `logToCSV`, the
-layout of 0.9.1 and later: commas, six significant digits.
+UR's two RTDE recorders: the official client writes one header row, single spaces, CR LF;
+SDU's ur_rtde commas, LF, six decimals. libfranka's `logToCSV` since 0.9.1: commas, six
+significant digits.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,11 +27,11 @@ from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
 from vftcli.wrench.solvers import LEAST_SIGMA, wrench_of
 
-#: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next
-#: NAME" the row that follows, the last repeated: a command is executed one cycle later.
+#: Column → its signal or constants, one a column; "-NAME" is minus the signal, "next
+#: NAME" the next row, the last repeated: commands run one cycle later.
 Columns = Mapping[str, str | tuple[float, ...]]
-#: The default record_configuration.xml of the official client. The constants are of what
-#: the simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL.
+#: The official client's default record_configuration.xml. Constants are of what is not
+#: simulated: robot mode RUNNING, joint mode RUNNING, safety NORMAL.
 CLIENT: Columns = {
     "timestamp": "time",
     "target_q": "target_q",
@@ -139,7 +139,7 @@ def pose_of(flange: FlangeMotion) -> Array:
 
 
 class VendorTable(NamedTuple):
-    """A format: its columns, the mark of an element's number, and how rows and numbers look."""
+    """A format: its columns, the mark of an element's number, rows and numbers."""
 
     columns: Columns
     element: str
@@ -216,7 +216,7 @@ def write_columns(
     columns: dict[str, Array],
     frames: Mapping[str, StatedFrame] | None = None,
 ) -> None:
-    """Write named columns (M,) of doubles as one Parquet table; wrenches have these frames."""
+    """Write named columns (M,) of doubles as a Parquet table, wrenches with frames."""
     import polars as pl
 
     table = pl.DataFrame(columns)
@@ -263,7 +263,7 @@ def is_ur(robot: Robot) -> bool:
 
 
 def vendor_format(robot: Robot) -> str:
-    """The format an arm's vendor logs in: RTDE for a UR, libfranka's for a Franka, else a table."""
+    """The format of an arm's vendor: RTDE for UR, libfranka's for Franka, or a table."""
     if is_ur(robot):
         return "rtde"
     return "libfranka" if robot.ros_state == ROBOT_STATE else "parquet"

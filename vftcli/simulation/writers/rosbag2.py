@@ -1,4 +1,4 @@
-"""rosbag2 (MCAP storage): FrankaRobotState for the Franka arms, JointState for the others."""
+"""rosbag2 (MCAP storage): FrankaRobotState for Franka arms, else JointState."""
 
 from pathlib import Path
 
@@ -59,7 +59,7 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
 
 
 def joint_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topic:
-    """`/joint_states`, effort in ampere for a current-driven arm, in N·m for the others."""
+    """`/joint_states`; effort in A for a current-driven arm, in N·m for the others."""
     names = [f"{name.removesuffix('_joint')}_joint" for name in simulation.robot.chain.names]
     seen = simulation.measured.signals
     values: dict[str, Value] = {
@@ -73,7 +73,7 @@ def joint_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topi
 
 
 def wrenches(readings: Array, stamps: Indices) -> Topic:
-    """`/force_torque_sensor_broadcaster/wrench` in the sensor's frame, force ON the robot."""
+    """`/force_torque_sensor_broadcaster/wrench`, sensor frame, force ON the robot."""
     values = {
         **stamped(stamps),
         "header.frame_id": "ft_sensor",
@@ -139,7 +139,7 @@ def quaternions(rotation: Array) -> Array:
 
 
 def six(path: str, names: tuple[str, str], columns: Array) -> dict[str, Value]:
-    """Six numbers as two vectors: a wrench's force and torque, a twist's linear and angular."""
+    """Six numbers as two vectors: force and torque, or linear and angular velocity."""
     first, second = (f"{path}.{name}" for name in names)
     return {**in_parts(first, "xyz", columns[:, :3]), **in_parts(second, "xyz", columns[:, 3:])}
 
