@@ -1,9 +1,9 @@
 """A log's free part and spectra, and its observers' input less the bias.
 
-The bias of the whole log (`vftcli.bias.whole_log`) comes off μ before an observer
-runs. `best` runs on what is left, tuned on the spectra of that; the other observers do
-where ``bias.method=whole-log`` asks for it. Nothing here refuses a log: what cannot be
-done is said, and `best` is made of what is left.
+The bias of the whole log (`vftcli.bias.whole_log`) comes off μ before an observer runs:
+for `best`, tuned on the spectra of the rest, and for the others if
+``bias.method=whole-log``. No log is refused: remarks say what is missing, and `best` is
+made of the rest.
 """
 
 from dataclasses import dataclass, field, replace
@@ -41,8 +41,7 @@ class Baseline:
     load: FreeLoad | None = None
     #: The whole log's bias, off the terms; None if none was fitted.
     correction: WholeLogBias | None = None
-    #: Whether the free part is what the fit of that bias takes for free: no contact that
-    #: comes and goes, though a load that stays may be in it.
+    #: Whether the free part is that bias's fit's: no passing contacts, perhaps a lasting load.
     by_fit: bool = False
     #: Its parts in use, those not in use, and the substitute for a free part.
     on_correction: tuple[Remark, ...] = ()
@@ -51,8 +50,7 @@ class Baseline:
     def of(self, run: Run) -> Run:
         """The log or one of its free runs, as the observers have it. Made once.
 
-        Where a correction was looked for, an observer has no samples that stand alone
-        either.
+        If a correction was looked for, without samples that stand alone.
         """
         if not self.on_correction:
             return run
@@ -78,8 +76,8 @@ class Baseline:
     def tunable(self) -> Spectra | None:
         """The spectra if gains may come from them, else None.
 
-        Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran
-        to the slowest.
+        Not from a free part by the fit with a load in it: 2.8 kg on a UR10e gave the
+        slowest gains.
         """
         return None if self.by_fit and self.load is not None else self.spectra
 
@@ -176,8 +174,7 @@ class FreeReading(NamedTuple):
 
     observer: Observer  #: The observer.
     estimate: ExternalTorque  #: Its estimate of the log.
-    #: What it reads in the free samples, of all pieces in a row, less a load that the
-    #: free part carries. (S, n) [N·m]
+    #: Its reading in the free samples of all pieces, less the free part's load. (S, n) [N·m]
     samples: Array
     resting: Mask  #: Whether a joint rests in them. (S, n)
 
@@ -223,7 +220,7 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
-    """A baseline without spectra with the bias fit's free part (T,), where that is enough."""
+    """A baseline without spectra, with the bias fit's free part (T,) if enough."""
     share = quiet.mean()
     remark = fact("free-by-the-fit", share=share)
     if found.motion.choice.is_given and found.missing is not None:

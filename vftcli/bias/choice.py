@@ -1,4 +1,4 @@
-"""A user's choice for a complete log: the bias to subtract, whether contacts are listed."""
+"""A user's choice for a complete log: bias subtracted, contacts listed or not."""
 
 from typing import Annotated
 

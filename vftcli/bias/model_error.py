@@ -3,8 +3,7 @@
 The raw disturbance d is the external torque less the model's error, d = τ_ext − A δx. The
 columns A are the inertial parameters of every link, the rotor inertias, the drive
 constants and the friction of every joint. Each δx has mean zero and a standard deviation
-that follows from the robot's own numbers: a maker's table is good to some percent,
-friction to a fifth.
+by the robot's own numbers: a maker's table is good to some percent, friction to a fifth.
 """
 
 from collections.abc import Iterator
@@ -113,7 +112,7 @@ def usual_friction(robot: Robot) -> Array:
 
 
 class ModelError(NamedTuple):
-    """One value for each column: an error of the model, or how large each is expected to be."""
+    """A value for each column: an error of the model, or its expected size."""
 
     inertial: Array  #: Of the links' inertial parameters, in the regressor's order. (10n,)
     rotor: Array  #: Of the reflected rotor inertias. (n,) [kg·m²]
@@ -154,7 +153,7 @@ def column_numbers(joint: int, joints: int) -> Indices:
 
 
 def expected_error(robot: Robot) -> ModelError:
-    """Standard deviation of the model's error in every column, from the robot's own numbers."""
+    """Standard deviation of the model's error in each column, by the robot's numbers."""
     chain, (dry, viscous, quadratic) = robot.loaded_chain, usual_friction(robot)
     inertial = np.empty((chain.joints, LINK))
     for j, (m, c) in enumerate(zip(chain.mass, chain.com, strict=True)):
@@ -187,7 +186,7 @@ def friction_alone(robot: Robot) -> ModelError:
 def error_columns(
     run: Run, motion: SmoothMotion, expected: ModelError, stride: int
 ) -> list[Array]:
-    """The rows of A of every joint, each column of `column_numbers` times its deviation. (S, p)"""
+    """Each joint's rows of A, columns `column_numbers` times their deviations. (S, p)"""
     n, kept, sds = run.robot.joints, slice(None, None, stride), expected.values
     shapes = [
         motion.dq[kept] if k == SHAPES - 2 else zero_phase(motion.t, shape, CUTOFF)[kept]

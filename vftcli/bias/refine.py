@@ -1,8 +1,8 @@
 """From a log's baseline to finished estimates: bands, and what limits them.
 
-Bands come from the log's own free samples and spectra, and say what an estimate's error
-is expected to be without a reference: the root mean square of their standard deviation
-over the log, the mean over the joints.
+Bands come from the log's own free samples and spectra, without a reference. They say the
+expected error of an estimate: the rms of their standard deviation over the log, averaged
+over the joints.
 """
 
 from collections.abc import Mapping, Sequence
@@ -52,11 +52,10 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
 def stated_band(found: Baseline, reading: FreeReading) -> Array:
     """Band of `best` without spectra, by the robot's own numbers. (T, n) [N·m]
 
-    Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a
-    bias was fitted it is what that leaves of it, and what is read where its fit sees no
-    contact. What the gains leave out of the torque is not known. In a log of a few
-    samples, or of hardly anything but gaps, a moving joint has `UNSEEN` of its dry
-    friction.
+    Friction is wrong by a fifth, as is usual (`model_error.expected_error`); with a
+    fitted bias the band is the rest of it, and the readings where its fit sees no
+    contact. Torque that the gains leave out is unknown. In a log of a few samples, or
+    mostly gaps, a moving joint has `UNSEEN` of its dry friction.
     """
     run = found.motion.log
     friction, nothing = run.dry_friction, np.zeros_like(run.dry_friction)
@@ -78,8 +77,8 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
 def known_error(found: Baseline, reading: FreeReading) -> FreeError:
     """An estimator's reading without contact, as far as the log shows it.
 
-    Samples that a fitted bias calls free speak too, as a stated part is short and often
-    at rest: the larger of both counts.
+    Samples that a fitted bias calls free count too, as a stated part is short and often
+    at rest: the larger of both.
     """
     stated = free_error(reading.samples, reading.resting, found.motion.log.dry_friction)
     called = fitted_error(found, reading)
@@ -95,8 +94,7 @@ def known_error(found: Baseline, reading: FreeReading) -> FreeError:
 def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
     """Readings in the correction fit's free samples; None in too few.
 
-    Slow loads that the fit believes in are no error of who reads them, nor is a load that
-    the free part carries where it believes in none.
+    Slow loads of the fit are no error of a reading, nor is the free part's where it has none.
     """
     run, tau, off = found.motion.log, reading.estimate.tau, found.correction
     if off is None or np.count_nonzero(off.free) < ENOUGH:
@@ -132,11 +130,10 @@ class Budget(NamedTuple):
 def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     """Divide an observer's error into its causes, each estimated from the log.
 
-    Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the
-    observer reads on the free part is model error: friction as far as sign and size of a
-    joint's own velocity explain it, the rest of the model otherwise. Stiction at rest is
-    the dry friction a resting joint may hide, F_c/√3, times the share of its time at
-    rest.
+    Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. Other readings
+    on the free part are model error: friction as far as sign and size of a joint's
+    velocity explain it, else the rest of the model. Stiction at rest is the dry friction
+    a resting joint may hide, F_c/√3, times its share of time at rest.
     """
     f, step, n = spectra.frequency, spectra.step, spectra.joints
     response = reading.observer.frequency_response(f, step, n)
@@ -159,7 +156,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
 
 
 def friction_share(dq: Array, tau: Array) -> Array:
-    """Share of a torque's power (S, n) by a joint's own velocity [rad/s], sign and size. (n,)"""
+    """Share of a torque's power (S, n) by velocity [rad/s], sign and size. (n,)"""
     shares = []
     for velocity, y in zip(dq.T, tau.T, strict=True):
         X = np.column_stack([np.tanh(velocity / SIGN_SPEED), velocity])
@@ -172,7 +169,7 @@ def friction_share(dq: Array, tau: Array) -> Array:
 def limits_remark(found: Budget, stuck: Mask) -> Remark:
     """Limits of a log: each joint's largest cause, and its part of the error.
 
-    What stiction may hide is added to the error of a standing joint, one of `stuck`. (n,)
+    Hidden stiction is added to the error of a standing joint, one of `stuck`. (n,)
     """
     stiction = found.parts[STICTION]
     moving = {cause: part for cause, part in found.parts.items() if cause != STICTION}

@@ -1,13 +1,13 @@
-"""The model's error from a whole log: weighted normal equations, a robust fit, its test on folds.
+"""The model's error from a whole log: normal equations, robust fit, fold tests.
 
-All columns are times their standard deviations: the prior is the unit matrix and the
+All columns are times their standard deviations: the prior is the unit matrix, the
 solution minimises Σ w (d + A u)² + Σ u². A joint's row has its own columns, a slow load
 only its two knots about a sample: sums go block by block.
 
-A hand that leans on the arm all the time looks like mass. So beside the model's columns
-there are those of external loads that change slowly: a wrench at the flange, forces at
-elbow and wrist on the links before them. By the lever rule these make a force anywhere
-along the arm. The estimate keeps their torque: in doubt a torque is a push.
+A hand that always leans on the arm looks like mass. So there are columns of slow external
+loads too: a wrench at the flange, forces at elbow and wrist on the links before them. By
+the lever rule these make a force anywhere along the arm. The estimate keeps their torque:
+in doubt a torque is a push.
 
 The first fit weighs samples down for all joints together: several feel a contact. The second
 fits the samples below a threshold, with the loads. Each fold of the free samples is predicted
@@ -38,7 +38,7 @@ WRENCH = 6  #: Components of the flange's wrench, the first loads.
 class SlowLoads(NamedTuple):
     """Columns of slow external loads along the samples of a fit."""
 
-    #: External torque, sign reversed, of one standard deviation of every component: the
+    #: External torque of one standard deviation of each component, sign reversed: the
     #: flange's wrench, then forces along the arm. (S, n, m) [N·m]
     torque: Array
     knot: Indices  #: The knot before each sample. (S,)
@@ -75,7 +75,7 @@ class SlowLoads(NamedTuple):
 
 
 def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
-    """Columns of slow external loads on a moving arm at times t (S,) [s] and positions q (S, n)."""
+    """Columns of slow external loads at times t (S,) [s] and positions q (S, n) [rad]."""
     n, poses = chain.joints, link_poses(chain, q)
     # At the flange, before the elbow's joint, before the wrist's.
     links = n, *sorted({j for j in ((n + 1) // 2 - 1, n - 3) if j > 0})
@@ -145,7 +145,7 @@ class Rows:
     def sums(
         self, weight: Array, chosen: Mask | None = None, parts: Sequence[Mask] = ()
     ) -> list[NormalEquations]:
-        """Sums of all columns, model's and loads', over some samples, then over parts of them.
+        """Sums of all columns, of model and loads, over some samples, then over parts.
 
         The rows have weights (S, n); no samples (S,) means all. Parts (S,) may overlap.
         """
@@ -176,8 +176,8 @@ class Rows:
     def solution(self, sums: NormalEquations, scale: float = 1.0) -> FittedError:
         """The most likely model error, with loads that make the rows likely.
 
-        The loads' groups are nested, and so are their Cholesky factors: one factor gives
-        every group's objective, c − Σ z² over its columns, z = L⁻¹AᵀWd.
+        The loads' groups are nested, so one Cholesky factor gives every group's
+        objective, c − Σ z² over its columns, z = L⁻¹AᵀWd.
         """
         unknowns, scales = self.unknowns, np.ones(len(sums.right))
         scales[:unknowns] = scale
@@ -255,9 +255,9 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
 
 
 def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Array, Array]:
-    """Residual of a fit without loads that weighs suspicious samples down, its scale. (S, n), (n,)
+    """Residual (S, n) without loads, suspicious samples weighed down; its scale.
 
-    So many samples count as one; the scale is at `least` (n,) [N·m].
+    So many samples count as one; the scale (n,) is at `least` (n,). [N·m]
     """
     rows, residual = replace(rows, loads=rows.loads.none), rows.d
     quiet = np.quantile(abs(residual), QUIET_SHARE, axis=0)
@@ -279,7 +279,7 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
 
 
 def free_samples(worst: Array, step: float) -> Mask:
-    """Samples free of contact by any joint's residual in its scale; all if few would be. (S,)"""
+    """Samples free of contact by all joints' scaled residuals; all if too few. (S,)"""
     # rounding of a step must not shorten such a run
     runs = [run for run in runs_of(worst > CONTACT) if (run[1] - run[0]) * step >= LASTS - 1e-9]
     free = ~covered(runs, len(worst), margin=round(GROWN / step))
@@ -299,8 +299,7 @@ LARGEST = 6.0  #: Most scales of a residual.
 #: A joint with less motion than this share is judged by all free samples.
 SELDOM = 0.2
 WORTH = 0.9  #: Most of the unseen error left for a full correction, …
-#: … and least for none; partly between: no sample switches it. A load of 2.8 kg that the
-#: fit cannot separate from the model leaves .95.
+#: … and least for none; partly between. An inseparable load of 2.8 kg leaves .95.
 WORTHLESS = 0.95
 
 
@@ -316,7 +315,7 @@ class Guarded(NamedTuple):
 
 
 def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
-    """A fit tested on folds of its free samples, as far as it predicts; dq (S, n) [rad/s]."""
+    """A fit tested on folds of its free samples; joint velocities dq (S, n) [rad/s]."""
     moves = faster(dq)
     judged = moves | (moves[fit.free].mean(axis=0) < SELDOM)
     folds = [(int(f[0]), int(f[-1]) + 1) for f in np.array_split(np.flatnonzero(fit.free), FOLDS)]

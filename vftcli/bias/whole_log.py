@@ -1,9 +1,8 @@
-"""The bias of the model from the whole log: what repeats with the motion is no contact.
+"""The model's bias from the whole log: a torque in every repeat is no contact.
 
-No free part is needed. The model's error δx is fitted to the raw disturbance
-d = τ_ext − A δx of all of the log, with contacts rejected and slow external loads left
-in; where it predicts motion that it has not seen, b = A δx is subtracted, μ ← μ − b, and
-any observer runs on the rest.
+No free part is needed. The model's error δx is fitted to the raw disturbance d = τ_ext −
+A δx of all of the log, with contacts rejected and slow external loads left in; where it
+predicts unseen motion, b = A δx is subtracted, μ ← μ − b, before any observer.
 """
 
 from dataclasses import dataclass, field, replace
@@ -39,8 +38,8 @@ from vftcli.signals.remarks import Remark, caution, fact, on_joints
 from vftcli.signals.rest import faster
 from vftcli.signals.series import median_step, resample_columns
 
-#: From its first to its last motion a log has to take this long: a shorter one tells
-#: inertia from a push no more, and friction alone is fitted. [s]
+#: Least motion, first to last: in less, inertia looks like a push; friction alone is
+#: fitted. [s]
 LEAST_MOTION = 10.0
 #: Less motion tells nothing: ten times `CORRELATED`. [s]
 LEAST_FRICTION = 3.0
@@ -54,8 +53,7 @@ USUAL = 1.1
 LED = 1.4
 #: A joint's friction is corrected in full with so much error left …
 CLEAR = 0.45
-#: … and not at all with so much. [1]
-#: On UR10e logs 5 s leave .3 to .9; led by hand .4 to .9.
+#: … and not at all with so much: on UR10e logs 5 s leave .3 to .9; led by hand .4 to .9. [1]
 UNCLEAR = 0.6
 RATE = 30.0  #: Samples a second that are fitted, …
 LONG = 60.0  #: … up to a log of this length [s], …
@@ -67,17 +65,15 @@ MOST_SAMPLES = 36_000  #: Samples that are fitted at most: an hour's.
 class WholeLogBias:
     """The model's bias along a log."""
 
-    #: How much of the model's error each joint loses: 0 on joints left alone, 1 where it
-    #: clearly predicts what it had not seen. (n,)
+    #: Share of the model's error that a joint loses: 1 where it clearly predicts. (n,)
     weight: Array
     bias: Array  #: Subtracted torque, zero on joints left alone. (T, n) [N·m]
-    #: Standard deviation of the model's error as it was fitted, and of what is subtracted
-    #: where that is a part of it: all or nothing, by chance. (T, n) [N·m]
+    #: Deviation of the model's error as fitted, and of a part of it where that is
+    #: subtracted: all or nothing, by chance. (T, n) [N·m]
     sd: Array
     #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
     free: Mask
-    #: External torque of the slow loads that the fit believes in, which stays in the
-    #: estimates; zero where it believes in none. (T, n) [N·m]
+    #: External torque of the fit's slow loads, kept in estimates; or zero. (T, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
     fitted: bool = (
@@ -141,7 +137,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
 
 
 def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
-    """How much of a fit of friction alone each joint of a short log gets. (n,)
+    """Share of a fit of friction alone that each joint of a short log gets. (n,)
 
     A hand that leads the arm looks like less friction: they differ in size and in foresight.
     """
@@ -154,7 +150,7 @@ def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
 
 
 def motion_of(run: Run) -> tuple[float, Remark | None]:
-    """How long a log moves from first to last [s], and why it tells no error of the model."""
+    """Length of a log's motion [s], and a remark if it shows no error of the model."""
     t, dq = without_waits(run.t), run.dq
     duration = t[-1] - t[0]
     if duration < LEAST_FRICTION:
