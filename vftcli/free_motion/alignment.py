@@ -25,9 +25,8 @@ LEAST_ALIKE = 0.001
 RIVALS = 40  #: Most shifts of longer overlap to try.
 COARSE = 300  #: Instants compared in the search for a shared part.
 
-#: Largest distance at another speed or clock, by the motion's own spread.
-#:
-#: True pairs leave .003, other motions with a rate that seems to fit 1.3 and more.
+#: Largest distance at another speed or clock, by the motion's own spread: true pairs
+#: leave .003, other motions with a fitting rate 1.3 and more.
 SAME_PATH = 0.1
 
 #: Length of pieces that compare logged velocities with the distance travelled. [s]
@@ -50,9 +49,9 @@ def align(recording: Recording, free: Recording) -> Alignment:
     """Shift at which `free` passes the recording's joint positions.
 
     A coarse shift minimises the mean squared position difference over all overlaps of at
-    least `LEAST_OVERLAP`, by FFT on a common uniform clock. Gauss–Newton steps, robust
-    against contacts, then refine shift and ratio of rates on the logs' own clocks. A
-    motion that repeats fits at every whole period: the shift with most overlap wins.
+    least `LEAST_OVERLAP`, by FFT on a common even clock. Gauss–Newton, robust against
+    contacts, refines shift and ratio of rates on the logs' clocks. Of a motion's whole
+    periods the shift with most overlap wins.
     """
     check_same_arm(recording, free)
     closest = aligned_at(recording, free, *best_fit(recording, free))
@@ -143,8 +142,8 @@ def check_same_arm(recording: Recording, free: Recording) -> None:
 def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     """The shared part of two logs' motions, None if too short.
 
-    At the shift at least `LEAST_OVERLAP` of the motion is within `SAME_TRAJECTORY`. Partners
-    are unbroken stretches of a second or more.
+    At least `LEAST_OVERLAP` of the motion is within `SAME_TRAJECTORY` at the shift.
+    Partners are unbroken stretches of a second or more.
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
     q = resample_columns(t, recording.t, recording.q)
@@ -162,7 +161,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
 
 
 def apart(t: Array, q: Array, free: Recording) -> Array:
-    """Free run less positions q at instants t of its clock, NaN beyond it. (T, n) [rad]"""
+    """Free run less positions q at times t of its clock, NaN beyond. (T, n) [rad]"""
     return resample_columns(t, free.t, free.q, np.nan) - q
 
 
@@ -254,8 +253,8 @@ def refined(
 def robust_equations(slopes: Array, distance: Array) -> tuple[Array, Array]:
     """Matrix (k, k) and right side (k,) of a Gauss–Newton step on distances (T, n).
 
-    The slopes are those by k unknowns (k, T, n). Each joint is weighted by its spread,
-    samples by Cauchy's weight, so that pushes do not pull.
+    The slopes are by k unknowns (k, T, n). A joint's weight is by its spread, a sample's
+    by Cauchy's, so that pushes do not pull.
     """
     weighted = slopes / ((robust_sd(distance) + 1e-7) ** 2 + distance**2)
     return (

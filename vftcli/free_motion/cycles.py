@@ -1,4 +1,4 @@
-"""A motion that repeats: its period, its cycles, and those of them that nobody touched."""
+"""A repeated motion: its period, its cycles, and the contact-free among them."""
 
 from typing import NamedTuple
 
@@ -19,8 +19,7 @@ from vftcli.signals.series import resample_columns, summed
 
 LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.
 
-#: A quarter of the positions must return, within this share of
-#: their spread: a soft servo is off its path while it is pushed.
+#: A quarter of the positions must return, within this share of their spread: pushes deflect.
 RETURNS = 0.015
 
 #: A valley is worth refining if a quarter of the samples come back within this share.
@@ -55,11 +54,10 @@ class Period(NamedTuple):
 def find_period(recording: Recording, stated: float | None = None) -> Period:
     """Find the time after which the joint positions return.
 
-    The mean squared distance between the log and itself later (the autocorrelation with
-    its overlap accounted for) has a valley at every multiple of the period. The first
-    valley from which enough samples return is refined below the sample time by
-    Gauss–Newton steps on all its multiples together, robust against contacts that push
-    the arm off its path.
+    The mean squared distance between the log and itself later (the autocorrelation,
+    corrected for overlap) has a valley at every multiple of the period. The first from
+    which enough samples return is refined below the sample time by Gauss–Newton on all
+    its multiples, robust against contacts that push the arm off its path.
 
     The search stays within `AROUND` of a stated period. [s]
     """
@@ -158,7 +156,7 @@ def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
 
 
 def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
-    """Lower quartile of the distance of q, one in `every`, and q `seconds` later. [rad]"""
+    """Lower quartile of the distance of q to q `seconds` later, one in `every`. [rad]"""
     here, path = t[::every], q[::every]
     inside = here + seconds <= t[-1]
     distance = resample_columns(here[inside] + seconds, t, q) - path[inside]
@@ -168,8 +166,7 @@ def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
 def refined_period(t: Array, q: Array, period: float) -> float:
     """Refine a period below the sample time, on the log's own clock. [s]
 
-    Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES`
-    multiples the log holds.
+    Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES` in the log.
     """
     # Interpolation goes along time, column by column.
     q = np.asfortranarray(q)
@@ -222,10 +219,9 @@ class Cycles(NamedTuple):
 def segment(recording: Recording, period: Period) -> Cycles:
     """Find where the repeated path begins and ends; the log may start amid a cycle.
 
-    A sample is on the path if one period later or earlier the arm is at this place, or if
-    the log is so short that neither is in it. Contacts push it off for a moment only, so
-    the path begins with the first sample after which at least three quarters of a cycle
-    are on it, and ends the same way.
+    A sample is on the path if the arm is at its place one period later or earlier, or if
+    the log holds neither. Contacts push it off for a moment, so the path begins with the
+    first sample after which three quarters of a cycle are on it, and ends alike.
     """
     t, q = moving_part(recording)
     seconds = period.seconds
@@ -270,8 +266,7 @@ class FreeCycles(NamedTuple):
     """Cycles assumed free."""
 
     numbers: tuple[int, ...]  #: Counted from 0.
-    #: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of
-    #: one that lies in a gap; None where they were given. (cycles,)
+    #: Each whole cycle's, by the smallest, ∞ in a gap; None of stated cycles. (cycles,)
     residuals: Array | None
 
     @property
@@ -283,7 +278,7 @@ class FreeCycles(NamedTuple):
         return tuple(self.numbers[k] for k in at)
 
     def remarks(self, whole: int) -> list[Remark]:
-        """Their numbers among so many whole cycles, and which are paired with the others if few."""
+        """Remarks on the free cycles among the whole ones, and on those paired if few."""
         count = len(self.numbers)
         named, drawn = ([k + 1 for k in numbers] for numbers in (self.numbers, self.drawn))
         if self.residuals is None:
@@ -301,8 +296,8 @@ class FreeCycles(NamedTuple):
 def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
     """The cycle of smallest residual, and those that differ by noise alone.
 
-    The residual of a cycle is the root mean square of torque minus the model's,
-    low-passed, of each joint relative to that joint's smallest, averaged over the joints.
+    A residual is the rms of torque less the model's, low-passed, relative to each joint's
+    smallest, averaged over the joints.
     """
     number = cycles.number(motion.t)
     if cycles.whole < 1:

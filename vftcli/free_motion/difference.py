@@ -1,6 +1,6 @@
-"""The two-cycle difference: ways to align a free run with a log, best last, and what each errs.
+"""The two-cycle difference: ways to align a free run with a log, best last.
 
-The error of a difference follows from the logs themselves, by sample and joint.
+The error of each follows from the logs themselves, by sample and joint.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -122,10 +122,9 @@ def differences(
     rungs: Sequence[str],
     cutoffs: Sequence[float | None],
 ) -> Iterator[Difference]:
-    """The difference on every rung that has its clock, at every low-pass [Hz], one by one.
+    """The difference on each rung with a clock, at each low-pass [Hz], one by one.
 
-    Clocks are "found" and, where a period is stated, "commanded", with one pairing a free
-    run.
+    Clocks are "found" and, for a stated period, "commanded", with one pairing a free run.
     """
     way, pair = None, None
     for name in rungs:
@@ -168,10 +167,10 @@ def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
 
 
 def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
-    """The difference with the least expected error, the simpler of equals; the floor of each.
+    """The difference of least expected error, the simpler of equals; floors of all.
 
-    Compared is the mean over trusted joints of expected error in motion, relative to the
-    lowest rung's. Only the best so far is kept: of a long log not all have room at once.
+    By the mean over trusted joints of expected error in motion, relative to the lowest
+    rung's. Only the best so far is kept: all of a long log need too much room.
     """
     steps = iter(made)
     chosen = next(steps)
@@ -201,8 +200,7 @@ def error_model(
     - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after
       a stop shorter than `STUCK` by its share, by `REPEATED_STOP` where the whole arm rests.
 
-    The signal is the difference where it is known, and smooth what is low-passed. (S, n)
-    [N·m]
+    The signal is the difference where known, smooth its low-passed part. (S, n) [N·m]
     """
     motion, known = pair.motion, pair.known
     t, step = motion.t[known], motion.step
@@ -237,9 +235,9 @@ def error_model(
 def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
     """Noise of a difference. (n,) [N·m]
 
-    Without a low-pass from second differences: for white noise of deviation σ on a smooth
-    signal x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, at
-    least `LEAST_BAND`, as contacts fill lower ones; assumed as dense throughout.
+    Without a low-pass from second differences: x_{k−1} − 2x_k + x_{k+1} of white noise σ
+    on a smooth signal has √6·σ. With one from the band about its cutoff, at least
+    `LEAST_BAND`, as contacts fill lower ones; assumed as dense throughout.
     """
     if cutoff is None:
         return np.asarray(rms(np.diff(x, 2, axis=0), moving[1:-1]) / np.sqrt(6.0))
@@ -257,7 +255,7 @@ def noise_below(
     cutoff: float,
     slope: int = 0,
 ) -> Array:
-    """Noise below a cutoff, as dense as in a band [Hz], differentiated by `slope`. (n,)"""
+    """Noise below a cutoff, dense as in a band [Hz], differentiated by `slope`. (n,)"""
     dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(noise_passed(step, limits))
     return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, slope)))
 
@@ -265,11 +263,11 @@ def noise_below(
 def noise_when_quiet(
     t: Array, x: Array, moving: Mask, step: float, cutoff: float | None
 ) -> Array:
-    """Coloured noise of a low-passed difference (S, n) from its quietest pieces. (n,) [N·m]
+    """Coloured noise of a low-passed difference, from its quiet pieces. (n,) [N·m]
 
-    Of each `PIECE` it is the deviation from a straight line, a slow load's course; `QUIET` of
-    them are assumed free. Slower wander does not count: this errs low. Zero for fewer than
-    `LEAST_PIECES`.
+    Of each `PIECE` of x (S, n) it is the deviation from a line, a slow load's course;
+    `QUIET` of them are assumed free. Slower wander does not count: this errs low. Zero
+    for fewer than `LEAST_PIECES`.
     """
     size = round(PIECE / step)
     count = len(t) // size

@@ -1,8 +1,8 @@
-"""Motion that nobody touched beside a log: its own spans and cycles, other runs; its load.
+"""Contact-free motion: a log's own spans and cycles, other runs; its load.
 
-A payload that the model lacks pulls in the free part too. Treated as noise it makes every
+A payload that the model lacks pulls in the free part too. As noise it would make every
 tuned gain slow and every band wide; it is an external torque, and stays in the estimates.
-The free part's disturbance is fitted with a load's weight, its friction beside it,
+The disturbance there is fitted with a load's weight and friction,
 
     d = J_Fᵀ(q) [m g; m c × g] + a tanh(q̇/v₀) + o,
 
@@ -256,7 +256,7 @@ class FreeLoad:
         return handed_over(load_regressor(run.robot.chain, run.q) @ self.weights)
 
     def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
-        """Wrench of its weight at positions (N, n) [rad], and its covariance. (N, 6), (N, 6, 6)
+        """Wrench of its weight at q (N, n) [rad], and covariance. (N, 6), (N, 6, 6)
 
         In base axes, the moment about the flange point. [N, N·m]
         """
@@ -299,7 +299,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
 
 
 def columns(piece: RunSamples) -> tuple[Indices, Array, Array] | None:
-    """The samples that are weighed, their disturbance and its columns, None of a short piece.
+    """The weighed samples, their disturbance and its columns; None of a short piece.
 
     (S,), (S, n) [N·m], (S, n, 4 + 2n)
     """
@@ -327,10 +327,10 @@ def columns(piece: RunSamples) -> tuple[Indices, Array, Array] | None:
 
 
 def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
-    """Weights of columns (m,), their standard deviations, and the rms that is left (n,) [N·m].
+    """Weights of columns (m,), their standard deviations, and the rms left (n,) [N·m].
 
     Regularised least squares of the disturbance d (S, n) [N·m] on A (S, n, m), each joint
-    weighed by what the fit leaves of it; the prior (m,) is of the weights about zero.
+    weighed by its residual; the prior (m,) is the weights' deviation about zero.
     """
     together = max(1.0, MEMORY * RATE)
     spread = root_mean_squares(d) + 1e-6

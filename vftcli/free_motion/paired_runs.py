@@ -1,6 +1,6 @@
-"""A log and its free runs: which instant of them belongs to which of its samples, what differs.
+"""A log and its free runs: partners of its samples, and their differences.
 
-Partners go by a clock, or by the nearest place on the joint-space path.
+They go by a clock, or by the nearest place on the joint-space path.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,8 +21,8 @@ FARTHEST = 0.1  #: How far phase may lie from the clock's word, as the low-passe
 PHASE_CUTOFF = 8.0
 #: A stop this long leaves all of the dry friction open. [s]
 STUCK = 0.3
-#: Of what lies farther away a filter of 3 Hz, that of a log at 15 Hz, lets
-#: e^(−2π 3 Hz · sin(π/4) · 2 s) = 3e-12 through. [s]
+#: From farther away a filter of 3 Hz, a 15 Hz log's, passes e^(−2π 3 Hz · sin(π/4) · 2 s)
+#: = 3e-12. [s]
 HEARD = 2.0
 #: Share of the stiction that cancels between two equal stops at one place.
 REPEATED = 0.5

@@ -59,10 +59,9 @@ def two_cycle_difference(
 def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     """The two-cycle difference of a log and its free motion, with its own error.
 
-    Where position and velocity repeat, gravity, inertia and friction cancel and what is
-    left is the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The
-    free run is one or more cycles of the log, which then have no reference of their own
-    unless there are two, or other logs of the motion.
+    Where position and velocity repeat, gravity, inertia and friction cancel: the rest is
+    the external torque (Sec. IV-A of the paper; sign of (18)). The free run is other logs
+    of the motion, or cycles of this log; a single one then has no reference of its own.
     """
     log, choice = motion.log, motion.choice
     clocks, remarks = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
@@ -179,7 +178,7 @@ def measured_scale(
 def error_ratio(found: Difference, where: Mask) -> Array:
     """Root mean square of a zero difference over its expected error. (n,)
 
-    Held between 0.3 and 3: beyond, something else than the error model is wrong.
+    Held between 0.3 and 3: beyond, the error model is not the cause.
     """
     moving = ~found.error.standing[where]
     expected = rms(found.error.sd[where], moving)
@@ -190,9 +189,9 @@ def error_ratio(found: Difference, where: Mask) -> Array:
 def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     """Change of dry friction since the free run, 0 if maybe chance. (n,) [N·m]
 
-    Joints warm up between two logs. The change is the mean of the difference (T, n) [N·m] times
-    the sign of the velocity, which contacts do not follow; its scatter over pieces of `BLOCK`
-    says how sure it is.
+    Joints warm up between two logs. The change is the mean of the difference (T, n) [N·m]
+    times the sign of the velocity, which contacts do not follow; its scatter over pieces
+    of `BLOCK` is its uncertainty.
     """
     t, n = motion.t, tau.shape[1]
     piece = ((t - t[0]) / BLOCK).astype(np.int64)
