@@ -1,4 +1,4 @@
-"""Task: what a user may choose of an identification."""
+"""Task: a user's choice of an identification."""
 
 from typing import Annotated
 
@@ -6,7 +6,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Choice, Option, interval, is_yes
 from vftcli.signals.parsing import check_known
 
-#: What ``--method`` takes; the gains of observers are `vftcli.observers.tuning`'s.
+#: Values of ``--method``; the gains of observers are `vftcli.observers.tuning`'s.
 METHODS = ("friction", "base", "targets", "payload", "gains")
 
 
@@ -14,7 +14,7 @@ class Task(Choice):
     """Method and settings of an identification.
 
     Raises:
-        ParameterError: If there is no such method, or it has no use for what is set.
+        ParameterError: If the method is unknown, or has no use for a setting.
     """
 
     #: Of `METHODS`; None: friction, or base without the arm's own links.
@@ -22,7 +22,7 @@ class Task(Choice):
         str | None,
         Option("--method", "|".join(METHODS), "Fit friction, base, targets, payload or gains."),
     ] = None
-    #: Where the band ends that is used. [Hz]
+    #: End of the used band. [Hz]
     cutoff: Annotated[
         float, Option("identify.cutoff", "HZ", "Cutoff of the zero-phase filter.")
     ] = 8.0
@@ -33,13 +33,13 @@ class Task(Choice):
             "identify.constants", "yes|no", "Whether friction fits drive constants K.", is_yes
         ),
     ] = False
-    #: The span of the logs that the result is tried on, None for all. [s]
+    #: The span of the logs for the check, None for all. [s]
     check_interval: Annotated[
         tuple[float, float] | None,
         Option("identify.check-interval", "A:B", "Seconds A to B of the --check logs.", interval),
     ] = None
     name: str = ""  #: Name of the new robot.
-    #: Whether the joints have friction to be fitted; a simulator's may have none.
+    #: Whether the joints have friction to fit; a simulator's may have none.
     friction: bool = True
 
     def __post_init__(self) -> None:

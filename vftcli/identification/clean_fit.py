@@ -21,15 +21,15 @@ from vftcli.signals.series import covered, intervals, median_step, near
 TOUCH = 7.0  #: Residual of a contact, in robust standard deviations.
 TOUCH_TIME = 0.15  #: Time it must last. [s]
 TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
-#: Least share of the torque's variation that profile links and friction explain in the
-#: joints with weight; 0.99 or more with the right robot.
+#: Least share of the torque's variation that profile links and friction explain in heavy
+#: joints; 0.99 or more with the right robot.
 WRONG = 0.95
 LOAD_EXPLAINS = 0.8  #: Least share of the misfit that a load explains.
 UNKNOWN_LOAD = 0.5  #: Smallest suspected load. [kg]
-#: A joint carries weight if its gravity torque varies by this share of the largest.
+#: Least variation of a heavy joint's gravity torque, as a share of the largest.
 HEAVY = 0.1
-#: Least ratio of the profile's rest to free links' for another arm: right links leave 1.0
-#: to 2.5 where friction or contact hide the torque, wrong ones 4 to 12.
+#: Least ratio of the profile's rest to free links' for another arm: right links leave 1.0 to
+#: 2.5 if friction or contact hide the torque, wrong ones 4 to 12.
 OTHER_LINKS = 3.0
 THIRDS = 3  #: Stretches of a log compared for a warm-up.
 #: Least fall of dry friction from the first to the last stretch.
@@ -106,7 +106,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     """
     t, usable = motion.t, motion.weights > 0
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
-    # The filter spreads an event at standstill over a period of its cutoff.
+    # The filter spreads an event at rest over a period of its cutoff.
     reach = max(1, round(1.0 / (motion.cutoff * median_step(t))))
     excess = abs(residual) - abs(dry) * near(slower(motion.dq, SLIDES), reach)
     z = excess * usable / np.maximum(sd, 1e-9)
@@ -131,8 +131,8 @@ def fitted_dry_friction(log: PreparedLog, fits: Mapping[int, JointFit]) -> Array
 def links_explain(data: Training, fits: Mapping[int, JointFit]) -> Array:
     """Rest of the profile's links over free ones', heavy joints. (h,) [1]
 
-    All inertial parameters are free, physical or not; the friction's structure is fixed.
-    No links explain the rest: it is this log's noise.
+    All inertial parameters are free, physical or not; the friction's structure is fixed. The
+    rest is this log's noise.
     """
     joints = range(data.robot.joints)
     shapes = tuple(fits[j].shape if j in fits else Shape(()) for j in joints)

@@ -1,4 +1,4 @@
-"""Logs in, a robot out: `vftcli identify` in the order of its data, and what its numbers are worth.
+"""Logs in, a robot out: `vftcli identify` in the order of its data, and checks.
 
 A log is scored filtered and in motion, from its first to its last sample that moves.
 """
@@ -40,30 +40,30 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import faster
 from vftcli.signals.series import resample_columns
 
-#: Name at the command line → method; without a name the first two are chosen between.
+#: Name at the command line → method; None chooses between the first two.
 FITS: dict[str | None, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
     "base": whole_arm,
     "targets": targets_method,
     None: chosen_method,
 }
-#: A row per log, model and joint: RMS of measured less predicted
-#: torque in motion. `log_index` counts logs from 1, training first.
+#: A row per log, model and joint: RMS of measured less predicted torque in motion.
+#: `log_index` counts logs from 1, training first.
 RESIDUALS = pl.Schema(
     {"log": str, "log_index": int, "role": str, "model": str}
     | {"joint": int, "rms_Nm": float, "samples": int}
 )
-EXPLAINS = 0.4  #: Share of a residual that a cause must explain to be named.
-HEAVY = 0.3  #: Smallest load that is remarked on. [kg]
-ENOUGH = 50  #: Samples in motion that a remark on friction needs.
-WORSE = 1.5  #: Times the training's residual from which a held-out joint is remarked on.
-#: A model that leaves this many times what the profile leaves of a log has made it worse.
+EXPLAINS = 0.4  #: Least share of a residual that a named cause explains.
+HEAVY = 0.3  #: Smallest load of a remark. [kg]
+ENOUGH = 50  #: Fewest samples in motion for a remark on friction.
+WORSE = 1.5  #: Multiple of the training's residual for a remark on a held-out joint.
+#: Least ratio of the model's rest of a log to the profile's in a remark.
 BEHIND = 1.01
 NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
-SLOWNESS = 0.1  #: Velocity difference that counts as much as that distance, as a time. [s]
-#: Share of a log's samples on another's trajectory from which it repeats that one.
+SLOWNESS = 0.1  #: Time that makes a velocity difference a distance. [s]
+#: Share of a log's samples on another's trajectory from which it repeats it.
 REPEATED = 0.8
-#: One row a number: its value, standard deviation, and what the profile said.
+#: One row a number: value, standard deviation, the profile's.
 PARAMETERS = pl.Schema(get_type_hints(Number))
 #: One row a friction candidate: its cross-validated error.
 SHAPE_CHOICES = pl.Schema({"joint": int, "friction": str, "cv_rms_Nm": float, "chosen": bool})
@@ -76,11 +76,11 @@ class Trace(NamedTuple):
     role: str  #: "train" or "held-out".
     measured: Array  #: Drive torque, by the identified drive constants. (M, n) [N·m]
     predicted: Array  #: Torque that the identified robot expects. (M, n) [N·m]
-    before: Array  #: RMS of what the profile does not explain. (n,) [N·m]
+    before: Array  #: RMS that the profile leaves. (n,) [N·m]
 
     @property
     def where(self) -> Where:
-        """The log as what a remark is about."""
+        """The log as a remark's place."""
         return Where(self.motion.recording.name)
 
     @property
@@ -94,7 +94,7 @@ class Trace(NamedTuple):
         return root_mean_squares(self.residual)
 
     def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
-        """Rows of `RESIDUALS`, this log being the one of this index."""
+        """Rows of `RESIDUALS` of this log and index."""
         name, samples = self.motion.recording.name, self.motion.samples
         return [
             (name, index, self.role, model, j, value, samples)
@@ -104,30 +104,30 @@ class Trace(NamedTuple):
 
 
 class Identification(NamedTuple):
-    """A robot made from logs, with the account of how."""
+    """A robot made from logs, with its provenance."""
 
     robot: Robot  #: The identified robot; its document carries the sources.
     profile: Robot  #: The robot it started from.
     method: str  #: Name of the method.
     residuals: pl.DataFrame  #: RMS per log, model and joint (`RESIDUALS`).
     parameters: pl.DataFrame  #: Identified numbers (`PARAMETERS`).
-    #: Friction candidates (`SHAPE_CHOICES`), empty where none competed.
+    #: Friction candidates (`SHAPE_CHOICES`), empty without competition.
     shape_choices: pl.DataFrame
-    base: pl.DataFrame | None  #: Base parameters (`BASE`), None for methods that have none.
+    base: pl.DataFrame | None  #: Base parameters (`BASE`), None without any.
     traces: tuple[Trace, ...]  #: Measured and predicted torque of every log.
     #: Filters, differentiation, decimation and band, by name.
     processing: Mapping[str, Any] = {}
-    remarks: tuple[Remark, ...] = ()  #: What the reader should know.
+    remarks: tuple[Remark, ...] = ()  #: Limits of the numbers.
 
 
 def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float) -> Trace | None:
-    """Measured torque of a log, the identified robot's and the profile's; None at rest."""
+    """Torque of a log: measured, identified robot's, profile's; None at rest."""
     motion = prepare(log, profile, cutoff)
     if motion.samples < 2:
         return None
     before = root_mean_squares(motion.tau - motion.predicted)
     old, new, measured = profile.torque_constant, robot.torque_constant, motion.tau
-    # What was made from currents with the old constants is made with the new.
+    # Torque from currents with the old constants gets the new.
     if old is not None and new is not None and uses_current(log, profile):
         measured = measured * (new / old)
     return Trace(motion, role, measured, motion.with_robot(robot).predicted, before)
@@ -157,7 +157,7 @@ def score_remarks(traces: Sequence[Trace]) -> Iterator[Remark]:
 def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
     """Causes of a held-out residual far above the training's. (n,) [N·m]
 
-    A load on the flange, which explains all joints at once, is looked for first.
+    A load on the flange, which explains all joints at once, is tried first.
     """
     motion, worse = trace.motion, trace.rms > WORSE * trained
     if not worse.any():
@@ -177,8 +177,8 @@ def held_out_remarks(trace: Trace, trained: Array) -> Iterator[Remark]:
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     """Whether friction explains joint j's (from 0) residual beyond training's.
 
-    Coulomb and viscous friction and an offset are fitted to the residual; where they
-    explain `EXPLAINS` of it, friction is named as its cause.
+    Coulomb and viscous friction and an offset are fitted to the residual; if they explain
+    `EXPLAINS` of it, friction is the cause.
     """
     motion, residual, size = trace.motion, trace.residual, trace.rms[j]
     where = on_joints([j], motion.recording.name)
@@ -201,14 +201,14 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
 def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
     """Share of the test's moving samples on the training log's (q, q̇) path.
 
-    Such a log is no test: whatever error the model has along that path, it has fitted.
+    Such a log is no test: the model has fitted its errors on that path.
     """
     from scipy.spatial import cKDTree
 
     if train.samples == 0 or test.samples == 0:
         return 0.0
     path, points = (np.hstack([log.q, SLOWNESS * log.dq]) for log in (train, test))
-    # Between samples the path is interpolated, so that its points lie nearer than `NEAR`.
+    # Interpolated between samples, so that points lie nearer than `NEAR`.
     index = np.arange(0, len(path) - 1 + 1e-9, 0.25)
     tree = cKDTree(resample_columns(index, np.arange(float(len(path))), path))
     distance, _ = tree.query(points, p=np.inf, distance_upper_bound=NEAR)
@@ -299,7 +299,7 @@ def with_provenance(
         published={},
     )
     document = robot_document(named)
-    # The profile's published numbers are those of the arm of the paper, not of this one.
+    # The profile's published numbers are of the paper's arm.
     document.pop("published", None)
     new = f"identified ({found.method}) from {names_of(trained)}"
     old = f"profile {profile.name}"

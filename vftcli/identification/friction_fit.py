@@ -45,9 +45,9 @@ NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
 #: Terms bounded at zero if no candidate of a joint is friction.
 BOUNDED = ("coulomb", "viscous")
 
-#: Velocities are reversed if both terms push, the bound leaves this many times the power,
-#: and by more than this share of the joint's largest torque: a right model's error pushes
-#: by up to .7 % of it; friction is 2 % (a Panda's wrist) to 20 % (a UR's).
+#: Velocities are reversed if both terms push, the bound leaves this many times the power, and
+#: by more than this share of the joint's largest torque: a right model's error pushes by up
+#: to .7 % of it; friction is 2 % (a Panda's wrist) to 20 % (a UR's).
 TURNED, PUSH = 2.0, 0.02
 
 SLIDING = 3e-3  #: Smoothing of the sign beside presliding. [rad/s]
@@ -129,8 +129,8 @@ class JointFit(NamedTuple):
     scores: dict[Shape, float]
     constant: bool  #: Whether the drive constant was fitted too.
     presliding: PreslidingScore  #: The presliding length of all joints.
-    #: RMS that the model, and the profile's friction and rotor, miss of stretches left
-    #: out; NaN if not compared. [N·m]
+    #: RMS missed by the model, and by the profile's friction and rotor, in stretches left out;
+    #: NaN if not compared. [N·m]
     errors: tuple[float, float] = (np.nan, np.nan)
 
     @property
@@ -179,8 +179,8 @@ def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: boo
 def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     """The equations of joint j (from 0) over all logs.
 
-    For an unknown drive constant the rigid body's torque is a column; its coefficient
-    would be 1 with the profile's right constant. Else it is subtracted.
+    For an unknown drive constant the rigid body's torque is a column, its coefficient 1 with
+    the profile's right constant. Else it is subtracted.
     """
     names = ("tau", "rigid", "ddq", "weights", "load", "predicted")
     torque, rigid, ddq, weights, load, predicted = (data.joined(name)[:, j] for name in names)
@@ -210,8 +210,8 @@ def all_residuals(data: Training, fits: Mapping[int, JointFit]) -> list[Array]:
 def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
     """One presliding length for the whole arm by cross-validation, or none.
 
-    An observer's band decides: in a wider one a slow step drowns in noise. Of the nearly
-    best the shortest wins: it forgets its start soonest.
+    An observer's band decides: in a wider one a slow step drowns in noise. The shortest of
+    the nearly best wins: it forgets its start soonest.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
     # One way only, the play operator is constant.
@@ -223,9 +223,9 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
         terms, parts = tellable_terms(RICHEST, data), data.parts
         y = data.slow(data.y[:, None])[:, 0]
         plain = data.slow(data.columns(Shape(terms, SLIDING)))
-        # Outliers' weights are fixed: all lengths answer for one set of samples.
+        # Outliers' weights are fixed: all lengths have one set of samples.
         weights = fit_column(plain, y, data.weights).weights
-        # A smoother sign that explains as much goes before presliding.
+        # A smoother sign that explains as much wins over presliding.
         shapes = [Shape(terms, SLIDING), Shape(terms, SMOOTHING)]
         play = Shape((*terms, "presliding"), SLIDING)
         shapes += [play._replace(presliding_length=length) for length in PRESLIDING_LENGTHS]
@@ -241,8 +241,8 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
 def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shape, float]]:
     """The simplest of a joint's nearly best models, and all errors. [N·m]
 
-    First the richest plain model decides the smoothing, then the logarithm's bend, then
-    the terms. A parabola competes only if it rises up to the joint's own speed.
+    First the richest plain model decides the smoothing, then the logarithm's bend, then the
+    terms. A parabola competes only if it rises up to the joint's own speed.
     """
     length = length if data.reverses else 0.0
     rich, plain = tellable_terms(RICHEST, data), Shape(tellable_terms(PLAIN, data))
@@ -251,7 +251,7 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
         return plain, {}  # positions may still rub correctly
     if bounded.terms in {(), ("offset",)}:
         return bounded, {}
-    # Outliers' weights are fixed: candidates answer for one set of samples.
+    # Outliers' weights are fixed: candidates have one set of samples.
     weights, parts = data.fit(Shape(rich)).weights, data.parts
 
     def error(shape: Shape) -> float:

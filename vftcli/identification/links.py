@@ -1,8 +1,8 @@
-r"""The links' parameters by least squares: what motion shows, and the nearest physical links.
+r"""The links' parameters by least squares, and the nearest physical links.
 
-Of the stacked equations only the R factor of their QR decomposition is kept, chunk by
-chunk: memory does not grow with the log. Base parameters are the combinations of inertial
-parameters that any motion shows at all.
+Only the R factor of the stacked equations' QR decomposition is kept, chunk by chunk: memory
+does not grow with the log. Base parameters are the combinations of inertial parameters that
+motion can show.
 
 A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
 
@@ -11,8 +11,8 @@ A link's ten parameters belong to some mass distribution exactly if its pseudo-i
 is positive definite (P. Wensing, S. Kim, J.-J. Slotine, IEEE RA-L 3(1), 2018). The
 distance to the profile is the log-determinant divergence tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4
 (T. Lee, P. Wensing, F. Park, IEEE T-RO 36(1), 2020): it has no units, does not depend on
-the frame, is convex in the parameters, and grows without bound towards the edge, so that
-Newton's method never leaves the physical models and finds the one optimum.
+the frame, is convex, and grows without bound towards the edge, so that Newton's method
+stays in the physical models and finds the one optimum.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,7 +27,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd
 
-#: One row a base parameter, or a friction coefficient estimated along with them.
+#: One row a base parameter, or a friction coefficient beside them.
 BASE = pl.Schema({"parameter": str, "value": float, "sd": float, "determined": bool})
 ROWS = 512  #: Samples stacked at once.
 REWEIGHTINGS = 3  #: Passes of reweighting; each evaluates the regressor twice.
@@ -45,15 +45,15 @@ MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
 #: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0
 STEPS = 100  #: Newton steps at most; a dozen or two are usual.
-#: Decrement at which Newton's method stops: the cost is a log-likelihood, where 1 is one
-#: standard deviation of one parameter, so that the rest to go is nothing.
+#: Decrement at which Newton's method stops: the cost is a log-likelihood, 1 is one standard
+#: deviation of one parameter.
 SETTLED = 1e-3
-#: A profile's link is made at least this thick, so that a distance to it exists. [m]
+#: Least thickness of a profile's link, for a finite distance to it. [m]
 SMALLEST_RADIUS = 1e-3
 
 
 class Triangles(NamedTuple):
-    """The stacked, weighted equations A x ≈ y of the logs, as R factors of [A y]."""
+    """The logs' stacked, weighted equations A x ≈ y, as R factors of [A y]."""
 
     layout: ParameterColumns  #: The unknowns.
     parts: tuple[Array, ...]  #: R factor of each stretch left out. (size+1, size+1) each
@@ -105,7 +105,7 @@ def triangulate(
 ) -> Triangles:
     """QR updates over all chunks of all logs, a triangle per stretch.
 
-    Joints are weighed by the robust deviation of what is left of them.
+    Joints are weighed by the robust deviation of their residual.
     """
     weights = np.concatenate([log.weights for log in logs])
     pairs = zip(np.concatenate(left).T, weights.T, strict=True)
@@ -237,7 +237,7 @@ def is_physical(phi: Array) -> bool:
 
 
 def thicken_links(phi: Array) -> Array:
-    """The nearest parameters with some mass and some thickness in every link. (10n,)
+    """The nearest parameters with mass and thickness in every link. (10n,)
 
     Rounded tables and point masses touch the edge of what is physical.
     """
@@ -333,8 +333,7 @@ def pulled_links(
     """Weights and their physical parameters (size,), strongest pull first."""
     start = x = starting_point(triangles.layout, profile)
     R, z = triangles.joined(leave_out)
-    # Correlated rows repeat each other; dividing them makes the misfit a log-likelihood
-    # that can be weighed against the distance.
+    # Correlated rows repeat each other: divided, the misfit is a log-likelihood.
     shrink = 1.0 / np.sqrt(triangles.correlation)
     problem = Problem(R * shrink, z * shrink, start, triangles.layout, np.inf)
     for weight in WEIGHTS[::-1]:

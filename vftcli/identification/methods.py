@@ -1,6 +1,6 @@
 """Methods: "friction" holds the maker's links, "base" frees them, "auto" chooses.
 
-What method "targets" says of a joint's friction is made here too.
+Friction by method "targets" is made here too.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -56,11 +56,11 @@ UNITS = {
     "mass": "kg",
     **dict.fromkeys(("com_x", "com_y", "com_z"), "m"),
 }
-#: Standard deviation over value up to which a number counts as determined by the logs.
+#: Largest relative standard deviation of a determined number.
 DETERMINED = 0.3
-#: Standard deviations off from which a profile's rotor inertia is replaced.
+#: Standard deviations from a profile's rotor inertia to its replacement.
 REFUTED = 3.0
-#: Measured over expected torque below which a current does not follow it.
+#: Ratio of measured to expected torque below which a current does not follow it.
 LEAST_SLOPE = 0.05
 
 
@@ -72,8 +72,8 @@ class Number(NamedTuple):
     value: float  #: The estimate.
     sd: float  #: Its standard deviation.
     unit: str  #: Unit of value, sd and profile.
-    profile: float  #: The profile's number, nan where it has none.
-    determined: bool  #: Whether the logs determine it; else it is not written.
+    profile: float  #: The profile's number, NaN without one.
+    determined: bool  #: Whether the logs determine it; if not, it is not written.
 
 
 def number(
@@ -90,10 +90,10 @@ class MethodResult(NamedTuple):
     method: str  #: Its name.
     robot: Robot  #: The identified robot.
     numbers: Sequence[Number] = ()  #: Its identified numbers.
-    remarks: Sequence[Remark] = ()  #: What the reader of the numbers should know.
+    remarks: Sequence[Remark] = ()  #: Limits of the numbers.
     fits: Mapping[int, JointFit] = {}  #: Joint, from 0 → its fit of friction.
     base: pl.DataFrame | None = None  #: Base parameters (`BASE`), if the method has them.
-    is_narrow: bool = False  #: Whether the motion tells the links too little.
+    is_narrow: bool = False  #: Whether the motion shows too little of the links.
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
@@ -143,8 +143,8 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
 def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
     """Coefficients of joint j (from 0), sd by its last drive constant, and this.
 
-    Torque is K i. Where the rigid body's comes out as scale times what it must be, the true K
-    is K / scale, and so are all coefficients.
+    Torque is K i. If the rigid body's comes out as scale times its model, the true K is
+    K / scale, and so are all coefficients.
     """
     scale, scale_sd = values[-1], sd[-1]
     if scale <= LEAST_SLOPE:
@@ -161,7 +161,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
 def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number, list[Remark]]:
     """Rotor inertia of joint j (from 0) [kg·m²], a remark where it is not known.
 
-    The logs determine it too where it is `REFUTED` sd off the profile's.
+    Also determined if `REFUTED` sd off the profile's.
     """
     if refuted := abs(value - before) >= REFUTED * sd:
         value = max(value, 0.0)
@@ -206,7 +206,7 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> Iterator[
     speed = data.fastest(j)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(log.tau)[j] for log in data.logs)
-    # A hundredth of the torque's spread: no friction comes out on either side of zero.
+    # A hundredth of the torque's spread: no friction scatters about zero.
     if np.all(torque < -0.01 * noise):
         raise IdentificationError(
             f"{data.recordings[0].name}: friction of joint {j + 1} comes out as {torque[0]:.2g} to "
@@ -223,7 +223,7 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> Iterator[
 
 
 def fit_remarks(data: Training, fits: Mapping[int, JointFit]) -> Iterator[Remark]:
-    """Remarks on fits of friction, and on the motion that they are made from."""
+    """Remarks on fits of friction, and on their motion."""
     for j, fit in fits.items():
         if fit.at_bound:
             yield caution("friction-at-bound", on_joints([j]), terms=" and ".join(fit.at_bound))
@@ -252,16 +252,16 @@ def temperature_remarks(data: Training) -> Iterator[Remark]:
 
 
 def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
-    """The profile's friction, one a joint even where it has none."""
+    """The profile's friction, one a joint, empty ones too."""
     return robot.friction or (JointFriction(),) * robot.joints
 
 
 #: Share of undetermined base parameters from which a motion is narrow.
 NARROW = 0.7
-#: That share where the weakest pull predicts best, as of rounds of one motion: each knows
-#: the others, whatever the links are.
+#: That share if the weakest pull predicts best, as in rounds of one motion, each of which
+#: knows the others.
 MOST = 0.5
-#: Share of a joint's torque that its profile's links must leave before others are sought.
+#: Share of a joint's torque that the profile's links must leave before others are tried.
 MATTERS = 0.02
 
 
@@ -308,7 +308,7 @@ def whole_arm(data: Training) -> MethodResult:
 def initial_columns(
     data: Training, fits: Mapping[int, JointFit]
 ) -> tuple[ParameterColumns, Array]:
-    """The unknowns of the whole arm, and the profile with its fitted friction. (size,)"""
+    """The unknowns of the arm, and the profile with fitted friction. (size,)"""
     chain = data.robot.loaded_chain
     shapes, values, rotor = list[Shape](), list[float](), chain.rotor_inertia.copy()
     for j, joint in enumerate(profile_friction(data.robot)):
@@ -330,7 +330,7 @@ def initial_columns(
 def with_vector(
     robot: Robot, layout: ParameterColumns, x: Array, friction: tuple[JointFriction, ...]
 ) -> Robot:
-    """The robot with a whole vector of parameters; a mounted payload is in it already."""
+    """The robot with a vector of parameters, a mounted payload included."""
     phi = np.array([round_digits(v, 12) for v in x[: layout.inertial]])
     rotor = np.array([round_digits(v) for v in x[layout.rotor_places]]) if layout.rotor else None
     chain = with_parameters(robot.chain, phi, rotor)
@@ -338,10 +338,10 @@ def with_vector(
 
 
 def chosen_method(data: Training) -> MethodResult:
-    """Result of "friction", or of "base" where the profile's links are not the arm's.
+    """Result of "friction", or of "base" if the profile's links are not the arm's.
 
-    The links are freed where they leave `OTHER_LINKS` times what free ones leave, the
-    logs tell them, and nothing suggests a load.
+    Links are freed if their rest is `OTHER_LINKS` times that of free ones, the logs show them,
+    and nothing suggests a load.
     """
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)

@@ -41,8 +41,8 @@ MOST_NAMED = 4  #: Logs called by name; episodes may be thousands.
 STRETCHES = 12  #: Independent stretches of a motion.
 REACH = 1.0  #: Farthest centre of mass from the flange. [m]
 LOOKED_AT = 400  #: Most samples of a motion among which poses are counted.
-#: Shortest motion: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7
-#: of their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
+#: Shortest motion: the masses of a UR10e and a UR3 scatter by .7 of their standard deviation
+#: over 9 stretches of 10 s, by 1.6 over those of 5 s, by 2.4 of 2.5 s. [s]
 LONG = 10.0
 #: Weighings with the load on the arm: a third moves mass and centre by less than .1 %.
 ROUNDS = 3
@@ -72,7 +72,7 @@ class LoadFit(NamedTuple):
     origin: Remark  #: Its source and method.
 
     def carried_by(self, recording: Recording) -> bool:
-        """Whether a log carries it. Logs are compared as objects: names may be equal."""
+        """Whether a log carries it, compared as objects: names may be equal."""
         return any(log is recording for log in self.loaded)
 
 
@@ -131,8 +131,7 @@ class JointsFit(NamedTuple):
     def motion_covariance(self, y: Array, gain: float) -> Array:
         """Covariance of x of a motion, by `STRETCHES` and drives. (k, k)
 
-        Friction of another temperature outlasts residuals: it holds while a motion goes
-        one way.
+        Friction of another temperature outlasts residuals: as long as a motion goes one way.
         """
         stretches = folds(len(self.A), STRETCHES)
         return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)
@@ -140,8 +139,8 @@ class JointsFit(NamedTuple):
     def gain_covariance(self, y: Array, gain: float) -> Array:
         """Covariance of x by drive constants of a relative deviation. (k, k)
 
-        Half of their variance belongs to all joints (gear, warmth) and scales the mass;
-        half to each one. The torque y (N, n) is what is explained.
+        Half of their variance belongs to all joints (gear, warmth) and scales the mass; half to
+        each one. The torque y (N, n) is the explained one.
         """
         # Each joint's torque adds its part to the solution.
         shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse
@@ -163,7 +162,7 @@ def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
-    """A load from one motion with and without it; the loaded log shows by itself.
+    """A load from one motion with and without it, in either order.
 
     At equal phase the torque differs by the load and by friction that grows with it.
     """
@@ -235,8 +234,8 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     """A load from poses at rest, by torque beyond the robot's own gravity.
 
     Stiction acts in every pose: the residual shows its size, many poses average it. The
-    model's errors and a day's effect on the drives are alike in all poses of a log: with
-    several logs, their difference is part of the standard deviations.
+    model's errors and the drives' day are alike in all poses of a log: with several logs, their
+    difference is part of the standard deviations.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
@@ -284,8 +283,8 @@ def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
 def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from motion, by torque beyond the robot's own weight.
 
-    The columns of `vftcli.free_motion.free_motion` hold only a load's weight. A second
-    weighing carries the load found, so that its inertia does not count as weight.
+    The columns of `vftcli.free_motion.free_motion` hold only a load's weight. A second weighing
+    carries the load found, so that its inertia is no weight.
     """
     names = names_of(recordings)
     q = np.concatenate([recording.q for recording in recordings])
@@ -368,11 +367,10 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )
         return fit
-    # A pair repeats a motion: in both logs some joint travels further than it would at
-    # rest. Two episodes of a dataset carry one load.
+    # A pair repeats a motion: in both logs a joint moves. Episodes carry one load.
     moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
     if len(logs) == 2 and moved and not all(r.source.part for r in logs):
-        # Two different motions with the load may still tell it.
+        # Two different motions with the load may still show it.
         with suppress(NotSameMotionError):
             return payload_from_pair(logs[0], logs[1], bare)
     with suppress(TooFewPosesError):

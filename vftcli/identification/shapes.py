@@ -1,7 +1,7 @@
 """The shape of a joint's friction: a sum of known terms times coefficients.
 
-A term is evaluated on the log as it was recorded and then filtered like the torque, so
-that a reversal is rounded alike on both sides of the equation.
+A term is evaluated on the recorded log and then filtered like the torque, so that both
+sides of the equation round a reversal alike.
 """
 
 import itertools
@@ -17,11 +17,11 @@ from vftcli.signals.arrays import Array
 SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)
 #: Velocities over which a Stribeck term may fade. [rad/s]
 STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
-#: Where a logarithm may flatten; UR's gears: .28 to 2.1. [rad/s]
+#: Velocities at which a logarithm may flatten; UR's gears: .28 to 2.1. [rad/s]
 LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
-#: Speeds of the points between which UR's controllers draw friction as a line. [rad/s]
+#: Speeds of the points of the friction line of UR's controllers. [rad/s]
 BENDS = (0.01, 0.5, 1.5, 3.2)
-#: Share of the way between two points that a motion must cover to tell the faster one.
+#: Least share of the way between two points in a motion that shows the faster one.
 SPANNED = 0.3
 #: Term → friction model in a robot file; the first that a joint has counts.
 MODELS = {
@@ -31,22 +31,21 @@ MODELS = {
     "quadratic": "coulomb-viscous-quadratic",
     "offset": "coulomb-viscous-offset",
 }
-SIMPLEST = "coulomb-viscous"  #: Model of a joint that has none of them.
+SIMPLEST = "coulomb-viscous"  #: Model of a joint without them.
 POINT = "point"  #: Head of a bent line's terms: point1 is the torque at its first speed.
 
 
 class Shape(NamedTuple):
-    """The structure of one joint's friction: which terms, and its nonlinear numbers."""
+    """The structure of one joint's friction: terms and nonlinear numbers."""
 
-    #: Keys of the robot file that hold coefficients, in order; those that begin with
-    #: `POINT` are the torques of a bent line.
+    #: Keys of coefficients in the robot file, in order; those that begin with `POINT` are the
+    #: torques of a bent line.
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
     stribeck_velocity: float = 0.05  #: Velocity over which the Stribeck term fades. [rad/s]
-    logarithmic_velocity: float = (
-        1.0  #: Velocity from which the logarithmic term flattens. [rad/s]
-    )
-    #: Way over which the teeth of the gear give before they slide. [rad]
+    #: Velocity from which the logarithmic term flattens. [rad/s]
+    logarithmic_velocity: float = 1.0
+    #: Way over which the gear's teeth give before they slide. [rad]
     presliding_length: float = 0.0
     speeds: tuple[float, ...] = ()  #: Speeds of the bent line's points. [rad/s]
 
@@ -84,7 +83,7 @@ class Shape(NamedTuple):
         for name in ("stribeck_velocity", "logarithmic_velocity", "presliding_length"):
             if name.partition("_")[0] in self.terms:
                 parameters[name] = getattr(self, name)
-        # A dry torque that is all presliding's leaves none to what slides.
+        # A dry torque that is all presliding's leaves none for sliding.
         required = FRICTION_MODELS[self.model].required
         parameters = {**dict.fromkeys(required, 0.0), **parameters}
         return JointFriction(
@@ -99,8 +98,8 @@ class Shape(NamedTuple):
 def bent(speed: float) -> Shape | None:
     """The bent line for a motion up to a speed [rad/s], None of fewer than two points.
 
-    Between its points the line is straight, so that a motion well beyond one of them
-    tells the next one too; behind its last point it goes on as it came.
+    Between its points the line is straight: a motion well beyond one shows the next one too;
+    behind its last point it continues.
     """
     reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
     count = 1 + [*reached, False].index(False)
@@ -111,7 +110,7 @@ def bent(speed: float) -> Shape | None:
 
 
 def round_digits(value: float, digits: int = 7) -> float:
-    """A number with as many digits as an identification can possibly mean."""
+    """A number with the digits of an identification."""
     return float(f"{value:.{digits}g}")
 
 

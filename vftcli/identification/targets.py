@@ -1,8 +1,8 @@
 """Method "targets": a UR controller's own model of its arm, by its targets.
 
-The controller logs its inverse dynamics' torque (target_moment) and the current it expects
-(target_current). At rest their ratio is K; in motion target_moment less the rigid body is J q̈,
-and K·target_current − target_moment its friction. A hand changes no target.
+The controller logs its inverse dynamics' torque (target_moment) and its expected current
+(target_current). At rest their ratio is K; in motion target_moment less the rigid body is
+J q̈, and K·target_current − target_moment its friction. A hand changes no target.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ from vftcli.signals.remarks import Remark, caution, on_joints
 from vftcli.signals.rest import NONZERO, SLIDES, faster
 from vftcli.signals.series import runs_of
 
-#: Cutoff for targets: above it the measured motion does not follow them. [Hz]
+#: Cutoff for targets: above it the measured motion departs from them. [Hz]
 CUTOFF = 4.0
 #: Largest relative deviation of a determined drive constant.
 CONSTANT_KNOWN = 1e-2
@@ -44,14 +44,14 @@ SHAPES = (
     Shape(("coulomb", "viscous", "quadratic")),
     Shape(("coulomb", "viscous", "quadratic", "offset")),
 )
-#: Friction shapes, the best of them written where the law has too few points.
+#: Friction shapes, the best of them written if the law has too few points.
 WRITTEN = tuple(
     Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend)
     for bend in LOGARITHMIC_VELOCITIES
 )
-UNASKED = 0.5  #: Least share of motion with a target velocity: below it a hand led the arm.
-#: Most of the law in a joint's friction under a guiding hand; programs feed .8 to 1.3 of
-#: it forward, by temperature and load.
+UNASKED = 0.5  #: Least share of motion with a target velocity, else a hand led.
+#: Most of the law in a joint's friction under a guiding hand; programs feed .8 to 1.3 of it
+#: forward, by temperature and load.
 GUIDED = 0.4
 SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of samples, which must agree too. [rad/s]
 SETTLE = 0.1  #: Cut at both ends of a rest. [s]
@@ -242,8 +242,8 @@ def rotor_inertia(j: int, log: ControllerTargets) -> Estimate:
 def controller_friction(j: int, log: ControllerTargets, constant: float) -> FrictionLaw | None:
     """Best shape of K·target_current − target_moment, coefficients, sd.
 
-    The controller's own law is a bent line: its points where the motion spans them,
-    elsewhere a logarithm. None at rest.
+    The controller's own law is a bent line, used where the motion spans its points, else a
+    logarithm. None at rest.
     """
     speed = abs(log.dq[:, j])
     fast = np.quantile(speed, 0.9)
@@ -266,9 +266,8 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
 def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) -> None:
     """Raise if a hand led the arm: the controller then uses less friction.
 
-    Logged target velocities are then zero while the arm moves. Without them the friction
-    fed forward is a fraction of the law, .1 to 1.1 by joint: one joint far below the law
-    shows the hand.
+    Logged target velocities are then zero while the arm moves. Without them the friction fed
+    forward is a fraction of the law, .1 to 1.1 by joint: one joint far below shows the hand.
     """
     share, least = 1.0, UNASKED
     if recording.target_dq is not None:

@@ -1,4 +1,4 @@
-"""Training data: logs filtered alike, without delay, with friction as columns; joints that move."""
+"""Training data: logs filtered alike, friction as columns, joints that move."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,11 +27,11 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.rest import MOVES, NONZERO, faster
 from vftcli.signals.series import covered, gaps_of, intervals, median_step
 
-#: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
+#: Cutoff of the zero-phase low-pass, −3 dB a pass; the used band ends there. [Hz]
 CUTOFF = 8.0
 #: Samples kept per period of the cutoff when the filtered log is decimated.
 OVERSAMPLING = 6.0
-STOP = 0.3  #: Length of a stop from which on it identifies nothing, because of stiction. [s]
+STOP = 0.3  #: Length of a stop that identifies nothing, by stiction. [s]
 STATIC = 4  #: Parameters of a link that gravity shows: mass, three first moments.
 GAP = 10.0  #: Steps longer than this many median steps are left out.
 
@@ -51,11 +51,11 @@ def settings_record(cutoff: float, step: float) -> dict[str, str | float]:
 
 
 def stride(cutoff: float, step: float) -> int:
-    """Every how many samples of the filtered log are kept."""
+    """Stride of the kept samples of the filtered log."""
     return max(1, int(1.0 / (step * OVERSAMPLING * cutoff) + 1e-9))
 
 
-ENOUGH = 1.0  #: Time a joint must move, and for both ways to count a tenth of it each way. [s]
+ENOUGH = 1.0  #: Least time of a joint's motion, a tenth of it each way. [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,15 +71,15 @@ class PreparedLog:
     dq: Array  #: Velocities. (M, n) [rad/s]
     ddq: Array  #: Accelerations. (M, n) [rad/s²]
     tau: Array  #: Drive torque, friction included. (M, n) [N·m]
-    #: Weight of every sample and joint, 0 where it tells nothing: in a long stop of the
-    #: joint, in a gap of the clock, in a contact. (M, n)
+    #: Weight of every sample and joint, 0 in a long stop of the joint, in a gap of the clock, in
+    #: a contact. (M, n)
     weights: Array
     #: Friction columns that were made for this robot. (M,) each
     columns: dict[tuple[str, int, tuple[float, ...]], Array] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:
-        """Number of samples M that were kept; 0 where nothing moves."""
+        """Number of kept samples M; 0 without motion."""
         return len(self.t)
 
     def with_robot(self, robot: Robot) -> "PreparedLog":
@@ -87,7 +87,7 @@ class PreparedLog:
         return replace(self, robot=robot, columns={})
 
     def filtered(self, signals: Array) -> Array:
-        """Filter signals on the log's whole clock (T, m) and keep what is kept. (M, m)"""
+        """Signals (T, m) filtered on the log's whole clock, kept samples. (M, m)"""
         return zero_phase(self.recording.t, signals, self.cutoff)[self.kept]
 
     def chunks(self) -> Iterator[slice]:
@@ -128,8 +128,8 @@ class PreparedLog:
         return torque + self.filtered(losses)
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
-        """One friction term of joint j (from 0), filtered like the torque, made once. (M,)"""
-        # The key holds only what the term depends on, so that shapes share their columns.
+        """One friction term of joint j (from 0), filtered like the torque. (M,)"""
+        # The key holds only the term's own numbers: shapes share columns.
         numbers = {
             **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),
             "stribeck": (shape.smoothing, shape.stribeck_velocity),
@@ -187,7 +187,7 @@ def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
     usable = np.ones(dq.shape, bool)
     for j, moves in enumerate(faster(dq, NONZERO).T):
         usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))
-    # What the filter makes of a gap reaches half a period of its cutoff to either side.
+    # The filter spreads a gap over half a period of its cutoff to either side.
     margin = 0.5 / cutoff
     for k in gaps_of(t, GAP):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
@@ -209,7 +209,7 @@ def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:
 
 
 class ParameterColumns(NamedTuple):
-    """Order of all unknowns in one vector: inertial parameters, rotor inertias, friction."""
+    """Order of all unknowns in a vector: inertial, rotor inertias, friction."""
 
     chain: Chain  #: The arm's geometry.
     rotor: bool  #: Whether rotor inertias are unknown: with torque measured before the gear.
@@ -222,7 +222,7 @@ class ParameterColumns(NamedTuple):
 
     @property
     def rotor_places(self) -> slice:
-        """Places of the rotor inertias, next; none with torque measured behind the gear."""
+        """Places of the rotor inertias, next; none behind the gear."""
         return slice(self.inertial, self.inertial + self.rotor * self.chain.joints)
 
     @property
@@ -313,7 +313,7 @@ def prepare_training(
 
 
 def moving_joints(motions: Sequence[PreparedLog]) -> tuple[Mask, Mask]:
-    """Joints that the logs move at all, and those that they move both ways. (n,), (n,)"""
+    """Joints that the logs move, and those that they move both ways. (n,), (n,)"""
     times = np.zeros((2, motions[0].dq.shape[1]))
     for motion in motions:
         if motion.samples > 1:
@@ -327,5 +327,5 @@ def moving_joints(motions: Sequence[PreparedLog]) -> tuple[Mask, Mask]:
             "identifies no friction and no inertia. Record free motion, or use --method "
             "payload on static poses"
         )
-    # A tenth of a second back is enough to tell the sign of friction from an offset.
+    # A tenth back separates the sign of friction from an offset.
     return moves, times.min(axis=0) >= 0.1 * ENOUGH
