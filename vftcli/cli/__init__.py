@@ -1,4 +1,4 @@
-"""The command line: one file a command; parse, call, print. Nothing else prints or exits."""
+"""The command line, one file a command: parse, call, print, exit."""
 
 import atexit
 import errno
@@ -23,7 +23,7 @@ from vftcli.signals.parsing import printable
 
 
 def make_app(load: Collection[str] = COMMANDS) -> typer.Typer:
-    """Make the command line; a command that is not to be loaded has its summary only."""
+    """The command line; a command that is not to be loaded has its summary only."""
     app = typer.Typer(
         cls=JourneyGroup,
         help=vftcli.__doc__,
@@ -43,7 +43,7 @@ def make_app(load: Collection[str] = COMMANDS) -> typer.Typer:
     return app
 
 
-HELP = {"help_option_names": ["-h", "--help"]}  #: How help is asked for.
+HELP = {"help_option_names": ["-h", "--help"]}  #: Options for help.
 
 
 def show_version(asked: bool) -> None:
@@ -65,13 +65,13 @@ def vftcli(
 
 
 def main() -> None:
-    """Run the app; turn what a user can mend into one line on stderr and exit code 1."""
+    """Run the app; an error that a user can mend is one line and exit code 1."""
     for library in ("OPENBLAS", "OMP", "MKL"):
-        # Matrices are small: threads only wait for each other, and change last digits.
+        # Matrices are small: threads only wait, and change last digits.
         os.environ[f"{library}_NUM_THREADS"] = "1"
-    gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
+    gc.set_threshold(200_000)  # collecting costs a tenth of a short command
     try:
-        # A shell that completes may ask for any command; `help` is asked for one other.
+        # A shell completes any command; `help` shows one other.
         words = with_command(sys.argv[1:])[:2]
         make_app(COMMANDS if "_VFTCLI_COMPLETE" in os.environ else words)(prog_name="vftcli")
     except VftError as error:
@@ -90,14 +90,14 @@ def main() -> None:
 
 
 def launch() -> None:
-    """Run `main` as a program and leave at once: what `vftcli` at the shell calls.
+    """Run `main` as a program and leave at once; this is `vftcli` in a shell.
 
-    Taking the interpreter and its libraries apart costs as much as reading a large log; everything
-    that has to be written is written, and whoever asked to be called at exit is called, before.
+    Taking the interpreter apart costs as much as reading a large log; everything is written, and
+    exit functions called, before.
     """
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
-            # What the caller had switched off, as nohup does, stays so.
+            # A signal ignored by the caller, as by nohup, stays ignored.
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, stop)
         open_streams()
@@ -117,13 +117,13 @@ def launch() -> None:
     os._exit(code if isinstance(code, int) else int(code is not None))
 
 
-#: Address space that the libraries reserve [B]: with two processors
-#: the report of 10 s at 1 kHz needs 3.0e9, of 20 s at 125 Hz 1.9e9.
+#: Address space that the libraries reserve [B]: with two processors the report of 10 s at
+#: 1 kHz needs 3.0e9, of 20 s at 125 Hz 1.9e9.
 ROOM = 3e9
 
 
 def check_room() -> None:
-    """Refuse a limit on memory within which libraries end this process with words of their own."""
+    """Refuse a memory limit under which libraries would end the process."""
     with suppress(ImportError):  # Windows has no such limit
         import resource
 
@@ -136,18 +136,18 @@ def check_room() -> None:
 
 
 class Stopped(BaseException):
-    """The user or the system ends the command by a signal; what is half written goes."""
+    """A signal ends the command; half-written files are removed."""
 
 
 def stop(number: int, _frame: FrameType | None) -> None:
-    """Unwind what the command is doing, once: a second signal must not stop the cleaning up."""
+    """Unwind the command, once: a second signal must not stop the cleaning up."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)
     raise Stopped(number)
 
 
 class ClosedOutput(io.TextIOBase):
-    """Standard output that the caller closed: who writes hears of it, as on a full disk."""
+    """Standard output that the caller closed: writing raises, as on a full disk."""
 
     def write(self, _text: str) -> int:
         """Raise, whatever is written."""
@@ -160,7 +160,7 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # Else the next file gets its number, and a library's words.
+            # Else the next file gets its number, and libraries write there.
             os.open(os.devnull, os.O_RDWR)
     if sys.stdout is None:
         sys.stdout = ClosedOutput()

@@ -1,4 +1,4 @@
-"""What commands ask of logs: the choices that they share, and what is made of them."""
+"""Choices that commands on logs share."""
 
 import os
 from dataclasses import replace
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
 
-#: How a log is read, its arm, and the rest but a reference.
+#: How a log is read and its arm; all but a reference.
 OF_LOG = (ReadChoice, RobotChoice)
 OF_ANALYSIS = (
     *OF_LOG,
@@ -32,23 +32,22 @@ OF_ANALYSIS = (
     Talk,
 )
 
-#: Arrays from this size on have memory of their own, which goes back with them. [bytes]
+#: Arrays from this size on have their own memory, returned with them. [bytes]
 #:
-#: Each page of such memory has to be found and cleared anew: of smaller arrays, which
-#: come by the thousand, that took a third of the time of an hour's report and made its
-#: peak no lower.
+#: Such memory is mapped and cleared anew: for the thousands of smaller arrays that took a
+#: third of the time of an hour's report, and its peak was no lower.
 LARGE = 1 << 24
 
-#: The number by which the C library knows the size from which memory is mapped.
+#: The C library's number of the size from which memory is mapped.
 MMAP_THRESHOLD = -3
 
 
 def give_back() -> None:
-    """Have freed arrays give their memory back, where the C library has a call for it.
+    """Have freed arrays return their memory, if the C library can.
 
-    Otherwise it keeps what it once had, and a long log's peak is the sum of all its stages.
+    Otherwise it keeps the memory, and a long log's peak is the sum of all its stages.
     """
-    # Read by pyarrow when it is imported; its own allocator keeps what it once had.
+    # Read at pyarrow's import: its own allocator keeps memory.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     import ctypes
 
@@ -65,7 +64,7 @@ def choice_for(
     on_screen: bool = False,
     observers: ObserverChoice | None = None,
 ) -> "AnalysisChoice":
-    """What is asked of a command's logs; their health is said."""
+    """The choice of a command on its logs, with an examiner that prints their health."""
     from vftcli.pipeline import choice_of
 
     if "observer" in asked.words:
@@ -75,6 +74,6 @@ def choice_for(
 
 
 def outputs_of(asked: Asked) -> OutputChoice:
-    """What is written for other programs."""
+    """Outputs for other programs."""
     extras = tuple(name for name in ("csv", "rrd", "mcap") if asked.words.get(name))
     return replace(asked.of(OutputChoice), extras=extras)

@@ -15,7 +15,7 @@ from vftcli.signals.option import WRITE, Anyway, Asked, Option
 from vftcli.signals.parsing import check_known
 from vftcli.wrench.choice import WrenchChoice
 
-ADDED = ("wrench", "sd", "contact")  #: What ``--add`` takes.
+ADDED = ("wrench", "sd", "contact")  #: Values of ``--add``.
 
 
 @opt.command(*OF_LOG, ObserverChoice, WrenchChoice, WorkersChoice, Anyway, opt.Talk)
@@ -85,7 +85,7 @@ def annotate_dataset(
 
 
 def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
-    """Lines on what was written, and on what a user of it should know."""
+    """Lines on the written copy, and on its limits."""
     from vftcli.doctor.examination import doubt
     from vftcli.signals.parsing import counted
 
@@ -97,7 +97,7 @@ def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
         f"{record['robot']['name']}, {observer}, {kind}",
     ]
     for name, column in record["columns"].items():
-        # Unit and axes of a force, else what 1 and 0 say.
+        # Unit and axes of a force, else the meaning of 1 and 0.
         force = f"{column['units']}, {column['frame']}"
         lines.append(f"  {name}: {column['sign'] if column['units'] == '1' else force}")
     if delay := record["transient_frames"]:

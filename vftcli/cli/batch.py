@@ -1,4 +1,4 @@
-"""`vftcli batch`: the same question to many logs."""
+"""`vftcli batch`: one command on many logs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +15,9 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs import OutputChoice
 from vftcli.signals.option import Asked, Option, names_at
 
-#: What is asked of logs without comparing them with anything.
+#: Commands that compare logs with nothing.
 WITHOUT_REFERENCE = ("estimate", "contacts")
-SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
+SOME_FAILED = 3  #: Exit code if some logs failed, not all.
 
 
 @opt.command(WorkersChoice, ReferenceChoice, *OF_ANALYSIS, opt.Mcap, OutputChoice)
@@ -102,7 +102,7 @@ MOST_NAMED = 10  #: Failures that are printed.
 
 
 def say_passed(names: list[str]) -> None:
-    """Say which files of the folders are no logs."""
+    """Name the files of the folders that are no logs."""
     if not names:
         return
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""

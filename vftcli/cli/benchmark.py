@@ -1,4 +1,4 @@
-"""`vftcli benchmark`: methods scored against truth on many logs; the observers' times."""
+"""`vftcli benchmark`: methods scored against truth on logs; observers' times."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -98,7 +98,7 @@ def benchmark(
 def named(
     what: str, data: Path | None, outside: list[str] | None
 ) -> "tuple[Manifest, list[Rival]]":
-    """The manifest and the outside estimates that the command line names."""
+    """The manifest and the outside estimates of the command line."""
     from vftcli.observers.table import DEFAULT
     from vftcli.reproduction.manifest import load_manifest, rival_of
 
@@ -112,7 +112,7 @@ def named(
 
 
 def say_none(manifest: "Manifest", form: str) -> None:
-    """Print that no log of a manifest is there, and where each is had."""
+    """Print that no log of a manifest is there, and their sources."""
     if form == "json":
         say_json([], rows=[], left_out=manifest.absent())
     none = f"Nothing is scored: {manifest.data.absolute()} has none of the logs. Put them there, "
@@ -121,7 +121,7 @@ def say_none(manifest: "Manifest", form: str) -> None:
 
 
 def unfair(manifest: "Manifest", rivals: "list[Rival]", *, anyway: bool) -> frozenset[str]:
-    """Names of logs with rows that are unfair or of another file; an exit unless `anyway`."""
+    """Names of logs with unfair rows or another file; exits unless `anyway`."""
     complaints = manifest.complaints(rivals)
     for line in (line for lines in complaints.values() for line in lines):
         echo(printable(f"{'warning' if anyway else 'error'}: {line}"), err=True)
@@ -131,7 +131,7 @@ def unfair(manifest: "Manifest", rivals: "list[Rival]", *, anyway: bool) -> froz
 
 
 def print_results(results: "Results", form: str, absent: list[str], *, every: bool) -> None:
-    """Print what a benchmark found in the form that is asked for."""
+    """Print a benchmark's results in the form asked for."""
     from vftcli.outputs.benchmark import text_of
 
     if form == "json":
@@ -143,7 +143,7 @@ def print_results(results: "Results", form: str, absent: list[str], *, every: bo
 
 
 def time_observers(robot: str, asked: BenchChoice, form: str) -> None:
-    """Print how long the dynamics and each observer take on this machine."""
+    """Print the times of the dynamics and each observer on this machine."""
     if form == "csv":
         raise typer.BadParameter("benchmark speed has --json, --markdown and --latex")
     from vftcli.outputs import grid

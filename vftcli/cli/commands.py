@@ -1,4 +1,4 @@
-"""The commands: where each is, what it does in a sentence, and what one sets out to do with it."""
+"""The commands: their files, summaries and aims."""
 
 import os
 import re
@@ -12,20 +12,20 @@ from vftcli.signals.parsing import tables_beside
 
 
 class ListedCommand(NamedTuple):
-    """One command: where it is, so that --help need not load it."""
+    """One command by its place, so that --help need not load it."""
 
     file: str  #: File of this package.
     function: str  #: The function in it.
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, read from the file: to load it takes longer."""
+        """First line of the function's docstring, read from the file for speed."""
         text = (Path(__file__).parent / f"{self.file}.py").read_text("utf-8")
         found = re.search(rf'(?sm)^def {self.function}\(.*?"""(.*?)\n', text)
         return found[1] if found else ""
 
 
-#: What one sets out to do → its commands, each with where it is.
+#: Aim of the user → its commands, each with its place.
 JOURNEYS = {
     "Ask a log": {
         "contacts": "contacts:list_contacts",
@@ -58,23 +58,23 @@ COMMANDS = {
     for name, place in places.items()
 }
 
-DEFAULT = "contacts"  #: The command of words that name none.
+DEFAULT = "contacts"  #: The command of words without one.
 #: Options of the program itself.
 OF_PROGRAM = frozenset({"-h", "--help", "--version", "--install-completion", "--show-completion"})
 
-#: What earlier commands and options are now, and what is `gone`.
+#: Former commands and options with today's, and those that are `gone`.
 former = partial(tables_beside, __file__, "former.toml")
 
 
 def with_command(words: list[str]) -> list[str]:
-    """The words of a call with its command, also where a log or options come first."""
+    """The words of a call with its command, also if a log or options come first."""
     if not words or words[0] in COMMANDS or words[0] in OF_PROGRAM:
         return words
     first = words[0]
     if first in former()["gone"]:
         return words
     if now := former()["commands"].get(first, "").split():
-        # `init -o FILE` has said where.
+        # `init -o FILE` has its output.
         own = now[1] != "-o" or not any(word.startswith(("-o", "--output")) for word in words)
         return [now[0], *(now[1:] * own), *words[1:]]
     is_log = not {".", "/", os.sep}.isdisjoint(first) or Path(first).exists()
@@ -82,7 +82,7 @@ def with_command(words: list[str]) -> list[str]:
 
 
 def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[str]]:
-    """The words with today's options for former ones, and what each former one is now.
+    """The words with today's options for former ones, and a note on each.
 
     Raises:
         ParameterError: If one is gone, or lacks its value.
@@ -112,7 +112,7 @@ def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[
 
 
 def now_of(name: str, value: str) -> str | None:
-    """What a former option of a value is now, None of any other word.
+    """Today's form of a former option with a value, None of any other word.
 
     Raises:
         ParameterError: If it is gone.
@@ -126,7 +126,7 @@ def now_of(name: str, value: str) -> str | None:
 
 
 def add_arguments(words: list[str], arguments: list[str]) -> None:
-    """Add the arguments of a xacro to the robot that the words name.
+    """Add the arguments of a xacro to the robot in the words.
 
     Raises:
         ParameterError: If they name none.

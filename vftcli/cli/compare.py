@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from vftcli.outputs.files import OutputFolder
     from vftcli.pipeline import AnalysisChoice
 
-MORE = "Intervals, lags, pairs of observers: --details"  #: What screens leave out.
+MORE = "Intervals, lags, pairs of observers: --details"  #: Left out of screens.
 
 
 def figure_folder(figures: str | None, output: Path | None, force: bool) -> "OutputFolder | None":
-    """Where the figure of the errors goes, None where none is asked for."""
+    """The folder of the figure of the errors, None without a figure."""
     if (figures is None) != (output is None):
         raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
     if output is None:
@@ -43,7 +43,7 @@ def figure_folder(figures: str | None, output: Path | None, force: bool) -> "Out
 def judged_by_jacobian(
     log: Path, error: VftError, choice: "AnalysisChoice", reference: str
 ) -> "JacobianJudgement":
-    """What a vendor's torques beside a Jacobian tell; raises any other error."""
+    """Errors of a vendor's torques beside a Jacobian; raises any other error."""
     from vftcli.evaluation.wrenches import judge_jacobian
     from vftcli.readers.references import jacobian_log
     from vftcli.readers.table import JacobianError
@@ -58,7 +58,7 @@ def judged_by_jacobian(
 
 
 def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, details: bool) -> str:
-    """The errors for the terminal, with details the pairs of observers below them."""
+    """The errors for the terminal; with details the pairs of observers below."""
     import polars as pl
 
     from vftcli.evaluation.intervals import paired_significance
@@ -84,7 +84,7 @@ def print_errors(
     *,
     details: bool,
 ) -> None:
-    """Print the errors in the form that is asked for."""
+    """Print the errors in the form asked for."""
     from vftcli.outputs.error_tables import FORMS
     from vftcli.outputs.run_record import all_remarks
 

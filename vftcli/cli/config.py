@@ -1,7 +1,7 @@
-"""Options kept in a TOML file: ``--config FILE``, or `vftcli.toml` in the working folder.
+"""Options in a TOML file: ``--config FILE``, or `vftcli.toml` in this folder.
 
-Its values become words behind the typed ones, and are checked as these. `run.json` has them in
-its command line.
+Its values become words behind the typed ones, and are checked like these. `run.json` has
+them in its command line.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -19,9 +19,9 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Choice, interval, settings_as_typed, settings_by_name
 from vftcli.signals.parsing import did_you_mean, printable, shown, toml_file
 
-NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
-NONE = "none"  #: Value of ``--config`` with which no file is read.
-#: Options that are only typed: overwriting is asked each time.
+NAME = "vftcli.toml"  #: The file that is read if it is in the working folder.
+NONE = "none"  #: Value of ``--config`` for no file.
+#: Options that are only typed: overwriting needs --force each time.
 TYPED = frozenset({"config", "force", "help", "set"})
 #: Command → options that only its own table gives.
 OTHERWISE = {
@@ -30,30 +30,30 @@ OTHERWISE = {
     "convert": {"log.derive"},  # it writes what was logged
 }
 Table = dict[str, Any]  #: A table of TOML.
-Click = Any  #: Of typer, which carries a click of its own without types.
-FILE = "file:"  #: What a reference's file begins with.
+Click = Any  #: A type of typer's own click, which has none.
+FILE = "file:"  #: Head of a reference's file.
 
 
 #: The words of this call, with those of a file of options.
 WORDS: ContextVar[Sequence[str]] = ContextVar("words", default=())
-#: The file of options that this call reads, None for none.
+#: The file of options of this call, None without one.
 READ: ContextVar[Path | None] = ContextVar("read", default=None)
 
 
 def is_configured(command: Click) -> bool:
-    """Whether a command takes options from a file: those that read a log."""
+    """Whether a command has options from a file: those that read a log."""
     return any("--columns" in param.opts for param in command.params)
 
 
 def kept_words(ctx: Click, args: Sequence[str]) -> tuple[Path, list[str]] | None:
-    """The file that is read beside these words, and what it gives as words; None for no file.
+    """The file of options beside these words, and its words; None without one.
 
-    What is typed is left away, and what cannot be meant for the logs that are.
+    Options that are typed, or do not fit the logs, are left away.
     """
     command = ctx.command
     opts, _, params = command.make_parser(ctx).parse_args(list(args))
     named: str | None = opts.get("config")
-    # Who writes such a file does not read the one that is there.
+    # Who writes such a file does not read it.
     writes = command.name == "inspect" and any(param.name == "output" for param in params)
     unread = named == NONE or (named is None and (writes or not Path(NAME).is_file()))
     if ctx.resilient_parsing or unread or "help" in opts:
@@ -83,7 +83,7 @@ def kept_words(ctx: Click, args: Sequence[str]) -> tuple[Path, list[str]] | None
 
 
 def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401
-    """A kept value for these logs, None where it is not for them.
+    """A kept value for these logs, None if it is not for them.
 
     Columns are a log's, not those of estimates made from it; a log is no free run of itself.
     """
@@ -98,7 +98,7 @@ def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401
 
 
 def keys_for(command: Click, path: Path) -> Table:
-    """What a file holds for a command: what is on top, then what is in the command's table.
+    """Options of a file for a command: those on top, then the command's table.
 
     Settings have their dotted names, and their values are texts.
     """
@@ -137,7 +137,7 @@ def entry(
     owner: str,
     choices: Sequence[type[Choice]],
 ) -> Table:
-    """One key of a file as an option, or its settings by their dotted names, as texts."""
+    """One key of a file as an option, or its settings by dotted names, as texts."""
     if key not in known and not isinstance(value, dict):
         key, value = key_now(path, key, value)
     if isinstance(value, dict):
@@ -156,10 +156,10 @@ def entry(
 
 
 def key_now(path: Path, key: str, value: Any) -> tuple[str, Any]:  # noqa: ANN401 - of TOML
-    """A former key as the option or setting that it is now, with a note; any other as it is."""
+    """A former key as today's option or setting, with a note; others unchanged."""
     text = next(words_in(value), "")
     now = None if key in TYPED or isinstance(value, list) else now_of(f"--{key}", text)
-    # An argument, of a command or of a xacro, has no key of its own.
+    # An argument, of a command or of a xacro, has no key.
     if now is None or not now.startswith("--") or "'" in now or (not text and "VALUE" in now):
         return key, value
     echo(printable(f"note: {path}: {key} is now {now.replace('VALUE', '…')}"), err=True)
@@ -178,23 +178,23 @@ def every_command() -> Mapping[str, Click]:
 
 
 def choices_of(*commands: Click) -> tuple[type[Choice], ...]:
-    """The choices that have the settings of some commands, each once."""
+    """The choices with the settings of some commands, each once."""
     each = (kind for command in commands for kind in vars(command.callback)["choices"])
     return tuple(dict.fromkeys(each))
 
 
 def options_of(command: Click) -> dict[str, Any]:
-    """Option of a command by its key, its name as it is typed without dashes."""
+    """Option of a command by its key: its name without dashes."""
     options = (p for p in command.params if p.param_type_name == "option")
     every = {max(p.opts, key=len).lstrip("-"): p for p in options}
     return {key: p for key, p in every.items() if key not in TYPED}
 
 
 def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> Any:  # noqa: ANN401
-    """A value as typer takes it for an option: words, or True of one that is given or not.
+    """A value for typer's option: words, or True of a flag.
 
     Returns:
-        None of an option that the file says is not given.
+        None of an option that is off in the file.
     """
     if option.is_flag:
         if not isinstance(value, bool):
@@ -216,7 +216,7 @@ def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> 
 
 
 def words_in(value: object) -> Iterator[str]:
-    """The words that a value would be typed as; none where it is of another kind."""
+    """The words that would be typed for a value; none of another kind."""
     for word in value if isinstance(value, list | tuple) else [value]:
         if isinstance(word, bool) or not isinstance(word, str | int | float):
             return
@@ -224,14 +224,14 @@ def words_in(value: object) -> Iterator[str]:
 
 
 def beside(folder: Path, word: str, option: Click) -> str:
-    """A word, from the file's folder on where it is the name of a file or folder."""
+    """A word; from the file's folder on if it names a file or folder."""
     prefix = FILE if word.startswith(FILE) else ""
     name = word.removeprefix(FILE)
     with suppress(ParameterError):
         interval(name)
         return word
     takes_file = any(kind in str(option.metavar) for kind in ("FILE", "LOG", "REF"))
-    # A word without an ending is a name, unless a log has it.
+    # A word without an ending is a name, unless it is a log.
     is_file = Path(name).suffix or len(Path(name).parts) > 1
     is_file = is_file or ("LOG" in str(option.metavar) and (folder / name).exists())
     return f"{prefix}{folder / name}" if takes_file and (prefix or is_file) else word

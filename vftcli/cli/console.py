@@ -1,4 +1,4 @@
-"""What every command prints alike: how much is said, to whom, and how wide."""
+"""Common output of the commands: how much, where, and how wide."""
 
 import os
 import shlex
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
 
-echo, echo_data = STAGES.echo, STAGES.echo_data  #: What prints all that a command prints.
-QUIET, USUAL, DETAILS = range(3)  #: How much a command says.
+echo, echo_data = STAGES.echo, STAGES.echo_data  #: All output of a command.
+QUIET, USUAL, DETAILS = range(3)  #: Levels of output.
 
 _level: ContextVar[int] = ContextVar("level", default=USUAL)
 
 
 @contextmanager
 def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
-    """Say as much as is asked for a block, and on a terminal how far its work is."""
+    """Set how much is printed for a block, and its progress on a terminal."""
     if details and quiet:
         raise typer.BadParameter("choose one of --details, --quiet")
     token = _level.set(DETAILS if details else QUIET if quiet else USUAL)
@@ -52,7 +52,7 @@ PARTS = frozenset({"episode-chosen", "episode-chosen-first", "arm-side-chosen"})
 
 
 def command_line() -> str:
-    """The command for `run.json` and the report: as typed, with what a file of options gave it."""
+    """The command for `run.json` and the report, with words of a file of options."""
     return printable(shlex.join(["vftcli", *WORDS.get()]))
 
 
@@ -63,7 +63,7 @@ def say(text: str) -> None:
 
 
 def say_left_out(names: Iterable[Path | str]) -> None:
-    """Say which of the files that a command writes lack something for want of a package."""
+    """Name the written files that lack something for want of a package."""
     from vftcli.outputs.files import left_out
 
     for line in left_out(Path(name).name for name in names):
@@ -71,7 +71,7 @@ def say_left_out(names: Iterable[Path | str]) -> None:
 
 
 def detail(text: str) -> None:
-    """Print words to stderr where --details asks for everything that is known."""
+    """Print words to stderr with --details."""
     if _level.get() == DETAILS:
         say(text)
 
@@ -79,7 +79,7 @@ def detail(text: str) -> None:
 def show(text: str) -> None:
     """Print a result that a file holds as well to stdout, unless --quiet.
 
-    Its colours are the canvas's affair: there are none where there shall be none.
+    Its canvas decides on colours.
     """
     if _level.get() > QUIET:
         echo(text, nl=not text.endswith("\n"), colour=True)
@@ -88,7 +88,7 @@ def show(text: str) -> None:
 def say_written(
     record: str, folder: Path, names: Sequence[str], *, json: bool, several: bool = False
 ) -> None:
-    """Print which of these files were written and the page to open, or `run.json` for machines."""
+    """Print the written files and the page to open, or `run.json` for machines."""
     from vftcli.outputs.screen import written_lines
 
     say_left_out([*names, *["recording.rrd"] * several])
@@ -99,7 +99,7 @@ def say_written(
 
 
 def open_made(path: Path) -> None:
-    """Open a page, a folder's page or its recording in what shows it, and say what was opened."""
+    """Open a page, a folder's page or its recording in its viewer, and say so."""
     page, recording = path, path / "recording.rrd"
     if path.is_dir():
         page = path / "index.html"
@@ -116,13 +116,13 @@ def open_made(path: Path) -> None:
         check_installed("rerun", f"the viewer of {recording}")
         words = [sys.executable, "-m", "rerun", str(recording)]
         quiet = subprocess.DEVNULL
-        # It goes on when the command has ended.
+        # It outlives the command.
         subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
         say(f"{recording} opens in the Rerun viewer; a click on a time of its log goes there")
 
 
 def canvas() -> "Canvas":
-    """What stdout can show: its width, its letters, whether in colour."""
+    """Abilities of stdout: width, letters, colour."""
     from vftcli.outputs.screen import Canvas
 
     stream = sys.stdout
@@ -139,7 +139,7 @@ def say_json(
     remarks: "Iterable[Remark]" = (),
     **found: Any,  # noqa: ANN401 - whatever JSON can hold
 ) -> None:
-    """Print what a command found to stdout, for machines; what is no finite number is null."""
+    """Print a command's results as JSON to stdout; null if not finite."""
     from vftcli.outputs.run_record import envelope, log_entry, to_json
 
     entries = [log if isinstance(log, dict) else log_entry(log) for log in logs]
@@ -147,10 +147,10 @@ def say_json(
 
 
 class LeftOut:
-    """The logs of a command that could not be analysed: one line each, the others go on.
+    """The logs that a command cannot analyse, one line each; the others go on.
 
     Attributes:
-        reasons: Label of every other log → why it is left out.
+        reasons: Label of every such log → why it is left out.
     """
 
     def __init__(self, library: "Library", logs: Sequence[Path]) -> None:
@@ -158,7 +158,7 @@ class LeftOut:
         self.reasons: dict[str, str] = {}
 
     def add(self, log: Path, error: VftError) -> None:
-        """Say that a log is left out, and why; of the only one raise it."""
+        """Say that a log is left out, and why; raise it for the only one."""
         if not self._several:
             raise error
         reason = " ".join(str(error).split())
@@ -175,7 +175,7 @@ class LeftOut:
 
 
 def say_recording(recording: "Recording") -> None:
-    """In details: one line on what was read, then what was repaired or looks odd."""
+    """In details: one line on the log, then repairs and oddities."""
     from vftcli.signals.parsing import counted
 
     source = recording.source
@@ -184,7 +184,7 @@ def say_recording(recording: "Recording") -> None:
         f"{recording.name}: {source.format}, {recording.joints} joints, "
         f"{counted(recording.samples, 'sample')}, {recording.duration:.1f} s{rate}"
     )
-    # Which part of a file is read is said with the health of the log.
+    # The part of a file is printed with the log's health.
     others = [remark for remark in source.remarks if remark.code not in PARTS]
     for remark in sorted(others, key=lambda remark: remark.level != "fact"):
         detail(f"  note: {remark}")
@@ -193,7 +193,7 @@ def say_recording(recording: "Recording") -> None:
 def health_of(
     library: "Library", *, anyway: bool, fitting: bool = True, on_screen: bool = False
 ) -> "Examiner":
-    """The examiner of a command's logs: it prints one line on the health of each."""
+    """The examiner of a command's logs: it prints one line on each."""
     from vftcli.doctor.examination import Examiner, doubt
     from vftcli.outputs.examination import health_line
 
@@ -213,13 +213,13 @@ def health_of(
 
 
 def say_robots(robots: "Iterable[Robot]") -> None:
-    """What a user of the robots' numbers should know."""
+    """Print the limits of the robots' numbers."""
     for remark in dict.fromkeys(str(remark) for robot in robots for remark in robot.remarks):
         say(f"note: {remark}")
 
 
 def say_analysis(analysis: "Analysis") -> None:
-    """In details: what was read, and what the reader of the numbers should know."""
+    """In details: the log, and the limits of its numbers."""
     say_recording(analysis.recording)
     reference = analysis.reference.remarks if analysis.reference is not None else ()
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
@@ -240,7 +240,7 @@ def say_analysis(analysis: "Analysis") -> None:
 
 
 def say_remarks(remarks: "Iterable[Remark]") -> None:
-    """What can make a result wrong, and in details the rest."""
+    """Print remarks that can make a result wrong; in details the rest."""
     for remark in remarks:
         if remark.level == "warning":
             say(f"warning: {remark}")

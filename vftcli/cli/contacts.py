@@ -59,7 +59,7 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
 
 
 def print_stored(estimates: Path, asked: Asked) -> None:
-    """Print the list that the folder of an ``estimates.parquet`` holds."""
+    """Print the list in the folder of an ``estimates.parquet``."""
     from vftcli.outputs.contacts import contacts_csv, stored_list, stored_record
     from vftcli.outputs.screen import list_screen
 
@@ -73,7 +73,7 @@ def print_stored(estimates: Path, asked: Asked) -> None:
 
 
 def print_lists(found: "list[Analysis]", asked: Asked, failed: "Mapping[str, str]") -> None:
-    """Print the lists in the form that is asked for."""
+    """Print the lists in the form asked for."""
     from vftcli.outputs.contacts import contacts_csv
     from vftcli.outputs.report import contacts_envelope
     from vftcli.outputs.run_record import to_json

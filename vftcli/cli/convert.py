@@ -1,4 +1,4 @@
-"""`vftcli convert` and `vftcli simulate`: a log as another file, or as a robot would write it."""
+"""`vftcli convert` and `vftcli simulate`: a log as a file, or simulated."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -36,7 +36,7 @@ def convert_log(
         )
     recording = Library().open(log, replace(choice, derive="none"))
     convert(recording, output, force=force)
-    # A table may be made of any log, also of one that no estimate should be made of.
+    # Any log may become a table, even one without a sound estimate.
     say(health_line(examine(recording)))
     say_left_out([output])
     if json:

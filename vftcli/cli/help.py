@@ -1,6 +1,6 @@
-"""`vftcli help` and `--help`: commands by their aim, options in groups, topics, and lists.
+"""`vftcli help` and `--help`: commands by aim, options in groups, topics, lists.
 
-Nothing here loads more than the command line itself, so that help comes at once.
+Nothing here loads more than the command line, so that help comes at once.
 """
 
 import shlex
@@ -31,12 +31,12 @@ from vftcli.signals.errors import ParameterError, UnknownFormatError
 from vftcli.signals.option import GROUPS, LOG, NUMBERS, OUTPUT, Choice, Option, settings_by_name
 from vftcli.signals.parsing import did_you_mean, nearest, printable, tables_beside
 
-OWN = "This command"  #: Heading of the options that only one command has.
-NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and of its left half at most.
+OWN = "This command"  #: Heading of one command's own options.
+NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and most of its left half.
 
 
 class GroupedCommand(TyperCommand):
-    """A command that shows its options in groups for `--help`."""
+    """A command with its options in groups for `--help`."""
 
     def __init__(self, *words: Any, **more: Any) -> None:  # noqa: ANN401 - typer's own
         super().__init__(*words, **more)
@@ -46,7 +46,7 @@ class GroupedCommand(TyperCommand):
             self.params.append(TyperOption(param_decls=["--config"], **how))
 
     def parse_args(self, ctx: Click, args: list[str]) -> Click:
-        """Parse the words; of an option that there is not, name the nearest if it is near."""
+        """Parse the words; an unknown option's error names the nearest."""
         try:
             kept = kept_words(ctx, args) if is_configured(self) else None
             READ.set(kept[0] if kept else None)
@@ -68,7 +68,7 @@ class GroupedCommand(TyperCommand):
         return rest
 
     def format_help(self, ctx: Click, formatter: Click) -> None:
-        """Write how it is called, what it does, its options by group."""
+        """Write its usage, its purpose, and its options by group."""
         width = columns()
         lines = [" ".join(["Usage:", ctx.command_path, *self.collect_usage_pieces(ctx)]), ""]
         for paragraph in (self.help or "").split("\n\n"):
@@ -76,7 +76,7 @@ class GroupedCommand(TyperCommand):
         found: dict[str, list[tuple[str, str]]] = {}
         for param in self.get_params(ctx):
             if (record := row_of(param, ctx)) is not None:
-                # Those of every command were made of no option.
+                # Those of every command have no `Option`.
                 own = vars(self.callback).get("options", {}).get(param.name)
                 group = own.group or OWN if own else OUTPUT
                 is_log = param.param_type_name == "argument"
@@ -89,10 +89,10 @@ class GroupedCommand(TyperCommand):
 
 
 class JourneyGroup(TyperGroup):
-    """The program: its `--help` lists the commands by what one sets out to do."""
+    """The program: its `--help` lists the commands by aim."""
 
     def format_help(self, ctx: Click, formatter: Click) -> None:
-        """Write the commands by what one sets out to do, then the program's options."""
+        """Write the commands by aim, then the program's options."""
         width, usage = columns(), "Usage: vftcli [COMMAND] LOG… [OPTIONS]"
         lines = [usage, "", *textwrap.wrap(self.help or "", width)]
         left = max(map(len, self.commands))
@@ -106,7 +106,7 @@ class JourneyGroup(TyperGroup):
         formatter.write("\n".join([*lines, "", *two_columns(rows)]) + "\n")
 
     def parse_args(self, ctx: Click, args: list[str]) -> Click:
-        """Parse the words: without a command of the default one, former words by today's."""
+        """Parse the words: the default command if none, today's for former words."""
         words = with_command(args)
         if not ctx.resilient_parsing and words and (command := self.commands.get(words[0])):
             there = [name for param in command.params for name in param.opts]
@@ -119,7 +119,7 @@ class JourneyGroup(TyperGroup):
         return super().parse_args(ctx, words)
 
     def resolve_command(self, ctx: Click, args: list[str]) -> Click:
-        """The command that is asked for; of one that there is not, the nearest if it is near."""
+        """The command asked for; an unknown one's error names the nearest."""
         if args[0] not in self.commands:
             if args[0] in former()["gone"]:
                 raise ParameterError(f"{args[0]} is gone; {former()['gone'][args[0]]}")
@@ -133,7 +133,7 @@ def columns() -> int:
 
 
 def row_of(param: Click, ctx: typer.Context) -> tuple[str, str] | None:
-    """How a parameter is typed, and what it means; None for one that is hidden."""
+    """A parameter as typed, and its meaning; None if hidden."""
     if param.param_type_name == "argument":
         return (param.metavar or param.name.upper(), param.help) if param.help else None
     record: tuple[str, str] | None = param.get_help_record(ctx)
@@ -141,7 +141,7 @@ def row_of(param: Click, ctx: typer.Context) -> tuple[str, str] | None:
 
 
 def two_columns(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """What is typed to the left, what it means to the right, wrapped."""
+    """Typed words to the left, meanings to the right, wrapped."""
     left = min(max(len(typed) for typed, _ in rows), LEFT)
     for typed, meaning in rows:
         lines = textwrap.wrap(meaning, columns() - left - 4) or [""]
@@ -155,7 +155,7 @@ def two_columns(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
 topics = partial(tables_beside, __file__, "topics.toml")  #: Topic → its summary and its text.
 
 
-#: What is listed → what its list shows.
+#: List → its content.
 LISTS = {
     "robots": "the robot profiles; NAME or FILE: one robot in full",
     "observers": "the observers, their equations and their numbers",
@@ -205,7 +205,7 @@ def show_help(
 
 
 def contents() -> Iterator[str]:
-    """What can be asked for: topics, lists and commands."""
+    """Topics, lists and commands of help."""
     explained = {name: entry["summary"] for name, entry in topics().items()}
     yield "vftcli help TOPIC, of"
     yield from two_columns([*explained.items(), *LISTS.items()])
@@ -263,7 +263,7 @@ def settings() -> Iterator[str]:
 
 
 def settings_of(kind: type[Choice]) -> Iterator[tuple[str, str]]:
-    """How each setting of a choice is given, and what it means."""
+    """Each setting of a choice as typed, and its meaning."""
     for name, (option, default) in settings_by_name([kind]).items():
         shown = {True: "yes", False: "no"}[default] if isinstance(default, bool) else default
         kept = f"; default {shown}" if isinstance(shown, str | int | float) else ""

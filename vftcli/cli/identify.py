@@ -27,7 +27,7 @@ from vftcli.signals.option import Anyway, Asked
 
 
 def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str, object]) -> None:
-    """Refuse what the method has no use for.
+    """Refuse options that the method does not use.
 
     Args:
         task: What is identified.
@@ -57,7 +57,7 @@ def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str,
 
 
 def file_for(robot: str) -> Path:
-    """The file in this folder for what is found of a robot, where no other is named."""
+    """The default file in this folder for a robot's results."""
     return Path("my_" + re.sub(r"[^\w.-]", "_", robot) + ".toml")
 
 
@@ -99,8 +99,8 @@ def identify_robot(
         find_gains(logs[0], output, asked, figures)
         return
     library = Library([*logs, *(check or ()), *free.logs])
-    # That the profile is not the arm's is what this command is there to change; but the
-    # friction method keeps the profile's links, and the default begins with it.
+    # This command changes a profile that is not the arm's; but the friction method keeps the
+    # profile's links, and the default begins with it.
     examiner = health_of(library, anyway=asked.anyway, fitting=task.keeps_links)
     choice = replace(choice_for(asked, library), examiner=examiner)
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
@@ -124,7 +124,7 @@ def identify_robot(
 
 
 def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None) -> None:
-    """Write the gains that a goal asks for: the log's spectra show what error every gain makes."""
+    """Write the gains for a goal, by the log's spectra."""
     from vftcli.answering import TUNED, gains_of
     from vftcli.outputs.examination import health_record, overridden_lines
     from vftcli.outputs.figures import write_tuned

@@ -1,4 +1,4 @@
-"""`vftcli inspect`: the log doctor, and the options that a log calls for, written down once."""
+"""`vftcli inspect`: the log doctor, and a log's options in a file."""
 
 import os
 from collections.abc import Sequence
@@ -74,7 +74,7 @@ def inspect_log(
 def write_options(
     output: Path, logs: Sequence[Path], asked: Asked, *, force: bool
 ) -> dict[str, Any]:
-    """Write the options that logs call for, and give them for machines."""
+    """Write the options for logs, and return them for machines."""
     from vftcli.outputs.files import write_text
     from vftcli.proposal import config_text, propose
     from vftcli.readers.library import Library
@@ -100,7 +100,7 @@ def write_options(
 
 
 def from_folder(folder: Path, option: "ProposedOption") -> "ProposedOption":
-    """An option with the files that it names from a folder on."""
+    """An option with its files named from a folder on."""
 
     def named(word: str) -> str:
         there = option.key in {"robot", "free"} and Path(word).exists()

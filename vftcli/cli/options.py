@@ -1,7 +1,7 @@
-"""The options of the commands: what typer is given, made of the rooms' choices.
+"""The commands' options: typer's parameters, made of the rooms' choices.
 
-An option is an `Option` beside a field of a room's choice, or beside an argument of the one command
-that has it. A command is handed the words of all options of its choices at once::
+An option is an `Option` beside a field of a room's choice, or beside an argument of its one
+command. A command gets the words of all options of its choices at once::
 
     @command(ReadChoice, Talk)
     def convert_log(log: Log, asked: Asked, force: Force) -> None: ...
@@ -39,7 +39,7 @@ Logs = Annotated[
 ]
 OUT = Option("-o/--output", "PATH", "Write here; required.", group=WRITE)
 Folder = Annotated[Path, OUT]
-#: A folder that `folder_of` names where it is not given.
+#: A folder that `folder_of` names if it is not given.
 LogFolder = Annotated[
     Path | None, OUT._replace(help="Write here; default: LOG.vft in this folder.")
 ]
@@ -53,11 +53,11 @@ Check = Annotated[
 ]
 
 
-FORMS = ("pdf", "svg", "png")  #: What figures may be written as.
+FORMS = ("pdf", "svg", "png")  #: Formats of figures.
 
 
 def checked_form(form: str) -> str:
-    """What figures are written as; refused where what draws them is missing."""
+    """Format of figures; refused without matplotlib."""
     if form not in FORMS:
         raise ParameterError(f"--figures {form!r} is not {', '.join(FORMS[:-1])} or {FORMS[-1]}")
     check_installed("matplotlib", "--figures")
@@ -82,12 +82,12 @@ LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).", group=OUTP
 SEED = Option("--seed", "N", "Seed everything random.", least=0)
 
 
-#: What a log's name ends with; of `run_1.5` the number stays.
+#: Endings of a log's name; of `run_1.5` the number stays.
 ENDING = re.compile(r"(?<=.)(\.[A-Za-z]\w*)?(\.(gz|zst|zstd|bz2|xz))?$")
 
 
 def folder_of(output: Path | None, logs: Sequence[Path], asked: Asked) -> Path:
-    """Where a command writes: as typed, else into a folder here that is named after the log."""
+    """Output folder of a command: as typed, else here, named after the log."""
     if output is not None:
         return output
     if len(logs) > 1:
@@ -99,7 +99,7 @@ def folder_of(output: Path | None, logs: Sequence[Path], asked: Asked) -> Path:
 
 
 class Talk(Choice):
-    """How much a command says; heard before it runs."""
+    """How much a command prints."""
 
     GROUP = OUTPUT
 
@@ -127,7 +127,7 @@ class TableForm(Choice):
 
 
 def form_of(asked: Asked) -> str:
-    """The one form of a table that is asked for, or "terminal"."""
+    """The one form of a table asked for, or "terminal"."""
     forms = [name for name in TableForm.options() if asked.words[name]]
     if len(forms) > 1:
         raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in forms)}")
@@ -135,11 +135,11 @@ def form_of(asked: Asked) -> str:
 
 
 def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a command for typer of a function: every option of these choices is a parameter.
+    """A typer command made of a function: these choices' options are parameters.
 
-    They come in the place of its argument `Asked`; an option that the function has as an argument
-    of its own is that one. The command has `options`, each by the name of its parameter, and
-    `choices`, which have its settings.
+    They replace its argument `Asked`; the function's own argument of an option's name wins. The
+    command has `options`, each by the name of its parameter, and `choices`, which have its
+    settings.
     """
 
     def of(function: Callable[..., None]) -> Callable[..., None]:
@@ -152,7 +152,7 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
             each = (assignment(w, "--set", "NAME=VALUE") for w in values.get("set") or ())
             settings = settings_as_typed(dict(each), choices, "--set ")
             inputs = [*inputs_of(values), *filter(None, [READ.get()])]
-            # How much it says: what its -v and -q ask, as usual where it has none.
+            # How much it prints: by its -v and -q, if it has them.
             loud = speaking(details=bool(values.get("details")), quiet=bool(values.get("quiet")))
             with protected(inputs), loud:
                 asked = Asked(values, settings, command_line())
@@ -172,7 +172,7 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
 def parameters_of(
     function: Callable[..., None], choices: Sequence[type[Choice]]
 ) -> Iterator[tuple[inspect.Parameter, Option]]:
-    """What typer sees of a function, each with its option."""
+    """Typer's parameters of a function, each with its option."""
     own = inspect.signature(function).parameters
     every = [(kind.GROUP, *each) for kind in choices for each in kind.options().items()]
     for name, argument in own.items():
@@ -195,14 +195,14 @@ EMPTY = inspect.Parameter.empty
 
 
 def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:
-    """What may stand behind ``--set``, each name with its equals sign."""
+    """Possible words after ``--set``, each name with its equals sign."""
     for kind in choices:
         for name, (option, _) in settings_by_name([kind]).items():
             yield from (f"{each}=" for each in (option.values() if name == NUMBERS else [name]))
 
 
 def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> inspect.Parameter:  # noqa: ANN401
-    """An option or argument as typer takes it; one that may be missing has a default."""
+    """An option or argument for typer; one that may be missing has a default."""
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
@@ -215,7 +215,7 @@ def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> 
 
 
 def typed_as(what: Any, option: Option) -> Any:  # noqa: ANN401 - annotations
-    """What typer makes of a field's typed text; where that is missing the room knows."""
+    """Typer's type of a field's typed text; the room replaces a missing one."""
     if not option.metavar:
         return bool
     among = (what, *get_args(what))
@@ -224,11 +224,11 @@ def typed_as(what: Any, option: Option) -> Any:  # noqa: ANN401 - annotations
 
 
 def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
-    """Every file and folder that the options name, but the output: nothing may write over these."""
+    """Every file and folder in the options but the output: protected inputs."""
     for name, value in values.items():
         for word in value if isinstance(value, list | tuple) else (value,):
             path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
-            # A word without an ending names a robot, where no log is due.
+            # A word without an ending is a robot, unless a log is due.
             named = path is word or (isinstance(path, Path) and path.suffix) or name == "free"
             if name != "output" and isinstance(path, Path) and named:
                 yield path

@@ -1,4 +1,4 @@
-"""What is being done and how far it is, on one line of stderr; and what is printed over it."""
+"""Progress on one line of stderr, and printing over it."""
 
 import atexit
 import os
@@ -12,27 +12,27 @@ from typing import TextIO
 
 import typer
 
-QUICK = 1.0  #: Work that is done within this time shows nothing. [s]
-EVERY = 1.0  #: Time after which the line is shown anew, whatever happens. [s]
-WIDTH = 79  #: Most columns of the line: one less than a terminal has. [characters]
+QUICK = 1.0  #: Shorter work shows nothing. [s]
+EVERY = 1.0  #: Time between updates of the line. [s]
+WIDTH = 79  #: Most columns of the line, one less than a terminal's. [characters]
 BAR = 20  #: Length of the bar. [characters]
-#: Share of the work after which the rest can be guessed from it.
+#: Share of the work from which the rest is predicted.
 ENOUGH = 0.02
 
 
 class Stages:
-    """One line on stderr: share of the work, stage and time left, once that takes `QUICK`."""
+    """One line on stderr after `QUICK`: share of the work, stage, time left."""
 
     def __init__(self) -> None:
         self._begun: float | None = None
         self._stage = ""
         self._share = 0.0
         self._from = (0.0, 0.0)  # time and share since which the speed is measured
-        self._shown = 0  # characters that stand on the line
-        self._lock = threading.RLock()  # who prints and who shows the line take turns
+        self._shown = 0  # characters of the line
+        self._lock = threading.RLock()  # printing and the line take turns
 
     def hear(self, stage: str, share: float) -> None:
-        """Hear what is done now, "" for the same as before, and the share that is done."""
+        """Note the present stage, "" if unchanged, and the share that is done."""
         if not stage:
             self._share = share
             return
@@ -55,7 +55,7 @@ class Stages:
         self.clear()
 
     def clear(self) -> None:
-        """Take the line away, before something else is printed."""
+        """Clear the line, before something else is printed."""
         with self._lock:
             if self._shown:
                 typer.echo("\r" + " " * self._shown + "\r", err=True, nl=False)
@@ -64,9 +64,9 @@ class Stages:
     def echo(
         self, text: str, *, err: bool = False, nl: bool = True, colour: bool | None = None
     ) -> None:
-        """Print over the line, which comes again below, fitted to the terminal or 80 columns.
+        """Print over the line, fitted to the terminal or 80 columns.
 
-        Words that no terminal shows stay one line: programs look for them.
+        The line comes again below. Words to no terminal stay one line, for programs.
         """
         if not err or is_terminal(sys.stderr):
             text = fitted(text, shutil.get_terminal_size().columns)
@@ -81,7 +81,7 @@ class Stages:
             typer.echo(text.rstrip("\n"))
 
     def _wait(self, seconds: float) -> None:
-        # A thread of its own: what takes long may tell nothing meanwhile.
+        # In its own thread: long work may be silent.
         timer = threading.Timer(seconds, self._tick)
         timer.daemon = True
         timer.start()
@@ -119,17 +119,17 @@ def clock(seconds: float) -> str:
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Whether somebody looks at a stream, on a terminal that can take a line away again."""
+    """Whether a stream is a terminal that can clear a line."""
     seen = stream is not None and stream.isatty()  # None where the caller closed it
     return seen and os.environ.get("TERM") != "dumb"
 
 
-#: What has no width, as colours, and what is copied whole.
+#: Words without width, as colours, and the head of words to copy.
 COLOUR, COMMAND = re.compile(r"\x1b\[[0-9;]*m"), "vftcli "
 
 
 def fitted(text: str, width: int) -> str:
-    """A text in lines of a width, but for commands and long paths, which are copied."""
+    """A text in lines of a width; commands and long paths stay whole."""
     lines: list[str] = []
     for line in text.split("\n"):
         words = line.lstrip()
@@ -144,5 +144,5 @@ def fitted(text: str, width: int) -> str:
     return "\n".join(lines)
 
 
-STAGES = Stages()  #: The one line that a program has.
-echo = STAGES.echo  #: What prints over the line.
+STAGES = Stages()  #: The program's line.
+echo = STAGES.echo  #: Prints over the line.

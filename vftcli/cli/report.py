@@ -1,4 +1,4 @@
-"""`vftcli report` and `vftcli estimate`: logs become folders, with all of it or estimates alone."""
+"""`vftcli report` and `vftcli estimate`: logs become folders."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -26,7 +26,7 @@ class PrintChoice(Choice):
 
 
 class Tables(Choice):
-    """What else is written of estimates."""
+    """Further files of estimates."""
 
     GROUP = WRITE
 
@@ -67,7 +67,7 @@ def report(
     if published is not None:
         check_published(published, asked.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
-    # Of several logs one may lack a wrench; details need all of it.
+    # One of several logs may lack a wrench; details need it all.
     choice = replace(choice, answers_first=len(logs) == 1 and not (json or details))
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.add):
@@ -80,7 +80,7 @@ def report(
     if not analyses:
         left_out.end(0)
     failed = left_out.reasons
-    if not json:  # the answer first: a file that cannot be written does not cost it
+    if not json:  # the answer first, even if writing fails
         show_answers(analyses, failed, details=details)
     stage("writing", WRITING, 1.0)
     record = write_report(
@@ -156,7 +156,7 @@ def estimate(
         refuse_estimates(log)
     OutputFolder(output, force, names).check()
     choice = choice_for(asked, library)
-    # Of a large log only the columns that are looked at are read; outputs show all.
+    # Of a large log only the needed columns are read; outputs show all.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = for_estimates(choice)
     recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))
@@ -166,7 +166,7 @@ def estimate(
     else:
         choice = replace(choice, answers_first=not (json or asked.words["details"]))
         found = analyse(prepared(recording, choice), choice)
-        if not json:  # the answer first; of blocks it comes with the last of them
+        if not json:  # the answer first; of blocks at the end
             show_short(found)
         found = sense(found, choice)
     made, record = write_estimate_folder(output, found, asked.line, written, force)

@@ -1,4 +1,4 @@
-"""`vftcli thresholds`: from motion nobody touched to the thresholds that a robot is given."""
+"""`vftcli thresholds`: from contact-free motion to a robot's thresholds."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -73,7 +73,7 @@ def contact_thresholds(
 
 
 def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
-    """What says where a log is touched without being named: its truth beside it, or its sensor."""
+    """Source of true contacts if not named: truth beside the log, or its sensor."""
     truth = Path(f"{recording.source.path}.truth.parquet")
     if truth.exists():
         return ReferenceChoice(name=f"{FILE}{truth}")
