@@ -1,4 +1,4 @@
-"""``python -m vftcli``: the command line, where its script is not on the path."""
+"""``python -m vftcli``: the command line without its script on the path."""
 
 from vftcli.cli import launch
 

@@ -1,4 +1,4 @@
-"""Analysis: everything one run over one log made, ready to be shown."""
+"""Analysis: the results of one run over one log."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
@@ -32,31 +32,31 @@ if TYPE_CHECKING:
 
 @record
 class Analysis(Shown):
-    """One log, one robot, its observers' estimates, and how they compare with the reference."""
+    """One log, one robot, its observers' estimates, and their errors."""
 
-    #: The log with its robot as it was used, payload mounted, friction possibly off, and
-    #: what is known of its free motion.
+    #: The log with its robot as used (payload mounted, friction possibly off) and its known
+    #: free motion.
     motion: "FreeMotion"
     observers: tuple[Observer, ...]  #: The observers that ran.
     estimates: tuple[ExternalTorque, ...]  #: Their estimates, in the same order.
-    #: What each observer's parameters mean at this log's sample time, by name.
+    #: Meaning of each observer's parameters at this log's sample time, by name.
     tunings: Mapping[str, Tuning]
-    #: What the complete log makes of the estimates, or None where nothing asked.
+    #: Corrections of the estimates by the complete log, or None.
     refinement: "Refinement | None" = None
-    #: The wrenches and what is known of them, or None where none was asked for.
+    #: The wrenches and their limits, or None if none was asked for.
     virtual_sensor: "SensorReading | None" = None
-    reference: ExternalTorque | None = None  #: What the estimates are judged by, or None.
+    reference: ExternalTorque | None = None  #: The torque to compare with, or None.
     #: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
     errors: "pl.DataFrame | None" = None
-    #: What touched the arm, or None where it is not asked or not known.
+    #: What touched the arm, or None if not asked or not known.
     contacts: "ContactList | None" = None
-    #: A printed table beside these errors, or None where none was asked for.
+    #: A printed table beside these errors, or None if none was asked for.
     published: "Comparison | None" = None
-    #: What is wrong with the log, then with its free runs.
+    #: Findings on the log, then on its free runs.
     examinations: "tuple[Examination, ...]" = ()
-    #: What the reader of the numbers should know, as `Remarks`.
+    #: Limits of the numbers, as `Remarks`.
     remarks: tuple[Remark, ...] = ()
-    #: The command, versions and conventions, as `run.json` holds them.
+    #: The command, versions and conventions, as in `run.json`.
     run: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -87,7 +87,7 @@ class Analysis(Shown):
 
     @property
     def wrench(self) -> "Wrench | None":
-        """The wrench of the first observer that has one: of `best`, where contacts are listed."""
+        """The wrench of the first observer with one: `best` if contacts are listed."""
         return next(iter(self.wrenches), None)
 
     @property
@@ -107,14 +107,14 @@ class Analysis(Shown):
 
     @property
     def torques(self) -> tuple[ExternalTorque, ...]:
-        """The estimates, and the reference last if there is one, under the name "reference"."""
+        """The estimates, and last the reference as "reference", if there is one."""
         if self.reference is None:
             return self.estimates
         return (*self.estimates, self.reference)
 
     @property
     def wrenches(self) -> "tuple[Wrench, ...]":
-        """One an observer, and the reference's last under the name "reference" if there is one."""
+        """One an observer, and last the reference's as "reference", if there is one."""
         if self.virtual_sensor is None:
             return ()
         reference = self.virtual_sensor.reference
@@ -128,7 +128,7 @@ class Analysis(Shown):
         joints: int | Sequence[int] | None = None,
         observers: str | Sequence[str] | None = None,
     ) -> "Figure":
-        """A matplotlib figure of the contacts, torques, wrench or errors, neither shown nor saved.
+        """A matplotlib figure of contacts, torques, wrench or errors, not shown or saved.
 
         Args:
             what: contacts, torques, wrench or errors.
@@ -138,30 +138,30 @@ class Analysis(Shown):
         Raises:
             VftError: If there is no such plot, or matplotlib is missing.
         """
-        # What draws and writes is several floors up; an analysis knows nothing of it.
+        # Drawing and writing are several floors up.
         draw = import_module("vftcli.outputs.figures").plot
         figure: Figure = draw(self, what, joints, observers)
         return figure
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Write page, recording, tables and estimates into a folder, as `vftcli report` does."""
+        """Write page, recording, tables, estimates into a folder, as `vftcli report`."""
         write = import_module("vftcli.outputs.report").write_report
         command = self.run.get("command", "vftcli.Analysis.save")
         write(Path(folder), [self], command=command, force=force)
 
     def run_of(self, name: str, run: "Run") -> "Run":
-        """The log or one of its free runs, as the observer of this name has it."""
+        """The log or a free run, as this observer has it."""
         found = self.refinement
         return run if found is None else found.baselines.of(name).of(run)
 
     def spare(self) -> None:
-        """Of a long log give back what the observers ran on; it is made again where asked for."""
+        """Free the terms of a long log; they are made again on request."""
         self.motion.log.spare("terms")
         if self.refinement is not None:
             self.refinement.baselines.best.spare()
 
     def free_log(self, name: str | None = None) -> "FreeLog":
-        """The log with what nobody touched, as an observer has it; for None as the model does."""
+        """The log with its free motion, as an observer has it, or the model."""
         from vftcli.free_motion.free_motion import without_load
         from vftcli.wrench.sensing import FreeLog, as_modelled
 

@@ -1,4 +1,4 @@
-"""What commands and notebooks answer alike, behind what one log's `pipeline` makes."""
+"""Answers that commands and notebooks share, beyond one log's `pipeline`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from vftcli.observers.spectra import Spectra
     from vftcli.observers.tuning import Goal, Tuned
 
-Opened = Path | Recording  #: A log as a call has it: a file, or read already.
+Opened = Path | Recording  #: A log of a call: a file, or already read.
 OpenedLogs = Sequence[Opened]  #: Several such logs.
 
 
 def errors_of(
     analyses: Sequence[Analysis], others: "Sequence[pl.DataFrame]" = ()
 ) -> "pl.DataFrame":
-    """The errors of several logs in one table, those of others too, pooled rows last."""
+    """The errors of several logs and of others in one table, pooled rows last."""
     import polars as pl
 
     from vftcli.evaluation.errors import PoolMember, evaluate_pooled
@@ -60,7 +60,7 @@ def errors_of(
 def free_thresholds(
     logs: OpenedLogs, choice: AnalysisChoice, rate: float
 ) -> "tuple[list[Run], list[ComparedSignals], Thresholds]":
-    """Contact-free logs, their signals, and what motion like theirs exceeds at a rate. [1/h]"""
+    """Contact-free logs, their signals, and thresholds exceeded at a rate. [1/h]"""
     from vftcli.contacts.threshold_check import compared_signals
     from vftcli.contacts.thresholds import find_thresholds
 
@@ -85,10 +85,10 @@ def modelled(recording: Recording, choice: AnalysisChoice) -> Run:
 
 
 def touched(run: Run, choice: AnalysisChoice) -> tuple[Remark, ...]:
-    """A remark where a log that is to be free shows contact.
+    """A remark if a log that should be free shows contact.
 
     Raises:
-        ParameterError: If it shows contact plainly, unless it shall be used anyway.
+        ParameterError: If it shows contact plainly, without `anyway`.
     """
     from vftcli.contacts.thresholds import SETTLING
     from vftcli.evaluation.references import PLAIN, touches
@@ -116,12 +116,12 @@ def identified(
     task: Task,
     tell: Callable[[Recording], None] | None = None,
 ) -> "Identification":
-    """The robot that logs show, tried on those to `check`; what is free is without the load."""
+    """The robot from logs, tried on those to `check`; free motion has no load."""
     from vftcli.identification import identify
 
     examiner, library = choice.examiner, choice.library
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
-    # An episode is one of LOG's; the others are logs of their own.
+    # An episode is one of LOG's; the others are separate logs.
     whole = choice.read.whole
     held_out, unloaded = (
         replace(whole, interval=span) for span in (task.check_interval, choice.read.interval)
@@ -139,24 +139,24 @@ def identified(
     return identify(train, profile, task, tried, free[0] if free else None)
 
 
-#: Observers that give the spectra from which gains are found.
+#: Observers for the spectra from which gains are found.
 TUNED = ObserverChoice(gains=LOG_GAINS, causal=True)
 
 
 class FoundGains(NamedTuple):
-    """Gains that a goal asks for, and what they rest on."""
+    """Gains for a goal, and their basis."""
 
     robot: Robot  #: The arm.
     recording: Recording  #: The log.
-    goal: "Goal"  #: What they are for.
+    goal: "Goal"  #: Their goal.
     tuned: "Sequence[Tuned]"  #: The gains of every observer.
-    spectra: "Spectra"  #: What shows the error that every gain makes.
-    remarks: tuple[Remark, ...]  #: What limits them.
-    examinations: "tuple[Examination, ...]"  #: What is wrong with the log and its free runs.
+    spectra: "Spectra"  #: Spectra that show every gain's error.
+    remarks: tuple[Remark, ...]  #: Their limits.
+    examinations: "tuple[Examination, ...]"  #: Findings on the log and its free runs.
 
 
 def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGains:
-    """The gains that a goal asks for, by the spectra of a log."""
+    """The gains for a goal, by the spectra of a log."""
     from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
 
     goal = parse_goal(asked.gains, asked.threshold)
@@ -172,7 +172,7 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
     return FoundGains(run.robot, run.recording, goal, tuned, spectra, remarks, examinations)
 
 
-#: Observer of the force unless another is named: the paper's controller has it.
+#: Default observer of the force: the paper's controller's.
 DRIVER = "kfo-fe"
 
 
@@ -187,8 +187,8 @@ def replayed(
 
     Args:
         log: The log or scenario, None for a release.
-        asked: The controllers, whether unstable ones run too, and what is asked of the log.
-        choice_of: The choice of what is asked.
+        asked: The controllers, whether unstable ones run too, and the log's options.
+        choice_of: The choice by those options.
         release: Where a release begins, as ``x=0.3``.
         seed: Seed of a scenario.
     """
@@ -203,7 +203,7 @@ def replayed(
     stored = None
     if isinstance(log, Path) and asked.words.get("columns") is None:
         stored = estimates_columns(log, named[0]) if log.exists() else None
-    # A table of estimates may hold those of an observer that is none of ours.
+    # A table of estimates may hold a foreign observer's.
     words = {"observer": named} if stored is None else {"observer": [DRIVER], "columns": stored}
     choice = choice_of(asked.but(**words))
     anyway = choice.examiner.anyway
@@ -224,14 +224,14 @@ def replayed(
             anyway=anyway,
         )
         return Replayed(made)
-    # A file of a scenario, or what has no ending and is no file.
+    # A scenario's file, or a name without ending that is no file.
     is_file = isinstance(log, Recording) or log.exists() or log.suffix or len(log.parts) > 1
     if isinstance(log, Path) and (log.suffix == ".toml" or not is_file):
         return looped(str(log), seed, choice, control, anyway=anyway)
     run = prepared(choice.library.open(log, choice.read), choice)
     recording, arm = run.recording, run.robot
     check_logged(recording, "admit runs a controller that must not see the future")
-    if stored is None:  # estimates of an earlier run were examined in it
+    if stored is None:  # an earlier run examined its estimates
         choice.examiner.examine(recording, arm)
     controllers = control.controllers(arm)
     force = force_of(run, choice, control.force, named[0] if stored else None)
@@ -242,7 +242,7 @@ def replayed(
 def force_of(
     log: Run, choice: AnalysisChoice, source: str | None, stored: str | None
 ) -> "DrivingForce":
-    """The wrench that drives a replay: the log's own, a file's, an estimate's or a new one."""
+    """The force of a replay: the log's own, a file's, an estimate's or a new one."""
     from vftcli.admittance import replay
 
     assert choice.wrench is not None, "`replayed` asks for one"
@@ -261,7 +261,7 @@ def force_of(
 def looped(
     name: str, seed: int | None, choice: AnalysisChoice, control: ControlChoice, *, anyway: bool
 ) -> "Replayed":
-    """A scenario with a controller in the loop, and the force it acted on through all of them."""
+    """A scenario with a controller in the loop, its force through all controllers."""
     from vftcli.admittance.closed_loop import UNLOADED, Replayed, loop_of
     from vftcli.admittance.replay import replay
 

@@ -1,4 +1,4 @@
-"""One call a question, for notebooks: what a command answers, as objects.
+"""One call a question, for notebooks: a command's answer, as objects.
 
 A log is a file, a bag's folder or a `Recording`; a robot is a profile's name, a file, or
 a `Robot`. Keywords are the options of the command without their dashes, made of the
@@ -51,11 +51,11 @@ if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
     from vftcli.contacts.thresholds import Thresholds
 
-#: A robot as a user names it; None where the log settles it.
+#: A robot's name by the user; None for the log's own.
 NamedRobot = str | Path | Robot | None
 R = TypeVar("R")
 
-#: The rooms' choices of which calls take the options.
+#: Choices that give the calls their options.
 OF_LOG: tuple[type[Choice], ...] = (ReadChoice, RobotChoice, Anyway)
 OF_CONTACTS = (*OF_LOG, FreeChoice)
 OF_ESTIMATE: tuple[type[Choice], ...] = (
@@ -70,7 +70,7 @@ OF_REPORT = (*OF_ESTIMATE, AlsoWrench, ReferenceChoice)
 def choice_for(
     asked: Asked, logs: Iterable[Opened], observers: ObserverChoice | None = None
 ) -> AnalysisChoice:
-    """What is asked of some logs, by other observers than it names where given."""
+    """The choice for some logs, with other observers than it names if given."""
     library = Library(log for log in logs if not isinstance(log, Recording))
     return choice_of(asked, library, Examiner(anyway=asked.anyway), observers)
 
@@ -78,11 +78,11 @@ def choice_for(
 def call(
     *kinds: type[Choice], also: Sequence[str] = ()
 ) -> Callable[[Callable[..., R]], Callable[..., R]]:
-    """Make a call of a function of logs and of what is `Asked`: options become its keywords.
+    """Decorate a function of logs and `Asked` as a call with options as keywords.
 
     Args:
-        kinds: The choices of which it takes the options.
-        also: Options that may be given by their place, behind the robot.
+        kinds: The choices with its options.
+        also: Options that may be positional, behind the robot.
     """
     options = {word: option for kind in kinds for word, (*_, option) in kind.options().items()}
     words = [word for word, each in options.items() if not each.is_setting and word != "robot"]
@@ -123,10 +123,10 @@ def call(
 
 
 def checked(log: object, robot: object) -> tuple[Any, str | Robot | None]:
-    """A log or several, and a robot, as a user named them; a name of a file as its path.
+    """One log or several, and a robot; a file's name as its path.
 
     Raises:
-        ParameterError: If one is of another kind than is expected.
+        ParameterError: If one is of another kind.
     """
     if not isinstance(robot, NamedRobot):
         raise ParameterError(f"robot is {robot!r}; expected a name as 'ur5', a file, or a Robot")
@@ -149,7 +149,7 @@ def several(logs: Opened | OpenedLogs) -> list[Opened]:
 
 @call(*OF_LOG)
 def inspect(log: Opened, asked: Asked) -> "Examination":
-    """What a log holds and what is wrong with it: its `remarks`, and the `robots` that fit."""
+    """A log's content and findings: its `remarks`, and the `robots` that fit."""
     choice = choice_for(asked, [log])
     recording = choice.library.open(log, choice.read)
     if choice.robot.name is not None or choice.read.effort == "auto":
@@ -180,7 +180,7 @@ def report(
     output: str | Path | None = None,
     force: bool = False,
 ) -> Analysis:
-    """Everything about a log, as `vftcli report` has it; ``output=`` is the folder to write."""
+    """Everything about a log, as `vftcli report`; ``output=``: the folder to write."""
     made = analysed(log, choice_for(asked, [log]), asked)
     if output is not None:
         made.save(output, force=force)
@@ -188,7 +188,7 @@ def report(
 
 
 def analysed(log: Opened, choice: AnalysisChoice, asked: Asked) -> Analysis:
-    """The analysis of a log, its remarks those of log, estimates and run together."""
+    """The analysis of a log, with the remarks of log, estimates and run."""
     from vftcli.outputs.run_record import all_remarks
 
     (made,) = analyse_logs([log], choice)
@@ -232,7 +232,7 @@ def simulate(
     seed: int | None = None,
     settings: Mapping[str, object] | None = None,
 ) -> Recording:
-    """The log of a simulated experiment, its true forces as a polars frame in its `truth`.
+    """The log of a simulated experiment, with true forces (polars) in its `truth`.
 
     Args:
         scenario: A scenario's name or file.
@@ -257,7 +257,7 @@ def admit(
     release: str | Sequence[str] = (),
     seed: int | None = None,
 ) -> "pl.DataFrame":
-    """The comparison of admittance controllers on a log's force, a row a controller and axis."""
+    """Admittance controllers on a log's force, a row a controller and axis."""
     release = [release] if isinstance(release, str) else list(release)
     logs = [] if log is None else [log]
     found = replayed(log, asked, lambda words: choice_for(words, logs), release, seed)

@@ -1,4 +1,4 @@
-"""The whole way from a log to its numbers, in the order the data flows."""
+"""From a log to its numbers, in the order of the data."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -34,35 +34,34 @@ if TYPE_CHECKING:
     from vftcli.wrench.choice import WrenchChoice
     from vftcli.wrench.detection import KnownContacts
 
-WRITING = 0.7  # share of a log's work that is done before its files are written
+WRITING = 0.7  # share of a log's work before its files are written
 
 
 @dataclass(frozen=True, kw_only=True)
 class AnalysisChoice:
-    """What a user asks of one log, as estimate, compare and report share it: a choice a room."""
+    """Choices on one log that estimate, compare and report share, one a room."""
 
-    #: How the log is read, and which part of it is used.
+    #: Reading of the log, and its part.
     read: ReadChoice = field(default_factory=ReadChoice)
-    #: Which arm made it, and how it is modelled.
+    #: Its arm and model.
     robot: RobotChoice = field(default_factory=RobotChoice)
-    #: Which observers run, and with which gains.
+    #: The observers and their gains.
     observers: ObserverChoice = field(default_factory=ObserverChoice)
-    #: What motion nobody touched, and how the two-cycle difference lays it under the log.
+    #: Motion that nobody touched, and its alignment with the log.
     free: FreeChoice = field(default_factory=FreeChoice)
-    #: What is done with the estimates once the whole log is known.
+    #: Corrections by the whole log.
     refinement: RefinementChoice = field(default_factory=RefinementChoice)
-    #: What is asked of the virtual force/torque sensor, None for joint torques alone.
+    #: The virtual force/torque sensor's, None for joint torques alone.
     wrench: "WrenchChoice | None" = None
-    #: What the estimates are compared with, or None.
+    #: The reference, or None.
     reference: "ReferenceChoice | None" = None
-    #: Whether what touched the arm is listed, where the complete log may be used.
+    #: Whether to list contacts, if the complete log may be used.
     contacts: bool = True
-    #: Whether the wrench of `best`, which nobody asked for, is left to `sense`: the screen,
-    #: which comes first, has nothing of it.
+    #: Whether the unasked wrench of `best` is left to `sense`: the first screen does without.
     answers_first: bool = False
-    #: Where the logs of the command are read, each once.
+    #: The logs of the command, each read once.
     library: Library = field(default_factory=Library, repr=False, compare=False)
-    #: Who examines them, each once, and says whether results mean anything.
+    #: Examines them, each once, and refuses meaningless results.
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -79,13 +78,13 @@ class AnalysisChoice:
 
     @property
     def looks_back(self) -> bool:
-        """Whether anything is asked that needs the complete log and its free part."""
+        """Whether anything needs the complete log and its free part."""
         asked = self.refinement.corrects_all or self.free.is_asked
         return asked or self.observers.from_spectra
 
     @property
     def lists_contacts(self) -> bool:
-        """Whether what touched the arm is listed: that needs the complete log."""
+        """Whether contacts are listed, from the complete log."""
         return self.contacts and not self.observers.causal
 
 
@@ -95,7 +94,7 @@ def choice_of(
     examiner: Examiner,
     observers: ObserverChoice | None = None,
 ) -> AnalysisChoice:
-    """What a command or a call asks of logs, by other observers than it names where given."""
+    """The choice of a command or a call, with `observers` instead if given."""
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.wrench.choice import WrenchChoice
 
@@ -131,7 +130,7 @@ def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> Run:
-    """A log with its robot, its effort named by the robot's model where that is asked for."""
+    """A log with its robot; the model names its effort if asked."""
     robot = choice.examiner.robot(recording, choice.robot)
     if choice.observers.causal:
         check_logged(recording, "--causal leaves out what looks ahead")
@@ -139,12 +138,12 @@ def prepared(recording: Recording, choice: AnalysisChoice) -> Run:
 
 
 def run_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Run:
-    """A log with a robot, as the observers asked for have it."""
+    """A log with a robot, as the chosen observers have it."""
     return choice.examiner.runs.of(recording, robot, literal=choice.observers.as_printed)
 
 
 def check_logged(recording: Recording, why: str) -> None:
-    """Check that no signal was derived from the complete log; else say why that will not do."""
+    """Raise if a signal was derived from the complete log, with the reason."""
     if recording.source.derived:
         raise MissingSignalError(
             f"{recording.name}: joint velocities (dq) that are derived from positions need the "
@@ -160,7 +159,7 @@ def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
     examinations = examine(motion, choice)
     stage(f"{name}: looking for free motion", 0.15, 0.25)
     baselines = model(motion, choice)
-    # Before there are estimates: of a long log both have no room at once.
+    # Before the estimates: both of a long log do not fit at once.
     contacts, unlisted = find_contacts(motion, baselines, examinations[0], choice)
     stage(f"{name}: running observers", 0.4, 0.5)
     analysis = refine(observe(motion, baselines, choice), baselines, choice)
@@ -172,9 +171,9 @@ def analyse(log: Run, choice: AnalysisChoice) -> Analysis:
     return judge(analysis, choice)
 
 
-#: What is done with each log of a command.
+#: The work on each log of a command.
 Analyser = Callable[[Run, AnalysisChoice], Analysis]
-#: Who hears which log could not be analysed, and why.
+#: Called with a log that cannot be analysed, and why.
 Failed = Callable[[Any, VftError], None]
 
 
@@ -184,10 +183,10 @@ def analyse_logs(
     failed: Failed | None = None,
     work: Analyser = analyse,
 ) -> Iterator[Analysis]:
-    """Analyses of the logs of a command one after the other; what they share is made once.
+    """Analyses of a command's logs, one after the other; common parts are made once.
 
-    A log that cannot be analysed is left out where somebody hears of it, else it raises a
-    VftError, as two logs of the same run do.
+    A log that cannot be analysed goes to `failed` if given, else raises a VftError, as two
+    logs of the same run do.
     """
     recordings: list[tuple[Path | Recording, Recording]] = []
     for path in logs:
@@ -223,7 +222,7 @@ def read(log: Run, choice: AnalysisChoice) -> FreeMotion:
 
 
 def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", ...]:
-    """Examinations of the log, then of its free runs; what is meaningless raises."""
+    """Examinations of the log, then of its free runs; meaningless ones raise."""
     runs = [motion.log, *(free.run for free in motion.runs)]
     found = [choice.examiner.examine(run.recording, run.robot) for run in runs]
     motion.log.recording.release()  # much of it is only examined
@@ -231,7 +230,7 @@ def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", 
 
 
 def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baselines | None":
-    """The log's free part, spectra and bias, None where nothing asks for them."""
+    """The log's free part, spectra and bias, None if not needed."""
     if not choice.looks_back:
         return None
     from vftcli.bias.baseline import find_baselines
@@ -267,7 +266,7 @@ def observe(
 
 
 def refine(analysis: Analysis, baselines: "Baselines | None", choice: AnalysisChoice) -> Analysis:
-    """Give the estimates what only the complete log allows: their bands."""
+    """The estimates with the bands that the complete log allows."""
     if baselines is None:
         return analysis
     from vftcli.bias import refine as room
@@ -284,7 +283,7 @@ def find_contacts(
     health: "Examination",
     choice: AnalysisChoice,
 ) -> "tuple[ContactList | None, tuple[Remark, ...]]":
-    """What touched the arm, where that is asked for; if it cannot be known, None and why."""
+    """What touched the arm, if asked for; None and the reason if unknown."""
     if not choice.lists_contacts:
         return None, ()
     from vftcli.contacts.listing import list_contacts
@@ -300,12 +299,12 @@ def find_contacts(
 
 
 def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
-    """The log with what is free of contact: where that is not given, what is given as unloaded."""
+    """The log with its free motion; if none is given, its unloaded spans."""
     return motion if choice.wrench is None else motion.unloaded(choice.wrench.zero.spans)
 
 
 def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -> Analysis:
-    """The analysis with the wrenches asked for, or `unasked` that of `best` beside its contacts."""
+    """The analysis with wrenches: as asked, or `unasked` of `best` with contacts."""
     if analysis.virtual_sensor is not None or (choice.wrench is None and not unasked):
         return analysis
     asked, names = choice.wrench, tuple(o.name for o in analysis.observers)
@@ -317,7 +316,7 @@ def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -
     from vftcli.wrench.choice import WrenchChoice
 
     listed, gate = analysis.contacts, None
-    # Outside of the contacts nothing touches, unless the whole log may be one.
+    # Outside the contacts nothing touches, unless the whole log may be one.
     if listed is not None and listed.tells_untouched and not (asked and asked.looks_back):
         prior = listed.model.prior and listed.model.prior.looser
         gate = sensing.Gate([(contact.start, contact.stop) for contact in listed.contacts], prior)
@@ -337,7 +336,7 @@ def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -
 
 
 def known_contacts(analysis: Analysis, choice: AnalysisChoice) -> "KnownContacts":
-    """What is known of the log's contacts: its list, and where nothing touches the arm."""
+    """Known contacts of the log: its list, and its free samples."""
     from vftcli.contacts.free_statistics import free_part
     from vftcli.wrench.detection import ContactInterval, KnownContacts, read_in_free_runs
 
@@ -357,7 +356,7 @@ def known_contacts(analysis: Analysis, choice: AnalysisChoice) -> "KnownContacts
 
 
 def judge(analysis: Analysis, choice: AnalysisChoice) -> Analysis:
-    """Compare the estimates with a reference, where one is asked for."""
+    """The analysis with errors against a reference, if one is chosen."""
     if choice.reference is None:
         return analysis
     from vftcli.evaluation import references

@@ -1,4 +1,4 @@
-"""Proposal: the options that a log calls for, each with its reason, as inspect writes them."""
+"""Proposal: the options for a log, each with its reason, for inspect."""
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,8 +21,8 @@ from vftcli.signals.errors import MissingSignalError, RobotError, VftError
 from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
 
-MOST_ROBOTS = 5  #: Profiles that are named where none is settled.
-#: What estimates can be compared with, the most telling first, and what for.
+MOST_ROBOTS = 5  #: Most profiles named where none is settled.
+#: References for estimates, the best first, and their reasons.
 REFERENCES = {
     "sensor": "the log holds a wrench that was measured",
     "two-cycle": "the free motion is known too: the reference is the difference of the two",
@@ -34,15 +34,15 @@ class ProposedOption(NamedTuple):
     """One option for a file of options, or a remark alone."""
 
     why: str  #: Its reason.
-    key: str = ""  #: The option without its dashes, or a setting; "" of a remark.
+    key: str = ""  #: The option without its dashes, or a setting; "" for a remark.
     value: str | list[str] = ""  #: Its value: a text or several.
-    holds: bool = True  #: Whether it holds, or is only a choice that you have.
+    holds: bool = True  #: Whether it holds, or is only offered.
 
 
 def propose(
     logs: Sequence[Path], choice: AnalysisChoice, given: Mapping[str, str | list[str]]
 ) -> Iterator[ProposedOption]:
-    """The options that logs call for."""
+    """The options for logs."""
     yield from (ProposedOption("as given", key, value) for key, value in given.items())
     recording = choice.library.open(logs[0], choice.read)
     for option in read_so(recording):
@@ -69,7 +69,7 @@ def propose(
 
 
 def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[ProposedOption]:
-    """The free motion and the references that logs of a known arm call for."""
+    """The free motion and the references for logs of a known arm."""
     run = prepared(choice.library.open(logs[0], choice.read), choice)
     refused = examine(run.recording, run.robot).refusals()
     if refused:
@@ -88,14 +88,14 @@ def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[Propo
     try:
         found = read(run, choice).part.remarks
     except VftError:
-        found = ()  # why there is none says the reference that would need it
+        found = ()  # the reference that needs it says why there is none
     own = "" if free else "; each log's own is found unasked"
     yield from (ProposedOption(f"{remark}{own}") for remark in found)
     yield from references(run, choice)
 
 
 def read_so(recording: Recording) -> Iterator[ProposedOption]:
-    """How a log was read."""
+    """Options for the reading of a log."""
     source = recording.source
     yield ProposedOption(
         f"{source.label} is recognised by its content; a file that is not needs this",
@@ -114,7 +114,7 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
 
 
 def possible_robots(recording: Recording, error: RobotError) -> Iterator[ProposedOption]:
-    """The arms that a log may be from, where it does not settle which."""
+    """Possible arms of a log that does not settle which."""
     fits = guess_robot(recording)[1][:MOST_ROBOTS]
     if not fits:
         yield ProposedOption(str(error))
@@ -128,11 +128,11 @@ def possible_robots(recording: Recording, error: RobotError) -> Iterator[Propose
 
 
 def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> ProposedOption:
-    """What the effort of a log is, by its robot's model."""
+    """The kind of a log's effort, by its robot's model."""
     as_called = choice.examiner.read_as(recording, robot, replace(choice.read, effort=None))
     for finding in examine(as_called, robot).findings:
         if (right := CORRECTIONS.get(finding.code)) is not None:
-            # A sign or a unit has no name of its own.
+            # A sign or a unit has no own name.
             named = right.kind.replace("_", "-") if right.factor == 1.0 else "auto"
             return ProposedOption(in_words(finding).evidence, "log.effort", named)
     called = effort_name(recording, robot).replace("_", "-")
@@ -141,7 +141,7 @@ def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Pro
 
 
 def free_log(log: Path, choice: AnalysisChoice) -> ProposedOption:
-    """Whether nothing touches the arm along a further log, as a remark that holds or not."""
+    """A further log as free motion, if nothing touches the arm; else a remark."""
     label = choice.library.label(log)
     try:
         run = prepared(choice.library.open(log, choice.read.whole), choice)
@@ -157,7 +157,7 @@ def free_log(log: Path, choice: AnalysisChoice) -> ProposedOption:
     return ProposedOption(f"{label}: no contact in {run.recording.duration:.3g} s")
 
 
-#: Why a difference of cycles may tell nothing.
+#: Reason that a difference of cycles may be meaningless.
 ONE_CYCLE = (
     "the log holds one whole cycle, which has to be free of contact: say so with "
     "two-cycle.free-cycles"
@@ -165,7 +165,7 @@ ONE_CYCLE = (
 
 
 def references(run: Run, choice: AnalysisChoice) -> Iterator[ProposedOption]:
-    """What estimates can be compared with: each is tried, and the first that works holds."""
+    """References for estimates, each tried; the first that works holds."""
     plain = replace(choice, observers=ObserverChoice(names=("gmo",)), contacts=False)
     found = False
     for name, why in reasons(run.recording).items():
@@ -184,11 +184,11 @@ def references(run: Run, choice: AnalysisChoice) -> Iterator[ProposedOption]:
 
 
 def reasons(recording: Recording) -> dict[str, str]:
-    """Each reference and what speaks for it, the most telling first."""
+    """Each reference and its reason, the best first."""
     frame, others = recording.wrench_frame, dict(REFERENCES)
     if frame is None or frame.axes != "base":
         return others
-    # A sensor measures in axes of its own; what is in base axes is its controller's.
+    # A sensor measures in its own axes; base axes are a controller's.
     del others["sensor"]
     words = "the log holds a wrench of its controller: an estimate as well where no sensor is"
     return {"two-cycle": others.pop("two-cycle"), "sensor": words, **others}
@@ -205,9 +205,9 @@ WIDTH = 98  #: Letters of a reason's line.
 
 
 def config_text(options: Iterable[ProposedOption]) -> str:
-    """A file of options, each under its reason, a mere choice behind a ``#``.
+    """A file of options, each under its reason, a mere offer behind a ``#``.
 
-    Settings stand last, in the table of their group.
+    Settings come last, in the table of their group.
     """
     parts, table = [HEADING], ""
     for option in sorted(options, key=lambda option: option.key.rpartition(".")[0]):

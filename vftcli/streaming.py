@@ -1,4 +1,4 @@
-"""Long logs: the analysis block by block, so that its memory does not grow with the log."""
+"""Long logs: the analysis in blocks, so that memory does not grow with the log."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,7 +25,7 @@ WHOLE_ROWS = 100_000
 
 
 def comes_in_blocks(recording: Recording, choice: AnalysisChoice) -> bool:
-    """Whether a log is long, and nothing that is asked of it needs all of it at once."""
+    """Whether a log is long and nothing asked needs all of it at once."""
     if recording.samples <= WHOLE_ROWS or recording.dq is None or recording.source.derived:
         return False
     if choice.looks_back or choice.lists_contacts or choice.reference is not None:
@@ -41,11 +41,10 @@ def comes_in_blocks(recording: Recording, choice: AnalysisChoice) -> bool:
 def analysed_in_blocks(
     recording: Recording, choice: AnalysisChoice
 ) -> Iterator[tuple[Analysis, slice | None]]:
-    """The analyses of a log's blocks, in order; with None for its rows that of the log at last.
+    """The analyses of a log's blocks, in order; the log's last, with None for rows.
 
-    The last holds the estimates of the last block alone. The log is examined in
-    stretches; its clock, its numbers and samples that no arm can have made are looked for
-    in all of it.
+    The last holds the estimates of the last block alone. The log is examined in stretches;
+    its clock, its numbers and impossible samples are checked in all of it.
     """
     robot = choice.examiner.robot(stretches(recording), choice.robot)
     log = choice.examiner.read_as(recording, robot, choice.read, in_stretches=True)
