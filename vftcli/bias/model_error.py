@@ -147,7 +147,7 @@ def error_of(values: Array, joints: int) -> ModelError:
 
 
 def column_numbers(joint: int, joints: int) -> Indices:
-    """Which of all columns the row of one joint has: links from it on, then its own."""
+    """Columns of one joint's row among all: links from it on, then its own."""
     own = LINK * joints + (SHAPES + 3) * joint
     return np.asarray(np.r_[LINK * joint : LINK * joints, own : own + SHAPES + 3])
 

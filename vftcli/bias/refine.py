@@ -186,7 +186,7 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
 
 @record
 class Refinement(Shown):
-    """What the complete log makes of its estimates."""
+    """Estimates of a complete log, with bands and limits."""
 
     estimates: tuple[ExternalTorque, ...]  #: The estimates with their bands.
     baselines: Baselines  #: The log's free part and spectra, as the observers have them.

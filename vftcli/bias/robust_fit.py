@@ -193,7 +193,7 @@ class Rows:
         return FittedError(scale * values[:unknowns], values[unknowns:], scale, factor)
 
     def residual(self, found: FittedError) -> Array:
-        """What model and loads leave of the torque. (S, n) [N·m]"""
+        """Torque less model and loads. (S, n) [N·m]"""
         return self.d + self.modelled(found.model) + self.loads.torque_of(found.loads)
 
 

@@ -197,7 +197,7 @@ def bias_of(
     found: Guarded,
     stride: int,
 ) -> WholeLogBias:
-    """The bias on the log's own clock, with its uncertainty and what is said of it."""
+    """The bias on the log's own clock, with its uncertainty and remarks."""
     t, n = motion.t, run.robot.joints
     free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
     load = handed_over(np.broadcast_to(0.0, run.q.shape))

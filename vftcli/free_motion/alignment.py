@@ -166,7 +166,7 @@ def apart(t: Array, q: Array, free: Recording) -> Array:
 
 
 def near(t: Array, q: Array, free: Recording) -> Mask:
-    """Whether the free run is within `SAME_TRAJECTORY` of q at its instants t. (T,)"""
+    """Whether the free run is within `SAME_TRAJECTORY` of q at times t. (T,)"""
     return np.asarray(abs(apart(t, q, free)).max(axis=1) <= SAME_TRAJECTORY)
 
 
@@ -192,7 +192,7 @@ def uniform(recording: Recording, step: float) -> Array:
 
 
 def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
-    """Shift [s] and clock rate of the closest fit; of equals the longest overlap."""
+    """Shift [s] and clock rate of the best fit; of equals the longest overlap."""
     step = max(recording.median_step, free.median_step)
     offset = free.t[0] - recording.t[0]
     q = uniform(free, step)

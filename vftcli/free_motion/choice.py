@@ -114,7 +114,7 @@ class FreeChoice(Choice):
 
     @property
     def is_given(self) -> bool:
-        """Whether the user said what is free; then nothing of it is doubted."""
+        """Whether the user stated the free part; then it is not doubted."""
         return bool(self.logs or self.spans or self.cycles)
 
     @property
@@ -129,7 +129,7 @@ class FreeChoice(Choice):
         free: Sequence[str | Path] | None = None,
         **words: Any,  # noqa: ANN401 - texts and numbers
     ) -> Self:
-        """The choice that the options of a command state, each the word after its option.
+        """The choice by a command's options, each the word after its option.
 
         A word of `free` is a log or a span ``A:B``.
         """

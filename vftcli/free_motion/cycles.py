@@ -132,7 +132,7 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
 
 
 def distances(x: Array) -> Array:
-    """Mean squared distance of x and x so many samples later, for every lag. (N,)"""
+    """Mean squared distance of x to x so many samples later, at each lag. (N,)"""
     x, lags, samples = x - x.mean(axis=0), np.arange(len(x)), len(x)
     cross, behind, ahead = overlapping(x, x, lags)
     return np.maximum(behind + ahead - 2.0 * cross, 0.0) / (samples - lags)
@@ -217,7 +217,7 @@ class Cycles(NamedTuple):
 
 
 def segment(recording: Recording, period: Period) -> Cycles:
-    """Find where the repeated path begins and ends; the log may start amid a cycle.
+    """The repeated path's begin and end; the log may start amid a cycle.
 
     A sample is on the path if the arm is at its place one period later or earlier, or if
     the log holds neither. Contacts push it off for a moment, so the path begins with the
@@ -271,7 +271,7 @@ class FreeCycles(NamedTuple):
 
     @property
     def drawn(self) -> tuple[int, ...]:
-        """Those paired with the others: all, or `MOST_PAIRED` from the first to the last."""
+        """Cycles paired with the others: all, or `MOST_PAIRED` from first to last."""
         if len(self.numbers) <= MOST_PAIRED:
             return self.numbers
         at = np.linspace(0, len(self.numbers) - 1, MOST_PAIRED).round().astype(int)

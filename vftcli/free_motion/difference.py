@@ -297,7 +297,7 @@ def off_line(x: Array, size: int) -> Array:
 
 @cache
 def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
-    """Square of `noise_when_quiet` for white noise over its variance, drawn once."""
+    """Square of `noise_when_quiet` of white noise over its variance, drawn once."""
     noise = np.random.default_rng(SEED).standard_normal((400 * size, 1))
     clock = step * np.arange(len(noise), dtype=float)
     smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)

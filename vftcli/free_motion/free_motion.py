@@ -61,7 +61,7 @@ def within(t: Array, spans: Iterable[tuple[float, float]]) -> Mask:
 
 
 class FreePart(NamedTuple):
-    """Everything that is free of contact, of the log and of free runs."""
+    """All that is free of contact, of the log and of free runs."""
 
     pieces: tuple[RunSamples, ...]  #: One a recording, the log's own first.
     own: Mask  #: RunSamples of the log itself that are free. (T,)
@@ -72,7 +72,7 @@ class FreePart(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeRun:
-    """A motion in another recording that nobody touched, beside the log it serves."""
+    """A contact-free motion of another recording, beside its log."""
 
     run: Run  #: The free run.
     log: Run  #: The log.
@@ -106,7 +106,7 @@ class FreeRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FreeMotion(Shown):
-    """The free motion of one log; each part is found once, when first asked for."""
+    """The free motion of one log; each part is found once, on demand."""
 
     log: Run  #: The log.
     choice: FreeChoice = field(default_factory=FreeChoice)  #: What the user says is free.
@@ -193,7 +193,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def part(self) -> FreePart:
-        """The free part, with how each free run lies on the log among its remarks."""
+        """The free part, with the place of each free run among its remarks."""
         paired = []
         for run in self.runs:
             about = Where(about=run.recording.name)

@@ -366,6 +366,6 @@ def effort_of(names: Sequence[str]) -> str:
 
 
 def robot_of(names: Sequence[str]) -> str | None:
-    """The profile that joint names settle; UR names do not tell the model."""
+    """The profile by joint names, None if ambiguous; UR's names fit all its models."""
     stems = {m[1] for name in names if (m := FRANKA.fullmatch(name))}
     return HINTS.get(stems.pop()) if len(stems) == 1 else None

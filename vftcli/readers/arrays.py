@@ -117,7 +117,7 @@ def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes =
 
 
 def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:
-    """What of a log are numbers, as arrays with a row or more."""
+    """The number arrays of a log with a row or more."""
     arrays = {}
     for name, value in log.items():
         if not isinstance(value, np.ndarray | list):

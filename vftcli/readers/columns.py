@@ -213,7 +213,7 @@ ALIKE, NEAR = (0.5, 2.0), 0.9
 
 
 class Guess(NamedTuple):
-    """What the values of a table say."""
+    """Columns guessed from the values of a table."""
 
     columns: str  #: The text for --columns.
     why: str  #: What was found, in words.

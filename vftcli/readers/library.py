@@ -69,7 +69,7 @@ class Library:
                 yield self.open(path, replace(choice, episode=number))
 
     def label(self, path: str | Path) -> str:
-        """What a log is called, a name that no other log of the command has."""
+        """The name of a log, unique within a command."""
         at = absolute(path)
         # A log without a label gets one that no other has.
         return self._labels.setdefault(at, labelled([at, *self._labels])[at])

@@ -184,7 +184,7 @@ class ArrayUnpickler(pickle.Unpickler):
         self._known: dict[int, Built | None] = {}
 
     def find_class(self, module: str, name: str) -> Data:
-        """Return what a name may stand for."""
+        """The stand-in for a name."""
         if (module, name) == ("collections", "OrderedDict"):
             return self._ordered
         if f"{module.replace('._core.', '.core.')}.{name}" not in ALLOWED:

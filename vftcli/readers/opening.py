@@ -105,7 +105,7 @@ class LogFile:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What had to be left behind to open the file."""
+        """A warning if the file is cut."""
         cut = self.wrapping is not None and self._unwrapped[1]
         return (warning("file-cut", wrapping=self.wrapping),) if cut else ()
 

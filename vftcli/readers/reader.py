@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class RawLog:
-    """What a reader found, in SI units, before the clock is cleaned."""
+    """A log in SI units, before its clock is cleaned."""
 
     stamps: "Array"  #: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
     tick: float = 1.0  #: Length of one tick. [s]
@@ -147,7 +147,7 @@ class ReadChoice(Choice):
 
     @property
     def spec(self) -> "ColumnSpec":
-        """What ``--columns`` says, of nothing where there is no such text."""
+        """The parsed ``--columns``, empty without such a text."""
         from vftcli.readers.columns import ColumnSpec, parse_columns
 
         return parse_columns(self.columns) if self.columns is not None else ColumnSpec()

@@ -251,7 +251,7 @@ SHOWN = 4  #: Names of files that a message shows.
 
 
 def description(file: LogFile) -> str:
-    """What a path is and what to do, behind its name."""
+    """The kind of a path and the remedy, to follow its name."""
     if file.is_folder:
         return of_folder(file.path, file.entries)
     if kind := known_kind(file):
@@ -269,7 +269,7 @@ def description(file: LogFile) -> str:
 
 
 def known_kind(file: LogFile) -> str | None:
-    """What a file is that begins as no log does, and what to do; None of any other."""
+    """The kind of a file that is no log and the remedy; None of any other."""
     mistakes = tables_beside(__file__, "mistakes.toml")
     # The end of a zip archive names what it holds.
     end = bytes(file.content[-HEAD_BYTES:]) if file.head.startswith(b"PK\x03\x04") else b""

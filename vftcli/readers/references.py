@@ -180,7 +180,7 @@ UNIT = 1e-3  #: How far from 1 the axis of a joint may be in the Jacobian.
 
 
 class JacobianLog(NamedTuple):
-    """What such a log holds; the Jacobian's axes and point are the log's own."""
+    """Such a log; the Jacobian's axes and point are the log's own."""
 
     name: str  #: What it is called in tables.
     path: Path  #: The file.

@@ -30,7 +30,7 @@ def plain_name(word: str) -> str:
 
 
 def model_of(name: str) -> str:
-    """What tells arms of one maker apart: the digits of a name and what follows them."""
+    """The mark of an arm among its maker's: from the first digit of a name on."""
     return plain_name(name).lstrip("abcdefghijklmnopqrstuvwxyz")
 
 

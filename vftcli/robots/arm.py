@@ -96,7 +96,7 @@ class BodyTree:
 
     @cached_property
     def below(self) -> dict[str, list[TreeJoint]]:
-        """Link → the joints that it carries, by name: the order in a file has no meaning."""
+        """Link → the joints that it carries, by name, whatever their order in a file."""
         found: dict[str, list[TreeJoint]] = {link: [] for link in self.bodies}
         for joint in sorted(self.joints, key=lambda joint: joint.name):
             found[joint.parent].append(joint)
@@ -194,7 +194,7 @@ class LumpedArm:
 
     @cached_property
     def end(self) -> str:
-        """The link that the tip names: behind the last joint it is the flange itself."""
+        """The tip's link: behind the last joint it is the flange itself."""
         joints = {joint.name: joint.child for joint in self.tree.joints}
         link = self.tip if self.tip in self.tree.bodies else joints.get(self.tip)
         if link is None or not self.longest(self.tree.path_to(link)):
@@ -205,7 +205,7 @@ class LumpedArm:
         return link
 
     def tips(self) -> Iterator[str]:
-        """What a tip may be: every arm's last link, and what is fixed to it."""
+        """Names of all possible tips: every arm's last link, and links fixed to it."""
         for run in filter(None, map(self.along, self.leaves())):
             links = [link for link, _ in self.tree.rigid_links(run[-1].child)]
             yield links[0]
@@ -264,7 +264,7 @@ class LumpedArm:
         return max(reversed(runs), key=lambda run: (len(run), self.mass(run)))
 
     def mass(self, run: Sequence[TreeJoint]) -> float:
-        """Mass of the links that these joints move, without what other joints move. [kg]"""
+        """Mass of the links on these joints, without those on other joints. [kg]"""
         heavy = self.tree.mass_beyond
         return sum(
             heavy[joint.child] - sum(heavy[b.child] for b in self.branches(joint.child))
@@ -285,7 +285,7 @@ class LumpedArm:
         return found
 
     def position(self, joint: TreeJoint) -> float:
-        """Where a locked joint is held; one that follows another goes with it. [rad or m]"""
+        """Position of a locked joint; a mimic joint goes with its own. [rad or m]"""
         if joint.name in self.angles:
             return self.angles[joint.name]
         if joint.follows in self.angles:
@@ -294,7 +294,7 @@ class LumpedArm:
 
     @cached_property
     def locked(self) -> dict[TreeJoint, int]:
-        """The joints that could move and are locked, base to tip, and the group of each."""
+        """The locked joints that could move, base to tip, each with its group."""
         return {
             joint: self.groups[joint.child][0]
             for joint in self.tree.inner
@@ -303,7 +303,7 @@ class LumpedArm:
 
     @cached_property
     def turned(self) -> list[tuple[Array, Body]]:
-        """Rotation of each joint's axis onto z; its link with what is locked there."""
+        """Rotation of each joint's axis onto z; its link with those locked on it."""
         parts = [[NO_BODY] for _ in self.joints]
         for link in self.tree.links:
             group, pose = self.groups[link]

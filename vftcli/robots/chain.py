@@ -45,7 +45,7 @@ class Payload(Shown):
 
 @record
 class Chain(Shown):
-    """Geometry and inertia of an n-joint revolute serial arm at rest on its base."""
+    """Geometry and inertia of a revolute serial arm at rest on its base."""
 
     names: tuple[str, ...]  #: Joint names, base to tip.
     rotation: Array  #: Orientation of frame j in frame j−1 at q = 0. (n, 3, 3)
@@ -94,7 +94,7 @@ class Chain(Shown):
         return list(map(Body, self.mass.tolist(), self.com, self.inertia))
 
     def with_payload(self, payload: Payload | None) -> "Chain":
-        """Return the chain with a load fixed to its flange, merged into the last link."""
+        """The chain with a load on its flange, merged into the last link."""
         if payload is None:
             return self
         flange = Pose(self.flange_rotation, self.flange_translation)
@@ -128,7 +128,7 @@ class Body(NamedTuple):
     inertia: Array  #: Tensor about it. (3, 3) [kg·m²]
 
     def moved(self, pose: Pose) -> "Body":
-        """The body in the axes of another frame, by the pose of its own frame there."""
+        """The body in another frame's axes, by the pose of its own frame there."""
         R, r = pose
         return Body(self.mass, R @ self.com + r, R @ self.inertia @ R.T)
 
@@ -137,7 +137,7 @@ NO_BODY = Body(0.0, np.zeros(3), np.zeros((3, 3)))  #: That of a link without ma
 
 
 def merge_bodies(bodies: Sequence[Body]) -> Body:
-    """One body of those that are joined rigidly, all in one frame (parallel axes)."""
+    """One body of rigidly joined ones, all in one frame (parallel axes)."""
     mass = sum(body.mass for body in bodies)
     com = np.sum([body.mass * body.com for body in bodies], axis=0) / (mass or 1.0)
     inertias = [tensor + m * point_tensor(c - com) for m, c, tensor in bodies]

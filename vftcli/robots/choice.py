@@ -19,7 +19,7 @@ DECLARED = "log"  #: Value of ``--payload``: what the controller knows of, as th
 
 
 class RobotChoice(Choice):
-    """Which arm made a log, and how it is modelled."""
+    """The robot of a log, and its model."""
 
     GROUP = LOG
 
@@ -79,7 +79,7 @@ class RobotChoice(Choice):
 
 
 def choices_for(recording: "Recording") -> str:
-    """What may be given with ``--robot`` for a log, in words."""
+    """Robots for ``--robot`` that fit a log, in words."""
     fitting = [p for p in PROFILES if load_robot(p).joints == recording.joints]
     return (
         f"choose one with --robot: {', '.join(fitting) or ', '.join(PROFILES)}, or a FILE.toml or "
@@ -88,7 +88,7 @@ def choices_for(recording: "Recording") -> str:
 
 
 def declared_payload(recording: "Recording") -> "Payload":
-    """The payload that the controller knows; it never has an inertia."""
+    """The payload known to the controller; it never has an inertia."""
     import numpy as np
 
     from vftcli.robots.chain import Payload

@@ -112,7 +112,7 @@ def load_described(path: Path, tip: str, arguments: Sequence[str]) -> Robot:
 
 
 def robot_of(lumped: LumpedArm, file: Section) -> Robot:
-    """The robot of an arm: its chain and limits, the rest from the TOML beside it."""
+    """The robot of an arm: chain and limits, the rest from its TOML."""
     chain = lumped.chain
     if why := weightless(chain.mass.sum()):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
@@ -155,7 +155,7 @@ def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]
 
 
 def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
-    """Which joints, flange and locked parts the arm has."""
+    """Remarks on the joints, flange and locked parts of the arm."""
     locked = {joint.name: lumped.position(joint) for joint in lumped.locked}
     values = {
         "robot": lumped.tree.name,
@@ -189,7 +189,7 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
 
 
 def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
-    """What is odd about the links' inertia, and the rotors' where there is any."""
+    """Remarks on odd inertia of links and rotors."""
     bare = chain.mass == 0.0
     if bare.any():
         yield caution("links-without-mass", on_joints(bare))

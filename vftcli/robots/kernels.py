@@ -55,7 +55,7 @@ ROUNDING = 1e-15
 
 
 class MomentumTerms(NamedTuple):
-    """The pieces of the equations of motion that need no acceleration."""
+    """The pieces of the equations of motion without acceleration."""
 
     p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
     coriolis_transpose_dq: Array  #: Cᵀq̇. (T, n) [N·m]
@@ -147,7 +147,7 @@ PROGRAMS = threading.local()
 
 
 def program_of(chain: Chain, wanted: tuple[str, ...]) -> Program:
-    """The program of an arm, recorded where it is not among the last `KEPT`."""
+    """The program of an arm, recorded unless among the last `KEPT`."""
     made: dict[tuple[bytes, tuple[str, ...]], Program] = vars(PROGRAMS).setdefault("made", {})
     numbers = vars(chain).values()
     key = b"".join(x.tobytes() for x in numbers if isinstance(x, np.ndarray)), wanted

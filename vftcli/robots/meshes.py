@@ -84,7 +84,7 @@ def named(link: UrdfPart, tag: str, packages: Mapping[str, str]) -> Iterator[Mes
 
 
 def file_of(name: str, path: Path, packages: Mapping[str, str]) -> Path | None:
-    """The mesh file of a name in a URDF, None where there is none that can be shown."""
+    """The mesh file of a name in a URDF, None without one to show."""
     scheme, _, rest = name.rpartition("://")
     package, _, inner = rest.partition("/")
     file = path.parent / rest if scheme != "package" else Path(packages.get(package, "")) / inner
@@ -99,7 +99,7 @@ def file_of(name: str, path: Path, packages: Mapping[str, str]) -> Path | None:
 
 
 def packages_near(path: Path) -> Iterator[tuple[str, str]]:
-    """Name and folder of the packages above a file and beside these, the nearest last."""
+    """Name and folder of packages above a file and beside, the nearest last."""
     for folder in reversed(path.resolve().parents[:ABOVE]):
         for manifest in (*sorted(folder.glob("*/package.xml")), *folder.glob("package.xml")):
             with suppress(RobotError):  # a neighbour's that is no text
@@ -132,7 +132,7 @@ def stl_corners(contents: bytes) -> Array:
 
 
 def obj_corners(contents: bytes) -> Array:
-    """Triangles of an OBJ: a face of more corners is a fan of them. (F, 3, 3)"""
+    """Triangles of an OBJ: a larger face is a fan of them. (F, 3, 3)"""
     points, fans = list[list[bytes]](), list[list[int]]()
     for kind, *words in filter(None, map(bytes.split, contents.splitlines())):
         if kind == b"v":
@@ -165,7 +165,7 @@ def dae_corners(contents: bytes) -> Array:
 
 
 def node_step(step: ET.Element) -> Array:
-    """What an element of a DAE's node does to what is in it. (4, 4)"""
+    """Transform of an element of a DAE's node. (4, 4)"""
     made, texts = np.eye(4), (step.text or "").split()
     if step.tag == "matrix":
         made = np.array(texts, dtype=float).reshape(4, 4)

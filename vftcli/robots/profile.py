@@ -105,14 +105,14 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
 
 
 def check_count(root: Section, key: str, count: int, message: str) -> None:
-    """Refuse a whole number that a key may state unless it is this one."""
+    """Refuse an optional whole number of a key unless it is this one."""
     stated = root.values.get(key, count)
     if isinstance(stated, bool) or stated != count:
         root.refuse(f"{key} is {shown(stated)}{message}", key)
 
 
 def joint_sections(root: Section) -> list[Section]:
-    """The ``[[joints]]`` tables, as many as `dof` says, each with a name of its own."""
+    """The ``[[joints]]`` tables, as many as `dof`, each with its own name."""
     tables = root.tables("joints")
     if not tables:
         root.refuse("there are no [[joints]] tables; a robot file has one for each joint")
@@ -226,7 +226,7 @@ def points(section: Section) -> dict[str, tuple[float, ...]]:
 
 
 def checked_gains(section: Section) -> dict[str, Mapping[str, Any]]:
-    """The ``[observers.*]`` tables: each value is a number, a list of them, or a word."""
+    """The ``[observers.*]`` tables: values are numbers, lists of them, or words."""
     for own in map(section.section, section.values):
         for key, value in own.values.items():
             own.value(key, TEXT if isinstance(value, str) else PER_JOINT)
@@ -275,7 +275,7 @@ def column(joints: Sequence[Section], key: str, default: float = math.nan) -> Ar
 def columns(
     joints: Sequence[Section], kind: type[Limits | SensorNoise], prefix: str = ""
 ) -> dict[str, Array]:
-    """The fields of a record, each a number a joint, by keys that begin with a prefix."""
+    """The fields of a record, each a number a joint, by keys with a prefix."""
     return {name: column(joints, prefix + name) for name in kind.__dataclass_fields__}
 
 
@@ -318,7 +318,7 @@ def robot_document(robot: Robot) -> Table:
 
 
 def kept_or_new(old: Table, payload: Payload) -> Table:
-    """The file's own section if it says the same mass, else a new one in flange axes."""
+    """The file's own section if its mass is the same, else a new one in flange axes."""
     if old.get("mass") == payload.mass:
         return {key: value for key, value in old.items() if not is_table(value)}
     tensor = payload.inertia[np.triu_indices(3)].tolist()
@@ -326,7 +326,7 @@ def kept_or_new(old: Table, payload: Payload) -> Table:
 
 
 def xyz_rpy_document(robot: Robot) -> Table:
-    """A document for a robot that came from a URDF: its chain, stated as xyz and rpy."""
+    """A document for a robot from a URDF: its chain as xyz and rpy."""
     chain = robot.chain
     joints = []
     figures = {**vars(robot.limits), **{f"noise_{k}": v for k, v in vars(robot.noise).items()}}

@@ -1,4 +1,4 @@
-"""Robot: everything known about one arm, whatever file it came from."""
+"""Robot: everything known about one arm, from any file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
@@ -50,12 +50,12 @@ class JointFriction(Shown):
 
     @property
     def reference_temperature(self) -> float:
-        """Joint temperature at which the numbers hold, `REFERENCE` where nobody says. [°C]"""
+        """Joint temperature of the numbers, `REFERENCE` if not stated. [°C]"""
         return REFERENCE if self.temperature_at is None else self.temperature_at
 
     @property
     def table(self) -> dict[str, Any]:
-        """The model as ``[joints.friction]`` of a robot file has it; empty for none."""
+        """The model as ``[joints.friction]`` of a robot file; empty for none."""
         if self.model == "none":
             return {}
         known = {key: value for key, value in vars(self).items() if value not in ((), None, "")}
@@ -105,7 +105,7 @@ class Mesh(NamedTuple):
 
 @record
 class Robot(Shown):
-    """One arm: chain, drives, friction, limits and the gains its observers start from."""
+    """One arm: chain, drives, friction, limits and gains of its observers."""
 
     name: str  #: Short name, as used with ``--robot``.
     chain: Chain  #: Geometry and inertia of the bare arm.
@@ -205,7 +205,7 @@ class Robot(Shown):
         write(Path(file), import_module("vftcli.robots.profile").robot_toml(self), force)
 
     def with_payload(self, payload: str | Payload | None) -> "Robot":
-        """The robot with a load on its flange: a name from the file, a Payload, or None."""
+        """The robot with a load on its flange: a name in its file, a Payload, or None."""
         if isinstance(payload, str):
             if payload not in self.payloads:
                 there = ", ".join(self.payloads) or "none"
@@ -217,7 +217,7 @@ class Robot(Shown):
         return replace(self, payload=payload)
 
     def without_friction(self) -> "Robot":
-        """Return the robot with no friction model, for ``model.friction=none``."""
+        """The robot without friction model, for ``model.friction=none``."""
         return replace(self, friction=())
 
 
@@ -245,7 +245,7 @@ class FlangeSolver:
         return Pose(np.array(place.rotation), np.array(place.translation))
 
     def reach(self, rotation: Array, translation: Array, guess: Array) -> tuple[Array, bool]:
-        """Joint positions at a pose, from a guess nearby, and whether the pose is reached.
+        """Joint positions at a pose, from a guess nearby, and whether it is reached.
 
         A step is Jᵀ(JJᵀ + λ²I)⁻¹e in base axes, cut at the joint limits; where the pose
         is not reached the joints are those of the last step.

@@ -173,7 +173,7 @@ LARGEST = 16 << 20  #: Largest robot file; one with all its words has a hundredt
 
 
 class RobotFile:
-    """A parsed robot file that can point at the line a complaint is about."""
+    """A parsed robot file with line numbers for its complaints."""
 
     def __init__(self, path: Path, what: str = "robot file", text: str | None = None) -> None:
         self.path = path
@@ -263,7 +263,7 @@ class Section(NamedTuple):
         return str(self.value(key, TEXT, default))
 
     def choice(self, key: str, known: Iterable[str], default: str | None = None) -> str:
-        """One of the words that are known, `default` if the key is absent."""
+        """One of the known words, `default` if the key is absent."""
         there = list(known)
         kind = ValueKind(f"one of {', '.join(there)}", lambda v: v in there)
         return str(self.value(key, kind, default))
@@ -281,7 +281,7 @@ class Section(NamedTuple):
         return Section(self.file, values, table, self.joint)
 
     def named_sections(self, *keys: str) -> dict[str, "Section"]:
-        """Each table in this one by its name, itself under "" if it has one of `keys`."""
+        """Tables in this one by name, itself under "" if it has one of `keys`."""
         found = {
             name: self.section(name)
             for name, table in self.values.items()
@@ -341,7 +341,7 @@ def quoted(text: str) -> str:
 
 
 def value_text(value: Any, key: str) -> str:  # noqa: ANN401 - whatever TOML can hold
-    """A value as TOML; floats with as many digits as tell them apart."""
+    """A value as TOML; floats with the fewest exact digits."""
     match value:
         case str():
             return quoted(value)

@@ -34,7 +34,7 @@ BULKY = (*SERIES[1:], "smooth_gap", "smooth_model", "smooth_dq")
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run(Shown):
-    """A recording, or a part of one, and what the robot's model says of it.
+    """A recording, or a part of one, with its robot's model evaluated.
 
     Less an error of its model it is a run again.
     """
@@ -46,7 +46,7 @@ class Run(Shown):
 
     @property
     def name(self) -> str:
-        """What the recording is called in tables and messages."""
+        """The recording's name in tables and messages."""
         return self.recording.name
 
     @property
@@ -95,7 +95,7 @@ class Run(Shown):
 
     @cached_property
     def smooth_gap(self) -> Array:
-        """What the model misses of the torque, below the band of the noise. (T, n) [N·m]"""
+        """Torque missed by the model, below the band of the noise. (T, n) [N·m]"""
         return low_pass(self.t, self.drive_torque - self.model_torque, signal_edge(self.step))
 
     @cached_property
@@ -130,7 +130,7 @@ class Run(Shown):
 
     @cached_property
     def standstill(self) -> Array:
-        """Length of the stop that a sample belongs to, 0 where the joint moves. (T, n) [s]"""
+        """Length of the stop of each sample, 0 where the joint moves. (T, n) [s]"""
         return duration(self.t, self.dq)
 
     @cached_property
@@ -145,13 +145,13 @@ class Run(Shown):
         return self.holding(terms=replace(self.terms, mu=mu))
 
     def holding(self, **values: object) -> "Run":
-        """The same recording with other values of what the model says."""
+        """This run with other values of the model."""
         made = replace(self)
         vars(made).update(values)
         return made
 
     def part(self, span: slice) -> "Run":
-        """Some of its samples as a run, with what the model says of them in the whole."""
+        """Some of its samples as a run, with the model's values of the whole."""
         motion = Recording(
             t=self.t[span], q=self.q[span], dq=self.dq[span], source=self.recording.source
         )
@@ -185,7 +185,7 @@ class Runs:
         self._runs: list[Run] = []
 
     def of(self, recording: Recording, robot: Robot, *, literal: bool = False) -> Run:
-        """The recording with this robot's model, the one that is there if there is one."""
+        """The run of a recording with this robot, an existing one if any."""
         check_joints(recording, robot)
         for run in self._runs:
             if run.recording is recording and run.robot is robot and run.literal == literal:
@@ -261,7 +261,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
 
 
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
-    """Places of a robot's joints among a log's, None where names do not tell.
+    """Places of a robot's joints among a log's, None if the names do not match.
 
     Names are compared as they are; then without a shared prefix and a trailing `_joint`;
     then by number, or by the order that is known of a maker's names.
@@ -272,7 +272,7 @@ def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | No
 
 
 def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
-    """The places of joints that a log calls by the same names behind a prefix.
+    """The places of joints with equal names in a log behind a prefix.
 
     None without one, and where several prefixes fit: two arms.
     """
@@ -293,7 +293,7 @@ def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
 
 
 def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
-    """The places of joints by their numbers, or by an order known of a maker's names."""
+    """The places of joints by number, or by a known order of a maker's names."""
     count = len(joints)
     if found := by_number(logged, count):
         return found
@@ -307,7 +307,7 @@ def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
 
 
 def by_number(names: Sequence[str], count: int) -> tuple[int, ...] | None:
-    """The places of names that differ in a number alone, in its order.
+    """The places of names that differ in a number alone, by that number.
 
     None where there are not as many of one stem as are wanted, of two stems, or with holes.
     """

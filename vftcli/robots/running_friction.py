@@ -37,7 +37,7 @@ class Play(NamedTuple):
 
 
 def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
-    """Deflection s of the play operator; the same in one piece and in stretches.
+    """Deflection s of the play operator, alike in one piece and in stretches.
 
     A sample is the map x → clip(x, q − s₀, q + s₀). Two such maps make one of the same
     kind, clip(clip(x, a, b), a′, b′) = clip(x, clip(a, a′, b′), clip(b, a′, b′)), so
@@ -55,7 +55,7 @@ def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
 
 
 def follow(low: Array, high: Array, start: Array) -> Array:
-    """What clipping to [low, high] sample after sample makes of `start` (n,). (T, n)"""
+    """`start` (n,) clipped to [low, high], sample after sample. (T, n)"""
     samples = len(low)
     if samples <= BLOCK:
         out, value = np.empty_like(low), start
@@ -124,7 +124,7 @@ class RunningFriction:
 
 
 def measured_temperature(recording: Recording) -> Array | None:
-    """A log's joint temperatures, NaN where they are none. (T, n) [°C]
+    """A log's joint temperatures, NaN where missing. (T, n) [°C]
 
     Controllers that do not measure them write zeros.
     """

@@ -21,7 +21,7 @@ class Value(NamedTuple):
     row: int | None = None  #: Number of the row; None for a constant.
 
     def __neg__(self) -> "Value":
-        """The same row with the other sign: no operation."""
+        """This row with the other sign: no operation."""
         return Value(-self.factor, self.row)
 
 
@@ -134,7 +134,7 @@ def constants(values: Array) -> Vector:
 
 
 class Program:
-    """What of a tape some outputs need, ready to run on rows of samples.
+    """The part of a tape for some outputs, ready to run on rows of samples.
 
     It works in memory of its own, which the next run writes over: one caller at a time.
     """

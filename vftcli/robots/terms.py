@@ -62,7 +62,7 @@ def uses_current(recording: Recording, robot: Robot) -> bool:
 
 
 def gain_sd(recording: Recording, robot: Robot) -> float:
-    """How well a log's torques are known, relative to them. [1]"""
+    """Relative deviation of a log's torques. [1]"""
     return CONSTANT_SD if uses_current(recording, robot) else SENSOR_SD
 
 

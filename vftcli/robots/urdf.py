@@ -115,7 +115,7 @@ class UrdfPart(NamedTuple):
         )
 
     def part(self, tag: str) -> ET.Element:
-        """The element of this tag within it, an empty one where there is none."""
+        """The element of this tag within it, an empty one if there is none."""
         found = self.element.find(tag)
         return ET.Element(tag) if found is None else found
 
@@ -143,7 +143,7 @@ class UrdfPart(NamedTuple):
         return unit
 
     def origin(self, parent: ET.Element) -> Pose:
-        """The pose that <origin> gives; both of its keys may be left out."""
+        """The pose of <origin>; both of its keys may be missing."""
         found = parent.find("origin")
         xyz, rpy = (
             self.bounded(parent, "origin", key, 3, key)
@@ -156,7 +156,7 @@ class UrdfPart(NamedTuple):
     def bounded(
         self, parent: ET.Element, tag: str, key: str, length: int, bound: str
     ) -> list[float]:
-        """The numbers of an attribute of an element below `parent`, within their bound."""
+        """The numbers of an element's attribute below `parent`, within bounds."""
         found = parent.find(tag)
         if found is None:
             self.refuse(f"<{parent.tag}> has no <{tag}>")
@@ -246,7 +246,7 @@ def pose_of(placement: Any) -> Pose:  # noqa: ANN401
 
 
 def mjcf_body(path: Path, model: Any, k: int) -> Body:  # noqa: ANN401
-    """What joint k of Pinocchio's model moves, what is fixed to that included."""
+    """The body on joint k of Pinocchio's model, with all that is fixed to it."""
     found, place = model.inertias[k], model.jointPlacements[k]
     body = Body(float(found.mass), np.array(found.lever), np.array(found.inertia))
     each = {**body._asdict(), "xyz": place.translation}

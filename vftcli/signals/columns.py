@@ -45,7 +45,7 @@ ON_ROBOT = "on the robot"  #: Whose force it is: the environment's on the robot.
 
 
 class StatedFrame(NamedTuple):
-    """What is known of some columns that hold wrenches."""
+    """Frame and sign of some wrench columns."""
 
     frame: str  #: Axes and reference point, in words.
     sign: str = ON_ROBOT  #: Whose force it is.

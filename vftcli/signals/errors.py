@@ -64,8 +64,8 @@ class IdentificationError(VftError):
 
 
 class PackageError(VftError):
-    """What is asked for needs a package that is not installed."""
+    """A needed package is not installed."""
 
 
 class ExaminationError(VftError):
-    """What the examination of a log found makes every result meaningless."""
+    """The examination of a log found every result meaningless."""

@@ -1,4 +1,4 @@
-"""What an observer takes and gives: dynamics terms in, external torque out."""
+"""An observer's input and output: dynamics terms, external torque."""
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
@@ -69,7 +69,7 @@ class DynamicsTerms(Shown):
 
     @cached_property
     def clock(self) -> Clock:
-        """How the log is sampled that these are the terms of."""
+        """Sampling of the log behind these terms."""
         return clock_of(self.t) if self.log_clock is None else self.log_clock
 
     @cached_property

@@ -1,4 +1,4 @@
-"""By how much one series runs behind another: the shift at which they fit best.
+"""Lag of one series behind another: the shift of their best fit.
 
 The late series comes first, the early one second; at a positive lag the first runs behind.
 """
@@ -91,7 +91,7 @@ def centred(signals: Array, known: Mask) -> Array:
 
 
 def peak(fit: Array) -> float:
-    """Position of the largest inner value, between samples; NaN if none stands out."""
+    """Position of the largest inner value, between samples; NaN without a peak."""
     k = 1 + int(fit[1:-1].argmax())
     before, here, after = fit[k - 1], fit[k], fit[k + 1]
     if not here >= LEAST_FIT or here < max(before, after):
@@ -118,7 +118,7 @@ def bridge_unknown(t: Array, x: Array) -> Array:
 
 
 class Offset(NamedTuple):
-    """How far one series runs behind another."""
+    """Lag of one series behind another."""
 
     lag: float  #: Time by which the first is late. [s]
     correlation: float  #: Correlation without that lag.
@@ -144,7 +144,7 @@ def time_offset(t: Array, late: Array, early: Array) -> Offset:
 
 
 class LagFit(NamedTuple):
-    """How well two series fit at every lag of the first behind the second."""
+    """Fit of two series at every lag of the first behind the second."""
 
     lag: Indices  #: (L,) [samples]
     #: Mean squared difference of all columns; infinite if short. (L,)

@@ -48,7 +48,7 @@ WORDS = str | int | float | Path  #: What a value is made of.
 
 
 class Option(NamedTuple):
-    """How one value is typed, and what `--help` says of it."""
+    """One option: its form on the command line, and its words in `--help`."""
 
     #: As typed, ``-v/--details``; "" of an argument; dotted of a setting.
     name: str
@@ -64,13 +64,13 @@ class Option(NamedTuple):
     completes: Callable[[], Iterable[str]] | None = None
 
     def values(self) -> list[str]:
-        """What a shell offers for its value; where that is none, files."""
+        """Completions of its value in a shell; none for files."""
         if self.completes is not None:
             return list(self.completes())
         return [word for word in self.metavar.split("|") if WORD.fullmatch(word)]
 
     def read(self, typed: Any) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
-        """What a typed value means, None where nothing was typed."""
+        """The value of a typed text, None if nothing was typed."""
         return self.reads(typed) if self.reads and typed is not None else typed
 
     def keyword(self, value: object) -> object:
@@ -207,7 +207,7 @@ C = TypeVar("C", bound=Choice)
 
 
 class Asked(NamedTuple):
-    """What a command or a call was given, as it would be typed."""
+    """The options of a command or a call, as typed."""
 
     words: Mapping[str, Any]  #: Word of an option → what was given for it, None for nothing.
     settings: Mapping[str, str]  #: Name → text of the settings.
@@ -228,7 +228,7 @@ class Asked(NamedTuple):
         return any(map(self.words.get, kind.options())) or any(map(kind.takes, self.settings))
 
     def but(self, **words: Any) -> "Asked":  # noqa: ANN401 - texts, numbers, lists of them
-        """The same with other words for some of the options."""
+        """This request with other words for some options."""
         return self._replace(words={**self.words, **words})
 
 

@@ -33,7 +33,7 @@ def installed(module: str) -> bool:
 
 
 def remedy(module: str) -> str:
-    """How to install the package of a module."""
+    """The command to install a module's package."""
     return PACKAGES[module][1]
 
 

@@ -17,7 +17,7 @@ HIDDEN = {"Cc", "Cf", "Co", "Zl", "Zp"}
 
 
 def counted(count: int, noun: str) -> str:
-    """How many of a thing: ``1 contact``, ``2 contacts``."""
+    """A number of things: ``1 contact``, ``2 contacts``."""
     return f"{count} {noun}{'s' * (count != 1)}"
 
 

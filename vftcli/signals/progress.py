@@ -1,4 +1,4 @@
-"""How far a long piece of work is: stages and loops say it to whoever hears."""
+"""Progress of long work: stages and loops report it to any listener."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,7 +20,7 @@ _part: ContextVar[tuple[float, float]] = ContextVar("part", default=(0.0, 1.0))
 
 @contextmanager
 def heard_by(hearer: Hearer) -> Iterator[None]:
-    """Within a block tell someone else, or `nobody`."""
+    """Report to another listener within a block, or to `nobody`."""
     token = _hearer.set(hearer)
     try:
         yield
@@ -29,13 +29,13 @@ def heard_by(hearer: Hearer) -> Iterator[None]:
 
 
 def stage(name: str, begin: float = 0.0, end: float = 1.0) -> None:
-    """Say what is done now: the work from one share to another."""
+    """Report the current work, from one share to another."""
     _part.set((begin, end - begin))
     _hearer.get()(name, begin)
 
 
 def steps(items: Sequence[Item]) -> Iterator[Item]:
-    """The items of a loop; before each it says what share is done."""
+    """The items of a loop; before each its share is reported."""
     begin, width = _part.get()
     for k, item in enumerate(items):
         first = begin + width * k / len(items)

@@ -100,12 +100,12 @@ class Source(Shown):
 
     @property
     def repairs(self) -> tuple[str, ...]:
-        """What was dropped, turned or derived, in words."""
+        """Parts that were dropped, turned or derived, in words."""
         return tuple(str(remark) for remark in self.remarks if remark.level == "fact")
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What looks suspicious, in words."""
+        """Suspicious findings, in words."""
         return tuple(str(remark) for remark in self.remarks if remark.level != "fact")
 
 
@@ -228,7 +228,7 @@ class Recording(TimeSeries):
 
     @property
     def name(self) -> str:
-        """What it is called in tables and messages: its label, unique within a command."""
+        """Its name in tables and messages: its label, unique within a command."""
         return self.source.label or "recording"
 
     @property

@@ -36,7 +36,7 @@ WORDS = Path(__file__).parent / "words"  #: The catalogue: a file a room.
 
 
 class Where(NamedTuple):
-    """What a remark is about."""
+    """The subject of a remark."""
 
     #: An observer, log or file by its name; "" where it is the run as a whole.
     about: str = ""
@@ -47,7 +47,7 @@ class Where(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Remark(Shown):
-    """What a reader of the numbers should know."""
+    """A finding about the numbers."""
 
     code: str  #: Which remark it is: a table of the catalogue.
     level: Level = "fact"  #: How much it matters.

@@ -10,7 +10,7 @@ from vftcli.signals.errors import ClockError
 
 
 class Clock(NamedTuple):
-    """How a log is sampled."""
+    """Sampling of a log."""
 
     uniform: bool  #: Whether all steps are equal, so that constant coefficients are exact.
     step: float  #: Nominal sample time. [s]

@@ -36,7 +36,7 @@ class Shown:
     """
 
     def _headline(self) -> str:
-        """What it is, behind the name of its class."""
+        """Its contents in words, behind the name of its class."""
         return ", ".join(f"{name} {text}" for name, text in field_texts(self))
 
     def _rows(self) -> Iterable[Sequence[object]]:
@@ -44,12 +44,12 @@ class Shown:
         return [("field", "value"), *field_texts(self)]
 
     def __repr__(self) -> str:
-        """What it is, on one line."""
+        """The thing on one line."""
         line = printable(f"{type(self).__name__} {self._headline()}".rstrip())
         return f"<{line if len(line) <= LONGEST else line[: LONGEST - 1] + '…'}>"
 
     def _repr_html_(self) -> str:
-        """What it is as the caption of a small table, for notebooks."""
+        """The thing as a small table with a caption, for notebooks."""
         head, *rows = [[escape(printable(cell(x))) for x in row] for row in self._rows()]
         heads = "".join(f"<th>{text}</th>" for text in head)
         lines = "".join(f"<tr>{''.join(f'<td>{text}</td>' for text in row)}</tr>" for row in rows)

@@ -30,7 +30,7 @@ Sign = Literal["on-robot", "by-robot"]
 
 @dataclass(frozen=True)
 class WrenchFrame:
-    """What a log states of its own wrench."""
+    """A log's statement of its own wrench."""
 
     #: base, flange, tool or sensor; or a frame that only the log knows.
     axes: str
@@ -69,7 +69,7 @@ class WrenchFrame:
 
     @property
     def factor(self) -> float:
-        """What turns the values into force on the robot: 1 or −1."""
+        """Factor from the values to force on the robot: 1 or −1."""
         return -1.0 if self.sign == "by-robot" else 1.0
 
     def __str__(self) -> str:
@@ -145,17 +145,17 @@ class Wrench(TimeSeries):
 
     @property
     def hidden(self) -> Mask:
-        """Samples in which the pose cannot tell the wrench. (T,)"""
+        """Samples with a pose at which the wrench is unknown. (T,)"""
         return np.asarray(self.masked, bool)
 
     @property
     def known(self) -> Array:
-        """The wrench, NaN where the pose cannot tell it. (T, 6) [N, N·m]"""
+        """The wrench, NaN where unknown. (T, 6) [N, N·m]"""
         return np.where(self.hidden[:, None], np.nan, self.values)
 
     @property
     def force(self) -> Array:
-        """The force, NaN where the pose cannot tell it. (T, 3) [N]"""
+        """The force, NaN where unknown. (T, 3) [N]"""
         return self.known[:, :3]
 
     @property
@@ -165,7 +165,7 @@ class Wrench(TimeSeries):
 
     @property
     def size(self) -> Array:
-        """|F|, NaN where the pose cannot tell it. (T,) [N]"""
+        """|F|, NaN where unknown. (T,) [N]"""
         size: Array = np.linalg.norm(self.force, axis=1)
         return size
 

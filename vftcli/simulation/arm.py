@@ -1,4 +1,4 @@
-"""The simulated arm with its servo and its contacts, one inner step at a time."""
+"""The simulated arm with servo and contacts, one inner step at a time."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -87,7 +87,7 @@ def rigid_torque(model: Any, reference: Reference) -> Array:  # noqa: ANN401
 
 
 class TrueArm(NamedTuple):
-    """The arm as it is, beside the robot the controller and the observers believe in."""
+    """The true arm, beside the robot of the controller and the observers."""
 
     chain: Chain  #: Geometry and inertia, payload and sensor mounted.
     friction: TrueFriction  #: Friction.
@@ -104,7 +104,7 @@ class Arm:
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
-        """Prepare a run of so long [s]; the arm starts on the reference's one row."""
+        """Prepare a run of a length [s] from the reference's one row."""
         if seed < 0:
             raise ParameterError(f"the seed is {seed}; it must be zero or positive")
         for name in ("temperature_begin", "temperature_end"):
@@ -216,7 +216,7 @@ class Arm:
         return np.asarray(begin + (end - begin) * share)
 
     def close(self) -> dict[str, Array]:
-        """The history so far; what has no value after the last step keeps its last."""
+        """The history so far; its last values fill the row after the last step."""
         self.check_motion()
         history, k = self.history, self.made
         for array in history.values():
@@ -248,7 +248,7 @@ def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
 
 
 def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> TrueArm:
-    """The arm of a scenario: whatever the sizes are, the same numbers are drawn."""
+    """The arm of a scenario; its sizes do not change the drawn numbers."""
     sizes, n = scenario.mismatch, robot.joints
     for name, size in vars(sizes).items():
         most = ABSOLUTE.get(name, LARGEST_SHARE)

@@ -105,7 +105,7 @@ def drawn(spec: PushesSpec, rng: np.random.Generator, duration: float) -> Iterat
 
 
 def hand_of(spec: HandSpec) -> SimulatedContact:
-    """A hand: spring and damper between the handle and where the hand moves."""
+    """A hand: spring and damper between the handle and a moving anchor."""
     for name, rows in (("moves", spec.moves), ("turns", spec.turns)):
         if rows and len(rows) != len(spec.spans):
             raise ParameterError(
@@ -138,7 +138,7 @@ def hand_of(spec: HandSpec) -> SimulatedContact:
 
 
 def stop_of(spec: StopSpec) -> SimulatedContact:
-    """A hard stop: it pushes along its normal where it is met, and never pulls."""
+    """A hard stop: it pushes along its normal and never pulls."""
     if not any(spec.normal):
         raise ParameterError(f"contacts.{spec.name}.normal has no length")
     normal = np.array(spec.normal) / np.linalg.norm(spec.normal)

@@ -70,7 +70,7 @@ class Simulation(NamedTuple):
 
     @property
     def recording(self) -> Recording:
-        """The log as a reader would hand it over: repeats dropped, losses left as gaps."""
+        """The log as from a reader: repeats dropped, losses left as gaps."""
         stamp, written, signals = self.measured
         rows = np.unique(written)
         duplicates = len(written) - len(rows)
@@ -123,7 +123,7 @@ def prepare(scenario: Scenario, seed: int) -> tuple[Arm, Reference]:
 def simulate(
     scenario: Scenario, seed: int | None = None, noise_seed: int | None = None
 ) -> Simulation:
-    """Run an experiment: same scenario and seed, same numbers on the same platform.
+    """Run an experiment: one scenario and seed give one result on a platform.
 
     Args:
         scenario: The experiment.
@@ -144,7 +144,7 @@ def simulate(
 
 
 def observe(arm: Arm) -> Simulation:
-    """Turn a finished run, whoever commanded it, into its log and truth."""
+    """The log and truth of a finished run, whoever commanded it."""
     samples = sample_run(arm)
     truth = truth_of(arm, samples)
     return Simulation(

@@ -107,7 +107,7 @@ class TrueFriction:
 
     @cached_property
     def present(self) -> frozenset[str]:
-        """Names of what any joint has; what none has is left out of a step."""
+        """Parameters that any joint has; others are left out of a step."""
         return frozenset(name for name in SHAPES if getattr(self, name).any())
 
     def times(self, dry: Array, wet: Array) -> "TrueFriction":
@@ -210,7 +210,7 @@ class Plant:
         self.signs = np.where(sticks, np.sign(self.v), 1.0)
 
     def advance(self, tau: Array, external: External | None = None) -> None:
-        """Move one step on under drive torques `tau` (n,) [N·m] and the contacts' torque."""
+        """Move one step under drive torques `tau` (n,) [N·m] and contacts."""
         # The midpoint velocity needs an acceleration before it.
         if not self.moved:
             signs = self.signs

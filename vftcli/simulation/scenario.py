@@ -51,7 +51,7 @@ class ServoSpec(Spec):
 
 
 class FrictionSpec(Spec):
-    """Differences in kind of the true friction from the profile's smoothed curve."""
+    """True friction's differences in kind from the profile's smoothed curve."""
 
     enabled: bool = True  #: False for a frictionless arm.
     #: Dry friction of an arm without friction in its robot file. (n,) [N·m]
@@ -72,7 +72,7 @@ class FrictionSpec(Spec):
 
 
 class MismatchSpec(Spec):
-    """Deviations of the arm from its profile: one standard deviation, relative.
+    """Relative standard deviations of the arm from its profile.
 
     Each is drawn by the seed, a normal deviate cut at two deviations. 0 keeps the profile.
     """
@@ -156,7 +156,7 @@ class ProfileSpec(OnLink, kind="profile"):
 
 
 class LoadSpec(OnLink, kind="load"):
-    """A load hung on a string: its weight, pulling straight down at the point."""
+    """A load on a string: its weight pulls straight down at the point."""
 
     weight: float  #: Weight. [N]
     spans: tuple[tuple[float, float], ...]  #: When it hangs. (K, 2) [s]
@@ -262,7 +262,7 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def apply_override(table: dict[str, Any], override: str) -> None:
-    """Put one `key=value` into the parsed file; contacts are addressed by name."""
+    """Put one `key=value` into the parsed file; contacts go by name."""
     key, text = assignment(override, "--set", "key=value")
     parts = key.split(".")
     node: Any = {"": table}
@@ -281,7 +281,7 @@ def apply_override(table: dict[str, Any], override: str) -> None:
 
 
 def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
-    """A section's dataclass of its TOML table; complaints name the key that is wrong."""
+    """A section's dataclass from its TOML table; errors name the wrong key."""
     keys = fields(cls)  # type: ignore[arg-type]
     paths = {key.name: f"{where}.{key.name}".lstrip(".") for key in keys}
     for name in table:

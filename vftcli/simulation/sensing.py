@@ -51,7 +51,7 @@ class Measured(NamedTuple):
 
 
 def check_sensing(spec: SensingSpec) -> None:
-    """Raise unless the sensing section describes something that can be."""
+    """Raise unless the sensing section is possible."""
     for name in ("dropped", "repeated"):
         if not 0 <= (value := getattr(spec, name)) < 1:
             raise ParameterError(f"sensing.{name} is {value:g}; it is a share from 0 to 1")
@@ -65,7 +65,7 @@ def check_sensing(spec: SensingSpec) -> None:
 
 
 def log_rate(spec: SensingSpec, robot: Robot) -> float:
-    """The log's rate: stated, the robot's own, or the usual one of its kind. [Hz]"""
+    """The log's rate: stated, the robot's own, or its kind's usual one. [Hz]"""
     if spec.rate > 0:
         return spec.rate
     if np.isfinite(robot.sample_rate_hz):

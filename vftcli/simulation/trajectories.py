@@ -70,7 +70,7 @@ class Stretches:
     duration: float  #: Length with the rest at the end. [s]
 
     def at(self, t: Array) -> Reference:
-        """Where the stretches lead at times `t` (T,) [s]; between them the motion rests."""
+        """Reference at times `t` (T,) [s]; between stretches the motion rests."""
         from numpy.polynomial import chebyshev
 
         t = np.asarray(t, float)
@@ -99,7 +99,7 @@ Command = Periodic | Stretches
 
 
 def straight_paths(points: Sequence[Array]) -> tuple[Array, ...]:
-    """Paths of `Stretches` that lead from each of the points (n,) [rad] to the next."""
+    """Paths of `Stretches` from each of the points (n,) [rad] to the next."""
     return tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairwise(points))
 
 
@@ -155,7 +155,7 @@ class HoldSpec(Spec, kind="hold"):
     length: float = 10.0  #: How long. [s]
 
     def motion(self, robot: Robot) -> Command:
-        """A motion that stays at the pose, the usual one if none is given."""
+        """A motion that stays at the pose, by default the usual one."""
         points = [check_start(robot, self.start)] * 2
         return Stretches(np.array([[0.0, 1.0]]), straight_paths(points), self.length)
 
@@ -170,7 +170,7 @@ class OffsetsSpec(Spec, kind="offsets"):
     start: tuple[float, ...] = ()  #: Joint positions at the offset (0, 0, 0). (n,) [rad]
 
     def motion(self, robot: Robot) -> Command:
-        """Each line as a polynomial path of the joints, run through with minimum jerk."""
+        """Each line as a polynomial path of the joints, with minimum jerk."""
         from numpy.polynomial import chebyshev
 
         q = check_start(robot, self.start)
@@ -241,7 +241,7 @@ class PosesSpec(Spec, kind="poses"):
 
 
 class JointwiseSpec(Spec, kind="jointwise"):
-    """One joint at a time swept back and forth at several speeds, the others at rest."""
+    """One joint at a time swept back and forth at several speeds."""
 
     amplitude: float = 0.4  #: Sweep to each side. [rad]
     speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)  #: Mean speeds of the sweeps. [rad/s]

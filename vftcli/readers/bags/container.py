@@ -63,7 +63,7 @@ def batched(messages: Messages, budget: "ReadBudget") -> Iterator[Batch]:
 
 @dataclass
 class MessageCount:
-    """What a container says of its messages, and what was found."""
+    """Messages found in a container, and its own count."""
 
     end: int  #: Where its last whole record ends. [B]
     kept: int = 0  #: Messages found.
@@ -90,7 +90,7 @@ SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
 
 @dataclass
 class ReadBudget:
-    """What reading a container may cost, and what had to be left behind."""
+    """Bounds on reading a container, and remarks on the parts left out."""
 
     path: Path  #: The file, for messages.
     size: int  #: Its size. [B]

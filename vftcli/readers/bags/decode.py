@@ -109,7 +109,7 @@ class Stream:
 
     @property
     def kind(self) -> Kind:
-        """What its type means."""
+        """The meaning of its type."""
         return KINDS[self.channel.type]
 
     @property

@@ -84,7 +84,7 @@ class MessageLayout:
         self.kind = np.dtype(fields | {"itemsize": len(message)})
 
     def fits(self, messages: Bytes) -> Mask:
-        """Which messages, all as long as this layout, have it. (k,)"""
+        """Whether messages, all as long as this layout, have it. (k,)"""
         same = np.ones(len(messages), dtype=bool)
         for a, b in self._fixed:
             same &= (messages[:, a:b] == self._first[a:b]).all(axis=1)

@@ -237,7 +237,7 @@ UR_JOINTS, FRANKA_JOINTS = 6, 7
 
 
 def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
-    """Return the format asked for, the scenario's, or the vendor's usual one.
+    """The format asked for, the scenario's, or the vendor's usual one.
 
     Raises:
         ParameterError: If there is no such format, or the arm cannot log in it.
