@@ -50,8 +50,8 @@ def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
     """Load a robot by profile name, robot file (TOML) or description.
 
     Args:
-        robot: The name, or the file; arguments of a xacro follow it as ``NAME:=VALUE``. A robot is
-            loaded already.
+        robot: The name, or the file, with a xacro's arguments as ``NAME:=VALUE``; a Robot
+            stays as it is.
         tip: The link or joint at the arm's end in a description with hands or several arms.
 
     Raises:

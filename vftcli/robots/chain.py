@@ -7,10 +7,10 @@ model are all made from a chain.
 
 A robot file states its kinematics in one of three ways:
 
-- ``modified-dh``: T_j = Rx(α) Tx(a) Rz(q+θ) Tz(d); the table's frame j is the chain's frame j moved
-  along z by nothing (Tz commutes with Rz), so inertials stay where they are.
-- ``standard-dh``: T_j = Rz(q+θ) Tz(d) Tx(a) Rx(α); the table gives inertials in the *distal* frame
-  j, which sits at the far end of the link: they are moved by Tz(d) Tx(a) Rx(α).
+- ``modified-dh``: T_j = Rx(α) Tx(a) Rz(q+θ) Tz(d); the table's frame j is the chain's (Tz
+  commutes with Rz), so inertials stay as they are.
+- ``standard-dh``: T_j = Rz(q+θ) Tz(d) Tx(a) Rx(α); the table gives inertials in the
+  *distal* frame j, at the far end of the link: they are moved by Tz(d) Tx(a) Rx(α).
 - ``xyz-rpy``: T_j = Trans(xyz) R(rpy) Rz(q), as in a URDF with all axes z.
 """
 

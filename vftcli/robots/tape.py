@@ -51,8 +51,8 @@ class Tape:
     """The operations that equations need, in their order.
 
     Attributes:
-        inputs: Number of rows that are given; those that operations make are counted on from there.
-        operations: What has been recorded.
+        inputs: Number of given rows; rows of operations are counted on from there.
+        operations: The recorded ones.
     """
 
     def __init__(self, inputs: int) -> None:

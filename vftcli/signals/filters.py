@@ -4,8 +4,8 @@ They equal SciPy's `butter` and `sosfiltfilt` to rounding, by `steady_filter`: i
 `scipy.signal` takes longer than filtering a log of a minute.
 
 References:
-    A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, Section 7.2, 2010 (bilinear
-    transformation);
+    A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing, 2010, Section 7.2, for
+    the bilinear transformation;
     P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra",
     IEEE Trans. Audio Electroacoust. 15(2), 1967, for the averaging of segments.
 """

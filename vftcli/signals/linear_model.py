@@ -9,8 +9,8 @@ state with f = q = 0 has mean and variance exactly zero. A block with H = 0 says
 Axes between blocks and numbers hold models of one length side by side.
 
 References:
-    H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
-    AIAA Journal 3(8), 1965.
+    H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic
+    systems", AIAA Journal 3(8), 1965.
 """
 
 from collections.abc import Iterator

@@ -1,7 +1,7 @@
 """Option: the command-line form of a field, and its words in `--help`.
 
-The fields of a room's choice, a dataclass, say how a user gives them, once for the command line,
-the file of options and notebooks. What few users need is a setting, given by ``--set NAME=VALUE``::
+Each field of a room's choice has one, for the command line, the file of options and
+notebooks alike. Rare ones are settings, given by ``--set NAME=VALUE``::
 
     frame: Annotated[str, Option("--frame", "FRAME", "Give the wrench in this frame.")] = "flange"
     period: Annotated[float | None, Option("two-cycle.period", "S", "Commanded period.")] = None

@@ -5,8 +5,9 @@ arm or drive moves away and back within two samples. One can spoil a spectrum or
 a whole log.
 
 References:
-    F. R. Hampel, P. J. Rousseeuw, E. M. Ronchetti, W. A. Stahel, "Robust Statistics: The Approach
-    Based on Influence Functions", Wiley, 1986, Sec. 2.6, for a limit beyond which influence falls.
+    F. R. Hampel, P. J. Rousseeuw, E. M. Ronchetti, W. A. Stahel, "Robust Statistics: The
+    Approach Based on Influence Functions", Wiley, 1986, Sec. 2.6, for a limit beyond which
+    influence falls.
 """
 
 from dataclasses import replace

@@ -163,8 +163,8 @@ class Arm:
             q_d: Commanded positions. (n,) [rad]
             dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
             ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
-            forward: Feed-forward torque; if not given the servo's own, the positions brought to the
-                joint limits. (n,) [N·m]
+            forward: Feed-forward torque; if not given the servo's own, with positions
+                brought to the joint limits. (n,) [N·m]
         """
         rest = np.zeros_like(q_d)
         dq_d, ddq_d = rest if dq_d is None else dq_d, rest if ddq_d is None else ddq_d

@@ -178,7 +178,8 @@ class Plant:
 
     Moreau's midpoint scheme: with q_m = q + h/2 v and v_m extrapolated half a step ahead,
 
-    (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
+    (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,
+    q⁺ = q + h/2 (v + v⁺)
 
     λ is the impulse of dry friction, D the slope of the smooth one; of second order in h
     while no joint begins to stick or slide. Presliding friction is evaluated at q_m. For
