@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 class Analysis(Shown):
     """One log, one robot, its observers' estimates, and their errors."""
 
-    #: The log with its robot as used (payload mounted, friction possibly off) and its known
-    #: free motion.
+    #: The log with its robot as used (payload, friction), and its known free motion.
     motion: "FreeMotion"
     observers: tuple[Observer, ...]  #: The observers that ran.
     estimates: tuple[ExternalTorque, ...]  #: Their estimates, in the same order.
@@ -48,7 +47,7 @@ class Analysis(Shown):
     reference: ExternalTorque | None = None  #: The torque to compare with, or None.
     #: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
     errors: "pl.DataFrame | None" = None
-    #: What touched the arm, or None if not asked or not known.
+    #: The contacts, or None if not asked or not known.
     contacts: "ContactList | None" = None
     #: A printed table beside these errors, or None if none was asked for.
     published: "Comparison | None" = None

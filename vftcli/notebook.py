@@ -160,7 +160,7 @@ def inspect(log: Opened, asked: Asked) -> "Examination":
 
 @call(*OF_CONTACTS)
 def contacts(log: Opened, asked: Asked) -> "ContactList":
-    """What touched the arm along a log."""
+    """The contacts along a log."""
     (made,) = analyse_logs([log], choice_for(asked, [log]), work=list_touches)
     assert made.contacts is not None, "a log that tells no contacts raises"
     return made.contacts

@@ -118,7 +118,7 @@ def choice_of(
 
 
 def list_touches(log: Run, choice: AnalysisChoice) -> Analysis:
-    """What touched the arm along a log, without any observer's estimate."""
+    """The contacts along a log, without any observer's estimate."""
     from vftcli.contacts.listing import list_contacts
 
     motion = read(log, choice)
@@ -283,7 +283,7 @@ def find_contacts(
     health: "Examination",
     choice: AnalysisChoice,
 ) -> "tuple[ContactList | None, tuple[Remark, ...]]":
-    """What touched the arm, if asked for; None and the reason if unknown."""
+    """The contacts, if asked for; None and the reason if unknown."""
     if not choice.lists_contacts:
         return None, ()
     from vftcli.contacts.listing import list_contacts

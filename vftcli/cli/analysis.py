@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
 
-#: How a log is read and its arm; all but a reference.
+#: Choices of reading and arm; all but the reference.
 OF_LOG = (ReadChoice, RobotChoice)
 OF_ANALYSIS = (
     *OF_LOG,

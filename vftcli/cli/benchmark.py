@@ -23,7 +23,7 @@ SPEED = "speed"  #: The benchmark of times.
 
 
 class BenchChoice(Choice):
-    """How much is timed."""
+    """Size of the timing."""
 
     samples: Annotated[int, Option("bench.samples", "N", "Log length.", least=100)] = 30_060
     rounds: Annotated[int, Option("bench.rounds", "N", "Interleaved runs.", least=1)] = 7

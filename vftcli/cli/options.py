@@ -99,7 +99,7 @@ def folder_of(output: Path | None, logs: Sequence[Path], asked: Asked) -> Path:
 
 
 class Talk(Choice):
-    """How much a command prints."""
+    """Amount of a command's output."""
 
     GROUP = OUTPUT
 
@@ -138,8 +138,7 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
     """A typer command made of a function: these choices' options are parameters.
 
     They replace its argument `Asked`; the function's own argument of an option's name wins. The
-    command has `options`, each by the name of its parameter, and `choices`, which have its
-    settings.
+    command has `options` by their parameters' names, and `choices`, which have its settings.
     """
 
     def of(function: Callable[..., None]) -> Callable[..., None]:
@@ -152,7 +151,7 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
             each = (assignment(w, "--set", "NAME=VALUE") for w in values.get("set") or ())
             settings = settings_as_typed(dict(each), choices, "--set ")
             inputs = [*inputs_of(values), *filter(None, [READ.get()])]
-            # How much it prints: by its -v and -q, if it has them.
+            # By its -v and -q, if it has them.
             loud = speaking(details=bool(values.get("details")), quiet=bool(values.get("quiet")))
             with protected(inputs), loud:
                 asked = Asked(values, settings, command_line())

@@ -17,7 +17,7 @@ class ContactsRoom(ModuleType):
     """This package as a module that can be called."""
 
     def __call__(self, *words: Any, **options: Any) -> "ContactList":  # noqa: ANN401
-        """What touched the arm along a log; see `vftcli.notebook.contacts`."""
+        """The contacts along a log; see `vftcli.notebook.contacts`."""
         # The notebook's call, several floors up.
         found: ContactList = import_module("vftcli.notebook").contacts(*words, **options)
         return found

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from vftcli.robots.run import Run
     from vftcli.wrench.smoother import WrenchPrior
 
-Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
+Trust = Literal["good", "fair", "weak"]  #: Trust in a row.
 #: Evidence and band of a row that is good; a wider band makes it weak.
 SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
 #: An axis that sees only larger forces is blind. [N]
@@ -97,7 +97,7 @@ class Contact(Shown):
     course: ForceCourse | None = None  #: |F| from start to end, None where no force is known.
     #: Whether neither free motion nor a reference checks its size.
     inferred: bool = False
-    remarks: tuple[Remark, ...] = ()  #: What limits this row.
+    remarks: tuple[Remark, ...] = ()  #: Limits of this row.
 
     def __post_init__(self) -> None:
         seal(self, "wrench", "wrench_sd", "mean_force", "impulse")
@@ -171,7 +171,7 @@ class Contact(Shown):
 
     @property
     def trust(self) -> Trust:
-        """How far the size of the row may be believed: by its evidence, band and remarks."""
+        """Trust in the size of the row, by its evidence, band and remarks."""
         force, narrow, wide = self.peak_force, self.place_band, self.peak_band
         doubted = self.remarks or self.is_load or (self.evidence or 0.0) < SURE_NATS
         if doubted or force is None or narrow is None or wide is None:
@@ -234,7 +234,7 @@ class Unexplained(NamedTuple):
 class ContactModel(Shown):
     """Noise model behind a list, for `run.json`."""
 
-    #: How the wrench of the contacts moves, None where it was not learned.
+    #: Prior of the contacts' wrench, None if it was not learned.
     prior: "WrenchPrior | None"
     noise_sd: Array  #: √R of each joint. (n,) [N·m]
     error_sd: Array  #: Standard deviation of the model error. (n,) [N·m]
@@ -244,37 +244,37 @@ class ContactModel(Shown):
 
 @record
 class ContactList(Shown):
-    """What touched the arm along a log: a sequence of `Contact`."""
+    """The contacts along a log: a sequence of `Contact`."""
 
     recording: str  #: The log's label.
-    duration: float  #: How long it is. [s]
+    duration: float  #: Its length. [s]
     contacts: tuple[Contact, ...]  #: The contacts, in the order of time.
-    #: What may be contacts, and what may be errors of the model, with less evidence.
+    #: Possible contacts, or errors of the model, of less evidence.
     candidates: tuple[Contact, ...] = ()
-    basis: "Basis"  #: What tells a contact from an error of the model.
+    basis: "Basis"  #: Tells contact from model error.
     #: Remarks on known free motion; none where nothing is known.
     free: tuple[Remark, ...] = ()
-    free_seconds: float = 0.0  #: How much of it there is. [s]
+    free_seconds: float = 0.0  #: Length of the free motion. [s]
     #: Contacts listed in the log's own free part, None where it has none.
     false_on_free: int | None = None
     threshold: float | None = None  #: Evidence that a contact must have, None without. [nats]
     #: The smallest force that this log can tell, None without a wrench. [N]
     smallest_force: float | None = None
-    #: Where nothing can be listed the largest torque, else None.
+    #: The largest torque if nothing can be listed, else None.
     unexplained: Unexplained | None = None
     #: A load that the arm carries and its model lacks, None where none shows.
     load: CarriedLoad | None = None
     #: When the arm stopped so abruptly that what follows is no contact. [s]
     stops: tuple[float, ...] = ()
     model: ContactModel  #: Noise model behind the list.
-    remarks: tuple[Remark, ...] = ()  #: What limits the list as a whole.
+    remarks: tuple[Remark, ...] = ()  #: Limits of the whole list.
 
     def __getitem__(self, place: int) -> Contact:
         """The contact at a place of the list, from 0."""
         return self.contacts[place]
 
     def __len__(self) -> int:
-        """How many contacts there are."""
+        """The number of contacts."""
         return len(self.contacts)
 
     def __bool__(self) -> bool:

@@ -34,7 +34,7 @@ from vftcli.wrench.smoother import BlockLog, Lane, WrenchPrior, contact_block
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
-#: How long it must last, and the pause that joins two. [s]
+#: Least length of a touch, and the pause that joins two. [s]
 LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
 #: Basis on which contact and model error are told apart: known free motion, samples that

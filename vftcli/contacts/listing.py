@@ -73,7 +73,7 @@ AROUND = 1.0
 def list_contacts(
     motion: FreeMotion, bias: WholeLogBias | None = None, *, referenced: bool = False
 ) -> ContactList:
-    """What touched the arm along a log."""
+    """The contacts along a log."""
     log = motion.log
     check_log(log)
     bias = bias or whole_log_bias(log)
@@ -267,8 +267,7 @@ def limits(
 def felt_by(run: Run, torque: Array) -> float:
     """Median over the log of the smallest force that the joint torques show. [N]
 
-    Along the best axis, each joint hiding 1.96 standard deviations of its torque (n,)
-    [N·m].
+    Along the best axis; each joint hides 1.96 standard deviations (n,) [N·m].
     """
     some = slice(None, None, -(-len(run.q) // POSES))
     J = abs(flange_jacobian(run.robot.loaded_chain, run.q[some])[:, :3])
@@ -332,8 +331,7 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
     """One row for contacts that are a load: mean of the ungated wrench, and band.
 
-    Standard deviation of the mean: √(s²/m + (3 % of the mean)²), s the spread of m means
-    over 5 s.
+    Standard deviation of the mean: √(s²/m + (3 % of it)²), s the spread of m means over 5 s.
     """
     part = free_part(motion)
     wrench = smooth_wrench(motion.log, () if part is None else part.pieces)

@@ -55,7 +55,7 @@ class ContactLocation(NamedTuple):
     """Place of a contact, as far as it is known."""
 
     fits: list[PointFit]  #: Points that fit, the best first.
-    joints: int  #: How many the arm has.
+    joints: int  #: Number of joints.
     #: Links that a force and a moment may have touched; 0 is the flange.
     likely: tuple[int, ...]
 
@@ -110,7 +110,7 @@ class ContactMeasurement:
     run: Run  #: The log with its robot's model.
     found: Candidates  #: The contacts that were kept.
     log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
-    prior: WrenchPrior  #: How the wrench of the contacts moves.
+    prior: WrenchPrior  #: Prior of the contacts' wrench.
     test: PseudoContactTest  #: Errors of a wrench in free motion.
     #: Mean and variance of the model error. (K, n) [N·m], [(N·m)²]
     quiet: tuple[Array, Array]
@@ -136,7 +136,7 @@ class ContactMeasurement:
 
     @cached_property
     def priors(self) -> list[WrenchPrior]:
-        """How the wrench of every contact may move: one that is short moves faster."""
+        """Prior of every contact's wrench: a short contact moves faster."""
         own = self.prior.looser
         return [own._replace(time=min(own.time, OWN_TIME * s)) for s in self.found.lasts]
 
@@ -148,7 +148,7 @@ class ContactMeasurement:
 
     @cached_property
     def locations(self) -> list[ContactLocation]:
-        """Where every contact is, from the disturbance less the model error."""
+        """Place of every contact, from the disturbance less the model error."""
         return [self.location(i) for i in range(len(self.found.runs))]
 
     def rows(self, locations: Sequence[ContactLocation] | None = None) -> list[Contact]:
@@ -171,7 +171,7 @@ class ContactMeasurement:
         return [self.row(i, *pair, moved.get(i, J)) for i, pair in each]
 
     def location(self, number: int) -> ContactLocation:
-        """Where a contact is."""
+        """Place of a contact."""
         run, blocks = self.found.runs[number], self.log.blocks
         size = self.wrenches[number].within(run).size
         peak = run[0] + size.argmax()
@@ -195,7 +195,7 @@ class ContactMeasurement:
         """One row of the list."""
         run, blocks = self.found.runs[number], self.log.blocks
         span, inside, factor = slice(*run), course.within(run), WIDENED * self.test.widening
-        # What drive constants and block length hide, as for `best`.
+        # Hidden by drive constants and block length, as for `best`.
         hidden = hidden_by_blocks(course.values, self.bent)[run[0] - course.first :]
         covariances = inside.covariance * np.outer(factor, factor) + hidden[: len(inside.values)]
         force, length = inside.values[:, :3], blocks.length[span]

@@ -69,15 +69,15 @@ HALF, TURNED, APART = 0.5, np.cos(np.radians(60.0)), 0.25
 
 
 class Candidates(NamedTuple):
-    """What may be contacts along a log."""
+    """Possible contacts along a log."""
 
     log: BlockLog  #: The log in blocks, b strict.
-    places: list[ContactPlace]  #: Where a contact may be.
+    places: list[ContactPlace]  #: Possible places of a contact.
     runs: list[BlockSpan]  #: Blocks of every candidate, in the order of time.
     evidence: Array  #: Of every candidate at every place. (C, places) [nats]
     #: Of every candidate whether a joint's torque is beyond its threshold in it.
     beyond: list[bool]
-    prior: WrenchPrior  #: How the wrench of the candidates moves.
+    prior: WrenchPrior  #: Prior of the candidates' wrench.
 
     @property
     def best(self) -> Array:
@@ -104,10 +104,9 @@ class Candidates(NamedTuple):
 
 
 def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candidates:
-    """What may be contacts along a log, in blocks of a length [s].
+    """Possible contacts along a log, in blocks of a length [s].
 
-    Free motion has this noise, and the momentum observer's torque this level in it. (n,)
-    [N·m]
+    `noise` and `level`, the momentum observer's torque (n,) [N·m], are of free motion.
     """
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)

@@ -38,9 +38,8 @@ GAIN = 10.0  #: Of the momentum observer. [1/s]
 def compared_signals(run: Run) -> ComparedSignals:
     """Signals that a robot would compare along a log.
 
-    The wrench is the log's own where the robot made it (sensor axes are an instrument's,
-    unseen by the robot), else by least squares from the torque, in base axes about the
-    flange point.
+    The wrench is the log's own if the robot made it (one in sensor axes is an instrument's),
+    else by least squares from the torque, in base axes about the flange point.
     """
     # Without a model nothing else checks the joints.
     log = run.recording
@@ -81,11 +80,11 @@ class CheckedContact(NamedTuple):
 
 
 class ThresholdDetection(NamedTuple):
-    """What thresholds would have done along a log with contacts."""
+    """Contacts of a log, and their detection by thresholds."""
 
     log: str  #: The log.
     contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
-    remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
+    remarks: tuple[Remark, ...]  #: Limits of the numbers.
     #: Source of the true contacts; without one (None) the alarms count as contacts.
     reference: str | None = None
     #: Alarms that touch no contact, None without a reference.
@@ -185,7 +184,7 @@ class CountedAlarms(NamedTuple):
 
 
 def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedAlarms:
-    """How often a log passes thresholds."""
+    """Passages of thresholds along a log."""
     t, joints = signals.t, thresholds.level("joints", signals)
     hours = max(signals.recording.duration - SETTLING, 0.0) / 3600.0
     return CountedAlarms(

@@ -59,7 +59,7 @@ class Tail(NamedTuple):
     """The exponential tail of one signal of one log."""
 
     maxima: Array  #: The block maxima, largest first. (B,)
-    size: int  #: How many of them, k, lie beyond `start`.
+    size: int  #: Number k of them beyond `start`.
 
     @property
     def start(self) -> float:
@@ -174,8 +174,7 @@ class SignalThreshold(NamedTuple):
     interval: tuple[float, float]  #: 95 % of it.
     rate: float  #: The false alarms that are this signal's share. [1/h]
     log: str  #: The free log that it comes from: the one that needs the highest.
-    #: That log's tail; None of a log that is too short for one and reads higher than the
-    #: others' tails.
+    #: That log's tail; None of one too short for a tail that reads higher than the others'.
     tail: Tail | None
 
     @property
@@ -211,7 +210,7 @@ class Thresholds(Shown):
     force: tuple[SignalThreshold, ...]
     of_vendor: bool  #: Whether the joints' are of the robot's own estimate.
     logged_wrench: bool  #: Whether those of axes and force are of the robot's own wrench.
-    remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
+    remarks: tuple[Remark, ...] = ()  #: Limits of the numbers.
 
     def _headline(self) -> str:
         values = joined(one.value for one in self.joints)

@@ -73,7 +73,7 @@ class PointFit(NamedTuple):
     """A force at a point of a link, as it explains a torque."""
 
     link: int  #: The link, from 1; the last one's end is the flange.
-    share: float  #: Where along the link, from its joint (0) to the next (1).
+    share: float  #: Share along the link, from its joint (0) to the next (1).
     misfit: float  #: χ² of the torque that is left.
     score: float  #: χ² and what the size of the force costs.
     force: Array  #: The force in base axes. (3,) [N]
@@ -89,8 +89,7 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     """Forces at points of the links that fit within `ALIKE`, the best first.
 
     `POINTS` a link are tried, from `FIRST_LINK` on. F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows
-    of the point's Jacobian over sd. Joints behind the point predict zero: so the torque
-    shows the place.
+    of the point's Jacobian over sd. Joints behind it predict zero, which shows the place.
     """
     poses, n = link_poses(chain, q[None]), chain.joints
     links = np.arange(FIRST_LINK, n + 1).repeat(POINTS)
@@ -113,8 +112,8 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     return [PointFit(*each) for each in zip(*columns, forces[order], bands[order], strict=True)]
 
 
-MARGIN = 1.0  #: How far a window reaches beyond its contacts on either side. [s]
-NEAR = 0.4  #: How far it reaches where only the prior is learned. [s]
+MARGIN = 1.0  #: Length of a window beyond its contacts on either side. [s]
+NEAR = 0.4  #: That length where only the prior is learned. [s]
 MOST_LANES = 96  #: Lanes that are worked on at once.
 START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]

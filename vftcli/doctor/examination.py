@@ -107,10 +107,8 @@ def examine(
 
     Args:
         recording: The log.
-        robot: The arm it is from, its payload mounted; None for the log's own, or to find it
-            among the profiles.
-        in_stretches: Whether to examine `stretches` of a long log, and its whole clock, to save
-            room.
+        robot: The arm, its payload mounted; None for the log's own, or a search.
+        in_stretches: Whether to examine `stretches` of a long log, and its whole clock.
     """
     part = stretches(recording) if in_stretches else recording
     if unusable := tuple(unusable_findings(part)):
@@ -150,8 +148,7 @@ class Examiner:
     Args:
         anyway: Whether to continue despite a finding that makes results meaningless.
         fitting: Whether the robot must be the log's; identification makes it so.
-        tell: Called at once with every examination that refuses nothing, so that its findings
-            appear whatever follows.
+        tell: Called at once with every examination that refuses nothing.
     """
 
     def __init__(
@@ -276,9 +273,9 @@ class FindingWords(NamedTuple):
     name: str  #: Short name; variants of one finding share it.
     #: A note informs; a warning can make results wrong and fails ``--strict``.
     severity: str
-    evidence: str  #: What was seen, with numbers.
-    consequence: str  #: What it does to the results.
-    remedy: str  #: What to do about it.
+    evidence: str  #: The evidence, with numbers.
+    consequence: str  #: Its effect on the results.
+    remedy: str  #: Its remedy.
 
     def __str__(self) -> str:
         """The finding on one line."""

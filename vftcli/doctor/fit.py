@@ -38,8 +38,8 @@ CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
 #: and a measured effort (1.3–12 %).
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
 #: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the
-#: next: UR10e logs fit their own to .1–.26 %, the next 30 times worse; FR3 and Panda are
-#: 2 apart.
+#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the
+#: next: UR10e logs fit theirs to .1–.26 %, the next 30 times worse; FR3 and Panda 2.
 GUESSED, APART = 0.012, 5.0
 HEAVY = 5.0  #: A load from which a measured effort is another arm's. [kg]
 #: Torques that a model should explain, the clearest first.
@@ -48,8 +48,7 @@ MAKER, RESIDUAL, MEASURED = (
     "torque less the vendor's residual",
     "measured effort",
 )
-#: Misfit of a measured effort that no friction of a sound log makes (below .12), load and
-#: contact left out.
+#: Misfit of a measured effort beyond friction's (sound logs: .12), load and contact apart.
 NO_FIT = 0.35
 DOUBTFUL = 0.15  #: Misfit from which other arms are compared.
 ANOTHER = 0.6  #: Share of the misfit that another profile may leave to be the log's own.

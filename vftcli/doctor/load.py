@@ -23,8 +23,8 @@ JOINT_CONSTANTS = np.array(
     [3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756]
 )
 SAME = 0.02  #: Scatter of one joint size's constants between firmwares.
-#: Loads in a note, and in a warning: hands weigh .5–1.1, constants 3 % off look like .3 on
-#: a UR10e. [kg]
+#: Loads in a note, and in a warning: hands weigh .5–1.1, constants 3 % off seem .3 on a
+#: UR10e. [kg]
 HAND, LOAD = 0.4, 1.2
 SURE = 4.0  #: Least load in standard deviations by the scatter.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.

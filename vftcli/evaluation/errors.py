@@ -89,8 +89,7 @@ class Scored(NamedTuple):
     reference: Array  #: (T,) [N·m]
     moving: Mask  #: Whether the joint moves: then the reference is reliable. (T,)
     floor: float  #: The reference's own error, NaN if unknown. [N·m]
-    #: Bootstrap draws of the mean squared errors, one column an observer, in shared blocks, to
-    #: compare observers.
+    #: Bootstrap draws of the mean squared errors, one column an observer, in shared blocks.
     paired: Resampled
     #: Draws of each observer, in blocks of its own length.
     own: tuple[Resampled, ...]

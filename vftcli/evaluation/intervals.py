@@ -52,10 +52,9 @@ class Resampled(NamedTuple):
 def resample(squares: Array, length: int) -> Resampled:
     """Moving-block bootstrap draws of the means of squared errors. (T, m) [(N·m)²]
 
-    Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from
-    the series closed to a ring, so that every sample counts alike (Politis and Romano's
-    circular variant of Künsch's moving blocks); all columns share blocks of `length`
-    [samples].
+    Blocks of `MEMORY` correlation times (`block_lengths`), all columns' `length` [samples],
+    are drawn with replacement from the series closed to a ring, so that every sample counts
+    alike (Politis and Romano's circular variant of Künsch's moving blocks).
     """
     samples = len(squares)
     blocks = max(1, round(samples / length))

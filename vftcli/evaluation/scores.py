@@ -40,8 +40,8 @@ def parts_of(t: Array, scored: Mask, contacts: Sequence[Sequence[float]]) -> dic
 def episodes(t: Array, size: Array, on: float, off: float) -> list[tuple[float, float, float]]:
     """True contacts of a size |f| or max |τ|: start, end [s], and peak.
 
-    One starts above `on` and ends below `off`; gaps below `GAP` are closed, then those shorter
-    than `SHORTEST` dropped.
+    One starts above `on` and ends below `off`; gaps below `GAP` are closed, then contacts
+    shorter than `SHORTEST` dropped.
     """
     inside = np.zeros(len(t), bool)
     for start, stop in runs_of(~(size < off)):

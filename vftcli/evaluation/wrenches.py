@@ -73,8 +73,7 @@ def evaluate_wrenches(
 #: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench"
 #: or "list".
 #:
-#: One to one: rows neither credited to a true contact nor false alarms are pieces of one,
-#: or its echo.
+#: Rows neither credited to a true contact nor false alarms are pieces of one, or its echo.
 CONTACT_SCHEMA: Schema = {
     "recording": pl.String,
     "observer": pl.String,

@@ -1,8 +1,7 @@
 r"""The links' parameters by least squares, and the nearest physical links.
 
 Only the R factor of the stacked equations' QR decomposition is kept, chunk by chunk: memory
-does not grow with the log. Base parameters are the combinations of inertial parameters that
-motion can show.
+does not grow with the log. Motion shows only base parameters, combinations of the inertial.
 
 A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
 
@@ -198,8 +197,7 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
 def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     """Base parameters by weighted least squares, as rows of `BASE`.
 
-    Directions without data keep the start; a parameter mostly in them has infinite
-    deviation.
+    Directions without data keep the start; parameters mostly in them have infinite sd.
     """
     layout = triangles.layout
     grouping, (R, z) = group_parameters(layout), triangles.joined()

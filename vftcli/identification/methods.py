@@ -258,8 +258,7 @@ def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
 
 #: Share of undetermined base parameters from which a motion is narrow.
 NARROW = 0.7
-#: That share if the weakest pull predicts best, as in rounds of one motion, each of which
-#: knows the others.
+#: That share if the weakest pull predicts best, as in rounds of one motion.
 MOST = 0.5
 #: Share of a joint's torque that the profile's links must leave before others are tried.
 MATTERS = 0.02

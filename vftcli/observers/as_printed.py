@@ -1,8 +1,7 @@
 """Printed variants of the paper, run by `--as-printed` to show its errata.
 
-FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹), a share of
-the momentum, to dᵗ; and the filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, without −ωe^{−ωt}p₀
-of (26).
+FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ; and
+the filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, without −ωe^{−ωt}p₀ of (26).
 
 GMO (35): feeds back r^{i−1} + r^{i−2}: oscillates above K·Ts = .343, unstable from 2 on.
 

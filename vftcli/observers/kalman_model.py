@@ -206,8 +206,7 @@ def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
 
         eᵗ = (1−L₁)(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹),  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹)
 
-    from e⁰ = 0, τ̂⁰ = 0, hence x̂⁰ = [p⁰; 0]: the same filter, but two large momenta do
-    not cancel.
+    from e⁰ = 0, τ̂⁰ = 0, hence x̂⁰ = [p⁰; 0]: the same filter without large momenta.
     """
     (f11, f12), (f21, f22) = closed_loop(gains, model)
     return np.array([[f11, -f12], [-f21, f22]]), np.array([f11, gains.l2])
@@ -216,8 +215,7 @@ def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
 def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
     """Gains of one piece, with its models in blocks. (length, n, blocks) each
 
-    `entering` is the covariance after the sample before the piece, `guess` the blocks'
-    first start. (n,)
+    `entering` is the covariance before the piece, `guess` the blocks' first start. (n,)
     """
     blocks = model.r.shape[2]
     starts = np.stack(guess)[..., None].repeat(blocks, axis=2)

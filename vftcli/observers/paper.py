@@ -1,8 +1,7 @@
 r"""The paper's four observers: filtered dynamics, momentum, two Kalman filters.
 
 All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and
-μ = τ + Cᵀq̇ − g − F_f. Their one input is the gain of momentum over a sample beyond the
-model:
+μ = τ + Cᵀq̇ − g − F_f. Their one input is a sample's momentum beyond the model:
 
     dᵗ = pᵗ − pᵗ⁻¹ − ½Ts(μᵗ + μᵗ⁻¹).
 
@@ -70,8 +69,7 @@ class FirstOrderObserver(BlockObserver):
     """τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a), a = K·Ts/2, common to FDO and GMO.
 
     Past a gap (`GAP` nominal steps) with a > 1 the state would change its sign: there the
-    filter starts afresh, with a remark. Gains with a > 1 at the nominal step restart
-    nothing.
+    filter starts afresh, with a remark, unless a > 1 at the nominal step.
     """
 
     @abstractmethod
@@ -226,8 +224,7 @@ class KalmanObserver(BlockObserver):
     With diagonal R, Q_p and Q_τ it is n two-state filters with gains independent of data.
     The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the
     stationary prior: no transient of the gains at a constant sample time. On an uneven
-    clock each step has its own A, B, Q and R. The estimate's `sd` is √P₂₂, the filter's own
-    error.
+    clock each step has its own A, B, Q and R. The estimate's `sd` is the filter's √P₂₂.
 
     For A_τ = 0, A_c² = 0 and both discretisations share A and B; only Q differs.
 

@@ -90,8 +90,7 @@ class Spectra:
     def external(self) -> Array:
         """S_τ, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
 
-        It is the excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times the
-        excess below.
+        The excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times it below.
         """
         f = self.frequency[:, None]
         slow = (self.frequency > 0.0) & (self.frequency <= SLOW)

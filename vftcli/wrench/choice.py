@@ -57,7 +57,7 @@ class AlsoWrench(Choice):
 
 
 class WrenchChoice(Choice):
-    """What a user asks of the virtual sensor."""
+    """A user's choice of the virtual sensor."""
 
     GROUP = WRENCH
 

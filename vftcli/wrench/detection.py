@@ -30,8 +30,7 @@ TRUE_TORQUE = 0.5  #: A true joint torque beyond this is a contact. [N·m]
 #: A true contact, and least half width of a free band. (6,) [N, N·m]
 WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
 LEAST_TORQUE = 0.5  #: Smallest half width of a free band of joint torques. [N·m]
-#: Contacts of an exact reference closer than this are one; a measured one has a floor and
-#: uses `GAP`. [s]
+#: Contacts of an exact reference closer than this are one; a measured one uses `GAP`. [s]
 TRUE_GAP = 0.12
 
 
@@ -77,7 +76,7 @@ def departure(values: Array, quiet: Array, least: Array | float) -> Array:
 
 
 class Detection(NamedTuple):
-    """How well found contacts agree with the true ones, one to one."""
+    """Agreement of found contacts with the true ones, one to one."""
 
     contacts: int  #: True contacts.
     listed: int  #: Found contacts, right or wrong.
@@ -116,8 +115,7 @@ def assignment(
 ) -> list[int | None]:
     """Number of the found contact credited to each true one, None if missed.
 
-    A found contact is credited to one true contact: as many as possible are found, with
-    the largest overlap.
+    Each is credited at most once: as many as possible, with the largest overlap.
     """
     given: list[int | None] = [None] * len(true)
     if found and true:
@@ -157,7 +155,7 @@ def match_contacts(
 
 
 class ContactScore(NamedTuple):
-    """How well one observer detects contacts."""
+    """Detection of contacts by one observer."""
 
     name: str  #: The observer.
     signal: str  #: Its source: "torque", "wrench", or "list" of contacts.
@@ -232,10 +230,9 @@ def judge_contacts(
 ) -> tuple[ContactScore, ...]:
     """Every observer's contacts against those of a reference torque.
 
-    A list of contacts is judged if an observer has one. Otherwise contacts are found in
-    the wrenches if they were asked for, else in the joint torques, by a free band: from
-    the zero spans, else the log's free part, else free runs, else the time before the
-    first true contact.
+    A list of contacts is judged if an observer has one. Otherwise contacts are found in the
+    wrenches if asked for, else in the joint torques, by a free band: from the zero spans,
+    else the log's free part, else free runs, else before the first true contact.
     """
     t, true = reference.t, true_contacts(reference)
     kind, least = "torque", np.asarray(LEAST_TORQUE)

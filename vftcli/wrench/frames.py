@@ -5,7 +5,7 @@ p its origin, a wrench given in S reads in F
 
     [F_F; N_F] = [[R, 0], [[p]×R, R]] [F_S; N_S]
 
-which is (56) corrected (the paper prints R transposed in the lower left block) and
+which is (56), corrected (the paper prints R inverted in the lower left block), and
 Pinocchio's ``SE3(R, p).act(Force)``.
 
 A log may state its wrench's axes, the point of its moment and its sign (`WrenchFrame`);
@@ -37,7 +37,7 @@ FRAMES: dict[str, str] = {
 
 
 class Mounting(NamedTuple):
-    """What is fixed to the flange."""
+    """Poses of tool and sensor on the flange."""
 
     tool: Pose | None = None  #: Pose of the tool in the flange frame, None if there is none.
     #: Pose of the force/torque sensor in the flange frame, None if there is none.

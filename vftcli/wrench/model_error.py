@@ -84,7 +84,7 @@ class TorqueNoise(NamedTuple):
     seen: Mask
     at_rest: Array  #: Variance that rest adds. (n,) [(N·m)²]
     pushed: Array  #: Variance that rest under a contact adds. (n,) [(N·m)²]
-    near: float = 0.0  #: How far rest reaches before and after itself. [s]
+    near: float = 0.0  #: Reach of rest before and after itself. [s]
     #: Length of the free motion behind it; 0 where it is assumed. [s]
     free_seconds: float = 0.0
 
@@ -279,7 +279,7 @@ class ErrorProcess(NamedTuple):
     decay: Array  #: Share of b that is kept from the block before. (K, n)
     added: Array  #: Variance that is added. (K, n) [(N·m)²]
     white: Array  #: R, `UNKNOWN` of a hidden block. (K, n) [(N·m)²]
-    spikes: Array  #: How often an innovation is a spike. (K, n)
+    spikes: Array  #: Rate of spikes among innovations. (K, n)
 
     def hiding(self, hidden: Mask) -> "ErrorProcess":
         """The process with some blocks (K,) hidden."""

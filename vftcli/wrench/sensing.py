@@ -220,9 +220,8 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
 def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     """The raw disturbance, averaged over `HALF` around each sample. (T, n) [N·m]
 
-    No option changes it and no filter delays it. The mean is a difference of its integral,
-    so an uneven clock weighs by time; at the ends of the log it is shorter. A log of one
-    sample reads zero.
+    No option changes it and no filter delays it. As a difference of its integral it weighs
+    an uneven clock by time; it is shorter at the log's ends, 0 for one sample.
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:

@@ -92,7 +92,7 @@ def find_mounting(
 
 
 class AxesFit(NamedTuple):
-    """How one force reads in terms of another: theirs ≈ gain · matrix · ours."""
+    """One force in terms of another: theirs ≈ gain · matrix · ours."""
 
     matrix: Array  #: The signed permutation of axes that fits best. (3, 3)
     gain: float  #: Factor on top of it.

@@ -87,11 +87,11 @@ class SensorReading(Shown):
     drifts: tuple[Drift, ...] = ()  #: Zero drift, one an unloaded span and observer.
     #: Unloaded samples: of the zero spans, or of the start. (T,)
     free: Mask
-    #: What the smoother found, by observer.
+    #: The smoother's wrenches, by observer.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
     #: The wrench that the others are compared with, in the same frame, or None.
     reference: Wrench | None = None
-    remarks: tuple[Remark, ...] = ()  #: What the reader of the numbers should know.
+    remarks: tuple[Remark, ...] = ()  #: Limits of the numbers.
 
     @property
     def masked_share(self) -> float:

@@ -111,11 +111,11 @@ class BlockLog(NamedTuple):
 class Lane(NamedTuple):
     """One hypothesis on one window."""
 
-    window: BlockSpan  #: Which blocks.
+    window: BlockSpan  #: Its blocks.
     gate: Mask  #: Blocks of the log in which the wrench may differ from zero. (K,)
     hidden: Mask  #: Blocks of the log that say nothing. (K,)
     jacobian: Array  #: J along the log. (K, 6, n)
-    prior: WrenchPrior | None  #: How the wrench may move; None where nothing touches.
+    prior: WrenchPrior | None  #: Prior of the wrench; None without contact.
 
 
 def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
@@ -219,8 +219,8 @@ class SmoothedWrench(NamedTuple):
     #: Blocks that may have a wrench; the others read zero, as far as the pose shows. (K,)
     inside: Mask
     seconds: float  #: Length of a block. [s]
-    prior: WrenchPrior  #: How the wrench may move.
-    noise: TorqueNoise  #: What counts as noise.
+    prior: WrenchPrior  #: Prior of the wrench.
+    noise: TorqueNoise  #: Its noise.
     gate: bool  #: Whether contacts were listed; else the whole log is one.
     #: Whether a correction of the model's error was left out; see `sensing.smooth_log`.
     uncorrected: bool = False
@@ -233,7 +233,7 @@ class SmoothedWrench(NamedTuple):
         return deviations(self.covariance)
 
     def unlisted(self, t: Array) -> Mask:
-        """Which times lie outside every listed contact; none without a list. (T,)"""
+        """Times outside every listed contact; none without a list. (T,)"""
         block = np.searchsorted(self.t + 0.5 * self.seconds, t)
         return ~self.inside[np.minimum(block, len(self.t) - 1)]
 
@@ -261,7 +261,7 @@ class SmoothedWrench(NamedTuple):
         }
 
     def remarks(self, name: str) -> tuple[Remark, ...]:
-        """What a reader of the wrench should know."""
+        """Remarks on the wrench: its noise, correction and load."""
         where, free = Where(name), self.noise.free_seconds
         learned = fact("wrench-noise-learned", where, free_s=free)
         found = [
@@ -336,8 +336,7 @@ def prior_of(
 def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     """Covariance of a contact of `UNLISTED` seconds about each block. (K, 6, 6)
 
-    The quiet blocks before it leave the model error b with the variance of a filter's steady
-    state,
+    The quiet blocks before it leave the model error b with a filter's steady variance,
 
         p⁺ = p⁻R/(p⁻ + R),    p⁻ = f²p⁺ + v(1 − f²).
 
