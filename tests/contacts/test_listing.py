@@ -168,7 +168,8 @@ def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
     assert row.peak_force == pytest.approx(np.linalg.norm(row.mean_force), rel=0.01)
     assert row.anywhere == (row.peak_force - row.peak_band, row.peak_force + row.peak_band)
     assert abs(np.median(row.course.force) - 27.5) < 2.0
-    assert row.vendor_force == pytest.approx(2.8 * 9.81)
+    # Interpolated between samples 32 ms apart, in which the pose turns by 1e-2 rad.
+    assert row.vendor_force == pytest.approx(2.8 * 9.81, rel=1e-4)
 
 
 def test_a_payload_nobody_reported_is_one_load(logs: Path) -> None:

@@ -147,7 +147,7 @@ class Tab:
 
     def blank_charts(self) -> list[str]:
         """Charts, living or still, that take no room or on which nothing is drawn."""
-        return self.page.evaluate("""() => {
+        look = """() => {
           const drawn = (canvas) => canvas.width && canvas.height && canvas.getContext("2d")
             .getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value);
           const living = [...document.querySelectorAll("canvas")].filter((x) => !drawn(x));
@@ -156,7 +156,12 @@ class Tab:
             return !(width > 20 && height > 20 && svg.querySelector("path, rect"));
           });
           return [...living, ...still].map((x) => x.closest("figure").textContent);
-        }""")
+        }"""
+        for _ in range(50):  # a busy machine draws late
+            if not (blank := self.page.evaluate(look)):
+                break
+            self.page.wait_for_timeout(100)
+        return blank
 
     @property
     def overflow(self) -> int:

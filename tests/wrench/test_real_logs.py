@@ -56,6 +56,23 @@ def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
 
 
 @pytest.mark.slow
+def test_dry_friction_at_a_reversal_is_no_push(logs: Path) -> None:
+    """J2 and J3 turn round within the pushes, stuck for a block or two.
+
+    MuJoCo's friction is 5 N·m off the model's then: a peak was 34 ± 8 N where 18 N act.
+    """
+    folder = logs / "mujoco_ur5e"
+    request = AnalysisChoice(
+        read=ReadChoice(columns=MUJOCO), robot=RobotChoice(name=str(folder / "robot.toml"))
+    )
+    rows = analysed(folder / "circle.csv", request).contacts.contacts
+    assert len(rows) == 5
+    for row in rows:
+        off = abs(row.peak_force - row.sensor_force)
+        assert off <= min(row.peak_band, 2.0)  # measured 0.0 to 0.7 N
+
+
+@pytest.mark.slow
 def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) -> None:
     """Exact profile, gain 30: ≤ 1.5 N and ≤ 0.4 N·m (measured 0.52 and 0.07)."""
     for name in ("pushes", "pushes_truth"):

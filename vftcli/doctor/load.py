@@ -88,12 +88,14 @@ def load_remarks(case: Case) -> Iterator[Remark]:
         return
     if missing and abs(mass - missing) < DECLARED + 0.3 * abs(missing):
         return
+    moved = case.rough.values[case.windows.weights.columns.shape[2]] - mass
     share = case.loaded.size / case.bare.size
     heavy = abs(mass) > LOAD and share < EXPLAINED
     if not heavy and share >= PARTLY:
         return
     values = {
-        "sd_kg": np.hypot(case.load_sd, gain_sd(recording, robot) * mass),
+        # By the scatter, and by how far drive constants and links move it.
+        "sd_kg": np.sqrt(sd**2 + (gain_sd(recording, robot) * mass) ** 2 + moved**2),
         "robot": robot.name,
         "bare_percent": 100 * case.bare.size / case.size,
         "loaded_percent": 100 * case.loaded.size / case.size,

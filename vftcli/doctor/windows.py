@@ -304,15 +304,6 @@ class Case:
         return fit
 
     @property
-    def load_sd(self) -> float:
-        """Standard deviation of a load's mass. [kg]
-
-        By the scatter, and by how far errors of the links move it.
-        """
-        moved = self.rough.values[self.windows.weights.columns.shape[2]] - self.loaded.values[0]
-        return float(np.hypot(self.loaded.sd[0], moved))
-
-    @property
     def mounted(self) -> float:
         """Mass of the payload in the robot file, 0 without one. [kg]"""
         payload = self.windows.robot.payload

@@ -298,7 +298,11 @@ def steady_process(
         time = np.where(starts, np.minimum(time, START_TIME), time)
     decay = np.exp(-steps(blocks)[:, None] / time)
     decay[0] = 0.0
-    white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
+    # Where a moving joint turns round, its dry friction may be any.
+    v, moves, turns = blocks.velocity, ~blocks.rests, np.zeros(decay.shape)
+    turns[1:-1] = (v[:-2] * v[2:] < 0.0) & moves[:-2] & moves[2:]
+    turned = turns * (REST_SHARE * noise.dry) ** 2
+    white = np.where(blocks.known[:, None], noise.white + turned, UNKNOWN)
     return ErrorProcess(decay, variance * (1.0 - decay**2), white, np.zeros(decay.shape))
 
 

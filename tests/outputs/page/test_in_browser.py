@@ -95,7 +95,8 @@ def test_nothing_is_asked_for_nor_reported_and_everything_is_drawn(
     opened: Callable, request: pytest.FixtureRequest, name: str
 ) -> None:
     text = render(request.getfixturevalue(name))
-    assert "NaN" not in text.partition('<script type="module">')[0]
+    words = text.partition('<script type="module">')[0]
+    assert not re.search(r"(?<![\w+/])NaN(?![\w+/])", words)  # base64 may hold its letters
     assert "{{" not in text
     tab = opened(text)
     asked: list[str] = []
@@ -484,13 +485,13 @@ def test_the_slider_goes_by_samples_and_seconds_and_says_what_it_reads(
     page.keyboard.press("PageUp")
     assert page.evaluate("vftcli.clock.head") == pytest.approx(before + 1.008)
     page.wait_for_timeout(60)
-    assert re.match(r"6\.0\d s, < 3 N\s+no contact", page.evaluate("slider.ariaValueText"))
+    assert re.match(r"6\.0\d s, < 2 N\s+no contact", page.evaluate("slider.ariaValueText"))
 
 
 def test_nothing_glides_where_motion_is_unwanted(opened: Callable, html: str) -> None:
     page = live(opened(html, reduced_motion="reduce"))
     page.locator("#contact-6").click()
-    there = pytest.approx(11.316, abs=0.0041)  # half a sample
+    there = pytest.approx(11.344, abs=0.0041)  # half a sample
     assert page.evaluate("[vftcli.clock.way, vftcli.clock.head]") == [None, there]
     page = live(opened(html))
     page.locator("#contact-6").click()

@@ -51,7 +51,7 @@ def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
     log, robot, span, contacts, hardest, least, error, state = overview_row(line)
     assert (log.text, robot, span) == ("ur5_circle.csv", "ur5", "20.0 s")
     assert log.html == '<a href="a%20b/index.html">ur5_circle.csv</a>'
-    assert (contacts, hardest, least) == ("12", "91 ± 7 N at 5.1 s", "3 N")
+    assert (contacts, hardest, least) == ("12", "91 ± 7 N at 5.1 s", "2 N")
     assert error == "0.273 N·m (best)"  # without J5, which rests
     assert state.text == f"{MARKS[line.standing]} {line.words}"
     bad = line._replace(standing="bad", words="load: heavy <b>", name="<i>")

@@ -158,7 +158,7 @@ def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None
         assert f"{row['force']} {row['band']}" == (unknown if contact.place_unknown else shown)
         assert row["weak"] == (contact.trust == "weak")
     assert data["first"] == data["contacts"][0]["i"]
-    assert data["none"] == ("< 3 N", "", "no contact")
+    assert data["none"] == ("< 2 N", "", "no contact")
     assert data["wrench"] == {"flange": True}
 
 

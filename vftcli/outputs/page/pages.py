@@ -10,7 +10,6 @@ from typing import Any
 import polars as pl
 
 from vftcli.analysis import Analysis
-from vftcli.bias.refine import Budget
 from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.errors import JointMeans, joint_means
 from vftcli.observers.table import OBSERVERS
@@ -86,7 +85,11 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
         grids += contact_grids(analysis.errors)
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
     if (refined := analysis.refinement) is not None and refined.budgets:
-        view["budget"] = budget_grid(refined.budgets[0])
+        # Stiction at rest is a bound, so the sum leaves it out.
+        first = refined.budgets[0]
+        each = {**first.parts, "all but stiction at rest": first.total}.items()
+        rows: Rows = [(first.name, cause, *values) for cause, values in each]
+        view["budget"] = Grid(("observer", "cause", *joint_columns(log.joints)), rows)
     if analysis.published is not None:
         view["printed"] = print_grid(analysis.published)
     answer, (surfaces, lacking) = headline(analysis), link_surfaces(analysis.robot)
@@ -238,14 +241,6 @@ def joint_values(values: Array) -> str:
     texts = enumerate(map(significant, values.tolist()), 1)
     runs = [(text, [j for j, _ in run]) for text, run in groupby(texts, itemgetter(1))]
     return part("parts/joint_values", runs)
-
-
-def budget_grid(budget: Budget) -> Grid:
-    """An observer's error by cause. [N·m]"""
-    # Stiction at rest is a bound, so the sum leaves it out.
-    parts = {**budget.parts, "all but stiction at rest": budget.total}
-    rows: Rows = [(budget.name, cause, *map(float, values)) for cause, values in parts.items()]
-    return Grid(("observer", "cause", *joint_columns(len(budget.total))), rows)
 
 
 def render_index(analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = {}) -> str:
