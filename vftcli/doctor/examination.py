@@ -254,7 +254,7 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
             none = "none explains the torques (vftcli inspect). Add --robot NAME or a URDF"
             words = f"{best}. Add {' or '.join(good)}" if good else f"{best}; {none}"
         raise UnsettledRobotError(f"Which arm? {words}", recording)
-    others = [str(fit) for fit in fits if fit is not found]
+    others = [fit.in_short for fit in fits[:3] if fit is not found]
     remark = fact("robot-guessed", robot=found.robot, fit=str(found), others=others or ["none"])
     return found.robot, (remark,)
 
