@@ -144,10 +144,12 @@ class Tab:
         """Open every part of the details and wait until its charts have been drawn."""
         self.page.evaluate("document.querySelectorAll('details').forEach(x => { x.open = true })")
         self.page.wait_for_timeout(150)
+        # A busy machine draws late.
+        self.page.evaluate("new Promise((done) => requestIdleCallback(done, {timeout: 5000}))")
 
     def blank_charts(self) -> list[str]:
         """Charts, living or still, that take no room or on which nothing is drawn."""
-        look = """() => {
+        return self.page.evaluate("""() => {
           const drawn = (canvas) => canvas.width && canvas.height && canvas.getContext("2d")
             .getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value);
           const living = [...document.querySelectorAll("canvas")].filter((x) => !drawn(x));
@@ -156,12 +158,7 @@ class Tab:
             return !(width > 20 && height > 20 && svg.querySelector("path, rect"));
           });
           return [...living, ...still].map((x) => x.closest("figure").textContent);
-        }"""
-        for _ in range(50):  # a busy machine draws late
-            if not (blank := self.page.evaluate(look)):
-                break
-            self.page.wait_for_timeout(100)
-        return blank
+        }""")
 
     @property
     def overflow(self) -> int:

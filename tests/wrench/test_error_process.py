@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from drawn_blocks import B, blocks, drawn, noise
 
-from vftcli.robots.friction import PUSHED_SHARE, REST_SHARE, STOP_SHARE
+from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.linear_model import SPIKE
 from vftcli.wrench.model_error import (
     LEAST_TIME,
@@ -119,7 +119,7 @@ def test_a_joint_that_turns_round_may_show_any_friction_for_a_moment() -> None:
     velocity = np.column_stack([np.linspace(0.5, -0.5, 20), 0.005 * (-1.0) ** np.arange(20)])
     course = error_process(noise(2), blocks(np.zeros((20, 2)), velocity))
     turned = np.isin(np.arange(20), [9, 10])
-    np.testing.assert_allclose(course.white[:, 0], 0.01 + turned * (REST_SHARE * 10.0) ** 2)
+    np.testing.assert_allclose(course.white[:, 0], 0.01 + turned * (CREEP_SHARE * 10.0) ** 2)
     np.testing.assert_allclose(course.white[:, 1], 0.01)
 
 

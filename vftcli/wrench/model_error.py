@@ -161,9 +161,11 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
         return None
     share = (~np.concatenate([piece.rests for piece in pieces])).mean(axis=0)
     noise = fitted_noise([without_reversals(piece, share > MOVES) for piece in pieces], dry)
-    # The innovations' tails may exceed the spectrum.
-    processes = ((piece.d, error_process(noise, piece)) for piece in pieces)
-    each = [innovations(error_model(d, own), own.spikes)[0] for d, own in processes]
+    # The innovations' tails, those where joints turn round too, may exceed the spectrum.
+    each = []
+    for piece in pieces:
+        process = error_process(noise, piece)._replace(white=noise.white + 0.0 * piece.d)
+        each.append(innovations(error_model(piece.d, process), process.spikes)[0])
     squares = np.concatenate(each)
     asked = [np.quantile(squares, share, axis=0) / value for share, value in QUANTILES]
     factor = np.maximum(np.max(asked, axis=0), 1.0)
@@ -298,10 +300,10 @@ def steady_process(
         time = np.where(starts, np.minimum(time, START_TIME), time)
     decay = np.exp(-steps(blocks)[:, None] / time)
     decay[0] = 0.0
-    # Where a moving joint turns round, its dry friction may be any.
-    v, moves, turns = blocks.velocity, ~blocks.rests, np.zeros(decay.shape)
-    turns[1:-1] = (v[:-2] * v[2:] < 0.0) & moves[:-2] & moves[2:]
-    turned = turns * (REST_SHARE * noise.dry) ** 2
+    # Where a moving joint turns round its dry friction may be any.
+    v, turns = np.where(blocks.rests, 0.0, blocks.velocity), np.zeros(decay.shape)
+    turns[1:-1] = v[:-2] * v[2:] < 0.0
+    turned = turns * (CREEP_SHARE * noise.dry) ** 2
     white = np.where(blocks.known[:, None], noise.white + turned, UNKNOWN)
     return ErrorProcess(decay, variance * (1.0 - decay**2), white, np.zeros(decay.shape))
 
