@@ -108,7 +108,7 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")
     quantile = student_quantile(0.5 + 0.5 * LEVEL, blocks - 1) * np.sqrt(blocks / (blocks - 1.0))
-    half = min(quantile * float(draws.std()) / mean_square, WIDEST)
+    half = min(quantile * draws.std() / mean_square, WIDEST)
     return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
 
 
@@ -161,7 +161,7 @@ def p_value(first: Array, second: Array) -> float:
 
     At least one over the number of draws; 1 where both numbers are equal.
     """
-    size = max(float(abs(first).mean()), float(abs(second).mean()), 1e-300)
+    size = max(abs(first).mean(), abs(second).mean(), 1e-300)
     if abs(first - second).max() <= SAME * size:
         return 1.0
     above = float(np.mean(first > second))

@@ -27,7 +27,7 @@ LAGS = 0.01 * np.arange(-10, 51)
 def weights(t: Array) -> Array:
     """Each sample's share of time, at most `LONGEST_STEP` medians. (T,) [s]"""
     step = np.gradient(t)
-    return np.asarray(np.clip(step, 0.0, LONGEST_STEP * np.median(step)))
+    return np.clip(step, 0.0, LONGEST_STEP * np.median(step))
 
 
 def parts_of(t: Array, scored: Mask, contacts: Sequence[Sequence[float]]) -> dict[str, Mask]:

@@ -65,7 +65,7 @@ class Block(NamedTuple):
     @property
     def at_floor(self) -> Mask:
         """Where an error may be the reference's own. (observers, joints)"""
-        return np.asarray(self.rmse <= AT_FLOOR * self.floor)
+        return self.rmse <= AT_FLOOR * self.floor
 
     @property
     def best(self) -> Mask:

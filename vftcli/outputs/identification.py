@@ -159,7 +159,7 @@ def velocity_plot(
 ) -> tuple[str, Scales, list[tuple[str, str]]]:
     """A joint's residual over velocity: name, scales, colour and dots of each log."""
     # One scale for all logs of a joint.
-    speed = max(float(np.max(np.abs(t.motion.dq[:, j]))) for t, _ in coloured) or 1.0
+    speed = max(abs(t.motion.dq[:, j]).max() for t, _ in coloured) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
     # Outliers at reversals are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0

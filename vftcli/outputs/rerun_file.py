@@ -135,7 +135,7 @@ def blueprint(
     corners = poses.translation.reshape(-1, 3)
     # The base at the origin must be visible too.
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
-    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    centre, radius = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low)
     eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
     arm = rrb.Spatial3DView(
         origin=ROBOT,

@@ -174,7 +174,7 @@ def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
         # The peak of every contact with a force; a load has a mean and no peak.
         felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
         force = np.array([c.peak_force for c in felt], dtype=float)
-        level = -BELOW * float(np.nanmax(np.concatenate([size[:, 0], [1.0], force])))
+        level = -BELOW * np.nanmax(np.concatenate([size[:, 0], [1.0], force]))
         # A line a part of the arm, so that the legend names them.
         for where, colour in PLACES.items():
             bar = np.full((len(t), 1), np.nan)

@@ -124,4 +124,4 @@ def spot_of(contact: Contact, joints: int) -> tuple[int, int]:
 def touched_point(contact: Contact, origins: Array) -> Array:
     """Place of a force, by origins of links and flange (S, n+1, 3). (S, 3) [m]"""
     first, last = spot_of(contact, origins.shape[1] - 1)
-    return np.asarray(0.5 * (origins[:, first - 1] + origins[:, last - 1]))
+    return 0.5 * (origins[:, first - 1] + origins[:, last - 1])

@@ -152,7 +152,7 @@ def _npy_array(file: LogFile) -> Column:
         array = np.lib.format.read_array(stream, allow_pickle=False)
     if left := len(file.content) - stream.tell():
         raise LogError(f"{file.path}: {left} bytes follow the array, so it holds more than one.")
-    return np.asarray(array)
+    return array
 
 
 #: Type words of the second line of a binary file by UR's official client.

@@ -236,7 +236,7 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         raise LogError(f"{path}: the clock is not a number in sample {row}. Cut the row out.")
     for name, value in raw.signals.items():
         # the largest tells whether all are finite; the slow look is only for the message
-        if all(max(float(np.max(x)), -float(np.min(x))) < ABSURD for x in pieces(value)):
+        if all(max(np.max(x), -np.min(x)) < ABSURD for x in pieces(value)):
             continue
         unknown = ~(np.abs(value) < ABSURD)
         row, column = np.argwhere(unknown)[0].tolist()

@@ -184,7 +184,7 @@ def tick_of(stamps: Array, name: str) -> tuple[float, str]:
         return units[match[1]], match[1]
     if len(stamps) == 0:
         return 1.0, "s"
-    usual = abs(float(stamps[len(stamps) // 2]))  # the first may be garbage
+    usual = abs(stamps[len(stamps) // 2])  # the first may be garbage
     # Counts since 1970 are near 1.7e18 ns, 1.7e15 µs and 1.7e12 ms.
     for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
         if size < usual < 1e20:

@@ -127,7 +127,7 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> Iterator[Given]:
     for axis in (0, 3):
         x, v = np.zeros((2, len(places), 6))
         x[:, axis], v[:, axis] = places, np.asarray(parameters.speed_limit)[axis]
-        motion = release(many, x, 1.1 * float(latest[axis]), v)
+        motion = release(many, x, 1.1 * latest[axis], v)
         turned = motion.t[np.argmax(motion.v[:, :, axis] <= 0.0, axis=0)].reshape(-1, len(laws))
         most = np.max(turned[:, :1] - turned, axis=0)[1:]
         name = AXES[axis]

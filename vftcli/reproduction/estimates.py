@@ -220,7 +220,7 @@ def guideline_numbers(made: Analysis) -> dict[str, dict[str, float]]:
             found[observer.name] = {
                 "response": float(step_response(observer, step, joints).max()),
                 "delay": float(tuning.delay.max()),
-                "passed": 100.0 * float(np.sqrt(gain.mean(axis=0)).mean()),
+                "passed": 100.0 * np.sqrt(gain.mean(axis=0)).mean(),
                 "rmse": means.get(observer.name, float("nan")),
                 "numbers": float(tuning.parameter_count),
             }

@@ -87,7 +87,7 @@ def coulomb_logarithmic(
     signed quadratic falls from 1.1–1.6 rad/s on.
     """
     rise = np.copysign(np.log1p(abs(dq) / logarithmic_velocity), dq)
-    return np.asarray(rise * logarithmic + coulomb_viscous(dq, **others))
+    return rise * logarithmic + coulomb_viscous(dq, **others)
 
 
 def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:

@@ -267,6 +267,6 @@ class FlangeSolver:
             normal.flat[::7] += DAMPING * min(size, 1.0) ** 2
             _, weights, _ = self.solve(normal, error)
             step = J.T @ weights
-            step *= LARGEST_STEP / max(float(abs(step).max()), LARGEST_STEP)
+            step *= LARGEST_STEP / max(abs(step).max(), LARGEST_STEP)
             q = np.fmin(np.fmax(q + step, self.lower), self.upper)
         return q, False

@@ -158,12 +158,12 @@ class Scales(NamedTuple):
     def across(self, x: Array | float) -> Array:
         """Horizontal places."""
         share = (np.asarray(x) - self.x.low) / ((self.x.high - self.x.low) or 1.0)
-        return np.asarray(self.box.left + share * (self.side - self.box.left))
+        return self.box.left + share * (self.side - self.box.left)
 
     def up(self, y: Array | float) -> Array:
         """Vertical places, which count downwards."""
         share = (np.asarray(y) - self.y.low) / ((self.y.high - self.y.low) or 1.0)
-        return np.asarray(self.floor - share * (self.floor - self.box.top))
+        return self.floor - share * (self.floor - self.box.top)
 
     def near(self, y: Array) -> Array:
         """Vertical places; those far outside the chart are moved near it."""

@@ -150,7 +150,7 @@ def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillA
     arrow, label = list[str](), (0.0, 0.0)
     if contact is not None and contact.wrench is not None and contact.peak_force is not None:
         tail, tip = view.seen(arrow_of(analysis, contact, view.reach))[:, :2]
-        ahead = (tip - tail) / max(float(np.linalg.norm(tip - tail)), 1e-9)
+        ahead = (tip - tail) / max(np.linalg.norm(tip - tail), 1e-9)
         beside, neck = 5.5 * np.array([-ahead[1], ahead[0]]), tip - 13.0 * ahead
         arrow = [polyline(np.vstack([tail, neck])), polyline([neck + beside, tip, neck - beside])]
         x, y = tail - np.array([24.0, 18.0]) * ahead
