@@ -68,7 +68,7 @@ def analysed_in_blocks(
             sensed = replace(sensed, wrenches=wrenches)
             masked.append(wrenches[0].hidden)
             if wrenches[0].sigma_min is not None:
-                least = min(least, float(np.min(wrenches[0].sigma_min)))
+                least = min(least, np.min(wrenches[0].sigma_min))
         done += block.samples
         stage("estimating", done / log.samples)
         motion = replace(whole, log=Run(recording=block, robot=robot))

@@ -347,3 +347,13 @@ def test_many_logs_are_named_by_the_first():
 def test_poses_that_repeat_count_once():
     assert different_poses(np.zeros((0, 7))) == 0
     assert different_poses(np.array([[0.0, 0.0], [0.05, 0.0], [0.2, 0.0], [0.21, 0.05]])) == 2
+
+
+@pytest.mark.slow
+def test_links_that_are_a_little_wrong_count_in_a_mass_from_poses():
+    """A Panda with masses 2 % off in a dozen poses: of its own scatter it was off by 4.5."""
+    for kg, seed in ((0.74, 702), (1.28, 704)):
+        carried = [f"payload.mass={kg}", "payload.com=[0.02,-0.01,0.06]"]
+        log = simulate_pair(load_scenario("panda-static-poses", carried), seed)[0].recording
+        fit = payload_from_poses([log], PANDA)
+        assert abs(fit.payload.mass - kg) < 1.96 * fit.mass_sd < 0.2

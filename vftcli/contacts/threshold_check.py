@@ -161,7 +161,7 @@ def checked(
 ) -> CheckedContact:
     """A contact with its peak force and the first alarm within it."""
     force = size[(t >= contact.start) & (t <= contact.stop)]
-    peak = float(np.fmax.reduce(force[np.isfinite(force)], initial=np.nan))
+    peak = np.fmax.reduce(force[np.isfinite(force)], initial=np.nan)
     begun = [
         (max(alarm.start - contact.start, 0.0), by)
         for by, alarm in alarms

@@ -18,7 +18,7 @@ import numpy as np
 from vftcli.doctor.signals import TRAVEL
 from vftcli.robots import Robot
 from vftcli.robots.chain import Chain, link_poses
-from vftcli.robots.kernels import LINK, load_regressor, momentum_terms, torque_regressor
+from vftcli.robots.kernels import load_regressor, momentum_terms, usual_errors
 from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_mean_squares
 from vftcli.signals.least_squares import inverse_of
 from vftcli.signals.recording import Recording
@@ -33,12 +33,9 @@ SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
 FAST = 0.8  #: Mean direction of a window in which a joint moves.
 #: Prior mass [kg] and first moment [kg·m] of a load.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
-#: Typical error of a rough description of a link's mass, and of its centre: public URDFs
-#: and profiles of one arm differ by 2–12 % in gravity's torque. [-, m]
-ROUGH = 0.1, 0.025
+ROUGH = 2.0  #: Errors of a rough description's links, in usual errors.
 #: Factor on their prior from fit to fit, and most fits.
 TIGHTER, ROUGH_FITS = 0.5, 8
-LIGHT = 0.1  #: Links below are as rough as one of this mass. [kg]
 KEPT = 0.7  #: Share of the windows in a fit: the rest may be contact.
 ROUNDS = 4  #: Rounds of fitting and trimming, after which nothing changes.
 OVERLAP = 2.0  #: Windows that overlap by half count half.
@@ -173,10 +170,7 @@ class Windows:
     def weights(self) -> Terms:
         """Torque of every link's mass and first moment, wrong by `ROUGH`."""
         chain, q = self.robot.loaded_chain, self.q[:, self.q.shape[1] // 2]
-        Y = torque_regressor(chain, q, 0.0 * q, 0.0 * q).reshape(*q.shape, -1, LINK)[..., :4]
-        share, shift = ROUGH
-        errors = np.maximum(chain.mass, LIGHT)[:, None] * [share, shift, shift, shift]
-        return Terms(Y.reshape(*q.shape, -1), prior=errors.ravel())
+        return Terms(usual_errors(chain, q), prior=ROUGH)
 
     def mean(self, value: Array) -> Array:
         """Mean of a signal over each window, of all its samples. (W, n)"""
@@ -296,10 +290,9 @@ class Case:
     def rough(self) -> RobustFit:
         """Fit by a load and by errors of the links in a rough description."""
         weights, load, friction = self.windows.weights, self.windows.load, self.windows.friction
-        errors = np.asarray(weights.prior)
-        for prior in errors * TIGHTER ** np.arange(ROUGH_FITS)[:, None]:
+        for prior in ROUGH * TIGHTER ** np.arange(ROUGH_FITS):
             fit = solve(self.given - self.needed, weights._replace(prior=prior), load, friction)
-            if root_mean_square(fit.values[: len(prior)] / errors) <= 1.0:
+            if root_mean_square(fit.values[: weights.columns.shape[2]]) <= ROUGH:
                 break
         return fit
 

@@ -157,7 +157,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
             paired = resample(squares, max(lengths))
         floor = float("nan") if reference.floor is None else float(reference.floor[j])
         if reference.floor is not None and reference.sd is not None and known.any():
-            floor = float(np.sqrt(np.nanmean(reference.sd[known, j] ** 2)))
+            floor = np.sqrt(np.nanmean(reference.sd[known, j] ** 2))
         yield Scored(
             names=names,
             joint=j + 1,
@@ -206,7 +206,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
     """One row an observer on one joint."""
     error, lines = joint.error, list[dict[str, object]]()
     best = int(np.mean(error**2, axis=0).argmin()) if len(error) else 0
-    share = float(joint.moving.mean()) if len(error) else 0.0
+    share = joint.moving.mean() if len(error) else 0.0
     for k, name in enumerate(joint.names):
         here: dict[str, object] = {
             "recording": recording,

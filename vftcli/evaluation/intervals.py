@@ -164,5 +164,5 @@ def p_value(first: Array, second: Array) -> float:
     size = max(abs(first).mean(), abs(second).mean(), 1e-300)
     if abs(first - second).max() <= SAME * size:
         return 1.0
-    above = float(np.mean(first > second))
+    above = np.mean(first > second)
     return float(np.clip(2.0 * min(above, 1.0 - above), 1.0 / len(first), 1.0))

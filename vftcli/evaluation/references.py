@@ -194,7 +194,7 @@ def table_reference(
             f"{path}: {tau.shape[1]} torque columns for a log of {recording.joints} joints"
         )
     tau = on_the_logs_clock(t, tau, recording, path)
-    covered = int(np.count_nonzero(np.isfinite(tau[:, 0])))
+    covered = np.count_nonzero(np.isfinite(tau[:, 0]))
     remark = caution("reference-file", file=path.name, covered=covered, samples=recording.samples)
     torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=(remark,))
     return ReferenceLoad(torque=torque, wrench=wrench)
@@ -234,7 +234,7 @@ def paper_gap(errors: pl.DataFrame, tunings: Mapping[str, Tuning]) -> tuple[Rema
     means = joint_means(errors).errors
     least, paper = means.get(BEST, 0.0), [name for name in PAPER if name in means]
     ratios = {name: means[name] / least for name in paper if least > 0.0}
-    ratio = float(np.mean([*ratios.values()])) if ratios else np.nan
+    ratio = np.mean([*ratios.values()]) if ratios else np.nan
     if not np.isfinite(ratio):
         return ()
     delays = np.concatenate([tunings[name].delay for name in paper])

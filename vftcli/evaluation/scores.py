@@ -121,7 +121,7 @@ class Score(NamedTuple):
 
         Skill is NaN where the truth is 0, and so are numbers of bands without any.
         """
-        drawn, rmse, banded = self.drawn, self.rmse, float(self.banded.sum())
+        drawn, rmse, banded = self.drawn, self.rmse, self.banded.sum()
         low, high = np.quantile([drawn, drawn - over], [0.025, 0.975], axis=1).tolist()
         return {
             "seconds": float(self.seconds[:, 0].sum()),
@@ -132,8 +132,8 @@ class Score(NamedTuple):
             "over_best_high_Nm": high[1],
             "l1_Nm": float(self.mean(self.sizes).mean()),
             "skill": skill(rmse, np.sqrt(self.mean(self.truth))),
-            "coverage_95": ratio(float(self.covered.sum()), banded),
-            "interval_score_Nm": ratio(float(self.penalties.sum()), banded),
+            "coverage_95": ratio(self.covered.sum(), banded),
+            "interval_score_Nm": ratio(self.penalties.sum(), banded),
             "missing": float(self.mean(self.missing).mean()),
         }
 

@@ -138,7 +138,7 @@ def judge_jacobian(
     sigma = decompose(log.jacobian).sigma_min
     values = unloaded(log, wrench_of(log.tau_ext, log.jacobian).values, zero)
     ours = Wrench(name="vendor", t=log.t, values=values, frame="jacobian", sigma_min=sigma)
-    least = float(sigma.min())
+    least = sigma.min()
     remarks = [caution("logged-jacobian", sigma_min_m=least)]
     if least < LEAST_SIGMA:
         near = "logged-jacobian-near-singular"

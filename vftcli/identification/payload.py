@@ -18,7 +18,13 @@ from vftcli.identification.training import (
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.friction import SMOOTHING
-from vftcli.robots.kernels import LINK, chain_parameters, momentum_terms, torque_regressor
+from vftcli.robots.kernels import (
+    LINK,
+    chain_parameters,
+    momentum_terms,
+    torque_regressor,
+    usual_errors,
+)
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import drive_torque, gain_sd, gravity_torque
@@ -234,8 +240,8 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     """A load from poses at rest, by torque beyond the robot's own gravity.
 
     Stiction acts in every pose: the residual shows its size, many poses average it. The
-    model's errors and the drives' day are alike in all poses of a log: with several logs, their
-    difference is part of the standard deviations.
+    model's errors and the drives' day are alike in all poses of a log: the difference of several
+    logs is part of the standard deviations, of one log what the links may be wrong by.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
@@ -256,6 +262,11 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     logs = np.split(np.arange(len(q)), np.cumsum(counts)[:-1])
     if len(logs) > 1:
         covariance += fit.cluster_covariance(logs)
+    else:  # links' errors pass for a load: usual ones, or as small as what is left shows
+        links = (fit.weights[..., None] * usual_errors(robot.chain, q)).reshape(extra.size, -1)
+        by_links, rest, *_ = np.linalg.lstsq(fit.A.reshape(-1, STATIC), links)
+        share = ((fit.left * fit.weights) ** 2).sum() / (rest.sum() or np.inf)
+        covariance += min(share, 1.0) * by_links @ by_links.T
     sd, left = np.sqrt(np.diag(covariance)), fit.left.std(axis=0)
     origin = fact("load-from-poses", poses=len(q), different=different, logs=len(logs))
     return load_at_flange(fit.x, sd, left, robot, recordings, origin)

@@ -161,7 +161,7 @@ def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
             f"a spectrum needs {LEAST_SEGMENT} samples in a row; the loaded part has "
             f"{longest[0]}, the free part {longest[1]}"
         )
-    thinned = float(inside.mean() / max(loaded.inside.mean(), 1.0 / len(t)))
+    thinned = inside.mean() / max(loaded.inside.mean(), 1.0 / len(t))
     size -= size % 2
     (noise, few), (both, many) = (welch(found, size, nominal) for found in (quiet, heavy))
     both = noise + thinned * (both - noise) if thinned > 1.0 else both

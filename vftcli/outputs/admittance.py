@@ -130,7 +130,7 @@ def admittance_record(made: Replayed, command: str) -> Record:
             "controller": run.controller.name,
             "stable": run.stable,
             "zero_removed": run.zero,
-            "poses_out_of_reach": int(np.count_nonzero(~run.reached)),
+            "poses_out_of_reach": np.count_nonzero(~run.reached),
             "latencies": latency_rows(run),
         }
         if (simulated := run.simulation) is not None:

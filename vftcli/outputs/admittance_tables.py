@@ -112,9 +112,9 @@ def stability_grid(replay: Replay) -> Grid:
     kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
     for controller in replay.controllers:
         for axes, part, unit in kinds:
-            bound = float(np.min(controller.escape[part]))
+            bound = np.min(controller.escape[part])
             each = controller.drag, controller.recovery
-            numbers = (float(np.max(values[part])) for values in each)
+            numbers = (np.max(values[part]) for values in each)
             escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
             rows.append((controller.name, axes, *numbers, escape))
     phases = (Column(head, form=".3g") for head in ("drag phase", "recovery, at the limit"))

@@ -193,7 +193,7 @@ class Results:
             for method in dict.fromkeys(row["method"] for row in spoken):
                 each = [(x["missing"], x["seconds"]) for x in spoken if x["method"] == method]
                 shares, seconds = zip(*each, strict=True)
-                if (share := float(np.average(shares, weights=seconds))) > SILENT:
+                if (share := np.average(shares, weights=seconds)) > SILENT:
                     yield f"{method}, {p}: no answer for {percent(share)} of the time, read as 0"
 
     def grids(self) -> Iterator[Grid]:

@@ -164,7 +164,7 @@ def hardest_words(found: ContactList) -> str:
 
 def direction(force: Array) -> str:
     """A force's direction in words: its main axes, the largest first."""
-    size = float(np.linalg.norm(force))
+    size = np.linalg.norm(force)
     if size == 0.0:
         return DASH
     u = force / size

@@ -162,7 +162,7 @@ def velocity_plot(
     speed = max(abs(t.motion.dq[:, j]).max() for t, _ in coloured) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
     # Outliers at reversals are drawn at the edge.
-    high = float(np.quantile(sizes, 0.995)) or 1.0
+    high = np.quantile(sizes, 0.995) or 1.0
     scales, drawn = Scales(Box(height=180), Span(-speed, speed), Span(-high, high)), []
     for trace, colour in coloured:
         pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))

@@ -333,7 +333,7 @@ def forces_of_list(found: ContactList, t: Array) -> Array:
 
 def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:
     """|F| [N] over time [s] as bars, above seconds and the contacts' numbers. (T,)"""
-    top = float(force.max())
+    top = force.max()
     labels = [f"{top * row / (ROWS - 1):.0f}" for row in range(ROWS)]
     left = max(map(len, labels))
     columns = canvas.width - left - 8

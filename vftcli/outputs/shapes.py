@@ -34,7 +34,7 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
     """Parts on the base and on each link: n + 1 lists, base first."""
     n = chain.joints
     offsets = np.vstack([chain.translation, chain.flange_translation])
-    length = float(np.linalg.norm(offsets, axis=1).sum())  # of the stretched arm
+    length = np.linalg.norm(offsets, axis=1).sum()  # of the stretched arm
     radii = length * np.linspace(*THICKNESS, n + 1)
     shapes: list[list[Capsule]] = []
     for j in range(n + 1):

@@ -356,7 +356,7 @@ def _refuse_degrees(raw: RawLog, path: Path) -> None:
     own = (~beyond | (np.mean(beyond) >= BAD_SHARE))[:, None]
     low = q.min(axis=0, where=own, initial=np.inf)
     high = q.max(axis=0, where=own, initial=-np.inf)
-    largest, travel = float(np.max([-low, high])), float(np.max(high - low))
+    largest, travel = np.max([-low, high]), np.max(high - low)
     if largest > limit or travel > TWO_TURNS:
         raise LogError(
             f"{path}: positions reach {largest:.4g} and travel {travel:.4g}, which looks like "

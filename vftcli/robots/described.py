@@ -203,7 +203,7 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         q = rng.uniform(-np.pi, np.pi, (POSES, chain.joints))
         sign = rng.choice([-1.0, 1.0], (2, *q.shape))
         regressor = torque_regressor(chain, q, SPEED * sign[0], ACCELERATION * sign[1])
-        worst = float(abs(regressor @ parameters).max())
+        worst = abs(regressor @ parameters).max()
         yield caution("tensors-changed", on_joints(changed), links=links, worst_Nm=worst)
     if bare.any():
         n = chain.joints

@@ -178,7 +178,7 @@ def lawless(law: Sequence[float]) -> str:
         return ""
     with np.errstate(over="ignore", invalid="ignore"):
         share = warmth(law, np.linspace(COLDEST, WARMEST, 100))
-        least, most = float(share.min()), float(share.max())
+        least, most = share.min(), share.max()
     if np.isfinite(most) and least > 0.0 and most < 1e3 * least:
         return ""
     return (

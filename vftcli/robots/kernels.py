@@ -288,6 +288,20 @@ def load_wrench(chain: Chain, q: Array) -> Array:
     return wrench
 
 
+LIGHT = 0.1  #: Links below are as wrong as one of this mass. [kg]
+
+
+def usual_errors(chain: Chain, q: Array) -> Array:
+    """Holding torque by usual errors, 5 % of a link's mass, 12 mm of its centre. (N, n, 4n)
+
+    Public URDFs and profiles of one arm differ by 2–12 % in gravity's torque.
+    """
+    columns = torque_regressor(chain, q, 0.0 * q, 0.0 * q).reshape(*q.shape, -1, LINK)
+    found = columns[..., :4]
+    found *= np.maximum(chain.mass, LIGHT)[:, None] * np.repeat([0.05, 0.0125], [1, 3])
+    return found.reshape(*q.shape, -1)
+
+
 def load_regressor(chain: Chain, q: Array) -> Array:
     """External joint torque of `load_wrench`, by the same four numbers. (N, n, 4)"""
     return flange_jacobian(chain, q).transpose(0, 2, 1) @ load_wrench(chain, q)

@@ -97,7 +97,7 @@ def without_isolated(recording: Recording) -> Recording:
             values[name] = handed_over(even)
     if not values:
         return recording
-    count = int(np.count_nonzero(changed.any(axis=1)))
+    count = np.count_nonzero(changed.any(axis=1))
     said = fact("isolated-samples-evened", on_joints(np.any(changed, axis=0)), samples=count)
     return recording.changed(said, **values)
 

@@ -80,11 +80,11 @@ def view_of(analysis: Analysis) -> View:
     every = known[:: max(len(known) // POSES, 1)] if len(known) else np.zeros((1, q.shape[1]))
     swept = link_poses(analysis.robot.chain, np.ascontiguousarray(every)).translation
     flange, points = swept[:, -1], [np.zeros((1, 3)), swept.reshape(-1, 3)]
-    reach = float(np.linalg.norm(flange, axis=1).max()) or 1.0
+    reach = np.linalg.norm(flange, axis=1).max() or 1.0
     sized = (c for c in analysis.listed if c.wrench is not None and c.size_known)
     points += (arrow_of(analysis, contact, reach)[:1] for contact in sized)
     mean = flange.mean(axis=0)
-    yaw = float(np.arctan2(mean[1], mean[0])) - ASIDE if np.hypot(*mean[:2]) > 0.05 else -ASIDE
+    yaw = np.arctan2(mean[1], mean[0]) - ASIDE if np.hypot(*mean[:2]) > 0.05 else -ASIDE
     axes, places, view = (
         axes_of(yaw, PITCH),
         np.vstack(points),
@@ -154,7 +154,7 @@ def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillA
         beside, neck = 5.5 * np.array([-ahead[1], ahead[0]]), tip - 13.0 * ahead
         arrow = [polyline(np.vstack([tail, neck])), polyline([neck + beside, tip, neck - beside])]
         x, y = tail - np.array([24.0, 18.0]) * ahead
-        label = float(np.clip(x, 40.0, WIDTH - 40.0)), float(np.clip(y, 14.0, HEIGHT - 8.0))
+        label = np.clip(x, 40.0, WIDTH - 40.0), np.clip(y, 14.0, HEIGHT - 8.0)
     return StillArm([part[1:] for part in parts], arrow, label)
 
 
