@@ -273,7 +273,7 @@ MOST = {
     "files": 239,
     "functions": 2781,
     "functions over 60 lines": 10,
-    "names, operators, numbers": 368_772,
+    "names, operators, numbers": 368_775,
     "characters a line that is not blank": 50.44,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7392,

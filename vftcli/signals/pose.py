@@ -87,7 +87,7 @@ def rpy_angles(rotation: Array) -> tuple[float, float, float]:
     """
     R = rotation
     level = np.hypot(R[0, 0], R[1, 0])
-    pitch = np.arctan2(-R[2, 0], level)
+    pitch = float(np.arctan2(-R[2, 0], level))
     # Above it the angles have nine digits.
     if level < 1e-9:
         return float(np.arctan2(-R[1, 2], R[1, 1])), pitch, 0.0
