@@ -157,7 +157,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
             paired = resample(squares, max(lengths))
         floor = float("nan") if reference.floor is None else float(reference.floor[j])
         if reference.floor is not None and reference.sd is not None and known.any():
-            floor = np.sqrt(np.nanmean(reference.sd[known, j] ** 2))
+            floor = float(np.sqrt(np.nanmean(reference.sd[known, j] ** 2)))
         yield Scored(
             names=names,
             joint=j + 1,

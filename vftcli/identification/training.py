@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, starmap
 from typing import NamedTuple
 
 import numpy as np
@@ -229,7 +229,7 @@ class ParameterColumns(NamedTuple):
     def frictions(self) -> tuple[slice, ...]:
         """Places of each joint's friction coefficients, behind the rotors."""
         edges = np.cumsum([self.rotor_places.stop, *(len(s.terms) for s in self.shapes)])
-        return tuple(slice(a, b) for a, b in pairwise(edges.tolist()))
+        return tuple(starmap(slice, pairwise(edges.tolist())))
 
     @property
     def size(self) -> int:

@@ -112,8 +112,8 @@ class Chart(NamedTuple):
                 half = 0.0 if line.half is None else np.nan_to_num(line.half[:, j])
                 for values in (line.values[:, j] - half, line.values[:, j] + half):
                     known = np.isfinite(values)
-                    low = min(low, np.min(values, where=known, initial=np.inf))
-                    high = max(high, np.max(values, where=known, initial=-np.inf))
+                    low = min(low, float(np.min(values, where=known, initial=np.inf)))
+                    high = max(high, float(np.max(values, where=known, initial=-np.inf)))
             if self.band is not None and np.isfinite(self.band[j]):
                 low, high = min(low, -float(self.band[j])), max(high, float(self.band[j]))
         # A constant line has no scale of its own.

@@ -5,7 +5,7 @@ newton-metres.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, starmap
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -339,7 +339,7 @@ def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
     found = [list(map(rmse_grid, tables)) for _, tables in alike]
     if axes := list(axis_grids(errors, analyses)):
         found.append(axes)
-    return doubts + "\n".join(latex(*grids) for grids in found)
+    return doubts + "\n".join(starmap(latex, found))
 
 
 #: Name of a form → the text of the errors table in it.

@@ -75,8 +75,10 @@ def check_line(check: ThresholdDetection) -> str:
         return f"{check.log}: {counted(count, 'alarm')}{least}"
     words = [f"{check.log}: {detected} of {count} contacts detected"]
     if detected:
-        words.append(f"{1e3 * check.median_delay:.0f} ms after they begin (median)")
-        words.append(f"at most {1e3 * check.longest_delay:.0f} ms")
+        words += [
+            f"{1e3 * check.median_delay:.0f} ms after they begin (median)",
+            f"at most {1e3 * check.longest_delay:.0f} ms",
+        ]
     if not isnan(weakest):
         words.append(f"the weakest detected {significant(weakest)} N")
     if not isnan(missed):

@@ -140,7 +140,7 @@ def deviations(A: Array, residual: Array, weights: Array) -> Array:
 def folds(samples: int, count: int = FOLDS) -> list[slice]:
     """Contiguous stretches of equal length that cover all samples."""
     edges = np.linspace(0, samples, count + 1).astype(int)
-    return [slice(a, b) for a, b in itertools.pairwise(edges)]
+    return list(itertools.starmap(slice, itertools.pairwise(edges)))
 
 
 def left_out(lengths: Sequence[int], use: Sequence[bool]) -> list[Array]:

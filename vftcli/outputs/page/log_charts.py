@@ -195,7 +195,7 @@ def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
         if contact.peak_force is not None and contact.peak_band is not None:
             tops.append(1.12 * (contact.peak_force + min(contact.peak_band, contact.peak_force)))
         if contact.is_load and (course := contact.course) is not None:
-            tops.append(np.max(course.force + np.minimum(course.band, course.force)))
+            tops.append(float(np.max(course.force + np.minimum(course.band, course.force))))
     return max(tops) or 1.0
 
 
