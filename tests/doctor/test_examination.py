@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from moving_arms import FRICTION, gravity, moving
 
-from vftcli.doctor import examine
+from vftcli.doctor import examine, in_words
 from vftcli.doctor.signals import signal_findings
 from vftcli.robots import load_robot
 from vftcli.signals.recording import Recording
@@ -35,6 +35,15 @@ def test_one_cause_is_said_once() -> None:
     assert [finding.code for finding in turned.warnings] == ["effort-sign"]
     large = examine(replace(log, current=1e3 * log.require("current")), UR10E)
     assert {finding.code for finding in large.warnings} == {"milliamperes"}
+
+
+def test_a_turned_joint_is_turned_back_by_the_word_of_its_signal() -> None:
+    """Currents named tau would be read as torques, too small by the drive constants."""
+    current = moving().require("current").copy()
+    current[:, 1] *= -1.0
+    (found,) = examine(replace(moving(), current=current), UR10E).warnings
+    assert (found.code, found.where.joints) == ("joint-sign", (2,))
+    assert "--columns current=a|-b|c" in in_words(found).remedy
 
 
 def test_the_constants_of_another_joint_size_are_reported() -> None:

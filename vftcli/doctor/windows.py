@@ -168,7 +168,7 @@ class Windows:
 
     @cached_property
     def weights(self) -> Terms:
-        """Torque of every link's mass and first moment, wrong by `ROUGH`."""
+        """Torque by usual errors of every link; a rough description has `ROUGH` of them."""
         chain, q = self.robot.loaded_chain, self.q[:, self.q.shape[1] // 2]
         return Terms(usual_errors(chain, q), prior=ROUGH)
 

@@ -319,8 +319,8 @@ REPEATED_STOP = 0.13
 HELD = 0.45
 #: Standard deviation of the wrench smoother's model error at rest, by the same logs.
 REST_SHARE = 0.5
-#: For contacts: added at rest to what was learned, the least that
-#: these logs show; and drawn anew where a joint comes to rest.
+#: For contacts: added at rest to what was learned, the least that these logs show, and for
+#: the wrench too where a joint turns round; and drawn anew where a joint comes to rest.
 CREEP_SHARE, STOP_SHARE = 0.3, 0.7
 #: For a joint that rests under a contact, which re-settles it.
 PUSHED_SHARE = 0.6
