@@ -158,7 +158,7 @@ SEVERAL = """\
   bad.csv                                             ✗ left out
 
 Can it be believed?
-  ✗ log2.csv: load    the arm carries 1.20 ± 0.10 kg unknown to ur5, perhaps a
+  ✗ log2.csv: load    the arm carries 1.20 ± 0.20 kg unknown to ur5, perhaps a
                       hand or a gripper
     vftcli identify log2.csv --method payload --robot ur5 -o loaded.toml
 """

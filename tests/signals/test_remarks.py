@@ -16,6 +16,7 @@ def catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
         'short = "{joints} rests in {share:.0%} of the samples"\n'
         'long = "{joints} rests from {span[0]:g} to {span[1]:g} s: {limits_Nm:.1f} N·m"\n'
         '[left-out]\nshort = "left out {topics}"\n'
+        '[load]\nshort = "{load_kg:.2f} {sd_kg:±.2f} kg"\n'
     )
     monkeypatch.setattr(remarks, "catalogue", lambda: (text,))
 
@@ -36,6 +37,12 @@ def test_words_are_made_of_values_and_place() -> None:
 def test_long_words_fall_back_to_the_short_ones_and_lists_are_separated_by_commas() -> None:
     remark = Remark("left-out", values={"topics": ["/a", "/b"]})
     assert sentence(remark, "long") == str(remark) == "left out /a, /b"
+
+
+@pytest.mark.usefixtures("catalogue")
+def test_a_band_is_1_96_deviations_and_a_minus_is_a_minus() -> None:
+    load = Remark("load", values={"load_kg": -1.5, "sd_kg": 0.1})
+    assert str(load) == "−1.50 ± 0.20 kg"
 
 
 @pytest.mark.usefixtures("catalogue")

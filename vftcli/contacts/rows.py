@@ -25,7 +25,7 @@ from vftcli.contacts.windows import (
 )
 from vftcli.robots.chain import link_jacobian, link_poses, points_on
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import NORMAL_95, Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import covered, resample_columns
@@ -38,7 +38,6 @@ WIDENED = np.repeat([1.3, 2.0], 3)
 BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
 #: Share of its bend that a short contact's peak may hide.
 BENT_SHORT = 0.4
-NORMAL = 1.96  #: Half width of a 95 % band in standard deviations.
 #: Least correlation time of a contact, as a share of its length.
 OWN_TIME = 0.5
 #: A contact shorter than this [s] loses its peak below so many samples a second [Hz]: a
@@ -206,7 +205,7 @@ class ContactMeasurement:
         anywhere = location.sizes(size, band)
         spread = 0.0 if named == "wrist" and lead >= SURE_NATS else location.spread(size)
         remarks = list[Remark]()
-        if len(location.parts) > 1 and NORMAL * spread > WIDE * size:
+        if len(location.parts) > 1 and NORMAL_95 * spread > WIDE * size:
             # Another place means another force.
             least, most = anywhere
             remarks.append(caution("size-goes-with-place", least_N=least, most_N=most))
@@ -229,7 +228,7 @@ class ContactMeasurement:
             stop=stop,
             peak=at,
             peak_force=size,
-            peak_band=np.hypot(band, NORMAL * spread),
+            peak_band=np.hypot(band, NORMAL_95 * spread),
             place_band=band,
             wrench=wrench,
             wrench_sd=np.sqrt(np.diag(covariance)),
@@ -277,7 +276,7 @@ def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
     """|F| of a force (K, 3) [N] of covariance (K, 3, 3), band along the force."""
     size = np.linalg.norm(force, axis=1)
     u = force / np.maximum(size, 1e-12)[:, None]
-    return ForceCourse(t, size, NORMAL * np.sqrt(np.einsum("ki,kij,kj->k", u, covariance, u)))
+    return ForceCourse(t, size, NORMAL_95 * np.sqrt(np.einsum("ki,kij,kj->k", u, covariance, u)))
 
 
 def vendor_force(run: Run, J: Array, at: float) -> float | None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vftcli.doctor.causes import RANGE
-from vftcli.doctor.windows import Case, RobustFit, solve
+from vftcli.doctor.windows import Case, RobustFit, Terms, solve
 from vftcli.robots import Robot
 from vftcli.robots.friction import friction_factor, steady_torque
 from vftcli.robots.running_friction import measured_temperature
@@ -93,8 +93,7 @@ def load_remarks(case: Case) -> Iterator[Remark]:
     if not heavy and share >= PARTLY:
         return
     values = {
-        # By the scatter, and by how far drive constants and links may move it.
-        "sd_kg": np.linalg.norm([sd, gain_sd(recording, robot) * mass, *by_links(case)]),
+        "sd_kg": masses_sd(case, case.loaded, case.windows.load.columns)[0],
         "robot": robot.name,
         "bare_percent": 100 * case.bare.size / case.size,
         "loaded_percent": 100 * case.loaded.size / case.size,
@@ -107,26 +106,34 @@ def load_remarks(case: Case) -> Iterator[Remark]:
         yield level("unmodelled-load" if heavy else "light-load", load_kg=mass, **values)
 
 
-def by_links(case: Case) -> Array:
-    """Mass of a load that passes for the usual errors of each link. (k,) [kg]
+def masses_sd(case: Case, fit: RobustFit, loads: Array) -> Array:
+    """Deviations of masses by scatter, drive constants and usual errors of links. (k,) [kg]
 
-    Of 30 loads of simulated arms 28 are within 95 % bands, errors 1.0 deviations rms.
+    `loads` are the columns (W, m, 4k) of k loads, which the fit begins with. Of 30 loads of
+    simulated arms 28 are within 95 % bands, errors 1.0 deviations rms.
     """
-    log, kept = case.windows, case.loaded.kept
-    fitted = np.concatenate([log.load.columns, log.friction.columns], axis=2)[kept]
-    A, B = map(np.concatenate, (fitted, log.weights.columns[kept]))
-    return np.asarray(np.linalg.lstsq(A, B)[0][0])
+    log, masses = case.windows, slice(None, loads.shape[2], 4)
+    fitted = np.concatenate([loads, log.friction.columns], axis=2)[fit.kept]
+    A, B = map(np.concatenate, (fitted, log.weights.columns[fit.kept]))
+    by_links = np.linalg.lstsq(A, B)[0][masses]
+    by_gain = gain_sd(log.recording, log.robot) * fit.values[masses]
+    parts = np.column_stack([fit.sd[masses], by_gain, by_links])
+    return np.asarray(np.linalg.norm(parts, axis=1))
 
 
 def load_change(case: Case) -> Remark | None:
     """The finding on a load picked up or set down along the log, or None."""
     count, load = len(case.given), case.windows.load
 
-    def with_two_loads(split: int) -> RobustFit:
-        """Fit by friction and two loads: before a window, and from it on."""
+    def two_loads(split: int) -> Terms:
+        """The columns of two loads: before a window, and from it on."""
         late = (np.arange(count) >= split)[:, None, None]
-        before, after = (load._replace(columns=load.columns * mask) for mask in (~late, late))
-        return solve(case.given - case.needed, before, after, case.windows.friction)
+        columns = np.concatenate([load.columns * ~late, load.columns * late], axis=2)
+        return load._replace(columns=columns, prior=np.tile(load.prior, 2))
+
+    def with_two_loads(split: int) -> RobustFit:
+        """Fit by friction and two loads."""
+        return solve(case.given - case.needed, two_loads(split), case.windows.friction)
 
     if with_two_loads(count // 2).size > HALVES * case.loaded.size:
         return None
@@ -140,7 +147,7 @@ def load_change(case: Case) -> Remark | None:
         return None
     if abs(after - before) < max(CHANGE, SURE * sd):
         return None
-    at = case.windows.t[split, 0]
+    at, sd = case.windows.t[split, 0], masses_sd(case, fit, two_loads(split).columns).max()
     return warning("load-changes", first_kg=before, last_kg=after, sd_kg=sd, at_s=at)
 
 

@@ -31,7 +31,7 @@ def signed(value: float) -> str:
 
 
 def banded(value: float | None, band: float | None, form: str = ".0f", unit: str = " N") -> str:
-    """A value with the half width of its 95 % band, or its standard deviation."""
+    """A value with the half width of its 95 % band."""
     return f"{minus(format(value, form))} ± {band:{form}}{unit}"
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import (
+    NORMAL_95,
     Array,
     Mask,
     check_clock,
@@ -19,8 +20,6 @@ from vftcli.signals.arrays import (
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import Clock, clock_of
 from vftcli.signals.shown import ALL, Shown, TimeSeries, joined, per_joint, record
-
-COVERS = 1.96  #: Half width of a 95 % band, in standard deviations.
 
 
 class Instant(NamedTuple):
@@ -143,7 +142,7 @@ class ExternalTorque(TimeSeries):
             sizes: tuple[float | None, float | None] = (None, None)
             if len(tau):
                 sizes = root_mean_square(tau), abs(tau).max()
-            band = None if sd is None or not len(sd) else COVERS * root_mean_square(sd)
+            band = None if sd is None or not len(sd) else NORMAL_95 * root_mean_square(sd)
             yield f"J{j + 1}", *sizes, band, f"{known.mean():.0%}"
 
     def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from vftcli.signals.arrays import NORMAL_95
 from vftcli.signals.parsing import counted
 from vftcli.signals.shown import Shown
 
@@ -132,15 +133,16 @@ def filled(template: str, remark: Remark) -> str:
 
 
 class ListFormatter(string.Formatter):
-    """`str.format` that formats the items of a list one by one."""
+    """`str.format` for items of a list one by one; ``{x_sd:±.2f}`` is the 95 % band."""
 
     def format_field(self, value: Any, format_spec: str) -> str:  # noqa: ANN401 - any value
         """A value by its format; a list's items, numbers apart by spaces, words by commas."""
+        if format_spec.startswith("±"):
+            return f"± {NORMAL_95 * value:{format_spec[1:]}}"
         if isinstance(value, str) or not isinstance(value, Iterable):
-            return str(super().format_field(value, format_spec))
-        items = [
-            str(super(ListFormatter, self).format_field(item, format_spec)) for item in value
-        ]
+            text = str(super().format_field(value, format_spec))
+            return text if isinstance(value, str) else text.replace("-", "−")
+        items = (self.format_field(item, format_spec) for item in value)
         return (" " if format_spec else ", ").join(items)
 
 

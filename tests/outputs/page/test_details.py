@@ -54,9 +54,8 @@ def test_rows_are_the_anchors_of_the_list(found: ContactList, pushed: Analysis) 
 def test_the_details_hold_every_number(found: ContactList) -> None:
     shown = part("parts/table", contact_details(found)[1])
     first = found.contacts[0]
-    assert (
-        f"{first.joint_torque[1]:.2f} ± {first.joint_torque_sd[1]:.2f}".replace("-", "−") in shown
-    )
+    torque, band = first.joint_torque[1], 1.96 * first.joint_torque_sd[1]
+    assert f"{torque:.2f} ± {band:.2f}".replace("-", "−") in shown
     pairs = model_pairs(found)
     assert pairs["basis"] == "free motion"
     assert pairs["free motion"].endswith(" s")
@@ -65,13 +64,13 @@ def test_the_details_hold_every_number(found: ContactList) -> None:
 
 
 def test_the_wrench_of_a_row_is_force_moment_mean_and_impulse() -> None:
-    """Each the numbers of `contact`, with their deviations behind them."""
+    """Each the numbers of `contact`, with their 95 % bands behind them."""
     wrench, torque = (grid.rows[0] for grid in contact_details(contact_list(contact())))
     assert wrench == (
-        "1", "4.60 – 4.78", "57–78", "0.4, 51.9, −38.8", "1.9, 3.1, 2.8", "0.2, 0.1, 0.0",
-        "0.5, 0.5, 0.5", "0.3, 32.0, −24.0", "0.1, 5.6, −4.1", 412.0, 44.0, None, None,
+        "1", "4.60 – 4.78", "57–78", "0.4, 51.9, −38.8", "3.7, 6.1, 5.5", "0.2, 0.1, 0.0",
+        "1.0, 1.0, 1.0", "0.3, 32.0, −24.0", "0.1, 5.6, −4.1", 412.0, 44.0, None, None,
     )  # fmt: skip
-    assert torque == ("1", *(f"{joint}.00 ± 1.00" for joint in range(6)), False)
+    assert torque == ("1", *(f"{joint}.00 ± 1.96" for joint in range(6)), False)
 
 
 def test_joints_that_agree_share_a_line() -> None:

@@ -7,6 +7,7 @@ from itertools import groupby, repeat
 from operator import itemgetter
 from typing import Any
 
+import numpy as np
 import polars as pl
 
 from vftcli.analysis import Analysis
@@ -31,7 +32,7 @@ from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, sti
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, ranged, significant, vector
 from vftcli.outputs.run_record import observer_record, run_record
 from vftcli.outputs.shapes import link_surfaces
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import NORMAL_95, Array
 from vftcli.signals.parsing import counted, printable
 from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.frames import FRAMES
@@ -47,12 +48,12 @@ FILES = {
     "run.json": "settings, versions, remarks",
 }
 MOST = 40  #: Most contacts in numbers.
-#: Keys of vectors in a contact's record.
+#: Keys of vectors in a contact's record; of deviations the 95 % band is shown.
 VECTORS = ("force_N", "force_sd_N", "moment_Nm", "moment_sd_Nm", "mean_force_N", "impulse_Ns")
 #: Columns of the table of contacts.
 WRENCHES = (
     *map(Column, ("#", "from – to [s]", "range [N]")),
-    *("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]"),
+    *("force [N]", "±", "moment [N·m]", "±", "mean force [N]", "impulse [N·s]"),
     *map(Column, ("log-likelihood ratio [nats]", "margin of the place [nats]")),
     *map(Column, ("vendor |F| [N]", "sensor |F| [N]")),
 )
@@ -180,14 +181,16 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     torques: Rows = []
     for c in contacts:
         record = c.record()
-        vectors = (None if record[key] is None else vector(record[key]) for key in VECTORS)
+        given = ((NORMAL_95 if "_sd_" in key else 1.0, record[key]) for key in VECTORS)
+        vectors = (None if x is None else vector(np.multiply(scale, x)) for scale, x in given)
         rest = (c.evidence, c.lead, c.vendor_force, c.sensor_force)
         ends = DASH if c.anywhere is None else ranged(*c.anywhere, unit="")
         wrenches.append((str(c.number), f"{c.start:.2f} – {c.stop:.2f}", ends, *vectors, *rest))
-        each = map(banded, c.joint_torque, c.joint_torque_sd, repeat(".2f"), repeat(""))
+        bands = NORMAL_95 * c.joint_torque_sd
+        each = map(banded, c.joint_torque, bands, repeat(".2f"), repeat(""))
         torques.append((str(c.number), *each, c.at_rest))
     columns = Column("#"), *joint_columns(len(contacts[0].joint_torque)), Column("at rest")
-    below = "Joint torque at the peak in N·m, ± its standard deviation"
+    below = "Joint torque at the peak in N·m"
     return Grid(WRENCHES, wrenches, title), Grid(columns, torques, below)
 
 
