@@ -57,6 +57,7 @@ KNOWN = {("evaluation", "bias"), ("contacts", "bias")}
 FILES = (
     "cli/",  # asks before it overwrites
     "batch/datasets/",
+    "batch/run.py",  # finds the logs of a folder
     "outputs/",
     "readers/",
     "reproduction/paper.py",  # what a paper prints

@@ -8,10 +8,9 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import Effort, Failure, Outcome
 from vftcli.batch.keys import digest_of
 from vftcli.batch.log_work import LogJob
-from vftcli.batch.run import BatchCount, BatchRun
+from vftcli.batch.run import BatchCount, BatchRun, LogEntry
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice
-from vftcli.readers.library import LogEntry
 from vftcli.signals.progress import heard_by
 
 

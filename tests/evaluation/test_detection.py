@@ -2,8 +2,7 @@
 
 import pytest
 
-from vftcli.evaluation.detection import rate_interval, score_list, share_interval
-from vftcli.readers.references import ListedRow
+from vftcli.evaluation.detection import ListedRow, rate_interval, score_list, share_interval
 
 NAN = float("nan")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.readers.library import LogCollection, LogEntry
+from vftcli.batch.run import LogCollection, LogEntry
 from vftcli.readers.reader import ALL, ReadChoice
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"

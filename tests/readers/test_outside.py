@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers.references import read_list, read_outside
+from vftcli.reproduction.manifest import read_list
+from vftcli.reproduction.scoring import read_outside
 from vftcli.signals.errors import LogError
 
 

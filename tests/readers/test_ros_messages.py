@@ -6,14 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from vftcli.readers.bags.ros_messages import (
-    in_parts,
-    long_name,
-    schema_text,
-    serialised,
-    stamped,
-)
+from vftcli.readers.bags.ros_messages import long_name
 from vftcli.signals.errors import OutputError
+from vftcli.simulation.writers.rosbag2 import in_parts, schema_text, serialised, stamped
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 TIMES = np.array([0, 1_700_000_000_123_456_789, 4_000_000_000], dtype=np.int64)

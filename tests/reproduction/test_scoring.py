@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from vftcli.evaluation.detection import ListedRow
 from vftcli.evaluation.scores import LAGS
 from vftcli.pipeline import AnalysisChoice
-from vftcli.readers.references import ListedRow
 from vftcli.reproduction import scoring
 from vftcli.reproduction.manifest import BenchmarkLog, Declaration, Rival
 from vftcli.reproduction.scoring import (

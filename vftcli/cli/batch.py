@@ -47,10 +47,10 @@ def batch(
     Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
     """
     from vftcli.batch.log_work import LogJob, for_comparison, for_estimates
-    from vftcli.batch.run import BatchRun
+    from vftcli.batch.run import BatchRun, LogCollection
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
-    from vftcli.readers.library import Library, LogCollection, absolute
+    from vftcli.readers.library import Library, absolute
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.parsing import counted
 

@@ -6,17 +6,25 @@ A row without overlap is false if its middle lies in a vouched span.
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-
-from vftcli.readers.references import ListedRow
 
 SLACK = 0.1  #: Largest distance of a row from its true contact. [s]
 NORMAL = 1.959964  #: Quantile .975 of the normal distribution.
 
 #: Start [s], end [s], peak [N] (NaN if unknown) of a true contact.
 TrueContact = tuple[float, float, float]
+
+
+class ListedRow(NamedTuple):
+    """One row of a list of contacts."""
+
+    start: float  #: [s]
+    stop: float  #: [s]
+    peak: float = 0.0  #: Its largest force, 0 where it has none. [N]
+    band: float = 0.0  #: Half width of its 95 % band. [N]
+    is_load: bool = False  #: Whether it is called a load.
 
 
 def score_list(

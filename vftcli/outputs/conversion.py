@@ -25,19 +25,13 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import beginning, contact_name
 from vftcli.outputs.files import SEAL, OutputFolder, atomic, check_file, put_table, table_file
 from vftcli.outputs.run_record import envelope, seal
-from vftcli.readers.bags.ros_messages import (
-    Value,
-    in_parts,
-    long_name,
-    schema_text,
-    serialised,
-    stamped,
-)
+from vftcli.readers.bags.ros_messages import long_name
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
+from vftcli.simulation.writers.rosbag2 import Value, in_parts, schema_text, serialised, stamped
 
 if TYPE_CHECKING:
     import polars as pl

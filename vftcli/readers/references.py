@@ -3,9 +3,7 @@
 They are tables with a clock and one external torque a joint, but no positions.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from itertools import count, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,9 +28,7 @@ from vftcli.readers.table import (
 from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.option import interval_text
-from vftcli.signals.wrench import AXES
 
 TORQUE = "tau_ext"
 
@@ -99,81 +95,6 @@ def _found(table: Table) -> Picks:
         columns.find("t"),
     ]
     return {pick.field: pick for pick in found if pick is not None}
-
-
-def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
-    """Torque and wrench (T, 6) or None of another program's file, at its own stamps.
-
-    Its columns are t, tau_ext/1…, band/1… (one standard deviation), wrench/fx… (force and
-    moment on the robot, base axes); a file of `vftcli estimate` has them as
-    tau_ext/NAME/1…. NaN is no answer.
-    """
-    table = table_at(path)
-    inner = f"/{name}/" if f"{TORQUE}/{name}/1" in table.names else "/"
-    columns = {column: Cell(k) for k, column in enumerate(table.names)}
-    picks = {}
-    for kind, ends in {TORQUE: count(1), "band": count(1), "wrench": AXES}.items():
-        wanted = (f"{kind}{inner}{end}" for end in ends)
-        cells = tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
-        if cells and (kind != "wrench" or len(cells) == len(AXES)):
-            picks[kind] = Item(kind, cells=cells)
-    if "t" not in columns or TORQUE not in picks:
-        raise LogError(
-            f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
-            f"{listed(table.names)}"
-        )
-    picks["t"] = Item("t", unit="s", cells=(columns["t"],))
-    raw = load_signals(table, picks, ReadChoice())
-    t, tau, sd = program_clock(raw, path), raw.signals[TORQUE], raw.signals.get("band")
-    return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), raw.signals.get("wrench")
-
-
-class ListedRow(NamedTuple):
-    """One row of a list of contacts."""
-
-    start: float  #: [s]
-    stop: float  #: [s]
-    peak: float = 0.0  #: Its largest force, 0 where it has none. [N]
-    band: float = 0.0  #: Half width of its 95 % band. [N]
-    is_load: bool = False  #: Whether it is called a load.
-
-
-def read_list(path: Path) -> list[ListedRow]:
-    """A list of contacts from CSV."""
-    import polars as pl
-
-    try:
-        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
-        return [
-            ListedRow(
-                start=float(row["start_s"]),
-                stop=float(row["stop_s"]),
-                peak=float(row.get("peak_force_N") or 0.0),
-                band=float(row.get("peak_force_band_N") or 0.0),
-                is_load=row.get("kind") == "load",
-            )
-            for row in rows
-        ]
-    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
-        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
-
-
-def read_parts(files: Mapping[str, Path]) -> dict[str, Array]:
-    """Columns t, q1… of text files, one a signal, t first, numbers row after row."""
-    columns: dict[str, Array] = {}
-    samples = 0
-    for signal, path in files.items():
-        try:
-            values = np.loadtxt(path, ndmin=1).ravel()
-            rows = values.reshape(samples or len(values), -1)
-        except (OSError, UnicodeDecodeError, ValueError):
-            raise LogError(
-                f"{path}: not numbers, as many for each of {samples or 'its'} samples"
-            ) from None
-        samples = len(rows)
-        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
-        columns |= dict(zip(names, rows.T, strict=True))
-    return columns
 
 
 UNIT = 1e-3  #: How far from 1 the axis of a joint may be in the Jacobian.

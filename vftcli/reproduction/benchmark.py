@@ -26,8 +26,14 @@ from vftcli.outputs.files import put_table
 from vftcli.outputs.run_record import envelope
 from vftcli.pipeline import prepared
 from vftcli.readers.library import Library, absolute
-from vftcli.readers.references import read_parts
-from vftcli.reproduction.manifest import PUSHED, BenchmarkLog, Manifest, Rival, TrainedRobot
+from vftcli.reproduction.manifest import (
+    PUSHED,
+    BenchmarkLog,
+    Manifest,
+    Rival,
+    TrainedRobot,
+    read_parts,
+)
 from vftcli.reproduction.scoring import SCHEMA, ScoreTask, planted, score_log
 from vftcli.signals.option import interval
 from vftcli.signals.packages import check_installed

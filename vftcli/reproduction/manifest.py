@@ -13,13 +13,17 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
+import numpy as np
+
 from vftcli.batch.keys import content_digest, digest_of, with_files
 from vftcli.doctor.examination import Examiner
+from vftcli.evaluation.detection import ListedRow
 from vftcli.notebook import OF_ESTIMATE
 from vftcli.pipeline import AnalysisChoice, choice_of
 from vftcli.readers.library import Library, absolute
 from vftcli.readers.table import listed
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.option import Asked, interval
 from vftcli.signals.parsing import check_known, toml_file
 from vftcli.simulation.scenario import Vector, section_from
@@ -354,3 +358,41 @@ def rival_of(text: str, ours: Sequence[str], logs: Sequence[BenchmarkLog]) -> Ri
             f"is looked for, LOG one of {', '.join(log.name for log in logs)}"
         )
     return rival
+
+
+def read_list(path: Path) -> list[ListedRow]:
+    """A list of contacts from CSV."""
+    import polars as pl
+
+    try:
+        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
+        return [
+            ListedRow(
+                start=float(row["start_s"]),
+                stop=float(row["stop_s"]),
+                peak=float(row.get("peak_force_N") or 0.0),
+                band=float(row.get("peak_force_band_N") or 0.0),
+                is_load=row.get("kind") == "load",
+            )
+            for row in rows
+        ]
+    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
+        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
+
+
+def read_parts(files: Mapping[str, Path]) -> dict[str, Array]:
+    """Columns t, q1… of text files, one a signal, t first, numbers row after row."""
+    columns: dict[str, Array] = {}
+    samples = 0
+    for signal, path in files.items():
+        try:
+            values = np.loadtxt(path, ndmin=1).ravel()
+            rows = values.reshape(samples or len(values), -1)
+        except (OSError, UnicodeDecodeError, ValueError):
+            raise LogError(
+                f"{path}: not numbers, as many for each of {samples or 'its'} samples"
+            ) from None
+        samples = len(rows)
+        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
+        columns |= dict(zip(names, rows.T, strict=True))
+    return columns

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import count, takewhile
 from pathlib import Path
 from time import thread_time
 from typing import Any, NamedTuple
@@ -12,16 +13,20 @@ from polars import Boolean, Float64, Int64, String
 
 from vftcli.batch.cluster import begin
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation.detection import TrueContact, score_list
+from vftcli.evaluation.detection import ListedRow, TrueContact, score_list
 from vftcli.evaluation.references import on_the_logs_clock, since_start, table_reference
 from vftcli.evaluation.scores import Score, episodes, lag_sums, parts_of, weights
 from vftcli.free_motion.free_motion import within
 from vftcli.observers.table import BEST, OBSERVERS
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice, analyse, prepared, run_of
+from vftcli.readers.columns import Cell, Item
 from vftcli.readers.library import Library
-from vftcli.readers.references import ListedRow, read_list, read_outside, read_reference
-from vftcli.reproduction.manifest import BenchmarkLog, Rival
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.references import TORQUE, program_clock, read_reference, table_at
+from vftcli.readers.table import listed
+from vftcli.readers.tables import load_signals
+from vftcli.reproduction.manifest import BenchmarkLog, Rival, read_list
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
@@ -30,6 +35,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import AXES
 from vftcli.wrench.frames import NOTHING
 
 #: A joint is touched from here on, until below this. [N·m]
@@ -295,3 +301,30 @@ def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
     square = float((w * (up - weight) ** 2)[known].sum()) / total
     shares = {"mean_N": mean, "rms_error_N": np.sqrt(square), "answered": total / w.sum()}
     return {"weight_N": weight, **shares}
+
+
+def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
+    """Torque and wrench (T, 6) or None of another program's file, at its own stamps.
+
+    Its columns are t, tau_ext/1…, band/1… (one standard deviation), wrench/fx… (force and
+    moment on the robot, base axes); a file of `vftcli estimate` has them as
+    tau_ext/NAME/1…. NaN is no answer.
+    """
+    table = table_at(path)
+    inner = f"/{name}/" if f"{TORQUE}/{name}/1" in table.names else "/"
+    columns = {column: Cell(k) for k, column in enumerate(table.names)}
+    picks = {}
+    for kind, ends in {TORQUE: count(1), "band": count(1), "wrench": AXES}.items():
+        wanted = (f"{kind}{inner}{end}" for end in ends)
+        cells = tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
+        if cells and (kind != "wrench" or len(cells) == len(AXES)):
+            picks[kind] = Item(kind, cells=cells)
+    if "t" not in columns or TORQUE not in picks:
+        raise LogError(
+            f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
+            f"{listed(table.names)}"
+        )
+    picks["t"] = Item("t", unit="s", cells=(columns["t"],))
+    raw = load_signals(table, picks, ReadChoice())
+    t, tau, sd = program_clock(raw, path), raw.signals[TORQUE], raw.signals.get("band")
+    return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), raw.signals.get("wrench")

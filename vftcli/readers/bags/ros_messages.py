@@ -6,18 +6,17 @@ if that is as long and all its length prefixes are equal; strings must be equal 
 that joint names hold for a group.
 """
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Sequence
 from functools import cache, lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.readers.bags.container import Bytes, Channel, type_name
+from vftcli.readers.bags.container import Bytes, Channel
 from vftcli.readers.opening import DAMAGE, reason_of
 from vftcli.readers.table import Names
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.errors import LogError, OutputError
+from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import tables_beside
 
 #: Franka's state with all its errors takes some 10 KiB.
@@ -202,12 +201,6 @@ def type_store() -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
     return store
 
 
-def schema_text(kind: str) -> str:
-    """A type's definition, then those of the types inside it, as bags embed them."""
-    text: str = type_store().generate_msgdef(long_name(kind), ros_version=2)[0]
-    return text
-
-
 def types_for(channel: Channel) -> Types:
     """All types that a channel's messages are made of: the container's own first."""
     known: Types = dict(type_store().fielddefs)
@@ -223,52 +216,3 @@ def types_for(channel: Channel) -> Types:
             "with ros2 bag convert on a machine that has the package."
         )
     return known
-
-
-#: Text, names, a number, or numbers: one row a message, or one row for all.
-Value = str | Sequence[str] | float | NDArray[Any]
-
-
-def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
-    """Many messages of one type and one layout in CDR, little-endian. (T, size)
-
-    One message is laid out; all have its bytes, but for numbers put in column by column.
-    """
-    template = bytes(type_store().serialize_cdr(template_of(kind, values), long_name(kind)))
-    layout = MessageLayout(type_store().fielddefs, template, kind, cdr=True)
-    if unknown := sorted({*values} - {*layout.paths, *layout.texts}):
-        raise OutputError(f"{kind} has no field {unknown[0]}")
-    out = np.tile(np.frombuffer(template, np.uint8), (rows, 1))
-    messages = out.view(layout.kind)[:, 0]
-    for path in values.keys() & layout.paths.keys():
-        if messages[path].size:
-            messages[path] = np.reshape(np.asarray(values[path]), (-1, messages[path].shape[1]))
-    return out
-
-
-def template_of(kind: str, values: Mapping[str, Value], path: str = "") -> Any:  # noqa: ANN401
-    """A message with the texts of values, and as many zeros as they have numbers."""
-    made: dict[str, Any] = {}
-    for name, described in type_store().fielddefs[long_name(kind)][1]:
-        inner, (part, many) = f"{path}.{name}" if path else name, element_of(described)
-        given: Any = values.get(inner)
-        # A sequence is as long as the rows that it is given.
-        if many == -1:
-            many = 0 if given is None else np.shape(given)[-1]
-        if part in SIZES:
-            made[name] = 0 if many is None else np.zeros(many, SIZES[part])
-        elif part == "string":
-            made[name] = str(given or "") if many is None else [*map(str, given or ())]
-        else:  # sequences of messages stay empty
-            made[name] = template_of(type_name(part), values, inner) if many is None else []
-    return type_store().types[long_name(kind)](**made)
-
-
-def stamped(times: NDArray[np.int64], path: str = "header.stamp") -> dict[str, Value]:
-    """The values of a stamp, of times since 1970. (T,) [ns]"""
-    return {f"{path}.sec": times // 10**9, f"{path}.nanosec": times % 10**9}
-
-
-def in_parts(path: str, names: str, columns: NDArray[Any]) -> dict[str, Value]:
-    """A vector's parts: ``in_parts("force", "xyz", …)`` gives force.x and so on."""
-    return {f"{path}.{name}": column for name, column in zip(names, columns.T, strict=True)}

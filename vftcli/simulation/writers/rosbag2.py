@@ -1,19 +1,22 @@
 """rosbag2 (MCAP storage): FrankaRobotState for Franka arms, else JointState."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vftcli.readers.bags.container import Bytes, type_name
 from vftcli.readers.bags.ros_messages import (
-    Value,
-    in_parts,
+    SIZES,
+    MessageLayout,
+    element_of,
     long_name,
-    serialised,
-    stamped,
     type_store,
 )
 from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.errors import OutputError
 from vftcli.simulation.experiment import FlangeMotion, Simulation
 from vftcli.wrench.solvers import wrench_of
 
@@ -28,7 +31,8 @@ ROBOT_STATE = "franka_msgs/FrankaRobotState"
 WRENCH, TWIST = ("force", "torque"), ("linear", "angular")
 UPRIGHT = np.array([[0.0, 0.0, 0.0, 1.0]])  #: The quaternion of no rotation, x, y, z, w.
 
-
+#: Text, names, a number, or numbers: one row a message, or one row for all.
+Value = str | Sequence[str] | float | NDArray[Any]
 #: A topic's name, type as package/Name, and messages (R, size).
 Topic = tuple[str, str, NDArray[np.uint8]]
 
@@ -129,6 +133,57 @@ def robot_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topi
     }
     messages = serialised(ROBOT_STATE, values, len(rows))
     return "/franka_robot_state_broadcaster/robot_state", ROBOT_STATE, messages
+
+
+def serialised(kind: str, values: Mapping[str, Value], rows: int) -> Bytes:
+    """Many messages of one type and one layout in CDR, little-endian. (T, size)
+
+    One message is laid out; all have its bytes, but for numbers put in column by column.
+    """
+    template = bytes(type_store().serialize_cdr(template_of(kind, values), long_name(kind)))
+    layout = MessageLayout(type_store().fielddefs, template, kind, cdr=True)
+    if unknown := sorted({*values} - {*layout.paths, *layout.texts}):
+        raise OutputError(f"{kind} has no field {unknown[0]}")
+    out = np.tile(np.frombuffer(template, np.uint8), (rows, 1))
+    messages = out.view(layout.kind)[:, 0]
+    for path in values.keys() & layout.paths.keys():
+        if messages[path].size:
+            messages[path] = np.reshape(np.asarray(values[path]), (-1, messages[path].shape[1]))
+    return out
+
+
+def template_of(kind: str, values: Mapping[str, Value], path: str = "") -> Any:  # noqa: ANN401
+    """A message with the texts of values, and as many zeros as they have numbers."""
+    made: dict[str, Any] = {}
+    for name, described in type_store().fielddefs[long_name(kind)][1]:
+        inner, (part, many) = f"{path}.{name}" if path else name, element_of(described)
+        given: Any = values.get(inner)
+        # A sequence is as long as the rows that it is given.
+        if many == -1:
+            many = 0 if given is None else np.shape(given)[-1]
+        if part in SIZES:
+            made[name] = 0 if many is None else np.zeros(many, SIZES[part])
+        elif part == "string":
+            made[name] = str(given or "") if many is None else [*map(str, given or ())]
+        else:  # sequences of messages stay empty
+            made[name] = template_of(type_name(part), values, inner) if many is None else []
+    return type_store().types[long_name(kind)](**made)
+
+
+def stamped(times: NDArray[np.int64], path: str = "header.stamp") -> dict[str, Value]:
+    """The values of a stamp, of times since 1970. (T,) [ns]"""
+    return {f"{path}.sec": times // 10**9, f"{path}.nanosec": times % 10**9}
+
+
+def in_parts(path: str, names: str, columns: NDArray[Any]) -> dict[str, Value]:
+    """A vector's parts: ``in_parts("force", "xyz", …)`` gives force.x and so on."""
+    return {f"{path}.{name}": column for name, column in zip(names, columns.T, strict=True)}
+
+
+def schema_text(kind: str) -> str:
+    """A type's definition, then those of the types inside it, as bags embed them."""
+    text: str = type_store().generate_msgdef(long_name(kind), ros_version=2)[0]
+    return text
 
 
 def quaternions(rotation: Array) -> Array:
