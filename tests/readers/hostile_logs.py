@@ -9,9 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
-from seed_logs import ROWS, bare_mcap, motion, rosbag1
-
-JOINTS = 7
+from seed_logs import ROWS, bare_mcap, motion, panda_py_log, rosbag1, rows_of, write_mcap
 
 
 def bag_cut_at_record(path: Path, compression: str = "") -> Path:
@@ -68,31 +66,22 @@ uint32 nanosec
 
 def mcap_of_type(path: Path, definition: str, position: float = 0.1) -> Path:
     """Twenty joint states in an MCAP that says their type is what a text defines."""
-    from mcap.writer import Writer
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    types = store.types
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile="ros2", library="test")
-        schema = writer.register_schema(
-            "sensor_msgs/msg/JointState", "ros2msg", definition.encode()
+    kind, store = "sensor_msgs/msg/JointState", get_typestore(Stores.ROS2_HUMBLE)
+    types, messages = store.types, []
+    for k in range(20):
+        time = types["builtin_interfaces/msg/Time"](sec=1, nanosec=8_000_000 * k)
+        message = types[kind](
+            header=types["std_msgs/msg/Header"](stamp=time, frame_id=""),
+            name=[f"j{j}" for j in range(6)],
+            position=np.full(6, position),
+            velocity=np.zeros(6),
+            effort=np.zeros(6),
         )
-        channel = writer.register_channel("/joint_states", "cdr", schema)
-        for k in range(20):
-            time = types["builtin_interfaces/msg/Time"](sec=1, nanosec=8_000_000 * k)
-            message = types["sensor_msgs/msg/JointState"](
-                header=types["std_msgs/msg/Header"](stamp=time, frame_id=""),
-                name=[f"j{j}" for j in range(6)],
-                position=np.full(6, position),
-                velocity=np.zeros(6),
-                effort=np.zeros(6),
-            )
-            content = store.serialize_cdr(message, "sensor_msgs/msg/JointState")
-            writer.add_message(channel, 8_000_000 * k, content, 8_000_000 * k, k)
-        writer.finish()
-    return path
+        messages.append(("/j", 8_000_000 * k, bytes(store.serialize_cdr(message, kind))))
+    schemas = {"/j": (kind, "ros2msg", definition.encode())}
+    return write_mcap(path, messages, encoding="cdr", schemas=schemas)
 
 
 RULE = "=" * 80
@@ -142,9 +131,8 @@ def viewed(path: Path) -> Path:
 
 def pickled_with_byte_order(path: Path) -> Path:
     """panda-py's log in the other byte order than most machines have."""
-    log = motion(JOINTS)
-    arrays = {"time": 1e3 * log["t"], "q": log["q"], "dq": log["dq"], "tau_J": log["tau"]}
-    path.write_bytes(pickle.dumps({name: a.astype(">f8") for name, a in arrays.items()}))
+    log = panda_py_log()
+    path.write_bytes(pickle.dumps({name: a.astype(">f8") for name, a in log.items()}))
     return path
 
 
@@ -180,7 +168,7 @@ def parquet(path: Path, **changed: object) -> Path:
     import pyarrow as pa
     from pyarrow.parquet import write_table
 
-    log = motion(JOINTS)
+    log = motion(7)
     columns: dict[str, object] = {"t": log["t"], "q": log["q"].tolist(), "dq": log["dq"].tolist()}
     write_table(pa.table(columns | changed), path)
     return path
@@ -188,7 +176,7 @@ def parquet(path: Path, **changed: object) -> Path:
 
 def lists(first: object = None) -> list[object]:
     """The positions as lists, the first replaced."""
-    return [first, *motion(JOINTS)["q"].tolist()[1:]]
+    return [first, *motion(7)["q"].tolist()[1:]]
 
 
 def parquet_of_zeros(path: Path) -> Path:
@@ -203,20 +191,15 @@ def parquet_of_zeros(path: Path) -> Path:
 
 def npz(path: Path, **changed: object) -> Path:
     """panda-py's arrays, some of them changed."""
-    log = motion(JOINTS)
-    arrays = {"time": 1e3 * log["t"], "q": log["q"], "dq": log["dq"], "tau_J": log["tau"]}
     with path.open("wb") as file:
-        np.savez(file, **(arrays | changed))
+        np.savez(file, **(panda_py_log() | changed))
     return path
 
 
 def table(path: Path, clock: Callable[[int], float], rows: int = ROWS) -> Path:
     """A text table whose clock is a function of the row."""
-    names = ["t", *(f"q{j}" for j in range(6)), *(f"dq{j}" for j in range(6))]
-    log = motion()
-    lines = [",".join(names)]
-    for k in range(rows):
-        numbers = [clock(k), *log["q"][k], *log["dq"][k]]
-        lines.append(",".join(repr(float(number)) for number in numbers))
+    log, times = motion(), [float(clock(k)) for k in range(rows)]
+    names = ["t", *(f"{name}{j}" for name in ("q", "dq") for j in range(6))]
+    lines = [",".join(names), *rows_of(np.array(times), log["q"][:rows], log["dq"][:rows])]
     path.write_text("\n".join(lines) + "\n")
     return path

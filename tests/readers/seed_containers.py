@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from seed_logs import motion, panda_py_log
+from seed_logs import ROWS, motion, panda_py_log
 
 Layout = dict[str, Any]
 """Path of a dataset → its numbers."""
@@ -36,11 +36,9 @@ def write_arrow(
 
 def json_lines(path: Path) -> Path:
     """panda-py's log, an object a sample."""
-    log = panda_py_log() | {"time": 1000 + np.arange(len(motion()["t"]))}
-    names = list(log)
-    rows = zip(*(log[name].tolist() for name in names), strict=True)
-    lines = [json.dumps(dict(zip(names, row, strict=True))) for row in rows]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    log = panda_py_log() | {"time": 1000 + np.arange(ROWS)}
+    states = ({name: value[k].tolist() for name, value in log.items()} for k in range(ROWS))
+    path.write_text("".join(f"{json.dumps(state)}\n" for state in states), encoding="utf-8")
     return path
 
 
@@ -54,16 +52,12 @@ def json_arrays(path: Path) -> Path:
 def json_skills(path: Path, skills: int = 1) -> Path:
     """frankapy's trajectory, as json.dump writes it."""
     log = motion(7, step=0.01)
-    times = log["t"].tolist()
-    held = {
-        str(k): {
-            "skill_description": "GuideMode",
-            "skill_state_dict": {
-                "q": (log["q"] + 0.1 * k).tolist(), "time_since_skill_started": times,
-            },
-        }
+    states = (
+        {"q": (log["q"] + 0.1 * k).tolist(), "time_since_skill_started": log["t"].tolist()}
         for k in range(skills)
-    }  # fmt: skip
+    )
+    described = ({"skill_description": "GuideMode", "skill_state_dict": s} for s in states)
+    held = {str(k): skill for k, skill in enumerate(described)}
     path.write_text(json.dumps(held), encoding="utf-8")
     return path
 
@@ -152,6 +146,8 @@ def droid(folder: Path, rows: int = 60, serial: str = "panda-295341") -> Path:
     return hdf5(folder / "trajectory.h5", layout)
 
 
+MOTION = {name: motion()[name] for name in ("t", "q", "dq", "current")}
+
 SEEDS: dict[str, tuple[Callable[[Path], Path], str | None]] = {
     "arrow": (arrow, None),
     "arrow-stream": (lambda path: arrow(path, stream=True, codec="zstd"), None),
@@ -161,10 +157,7 @@ SEEDS: dict[str, tuple[Callable[[Path], Path], str | None]] = {
     "mat": (matlab, None),
     "mat-struct": (lambda path: matlab(path, turned=True), None),
     "mat-73": (matlab_73, None),
-    "hdf5": (
-        lambda path: hdf5(path, {n: motion()[n] for n in ("t", "q", "dq", "current")}),
-        None,
-    ),
+    "hdf5": (lambda path: hdf5(path, MOTION), None),
     "aloha": (aloha, None),
 }
 """Name → how a log of that kind is made, and its --columns."""

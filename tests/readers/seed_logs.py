@@ -3,7 +3,8 @@
 import gzip
 import json
 import pickle
-from collections.abc import Callable, Iterable
+import shutil
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,17 +43,17 @@ def motion(joints: int = JOINTS, rows: int = ROWS, step: float = 0.008) -> dict[
 def ur_csv(path: Path, *, separator: str = " ", end: str = "\r\n", rows: int = ROWS) -> Path:
     """A log as the official RTDE client writes it (or ur_rtde, with commas)."""
     log = motion(rows=rows)
-    names = ["timestamp"]
-    columns = [1000 + log["t"]]
-    for name, key in (("actual_q", "q"), ("actual_qd", "dq"), ("actual_current", "current")):
-        names += [f"{name}_{j}" for j in range(6)]
-        columns += list(log[key].T)
-    names.append("robot_mode")
-    columns.append(np.full(rows, 7))
-    lines = [separator.join(names)]
-    lines += [separator.join(repr(float(v)) for v in row) for row in np.column_stack(columns)]
+    groups = ("actual_q", "actual_qd", "actual_current")
+    names = ["timestamp", *(f"{name}_{j}" for name in groups for j in range(6)), "robot_mode"]
+    columns = [1000 + log["t"], log["q"], log["dq"], log["current"], np.full(rows, 7)]
+    lines = [separator.join(names), *rows_of(*columns, separator=separator)]
     path.write_bytes((end.join(lines) + end).encode())
     return path
+
+
+def rows_of(*columns: np.ndarray, separator: str = ",") -> list[str]:
+    """The lines of a table, with every digit."""
+    return [separator.join(map(repr, row)) for row in np.column_stack(columns).tolist()]
 
 
 def ur_binary(path: Path) -> Path:
@@ -111,17 +112,14 @@ def table_csv(path: Path) -> Path:
     """A headed table by aliases."""
     log = motion()
     names = ["t"] + [f"{name}_{j}" for name in ("q", "dq", "tau") for j in range(6)]
-    matrix = np.column_stack([log["t"], log["q"], log["dq"], log["tau"]])
-    lines = [",".join(names), *(",".join(repr(float(v)) for v in row) for row in matrix)]
+    lines = [",".join(names), *rows_of(log["t"], log["q"], log["dq"], log["tau"])]
     path.write_text("\n".join(lines) + "\n")
     return path
 
 
 def table_gz(path: Path) -> Path:
     """The headed table, gzipped."""
-    plain = table_csv(path.with_suffix(".plain"))
-    path.write_bytes(gzip.compress(plain.read_bytes(), mtime=0))
-    plain.unlink()
+    path.write_bytes(gzip.compress(table_csv(path).read_bytes(), mtime=0))
     return path
 
 
@@ -177,22 +175,43 @@ def parquet(path: Path) -> Path:
     return path
 
 
-def mcap_json(path: Path) -> Path:
-    """JSON documents in an MCAP of several chunks."""
+Schema = tuple[str, str, bytes]
+"""Name of a type, the encoding of its definition, its definition."""
+
+
+def write_mcap(
+    path: Path,
+    messages: Iterable[tuple[str, int, bytes]],
+    *,
+    encoding: str = "json",
+    schemas: Mapping[str, Schema] | None = None,
+    chunk_size: int = 1 << 20,
+) -> Path:
+    """An MCAP of messages: topic, time [ns], content. `schemas` are by topic."""
     from mcap.writer import Writer
 
-    log = motion()
     with path.open("wb") as file:
-        writer = Writer(file, chunk_size=4096)
-        writer.start(profile="", library="test")
-        channel = writer.register_channel("/joints", "json", 0)
-        for k in range(ROWS):
-            stamp = 10**9 + round(log["t"][k] * 1e9)
-            document = {"timestamp": {"sec": stamp // 10**9, "nsec": stamp % 10**9}}
-            document |= {"q": log["q"][k].tolist(), "tau": log["tau"][k].tolist()}
-            writer.add_message(channel, stamp, json.dumps(document).encode(), stamp, k)
+        writer = Writer(file, chunk_size=chunk_size)
+        writer.start(profile="ros2" if encoding == "cdr" else "", library="test")
+        channels: dict[str, int] = {}
+        for k, (topic, time, content) in enumerate(messages):
+            if topic not in channels:
+                number = writer.register_schema(*schemas[topic]) if schemas else 0
+                channels[topic] = writer.register_channel(topic, encoding, number)
+            writer.add_message(channels[topic], time, content, time, k)
         writer.finish()
     return path
+
+
+def mcap_json(path: Path) -> Path:
+    """JSON documents in an MCAP of several chunks."""
+    log, messages = motion(), []
+    for k in range(ROWS):
+        stamp = 10**9 + round(log["t"][k] * 1e9)
+        document = {"timestamp": {"sec": stamp // 10**9, "nsec": stamp % 10**9}}
+        document |= {"q": log["q"][k].tolist(), "tau": log["tau"][k].tolist()}
+        messages.append(("/joints", stamp, json.dumps(document).encode()))
+    return write_mcap(path, messages, chunk_size=4096)
 
 
 def bag_messages(ros1: bool) -> tuple[object, list[tuple[str, str, int, object]]]:
@@ -271,39 +290,21 @@ def rosbag2(folder: Path, *, storage: str = "mcap", mode: str = "", method: str 
 def bare_mcap(path: Path) -> Path:
     """The MCAP inside a ROS 2 bag folder, chunked anew so that it has several chunks."""
     from mcap.reader import make_reader
-    from mcap.writer import Writer
 
     folder = rosbag2(path.with_suffix(".folder"))
-    inner = next(folder.glob("*.mcap"))
-    with inner.open("rb") as source, path.open("wb") as file:
-        writer = Writer(file, chunk_size=16 * 1024)
-        writer.start(profile="ros2", library="test")
-        channels: dict[str, int] = {}
-        for schema, channel, message in make_reader(source).iter_messages():
-            if channel.topic not in channels:
-                number = writer.register_schema(schema.name, schema.encoding, schema.data)
-                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
-            writer.add_message(
-                channels[channel.topic],
-                message.log_time,
-                message.data,
-                message.publish_time,
-                message.sequence,
-            )
-        writer.finish()
-    for inner in folder.iterdir():
-        inner.unlink()
-    folder.rmdir()
-    return path
+    with next(folder.glob("*.mcap")).open("rb") as source:
+        found = list(make_reader(source).iter_messages())
+    shutil.rmtree(folder)
+    schemas = {c.topic: (s.name, s.encoding, s.data) for s, c, _ in found}
+    messages = ((c.topic, m.log_time, m.data) for _, c, m in found)
+    return write_mcap(path, messages, encoding="cdr", schemas=schemas, chunk_size=16 * 1024)
 
 
 def bare_db3(path: Path) -> Path:
     """The database inside a ROS 2 bag folder."""
     folder = rosbag2(path.with_suffix(".folder"), storage="sqlite3")
     next(folder.glob("*.db3")).replace(path)
-    for inner in folder.iterdir():
-        inner.unlink()
-    folder.rmdir()
+    shutil.rmtree(folder)
     return path
 
 

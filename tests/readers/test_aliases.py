@@ -1,15 +1,19 @@
-"""Columns found by their names: joints in them, two-column clocks, what --columns leaves out."""
+"""Columns found by their names: joints in them and their order along the arm, clocks."""
 
+import random
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vftcli.readers.aliases import UR_NAMES
+from vftcli.readers.aliases import ALIASES, CLOCKS, UR_NAMES, kinematic_order, robot_of
+from vftcli.readers.columns import SIGNALS
 from vftcli.readers.reading import read
-from vftcli.signals.errors import ClockError, LogError
+from vftcli.signals.errors import LogError
 
+FRANKA = [f"fr3_joint{j}" for j in range(1, 8)]
 ROWS = 30
+CLOCK: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
 
 
 def write(path: Path, columns: dict[str, object]) -> Path:
@@ -30,21 +34,20 @@ def test_a_joints_name_beside_the_signals_gives_its_place(
     tmp_path: Path, pattern: str, word: str, effort: str
 ) -> None:
     """UR's drivers publish currents as effort; what is called torque is one."""
-    columns: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
+    columns = dict(CLOCK)
     for k, signal in enumerate(("pos", "vel", word)):
         for joint in reversed(UR_NAMES):
             columns[pattern.format(signal=signal, joint=joint)] = k + 0.1 * UR_NAMES.index(joint)
     log = read(write(tmp_path / "log", columns))
     assert log.joint_names == UR_NAMES
     assert log.signals == ("q", "dq", effort)
-    np.testing.assert_allclose(log.q[0], 0.1 * np.arange(6))
-    np.testing.assert_allclose(log.require("dq")[0], 1 + 0.1 * np.arange(6))
-    np.testing.assert_allclose(log.require(effort)[0], 2 + 0.1 * np.arange(6))
+    for k, signal in enumerate(("q", "dq", effort)):
+        np.testing.assert_allclose(log.require(signal)[0], k + 0.1 * np.arange(6))
 
 
 @pytest.mark.parametrize("pattern", ["{signal}_{k}", "{signal}_joint{k}", "joint{k}_{signal}"])
 def test_numbered_joints_are_ordered_by_number(tmp_path: Path, pattern: str) -> None:
-    columns: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
+    columns = dict(CLOCK)
     for signal in ("pos", "vel", "eff"):
         columns |= {pattern.format(signal=signal, k=k): 0.1 * k for k in (3, 1, 2)}
     log = read(write(tmp_path / "log", columns))
@@ -53,10 +56,9 @@ def test_numbered_joints_are_ordered_by_number(tmp_path: Path, pattern: str) -> 
 
 
 def test_a_pose_has_no_joints(tmp_path: Path) -> None:
-    columns: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
-    columns |= {f"{signal}_{axis}": 0.5 for signal in ("pos", "vel") for axis in "xyz"}
+    columns = {f"{signal}_{axis}": 0.5 for signal in ("pos", "vel") for axis in "xyz"}
     with pytest.raises(LogError, match="no joint positions"):
-        read(write(tmp_path / "log", columns))
+        read(write(tmp_path / "log", CLOCK | columns))
 
 
 @pytest.mark.parametrize(
@@ -86,12 +88,6 @@ def test_a_messages_stamp_goes_before_the_recorders_time(tmp_path: Path) -> None
     np.testing.assert_array_equal(read(write(tmp_path / "log", columns)).t, stamps * 1e-9)
 
 
-def test_seconds_alone_that_repeat_are_refused(tmp_path: Path) -> None:
-    columns = {"sec": np.arange(ROWS) // 10, "q1": np.linspace(0, 1, ROWS)}
-    with pytest.raises(ClockError, match="coarser than the samples"):
-        read(write(tmp_path / "log", columns))
-
-
 @pytest.mark.parametrize("nanoseconds", [0.5, 2e9, -1.0])
 def test_a_pair_that_is_none_is_refused(tmp_path: Path, nanoseconds: float) -> None:
     columns = {"sec": np.arange(ROWS), "nsec": nanoseconds, "q1": np.linspace(0, 1, ROWS)}
@@ -107,11 +103,8 @@ def test_a_rate_alone_leaves_the_signals_to_their_names(tmp_path: Path) -> None:
     assert log.require("current")[0, 0] == pytest.approx(2e-3)
 
 
-def test_what_a_text_with_positions_leaves_out_is_found_where_one_group_fits(
-    tmp_path: Path,
-) -> None:
-    clock = np.arange(ROWS) * 0.01
-    columns = {"time": clock, "arm_1": 0.1, "dq_1": 0.2, "tau_1": 0.3, "tau_ext_1": 0.4}
+def test_what_a_text_leaves_out_is_found_where_one_group_fits(tmp_path: Path) -> None:
+    columns = {"time": CLOCK["t"], "arm_1": 0.1, "dq_1": 0.2, "tau_1": 0.3, "tau_ext_1": 0.4}
     log = read(write(tmp_path / "log", columns), columns="q=arm_{i}")
     # A vendor's estimate may have either sign: it is not taken unasked.
     assert log.signals == ("q", "dq", "torque")
@@ -119,8 +112,53 @@ def test_what_a_text_with_positions_leaves_out_is_found_where_one_group_fits(
     # Of two efforts neither is.
     write(tmp_path / "log", {**columns, "current_1": 0.5})
     assert read(tmp_path / "log", columns="q=arm_{i}").signals == ("q", "dq")
-    assert read(tmp_path / "log", columns="q=arm_{i},tau=tau_{i}").signals == (
-        "q",
-        "dq",
-        "torque",
-    )
+    stated = read(tmp_path / "log", columns="q=arm_{i},tau=tau_{i}")
+    assert stated.signals == ("q", "dq", "torque")
+
+
+@pytest.mark.parametrize(
+    ("arm", "others"),
+    [
+        (UR_NAMES, ["gripper_finger"]),
+        ([f"left_{name}" for name in UR_NAMES], ["gripper_finger"]),
+        (FRANKA, ["fr3_finger_joint1", "fr3_finger_joint2"]),
+        (["base", "shoulder", "elbow", "wrist 1", "wrist_2", "Wrist_3"], []),
+        (["joint_1", "joint_2", "joint_10"], []),
+    ],
+)
+def test_an_arms_joints_are_found_in_any_order_and_among_others(arm, others) -> None:
+    names = [*arm, *others]
+    random.Random(1).shuffle(names)
+    assert [names[k] for k in kinematic_order(names)] == list(arm)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [["b", "a"], ["joint1", "joint1"], ["joint1", "hand"], [],
+     [*FRANKA, *(f"left_{name}" for name in FRANKA)]],
+)  # fmt: skip
+def test_names_that_tell_nothing_keep_the_files_order(names) -> None:
+    assert kinematic_order(names) == tuple(range(len(names)))
+
+
+@pytest.mark.parametrize(
+    ("names", "robot"),
+    [
+        (FRANKA, "fr3"),
+        ([f"panda_joint{j}" for j in range(1, 8)], "panda"),
+        ([f"fer_joint{j}" for j in range(1, 8)], "panda"),
+        ([*FRANKA, "panda_joint1"], None),
+        (UR_NAMES, None),
+    ],
+)
+def test_the_robot_that_names_settle(names, robot) -> None:
+    assert robot_of(names) == robot
+
+
+@pytest.mark.parametrize("field", ALIASES)
+def test_the_document_has_every_alias_and_every_name_of_the_clock(field: str) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "formats.md").read_text("utf-8")
+    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
+    signal = next(name for name, target in SIGNALS.items() if target == field)
+    assert all(f"`{alias}`" in rows[signal] for alias in ALIASES[field])
+    assert all(f"`{name}`" in text for name in CLOCKS)

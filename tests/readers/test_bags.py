@@ -2,23 +2,17 @@
 
 import bz2
 import shutil
+import sqlite3
+import struct
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import lz4.frame
 import numpy as np
 import pytest
 import zstandard
-from seed_logs import (
-    ROWS,
-    bag_messages,
-    bare_db3,
-    bare_mcap,
-    mcap_json,
-    motion,
-    rosbag1,
-    rosbag2,
-)
+from seed_logs import ROWS, bare_db3, bare_mcap, motion, rosbag1, rosbag2, write_mcap
 
 from vftcli.readers.bags.container import ReadBudget, unpacked
 from vftcli.readers.reading import read
@@ -69,31 +63,25 @@ def test_ros2_bags(tmp_path: Path, storage: str, mode: str, method: str) -> None
     assert_is_the_motion(recording)
 
 
-def test_bare_files_and_folders_without_metadata(tmp_path: Path) -> None:
-    assert_is_the_motion(read(bare_mcap(tmp_path / "x")))
-    assert_is_the_motion(read(bare_db3(tmp_path / "y")))
-    folder = rosbag2(tmp_path / "z")
-    (folder / "metadata.yaml").unlink()
-    assert_is_the_motion(read(folder))
+@pytest.mark.parametrize("make", [bare_mcap, bare_db3])
+def test_bare_files(tmp_path: Path, make: Callable[[Path], Path]) -> None:
+    assert_is_the_motion(read(make(tmp_path / "x")))
 
 
-def test_metadata_that_counts_more_messages_is_said(tmp_path: Path) -> None:
-    folder = rosbag2(tmp_path / "x")
-    text = (folder / "metadata.yaml").read_text()
-    (folder / "metadata.yaml").write_text(
-        text.replace("  message_count: 240", "  message_count: 300")
-    )
-    [reported] = read(folder).source.warnings
+def test_metadata_is_not_needed_and_cannot_choose_a_path(tmp_path: Path) -> None:
+    metadata = rosbag2(tmp_path / "x") / "metadata.yaml"
+    text = metadata.read_text()
+    (tmp_path / "secret.mcap").write_bytes(b"not to be opened")
+    metadata.write_text(text.replace("x.mcap", "../secret.mcap"))
+    assert_is_the_motion(read(tmp_path / "x"))
+    metadata.write_text(text.replace("  message_count: 240", "  message_count: 300"))
+    [reported] = read(tmp_path / "x").source.warnings
     assert "read 240 of the 300 messages that metadata.yaml counts" in reported
-
-
-def test_metadata_cannot_choose_a_path(tmp_path: Path) -> None:
-    folder = rosbag2(tmp_path / "x")
-    text = (folder / "metadata.yaml").read_text()
-    secret = tmp_path / "secret.mcap"
-    secret.write_bytes(b"not to be opened")
-    (folder / "metadata.yaml").write_text(text.replace("x.mcap", "../secret.mcap"))
-    assert_is_the_motion(read(folder))
+    metadata.unlink()
+    assert_is_the_motion(read(tmp_path / "x"))
+    shutil.move(next((tmp_path / "x").glob("*.mcap")), tmp_path / "x" / "x.txt")
+    with pytest.raises(LogError, match="not recognised"):
+        read(tmp_path / "x")
 
 
 def test_bulk_and_typed_decoding_agree(tmp_path: Path) -> None:
@@ -135,17 +123,6 @@ def test_cut_files_are_read_up_to_their_last_whole_chunk(
         read(path)
 
 
-def test_unclosed_ros1_bags_are_read(tmp_path: Path) -> None:
-    path = rosbag1(tmp_path / "x")
-    content = bytearray(path.read_bytes())
-    place = content.index(b"index_pos=") + 10
-    content[place : place + 8] = bytes(8)
-    path.write_bytes(content)
-    recording = read(path)
-    assert_is_the_motion(recording)
-    assert any("was never closed" in reported for reported in recording.source.warnings)
-
-
 def changed_index(path: Path, entry: Callable[[bytes], bytes]) -> Path:
     """A closed ROS 1 bag whose records behind each chunk, its index, are changed."""
     content = path.read_bytes()
@@ -161,8 +138,16 @@ def changed_index(path: Path, entry: Callable[[bytes], bytes]) -> Path:
 
 
 def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path: Path) -> None:
-    """A recorder that stopped between a chunk and its index."""
-    assert_is_the_motion(read(changed_index(rosbag1(tmp_path / "x"), lambda _: b"")))
+    """A recorder that stopped between a chunk and its index, and never closed the bag."""
+    path = changed_index(rosbag1(tmp_path / "x"), lambda _: b"")
+    assert_is_the_motion(read(path))
+    content = bytearray(rosbag1(tmp_path / "y").read_bytes())
+    place = content.index(b"index_pos=") + 10
+    content[place : place + 8] = bytes(8)
+    path.write_bytes(content)
+    recording = read(path)
+    assert_is_the_motion(recording)
+    assert any("was never closed" in reported for reported in recording.source.warnings)
 
 
 def test_a_bag_cut_within_the_index_of_a_chunk_is_read(tmp_path: Path) -> None:
@@ -196,43 +181,29 @@ def test_messages_that_an_index_leaves_out_are_damage(tmp_path: Path) -> None:
 
 
 def test_databases_without_definitions_know_the_usual_types(tmp_path: Path) -> None:
-    import sqlite3
-
     path = bare_db3(tmp_path / "x")
-    with sqlite3.connect(path) as db:
+    with closing(sqlite3.connect(path)) as db, db:
         db.execute("DROP TABLE message_definitions")
     with pytest.raises(LogError, match="no definition of franka_msgs/FrankaState"):
         read(path)  # only the current FrankaRobotState is known
-    with sqlite3.connect(path) as db:
+    with closing(sqlite3.connect(path)) as db, db:
         db.execute("DELETE FROM messages WHERE topic_id = 1")
         db.execute("DELETE FROM topics WHERE id = 1")
-    db.close()
-    recording = read(path)
-    np.testing.assert_array_equal(recording.q, motion(7)["q"])
+    np.testing.assert_array_equal(read(path).q, motion(7)["q"])
 
 
 def test_a_definition_is_read_once_for_all_topics_of_its_type(tmp_path: Path) -> None:
     """More definitions than the file has bytes, if each topic came with its own."""
-    import sqlite3
-
     path = bare_db3(tmp_path / "x")
-    with sqlite3.connect(path) as db:
+    with closing(sqlite3.connect(path)) as db, db:
         first = db.execute("SELECT * FROM topics WHERE id = 1").fetchone()
         rows = [(k, f"{first[1]}_{k}", *first[2:]) for k in range(10, 1010)]
         db.executemany(f"INSERT INTO topics VALUES ({', '.join('?' * len(first))})", rows)
     assert_is_the_motion(read(path))
 
 
-def test_json_documents(tmp_path: Path) -> None:
-    recording = read(mcap_json(tmp_path / "x"))
-    np.testing.assert_array_equal(recording.q, motion()["q"])
-    np.testing.assert_array_equal(recording.torque, motion()["tau"])
-    assert recording.source.t0_ns == 10**9
-
-
 def foxglove_joint_states(k: int) -> bytes:
     """A foxglove.JointStates message, written by hand from its published field numbers."""
-    import struct
 
     def field(number: int, content: bytes) -> bytes:
         return bytes([number << 3 | 2, len(content)]) + content
@@ -257,35 +228,12 @@ def varint(value: int) -> bytes:
 
 
 def test_foxglove_joint_states(tmp_path: Path) -> None:
-    from mcap.writer import Writer
-
-    with (tmp_path / "x").open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile="", library="test")
-        schema = writer.register_schema("foxglove.JointStates", "protobuf", b"")
-        channel = writer.register_channel("/joints", "protobuf", schema)
-        for k in range(30):
-            writer.add_message(channel, k, foxglove_joint_states(k), k, k)
-        writer.finish()
-    recording = read(tmp_path / "x")
+    messages = (("/joints", k, foxglove_joint_states(k)) for k in range(30))
+    schemas = {"/joints": ("foxglove.JointStates", "protobuf", b"")}
+    path = write_mcap(tmp_path / "x", messages, encoding="protobuf", schemas=schemas)
+    recording = read(path)
     np.testing.assert_allclose(recording.q[5], [1.05, 2.05, 3.05], rtol=1e-15)
-    assert recording.torque is not None
-    assert recording.torque[0].tolist() == [-1, -2, -3]
+    assert recording.require("torque")[0].tolist() == [-1, -2, -3]
     assert recording.joint_names == ("joint1", "joint2", "joint3")
     assert recording.source.t0_ns == 990_000_000
     np.testing.assert_allclose(recording.t, 1e-3 * np.arange(30), atol=1e-15)
-
-
-def test_folders_that_are_no_bags(tmp_path: Path) -> None:
-    folder = rosbag2(tmp_path / "x")
-    shutil.move(next(folder.glob("*.mcap")), folder / "x.txt")
-    with pytest.raises(LogError, match="not recognised"):
-        read(folder)
-
-
-def test_typestore_of_the_seeds_has_both_types() -> None:
-    _, messages = bag_messages(ros1=True)
-    assert {kind for _, kind, _, _ in messages} == {
-        "franka_msgs/msg/FrankaState",
-        "sensor_msgs/msg/JointState",
-    }

@@ -1,129 +1,119 @@
-"""Cleaning: what is dropped at the start, where a clock jumps, and what cannot be radians."""
+"""Cleaning: what is dropped, what is said of it, and what cannot be radians."""
 
+import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from vftcli.readers.cleaning import cleaned, without_leading_garbage
+import vftcli.readers
+from vftcli.readers.cleaning import cleaned
 from vftcli.readers.library import Library
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.signals.errors import ClockError, LogError
+from vftcli.readers.reading import assemble
+from vftcli.signals.errors import ClockError, LogError, MissingSignalError
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import WORDS
 
-STEP_NS = 2_000_000
 ROWS = 300
 GARBAGE = 3e19
 """A misread double: far beyond any joint position."""
 
 
-def raw(jumps: dict[int, float] | None = None, *, absurd: tuple[int, ...] = (0,)) -> RawLog:
+def made(stamps: Any, q: Any, **more: Any) -> Recording:
+    """A raw log, cleaned."""
+    signals = {"q": np.asarray(q)} | more.pop("signals", {})
+    log = RawLog(stamps=np.asarray(stamps), clock="test", signals=signals, **more)
+    return cleaned(log, Path("log"), "test")
+
+
+@pytest.mark.parametrize(
+    ("jumps", "absurd", "dropped"),
+    [
+        # Steps are judged in seconds: in nanoseconds each of them would be an enormous jump.
+        ({}, (0,), 1),
+        ({4: 1000.0}, (0,), 4),
+        ({4: 1000.0, 8: 1000.0}, (0,), 8),
+        # A pause of up to a minute, and of a thousand steps of a slow log, is no jump.
+        ({4: 30.0}, (0,), 1),
+        # A jump without garbage is left to be reported; one bad value is no misaligned packet.
+        ({4: 1000.0}, (), 0),
+        ({200: 1000.0}, (0,), 1),
+    ],
+)
+def test_what_lies_before_the_clocks_last_jump_goes_with_the_garbage(
+    jumps: dict[int, float], absurd: tuple[int, ...], dropped: int
+) -> None:
     """500 Hz, stamped in nanoseconds; the clock jumps by so many seconds before some rows."""
-    steps = np.full(ROWS, STEP_NS, dtype=np.int64)
-    for row, seconds in (jumps or {}).items():
+    steps = np.full(ROWS, 2_000_000, dtype=np.int64)
+    for row, seconds in jumps.items():
         steps[row] += round(seconds * 1e9)
     q = np.full((ROWS, 6), 0.5)
     q[list(absurd)] = GARBAGE
     stamps = 1_700_000_000_000_000_000 + np.cumsum(steps)
-    return RawLog(stamps=stamps, tick=1e-9, clock="test", signals={"q": q})
+    recording = made(stamps, q, tick=1e-9)
+    assert (recording.samples, recording.source.rows) == (ROWS - dropped, ROWS)
+    assert recording.source.t0_ns == int(stamps[dropped])
+    found = [r.values["rows"] for r in recording.source.remarks if "rows" in r.values]
+    assert found == ([dropped] if dropped else [])
 
 
-def dropped(log: RawLog) -> int:
-    return ROWS - len(without_leading_garbage(log).stamps)
-
-
-def test_a_lone_absurd_row_at_the_start_goes_alone_whatever_the_stamps_count_in():
-    """Steps are judged in seconds: in nanoseconds each of them would be an enormous jump."""
-    assert dropped(raw()) == 1
-
-
-def test_what_lies_before_the_clocks_last_jump_goes_with_the_garbage():
-    assert dropped(raw({4: 1000.0})) == 4
-    assert dropped(raw({4: -5.0})) == 4
-    assert dropped(raw({4: 1000.0, 8: 1000.0})) == 8
-
-
-def test_a_pause_is_no_jump():
-    """Up to a minute, and to a thousand steps of a slow log: 30 s here."""
-    assert dropped(raw({4: 30.0})) == 1
-
-
-def test_a_jump_without_garbage_is_left_to_be_reported():
-    assert dropped(raw({4: 1000.0}, absurd=())) == 0
-
-
-def test_one_bad_value_among_good_rows_is_not_a_misaligned_packet():
-    assert dropped(raw(absurd=(7,))) == 0
-
-
-def test_rows_after_the_head_are_never_taken_for_garbage():
-    assert dropped(raw({200: 1000.0})) == 1
-
-
-def test_the_source_counts_from_the_first_row_that_is_kept():
-    recording = cleaned(raw({4: 1000.0}), Path("x"), "test")
-    assert recording.samples == ROWS - 4
-    assert recording.source.rows == ROWS
-    assert recording.source.t0_ns == int(raw({4: 1000.0}).stamps[4])
-    assert [r.values["rows"] for r in recording.source.remarks] == [4]
+def test_a_clock_may_jump_back_behind_garbage_and_a_bad_value_later_is_none() -> None:
+    q, t = np.full((ROWS, 6), 0.5), 5 + 0.002 * np.arange(ROWS)
+    q[0] = GARBAGE
+    assert made(np.r_[5.0 + t[:4], t[4:]], q).samples == ROWS - 4
+    with pytest.raises(LogError, match="sample 8"):
+        made(t, np.roll(q, 7, axis=0))
 
 
 @pytest.mark.parametrize(
     ("joints", "reach", "refused"),
     [(6, 12.9, False), (6, 13.1, True), (7, 6.3, False), (7, 6.5, True)],
 )
-def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, reach, refused):
+def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, reach, refused) -> None:
     """Two turns are 12.6 rad; joints of seven-joint arms stay within one, 6.28 rad."""
     q = np.zeros((10, joints))
     q[5, 2] = reach
-    log = RawLog(stamps=np.arange(10.0), clock="test", signals={"q": q}, degrees_possible=True)
-    if refused:
-        with pytest.raises(LogError, match="looks like degrees"):
-            cleaned(log, Path("x"), "test")
-    else:
-        assert cleaned(log, Path("x"), "test").joints == joints
+    if not refused:
+        assert made(np.arange(10.0), q, degrees_possible=True).joints == joints
+        return
+    with pytest.raises(LogError, match="looks like degrees"):
+        made(np.arange(10.0), q, degrees_possible=True)
 
 
-def test_a_span_wider_than_two_turns_is_refused_too():
+def test_a_span_wider_than_two_turns_is_refused_too() -> None:
     q = np.zeros((10, 6))
     q[3], q[6] = -6.8, 6.8
-    log = RawLog(stamps=np.arange(10.0), clock="test", signals={"q": q}, degrees_possible=True)
     with pytest.raises(LogError, match=r"travel 13\.6"):
-        cleaned(log, Path("x"), "test")
+        made(np.arange(10.0), q, degrees_possible=True)
 
 
-def test_a_named_joint_without_numbers_is_left_out_and_said():
+def test_a_named_joint_without_numbers_is_left_out_and_said() -> None:
     """A gripper's effort is NaN throughout; of a whole signal that is NaN no joint is left out."""
-    q, effort = np.full((ROWS, 3), 0.5), np.full((ROWS, 3), 2.0)
+    t, q, effort = 0.01 * np.arange(ROWS), np.full((ROWS, 3), 0.5), np.full((ROWS, 3), 2.0)
     effort[:, 1] = np.nan
-    log = RawLog(
-        stamps=np.arange(ROWS) * 0.01,
-        clock="test",
-        signals={"q": q, "torque": effort},
-        joint_names=("a", "finger", "b"),
-    )
-    found = cleaned(log, Path("log"), "test")
-    assert found.joint_names == ("a", "b")
-    assert found.q.shape == (ROWS, 2)
+    named = {"joint_names": ("a", "finger", "b")}
+    found = made(t, q, signals={"torque": effort}, **named)
+    assert (found.joint_names, found.q.shape) == (("a", "b"), (ROWS, 2))
     assert [(r.code, r.values["joints"]) for r in found.source.remarks] == [
         ("joints-empty", ["finger"])
     ]
     with pytest.raises(LogError, match="torque of joint 2 holds no numbers"):
-        cleaned(replace(log, joint_names=()), Path("log"), "test")
-    wrench = replace(log, signals={"q": q, "wrench": effort})  # of as many axes as joints
+        made(t, q, signals={"torque": effort})
     with pytest.raises(LogError, match="log: wrench axis 2 holds no numbers at all"):
-        cleaned(wrench, Path("log"), "test")
+        made(t, q, signals={"wrench": effort}, **named)  # of as many axes as joints
     effort[:] = np.nan
     with pytest.raises(LogError, match="torque of joint 1 holds no numbers"):
-        cleaned(log, Path("log"), "test")
+        made(t, q, signals={"torque": effort}, **named)
 
 
 def test_a_log_of_more_years_than_nanoseconds_count_is_refused() -> None:
     """From the farthest start on 64 bits count 2.2e8 s: a cast to whole ones overflowed."""
-    stamps = np.linspace(0.0, 3e8, 10)
-    log = RawLog(stamps=stamps, clock="test", signals={"q": np.zeros((10, 6))})
     with pytest.raises(ClockError, match="over 3e\\+08 s, which no robot's log is"):
-        cleaned(log, Path("log"), "test")
+        made(np.linspace(0.0, 3e8, 10), np.zeros((10, 6)))
 
 
 @pytest.mark.parametrize(
@@ -152,3 +142,29 @@ def test_rows_with_an_unknown_value_are_left_out_and_counted(
     rows = log.source.row_samples
     expected = [kept.index(k) if k in kept else -1 for k in range(20)]
     assert (list(range(20)) if rows is None else rows.tolist()) == expected
+
+
+def test_arrays_are_cleaned_like_a_log_that_is_read() -> None:
+    t = [0.0, 0.1, 0.1, 0.2]
+    log = assemble(t, name="mine", q=np.zeros((4, 6)), torque=np.ones((4, 6)))
+    assert (log.name, log.samples, log.source.duplicates) == ("mine", 3, 1)
+    assert log.signals == ("q", "torque")
+
+
+@pytest.mark.parametrize("signals", [{"dq": np.zeros((2, 6))}, {"q": [[0.0], [0.0]], "tau": [1]}])
+def test_positions_are_needed_and_names_are_those_of_a_recording(signals) -> None:
+    with pytest.raises(MissingSignalError):
+        assemble([0.0, 0.1], **signals)
+
+
+MADE = re.compile(r"(?:fact|caution|warning)\(\s*\"([a-z-]+)\"")
+CHOSEN = re.compile(r"\"([a-z]+(?:-[a-z]+)*)\" if .* else \"([a-z]+(?:-[a-z]+)*)\"")
+
+
+def test_every_code_of_a_remark_has_words_and_every_word_a_use() -> None:
+    paths = Path(vftcli.readers.__file__).parent.rglob("*.py")
+    text = "".join(path.read_text(encoding="utf-8") for path in paths)
+    chosen = {code for pair in CHOSEN.findall(text) for code in pair}
+    words = set(tomllib.loads((WORDS / "readers.toml").read_text(encoding="utf-8")))
+    assert set(MADE.findall(text)) <= words
+    assert words <= set(MADE.findall(text)) | chosen

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from seed_logs import ROWS, headerless_csv, matrix_npy, motion, parquet, table_csv
+from seed_logs import headerless_csv, matrix_npy, motion, parquet, table_csv
 
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.reading import read, read_first_recording
@@ -15,14 +15,15 @@ from vftcli.signals.wrench import WrenchFrame
 DEGREE = np.pi / 180
 
 
-def write(path: Path, text: str) -> Path:
-    path.write_text(text)
-    return path
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "x"
 
 
-def test_one_joint_of_several_is_turned(tmp_path: Path) -> None:
-    rows = "t q_0 q_1 dq_0 dq_1\n0 0.1 0.2 0.3 0.0\n1 0.2 0.3 0.4 0.5\n2 0.3 0.4 0.5 0.6\n"
-    path = write(tmp_path / "x", rows)
+def test_one_joint_of_several_is_turned(path: Path) -> None:
+    path.write_text(
+        "t q_0 q_1 dq_0 dq_1\n0 0.1 0.2 0.3 0.0\n1 0.2 0.3 0.4 0.5\n2 0.3 0.4 0.5 0.6\n"
+    )
     recording = read(path, columns="t=t,q=q_{i},dq=dq_0|-dq_1")
     np.testing.assert_array_equal(recording.dq, [[0.3, 0.0], [0.4, -0.5], [0.5, -0.6]])
     assert not np.signbit(recording.require("dq")[0, 1])
@@ -36,35 +37,16 @@ def test_one_joint_of_several_is_turned(tmp_path: Path) -> None:
             read(path, columns=columns)
 
 
-def test_counted_columns_are_taken_in_file_order(tmp_path: Path) -> None:
-    log = motion()
-    recording = read(headerless_csv(tmp_path / "x"), columns="t,q:6,dq:6,current:6")
-    # the file has six decimals
-    np.testing.assert_allclose(recording.current, log["current"], atol=6e-7)
-    np.testing.assert_allclose(recording.t, log["t"], atol=1e-9)
-    assert recording.torque is None
-    assert recording.source.format == "headerless"
-
-
-def test_minus_turns_the_sign_and_is_said(tmp_path: Path) -> None:
-    path = matrix_npy(tmp_path / "x")
-    plain = read(path, columns="t,q:6,dq:6,current:6")
+def test_minus_turns_the_sign_and_is_said(path: Path) -> None:
+    plain = read(matrix_npy(path), columns="t,q:6,dq:6,current:6")
     turned = read(path, columns="t,q:6,_:6,-current:6")
     np.testing.assert_array_equal(turned.current, -plain.current)
     assert turned.dq is None
     assert "turned the sign of current (--columns)" in turned.source.repairs
 
 
-@pytest.mark.parametrize(
-    ("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]
-)
-def test_time_units(tmp_path: Path, unit: str, factor: float) -> None:
-    rows = "\n".join(f"{1000 * k},{0.1 * k}" for k in range(5))
-    recording = read(write(tmp_path / "x", rows + "\n"), columns=f"t[{unit}],q")
-    np.testing.assert_allclose(recording.t, 1000 * factor * np.arange(5), rtol=1e-12)
-
-
 UNITS = {
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     "q": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "rev": 2 * np.pi},
     "dq": {"rad/s": 1.0, "rad": 1.0, "deg/s": DEGREE, "deg": DEGREE, "rpm": np.pi / 30},
     "current": {"A": 1.0, "mA": 1e-3},
@@ -77,67 +59,65 @@ FIELDS = {"tau": "torque", "tau+g": "torque_without_gravity"}
 
 
 @pytest.mark.parametrize(("signal", "unit"), [(s, u) for s, each in UNITS.items() for u in each])
-def test_every_unit_becomes_that_of_the_si(signal: str, unit: str, tmp_path: Path) -> None:
-    path = write(tmp_path / "x", "".join(f"{k / 100},{k / 50},{k / 8}\n" for k in range(10)))
-    columns = f"t,q[{unit}],_" if signal == "q" else f"t,q,{signal}[{unit}]"
-    values = getattr(read(path, columns=columns), FIELDS.get(signal, signal))[:, 0]
-    given = np.arange(10) / (50 if signal == "q" else 8)
-    np.testing.assert_allclose(values, given * UNITS[signal][unit], rtol=1e-12)
+def test_every_unit_becomes_that_of_the_si(signal: str, unit: str, path: Path) -> None:
+    given = {"t": 1000.0 * np.arange(10), "q": np.arange(10) / 50}
+    given[signal] = given.get(signal, np.arange(10) / 8)
+    np.savetxt(path, np.column_stack([*given.values()]), delimiter=",")
+    units = {"t": "s", "q": "rad", signal: unit}
+    recording = read(path, columns=",".join(f"{name}[{units[name]}]" for name in given))
+    values = getattr(recording, FIELDS.get(signal, signal)).reshape(10)
+    np.testing.assert_allclose(values, given[signal] * UNITS[signal][unit], rtol=1e-12)
 
 
-def test_degrees_without_a_unit_are_refused(tmp_path: Path) -> None:
-    path = write(tmp_path / "x", "".join(f"{k / 100},{90 + k}\n" for k in range(10)))
+def test_degrees_without_a_unit_are_refused(path: Path) -> None:
+    path.write_text("".join(f"{k / 100},{90 + k}\n" for k in range(10)))
     with pytest.raises(LogError, match=r"q\[deg\]"):
         read(path, columns="t,q")
     assert read(path, columns="t,q[rad]").joints == 1
 
 
-def test_named_columns_start_at_the_smallest_index(tmp_path: Path) -> None:
-    head = "clock,eff_3,eff_4,pos_3,pos_4\n"
+def test_named_columns_start_at_the_smallest_index(path: Path) -> None:
     rows = "".join(f"{k / 10},{k},{2 * k},{0.1 * k},{0.2 * k}\n" for k in range(4))
-    recording = read(write(tmp_path / "x", head + rows), columns="t=clock,q=pos_{i},tau=eff_{i}")
+    path.write_text("clock,eff_3,eff_4,pos_3,pos_4\n" + rows)
+    recording = read(path, columns="t=clock,q=pos_{i},tau=eff_{i}")
     np.testing.assert_allclose(recording.q, np.outer(np.arange(4), [0.1, 0.2]), rtol=1e-12)
-    assert recording.torque is not None
-    np.testing.assert_array_equal(recording.torque[:, 1], 2 * np.arange(4))
+    np.testing.assert_array_equal(recording.require("torque")[:, 1], 2 * np.arange(4))
 
 
-def test_wrench_by_names_carries_its_frame(tmp_path: Path) -> None:
-    head = "t,q1,Fx,Fy,Fz,Mx,My,Mz\n"
+def test_wrench_by_names_carries_its_frame(path: Path) -> None:
     rows = "".join(f"{k},0,1,2,3,4,5,{k}\n" for k in range(4))
-    recording = read(
-        write(tmp_path / "x", head + rows), columns="t=t,q=q{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz"
-    )
+    path.write_text("t,q1,Fx,Fy,Fz,Mx,My,Mz\n" + rows)
+    recording = read(path, columns="t=t,q=q{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz")
     assert recording.wrench_frame == WrenchFrame("base", "flange")
-    assert recording.wrench is not None
-    np.testing.assert_array_equal(recording.wrench[3], [1, 2, 3, 4, 5, 3])
+    np.testing.assert_array_equal(recording.require("wrench")[3], [1, 2, 3, 4, 5, 3])
 
 
-def test_slices_of_list_columns(tmp_path: Path) -> None:
-    path = parquet(tmp_path / "x")
+def test_slices_of_list_columns(path: Path) -> None:
+    recording, log = read(parquet(path)), motion(7)
+    assert recording.source.format == "parquet"  # its names alone give all joints
+    np.testing.assert_array_equal(recording.q, log["q"])
     recording = read(path, columns="t=timestamp,q=observation.state[0:3],dq=dq[1:4]")
-    log = motion(7)
     np.testing.assert_array_equal(recording.q, log["q"][:, :3])
     np.testing.assert_array_equal(recording.dq, log["dq"][:, 1:4])
 
 
-def test_a_table_without_clock_takes_a_rate(tmp_path: Path) -> None:
-    path = write(tmp_path / "x", "".join(f"{0.1 * k},{k}\n" for k in range(5)))
+def test_a_table_without_clock_takes_a_rate(path: Path) -> None:
+    path.write_text("".join(f"{0.1 * k},{k}\n" for k in range(5)))
     recording = read(path, columns="t@125Hz,q,current")
     np.testing.assert_allclose(recording.t, np.arange(5) / 125, rtol=1e-15)
     assert "125 Hz as stated" in recording.source.clock
 
 
-def test_one_of_several_recordings(tmp_path: Path) -> None:
+def test_one_of_several_recordings(path: Path) -> None:
     rows = "".join(f"{k / 100},{j + 0.001 * k}\n" for j in range(3) for k in range(30))
-    path = write(tmp_path / "x", "t,q1\n" + rows)
+    path.write_text("t,q1\n" + rows)
     with pytest.raises(ClockError, match="segment=1"):
         read(path)
     for none in (0, 4):
         with pytest.raises(ClockError, match=f"no segment {none}; the file holds 3"):
             read(path, columns=f"segment={none}")
     second = read(path, columns="segment=2")
-    assert second.samples == 30
-    assert second.q[0, 0] == 1.0
+    assert (second.samples, second.q[0, 0]) == (30, 1.0)
     expected = [-1] * 30 + list(range(30)) + [-1] * 30  # the sample that each row is
     assert second.source.row_samples.tolist() == expected
     assert "read recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
@@ -169,87 +149,65 @@ def test_what_cannot_be_understood_is_said(text: str, reported: str) -> None:
         parse_columns(text)
 
 
-@pytest.mark.parametrize("skipped", ["t,q:6,dq:6,_:6", "t,q:6,dq:6,_:*", "t,q:6,_:*,current:6"])
-def test_columns_that_are_skipped(tmp_path: Path, skipped: str) -> None:
-    recording, log = read(headerless_csv(tmp_path / "x"), columns=skipped), motion()
+@pytest.mark.parametrize(
+    "columns", ["t,q:6,dq:6,current:6", "t,q:6,dq:6,_:6", "t,q:6,dq:6,_:*", "t,q:6,_:*,current:6"]
+)
+def test_columns_are_counted_in_file_order_and_some_skipped(path: Path, columns: str) -> None:
+    recording, log = read(headerless_csv(path), columns=columns), motion()
+    assert (recording.source.format, recording.torque) == ("headerless", None)
+    np.testing.assert_allclose(recording.t, log["t"], atol=1e-9)
     for name in ("q", "dq", "current"):
         values = getattr(recording, name)
-        assert (values is None) == (name not in skipped)
+        assert (values is None) == (name not in columns)
         if values is not None:
             np.testing.assert_allclose(values, log[name], atol=5e-7)  # six decimals are written
 
 
-@pytest.mark.parametrize(
-    ("columns", "reported"),
-    [
-        ("t,q:6", "skip the rest with _:12"),
-        ("t,q:6,dq:6,current:6,tau:6", "describes 25 columns, the table has 19"),
-        ("t,q:6,dq:5,current:7", "dq has 5 columns, q has 6"),
-        ("q=x_{i}", "no header"),
-    ],
-)
-def test_a_headerless_table_that_is_described_wrongly(
-    tmp_path: Path, columns: str, reported: str
-) -> None:
-    with pytest.raises(LogError, match=reported):
-        read(headerless_csv(tmp_path / "x"), columns=columns)
+HEADED, HEADERLESS = table_csv, headerless_csv
 
 
 @pytest.mark.parametrize(
-    ("columns", "reported"),
+    ("make", "columns", "reported"),
     [
-        ("t=time,q=q_{i}", "no column 'time'.*q_0"),
-        ("t=t,q=pos_{i}", r"no column 'pos_\{i\}'"),
-        ("t=t,q=q_0|q_1,dq=dq_0", "dq has 1 columns, q has 2"),
-        ("t=t,q=q_0[0:2]", "not of lists"),
-        ("t=t,q=q_0|q_1|q_1", "a column of q twice"),
+        (HEADERLESS, "t,q:6", "skip the rest with _:12"),
+        (HEADERLESS, "t,q:6,dq:6,current:6,tau:6", "describes 25 columns, the table has 19"),
+        (HEADERLESS, "t,q:6,dq:5,current:7", "dq has 5 columns, q has 6"),
+        (HEADERLESS, "q=x_{i}", "no header"),
+        (HEADED, "t=time,q=q_{i}", "no column 'time'.*q_0"),
+        (HEADED, "t=t,q=pos_{i}", r"no column 'pos_\{i\}'"),
+        (HEADED, "t=t,q=q_0|q_1,dq=dq_0", "dq has 1 columns, q has 2"),
+        (HEADED, "t=t,q=q_0[0:2]", "not of lists"),
+        (HEADED, "t=t,q=q_0|q_1|q_1", "a column of q twice"),
+        (HEADED, "-tau=effort", "no column 'effort' for tau; the table has t, q_0, q_1"),
     ],
 )
-def test_a_headed_table_that_is_described_wrongly(
-    tmp_path: Path, columns: str, reported: str
-) -> None:
+def test_a_table_that_is_described_wrongly(path: Path, make, columns: str, reported: str) -> None:
     with pytest.raises(LogError, match=reported):
-        read(table_csv(tmp_path / "x"), columns=columns)
+        read(make(path), columns=columns)
 
 
-def test_columns_of_lists_hold_the_clock_or_are_no_numbered_columns(tmp_path: Path) -> None:
+def test_columns_of_lists_hold_the_clock_or_are_no_numbered_columns(path: Path) -> None:
     """A pair of seconds and nanoseconds may be one list; q_{i} finds no lists."""
-    path = tmp_path / "x.parquet"
-    rows = {
-        "stamp": [[k, 5 * 10**8] for k in range(9)],
-        "q_0": [[0.1 * k, 0.2] for k in range(9)],
-    }
-    pl.DataFrame(rows).write_parquet(path)
+    stamps, q = [[k, 5 * 10**8] for k in range(9)], [[0.1 * k, 0.2] for k in range(9)]
+    pl.DataFrame({"stamp": stamps, "q_0": q}).write_parquet(path)
     for clock in ("stamp", "stamp[0]|stamp[1]"):
         assert read(path, columns=f"t={clock},q=q_0").source.t0_ns == 5 * 10**8
     with pytest.raises(LogError, match=r"no column 'q_\{i\}'"):
         read(path, columns="t=stamp,q=q_{i}")
 
 
-def test_every_row_is_kept(tmp_path: Path) -> None:
-    assert read(table_csv(tmp_path / "x")).samples == ROWS
-
-
-def test_a_torque_without_gravity_is_no_torque(tmp_path: Path) -> None:
+def test_a_torque_without_gravity_is_no_torque(path: Path) -> None:
     """By its name in --columns, and by UR's own name in a recording of its client."""
     rows = "\n".join(f"{0.1 * k},{','.join(str(k + j) for j in range(12))}" for k in range(4))
-    log = tmp_path / "log.csv"
-    log.write_text(f"t,{','.join(f'q{j}' for j in range(6))},{EFFORTS}\n{rows}\n")
-    found = read(log, columns="t=t,q=q{i},-tau+g[mNm]=e{i}")
-    assert found.torque is None
-    assert found.torque_without_gravity is not None
-    assert found.torque_without_gravity[2].tolist() == pytest.approx(
-        [-1e-3 * (2 + j) for j in range(6, 12)]
-    )
-    rtde = tmp_path / "rtde.csv"
-    names = [f"actual_q_{j}" for j in range(6)] + [
-        f"actual_current_as_torque_{j}" for j in range(6)
-    ]
-    rtde.write_text(f"timestamp,{','.join(names)}\n{rows}\n")
-    assert read(rtde).signals == ("q", "torque_without_gravity")
-
-
-EFFORTS = ",".join(f"e{j}" for j in range(6))
+    q, efforts = (",".join(f"{name}{j}" for j in range(6)) for name in "qe")
+    path.write_text(f"t,{q},{efforts}\n{rows}\n")
+    found = read(path, columns="t=t,q=q{i},-tau+g[mNm]=e{i}")
+    assert found.signals == ("q", "torque_without_gravity")
+    expected = [-1e-3 * (2 + j) for j in range(6, 12)]
+    assert found.require("torque_without_gravity")[2].tolist() == pytest.approx(expected)
+    names = q.replace("q", "actual_q_"), efforts.replace("e", "actual_current_as_torque_")
+    path.write_text(f"timestamp,{','.join(names)}\n{rows}\n")
+    assert read(path).signals == ("q", "torque_without_gravity")
 
 
 @pytest.mark.parametrize(
@@ -264,26 +222,20 @@ EFFORTS = ",".join(f"e{j}" for j in range(6))
     ],
 )
 def test_a_text_without_positions_says_something_of_its_signals_alone(
-    tmp_path: Path, columns: str, signal: str, value: float
+    path: Path, columns: str, signal: str, value: float
 ) -> None:
     rows = "\n".join(f"{k / 10},0.1,0.2,0.3,0.4,5,6" for k in range(5))
-    path = write(tmp_path / "x", "time,q_0,q_1,dq_0,dq_1,effort_0,effort_1\n" + rows + "\n")
+    path.write_text("time,q_0,q_1,dq_0,dq_1,effort_0,effort_1\n" + rows + "\n")
     recording = read(path, columns=columns)
     assert recording.signals == tuple(sorted({"q", "dq", signal}, key=["q", "dq", signal].index))
     assert getattr(recording, signal)[0, 0] == pytest.approx(value)
     assert recording.median_step == pytest.approx(1e-4 if columns.startswith("t[") else 0.1)
 
 
-def test_a_name_that_stands_for_no_columns_is_refused(tmp_path: Path) -> None:
-    path = write(tmp_path / "x", "t,q1,tau1\n" + "\n".join(f"{k},0.1,0.2" for k in range(5)))
-    with pytest.raises(LogError, match=r"no column 'effort' for tau; the table has t, q1, tau1"):
-        read(path, columns="-tau=effort")
-
-
-def test_an_error_lists_24_columns_and_counts_the_others(tmp_path: Path) -> None:
+def test_an_error_lists_24_columns_and_counts_the_others(path: Path) -> None:
     """A name of more than 40 letters is cut to 37."""
     names = ["t", "q1", "x" * 40, "y" * 41, *(f"c{k}" for k in range(22))]
-    path = write(tmp_path / "x", f"{','.join(names)}\n{','.join('1' * len(names))}\n")
+    path.write_text(f"{','.join(names)}\n{','.join('1' * len(names))}\n")
     shown = ", ".join([*names[:3], "y" * 37 + "…", *names[4:24]])
     with pytest.raises(LogError, match=f"the table has {shown} and 2 more.$"):
         read(path, columns="q=nope")

@@ -14,8 +14,10 @@ T31 = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 K = np.array([12.0, 12.0, 9.8, 10.8, 10.8, 10.8])
 """Drive constants of the planted controller. [N·m/A]"""
 
+Table = dict[str, np.ndarray]
 
-def table(joints: int = 6, seed: int = 3) -> dict[str, np.ndarray]:
+
+def table(joints: int = 6, seed: int = 3) -> Table:
     """Signals of an arm on sines: a controller's currents carry friction, the measured ones noise.
 
     The positions are integrated, so that dq is their derivative but for rounding. 100 Hz, 20 s
@@ -31,11 +33,16 @@ def table(joints: int = 6, seed: int = 3) -> dict[str, np.ndarray]:
     return found | {"target_current": current, "target_torque": torque}
 
 
-def guess(*names: str, extra: int = 0, joints: int = 6) -> Guess | None:
-    signals = table(joints)
-    return guess_columns(
-        list(np.hstack([*(signals[n] for n in names), np.ones((2000, extra))]).T)
-    )
+def guess(signals: Table, *names: str) -> Guess | None:
+    """What the signals in some order settle."""
+    return guess_columns(list(np.hstack([signals[n] for n in names or signals]).T))
+
+
+def settled(signals: Table, *names: str) -> bool:
+    """Whether a controller's 31 columns are the only thing that fits."""
+    found = guess(signals, *names)
+    assert found is not None
+    return found.columns == T31 and found.others == ()
 
 
 @pytest.mark.parametrize("order", list(permutations((3, 4, 5))))
@@ -43,10 +50,7 @@ def test_a_controllers_targets_settle_three_efforts_in_their_usual_order(
     order: tuple[int, ...],
 ) -> None:
     names = list(table())
-    found = guess(*names[:3], *(names[k] for k in order))
-    assert found is not None
-    usual = order == (3, 4, 5)
-    assert (found.columns == T31, found.others == ()) == (usual, usual)
+    assert settled(table(), *names[:3], *(names[k] for k in order)) == (order == (3, 4, 5))
 
 
 @pytest.mark.parametrize(
@@ -56,7 +60,7 @@ def test_positions_with_velocities_alone_are_settled(joints: int, fits: bool) ->
     """Of three to twelve joints."""
     columns = ",".join(["t", f"q:{joints}", f"dq:{joints}"])
     expected = Guess(columns, "the first steps evenly, dq is the derivative of q")
-    assert guess("t", "q", "dq", joints=joints) == (expected if fits else None)
+    assert guess(table(joints), "t", "q", "dq") == (expected if fits else None)
 
 
 @pytest.mark.parametrize(("pause", "fits"), [(19.5, True), (20.5, False)])
@@ -64,13 +68,13 @@ def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(
     pause: float, fits: bool
 ) -> None:
     t = np.cumsum(np.where(np.arange(2000) % 16 == 5, pause, 1.0)) * 0.001  # 6 % of the steps
-    w = 0.6 + 0.2 * np.arange(6)
-    columns = np.hstack([t[:, None], np.sin(np.outer(t, w)), w * np.cos(np.outer(t, w))])
-    assert (guess_columns(list(columns.T)) is not None) == fits
+    phase, w = np.outer(t, 0.6 + 0.2 * np.arange(6)), 0.6 + 0.2 * np.arange(6)
+    found = guess({"t": t[:, None], "q": np.sin(phase), "dq": w * np.cos(phase)})
+    assert (found is not None) == fits
 
 
 @pytest.mark.parametrize(
-    ("current", "target", "constant", "settled"),
+    ("current", "target", "constant", "expected"),
     [
         # noise of the measured current and of its target by their rms, drive constant
         (0.30, 0.0, 1.0, True),
@@ -86,7 +90,7 @@ def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(
     ],
 )
 def test_how_well_targets_and_currents_have_to_fit(
-    current: float, target: float, constant: float, settled: bool
+    current: float, target: float, constant: float, expected: bool
 ) -> None:
     signals, rng = table(), np.random.default_rng(7)
     clean = signals["target_current"]
@@ -94,36 +98,27 @@ def test_how_well_targets_and_currents_have_to_fit(
         scale = noise * np.sqrt(np.mean(clean**2, axis=0))
         signals[name] = clean + scale * rng.standard_normal(clean.shape)
     signals["target_torque"] = constant * signals["target_torque"]
-    found = guess_columns(list(np.hstack(list(signals.values())).T))
-    assert found is not None
-    assert (found.columns == T31 and found.others == ()) == settled
+    assert settled(signals) == expected
 
 
 @pytest.mark.parametrize(
-    ("gain", "settled"), [(0.45, False), (0.55, True), (1.9, True), (2.1, False), (-1.0, False)]
+    ("gain", "expected"), [(0.45, False), (0.55, True), (1.9, True), (2.1, False), (-1.0, False)]
 )
 def test_a_measured_current_is_between_half_and_twice_its_target(
-    gain: float, settled: bool
+    gain: float, expected: bool
 ) -> None:
     signals = table()
     signals["current"] = gain * signals["current"]
-    found = guess_columns(list(np.hstack(list(signals.values())).T))
-    assert found is not None
-    assert (found.columns == T31 and found.others == ()) == settled
+    assert settled(signals) == expected
 
 
-def test_one_effort_may_be_torque_or_current() -> None:
-    found = guess("t", "q", "dq", "current")
-    assert found is not None
-    texts = (found.columns, *found.others)
-    assert texts == ("t,q:6,dq:6,tau:6", "t,q:6,dq:6,current:6", "t,q:6,dq:6,tau+g:6")
-
-
-def test_columns_beyond_a_block_are_proposed_to_be_skipped() -> None:
-    found = guess("t", "q", "dq", "current", extra=2)
-    assert found is not None
-    assert found.columns == "t,q:6,dq:6,tau:6,_:2"
-    assert found.others
+def test_one_effort_may_be_torque_or_current_and_what_follows_is_skipped() -> None:
+    names = ["t", "q", "dq", "current"]
+    for more, skipped in (([], ""), (["more"], ",_:2")):
+        found = guess(table() | {"more": np.ones((2000, 2))}, *names, *more)
+        assert found is not None
+        efforts = [f"t,q:6,dq:6,{effort}:6{skipped}" for effort in ("tau", "current", "tau+g")]
+        assert [found.columns, *found.others] == efforts
 
 
 @pytest.mark.parametrize(
@@ -136,30 +131,25 @@ def test_columns_beyond_a_block_are_proposed_to_be_skipped() -> None:
     ],
 )
 def test_what_has_no_clock_or_no_velocities_behind_positions_is_not_guessed(names) -> None:
-    assert guess(*names) is None
+    assert guess(table(), *names) is None
 
 
 def test_a_joint_that_stands_is_counted_and_one_that_moves_without_velocity_is_not() -> None:
     signals = table()
-    columns = np.hstack([signals["t"], signals["q"], signals["dq"]])
-    columns[:, [1, 6]], columns[:, [7, 12]] = 0.3, 0.0
-    found = guess_columns(list(columns.T))
+    first = signals["q"][:, 0].copy()
+    signals["q"][:, [0, 5]], signals["dq"][:, [0, 5]] = 0.3, 0.0
+    found = guess(signals, "t", "q", "dq")
     assert found is not None
     assert found.columns == "t,q:6,dq:6"
     # Travel below 20 mrad need not show its velocity.
     for travel, fits in ((0.018, True), (0.022, False), (2.0, False)):
-        columns[:, 1] = 0.5 * travel * signals["q"][:, 0]
-        assert (guess_columns(list(columns.T)) is not None) == fits
+        signals["q"][:, 0] = 0.5 * travel * first
+        assert (guess(signals, "t", "q", "dq") is not None) == fits
 
 
-@pytest.mark.parametrize("kind", ["csv", "npy"])
-def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(
-    tmp_path: Path, kind: str
-) -> None:
-    signals = np.hstack(list(table().values()))
-    path = tmp_path / f"log.{kind}"
-    np.save(path, signals) if kind == "npy" else np.savetxt(path, signals, delimiter=",")
+def check_read_as_described(path: Path) -> None:
     log, described = read(path), read(path, columns=T31)
+    assert log.signals == described.signals, path
     for signal in ("t", *described.signals):
         np.testing.assert_array_equal(getattr(log, signal), getattr(described, signal))
     (reported,) = [r for r in log.source.remarks if r.code == "columns-by-value"]
@@ -167,22 +157,24 @@ def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(
     assert str(reported).startswith(f"31 columns read as {T31}: the first steps evenly")
 
 
-def test_an_open_table_is_refused_with_the_lines_that_fit(tmp_path: Path) -> None:
-    signals = table()
-    path = tmp_path / "log.csv"
-    np.savetxt(path, np.hstack([signals[n] for n in ("t", "q", "dq", "current")]), delimiter=",")
+def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(
+    tmp_path: Path,
+) -> None:
+    signals = np.hstack(list(table().values()))
+    np.save(tmp_path / "log.npy", signals)
+    np.savetxt(tmp_path / "log.csv", signals, delimiter=",")
+    for path in tmp_path.iterdir():
+        check_read_as_described(path)
+    np.savetxt(tmp_path / "log.csv", signals[:, :19], delimiter=",")
     with pytest.raises(LogError, match=r"19 columns .* t,q:6,dq:6,tau:6 or t,q:6,dq:6,current:6"):
-        read(path)
+        read(tmp_path / "log.csv")
 
 
 def test_real_tables_are_read_as_their_description_says(logs: Path) -> None:
     files = sorted((logs / "ur10e").iterdir())
     assert len(files) == 11
     for file in files:
-        log, described = read(file), read(file, columns=T31)
-        assert log.signals == described.signals, file.name
-        for signal in ("t", *described.signals):
-            np.testing.assert_array_equal(getattr(log, signal), getattr(described, signal))
+        check_read_as_described(file)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from seed_logs import mcap_json, motion, write_mcap
 
 from vftcli.readers.aliases import UR_NAMES
 from vftcli.readers.reading import read
@@ -24,12 +25,10 @@ def stamp(k: int) -> dict[str, Any]:
 def joint_state(k: int) -> dict[str, Any]:
     values = Q[k, [UR_NAMES.index(name) for name in ALPHABETICAL]]
     return {
-        "header": {"stamp": stamp(k), "frame_id": ""},
-        "name": ALPHABETICAL,
-        "position": values.tolist(),
-        "velocity": (1 + values).tolist(),
+        "header": {"stamp": stamp(k), "frame_id": ""}, "name": ALPHABETICAL,
+        "position": values.tolist(), "velocity": (1 + values).tolist(),
         "effort": (2 + values).tolist(),
-    }
+    }  # fmt: skip
 
 
 def wrench(k: int) -> dict[str, Any]:
@@ -42,18 +41,10 @@ def wrench(k: int) -> dict[str, Any]:
 
 def mcap(path: Path, **topics: Any) -> Path:
     """An MCAP whose topics hold JSON documents: what a function makes of the sample's number."""
-    from mcap.writer import Writer
-
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile="", library="test")
-        channels = {name: writer.register_channel(f"/{name}", "json", 0) for name in topics}
-        for k in range(ROWS):
-            time = START + k * 8_000_000
-            for name, make in topics.items():
-                writer.add_message(channels[name], time, json.dumps(make(k)).encode(), time, k)
-        writer.finish()
-    return path
+    return write_mcap(path, (
+        (f"/{name}", START + k * 8_000_000, json.dumps(make(k)).encode())
+        for k in range(ROWS) for name, make in topics.items()
+    ))  # fmt: skip
 
 
 def test_effort_names_and_wrench_are_taken_as_from_ros_messages(tmp_path: Path) -> None:
@@ -62,18 +53,20 @@ def test_effort_names_and_wrench_are_taken_as_from_ros_messages(tmp_path: Path) 
     np.testing.assert_array_equal(log.q, Q)
     np.testing.assert_array_equal(log.require("current"), 2 + Q)
     assert log.torque is None
-    np.testing.assert_allclose(log.require("wrench")[:, 0], 1.0 + np.arange(ROWS), rtol=1e-12)
-    np.testing.assert_array_equal(
-        log.require("wrench")[:, 1:], [[2, 3, -1 - k, -2, -3] for k in range(ROWS)]
-    )
+    expected = [[1 + k, 2, 3, -1 - k, -2, -3] for k in range(ROWS)]
+    np.testing.assert_array_equal(log.require("wrench"), expected)
     assert str(log.wrench_frame).startswith("tool0 axes at tool0")
     assert log.source.t0_ns == START
+    stated = read(tmp_path / "x", columns="tau=effort")
+    np.testing.assert_array_equal(stated.require("torque"), 2 + Q)
+    assert stated.current is None
 
 
-def test_columns_say_what_the_effort_is(tmp_path: Path) -> None:
-    log = read(mcap(tmp_path / "x", joint_states=joint_state), columns="tau=effort")
-    np.testing.assert_array_equal(log.require("torque"), 2 + Q)
-    assert log.current is None
+def test_plain_documents(tmp_path: Path) -> None:
+    log = read(mcap_json(tmp_path / "x"))
+    np.testing.assert_array_equal(log.q, motion()["q"])
+    np.testing.assert_array_equal(log.torque, motion()["tau"])
+    assert log.source.t0_ns == 10**9
 
 
 @pytest.mark.parametrize("state", [joint_state, lambda k: {"q": Q[k].tolist()}])

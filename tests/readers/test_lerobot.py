@@ -42,8 +42,7 @@ def dataset(
     import pyarrow as pa
     from pyarrow.parquet import write_table
 
-    index = np.arange(sum(ROWS))
-    episode = np.repeat(np.arange(3), ROWS)
+    index, episode = np.arange(sum(ROWS)), np.repeat(np.arange(3), ROWS)
     first = np.cumsum([0, *ROWS[:-1]])
     frame = index - first[episode]
     columns = {name: list(numbers) for name, (numbers, _) in features.items()}
@@ -51,33 +50,28 @@ def dataset(
     table = pa.table(columns | {"episode_index": episode, "index": index})
     numbered = [f"chunk-{k // 2:03d}/episode_{k:06d}" for k in range(3)]
     place = [f"chunk-000/file-{k:03d}" for k in files] if version == 3 else numbered
-    (folder / "meta" / "episodes" / "chunk-000").mkdir(parents=True)
+    meta = folder / "meta"
+    (meta / "episodes" / "chunk-000").mkdir(parents=True)
     for name in set(place):
-        rows = np.flatnonzero([place[k] == name for k in episode])
         path = folder / "data" / f"{name}.parquet"
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_table(table.take(rows), path)
+        write_table(table.take(np.flatnonzero([place[k] == name for k in episode])), path)
     if version == 3:
         reported = {
-            "episode_index": range(3), "length": ROWS, "dataset_from_index": first,
+            "episode_index": [0, 1, 2], "length": ROWS, "dataset_from_index": first,
             "dataset_to_index": first + ROWS, "data/chunk_index": [0] * 3,
             "data/file_index": files,
         }  # fmt: skip
-        write_table(
-            pa.table({name: list(values) for name, values in reported.items()}),
-            folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet",
-        )
+        write_table(pa.table(reported), meta / "episodes" / "chunk-000" / "file-000.parquet")
     else:
-        lines = [
-            json.dumps({"episode_index": k, "tasks": [], "length": ROWS[k]}) for k in range(3)
-        ]
-        (folder / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n")
+        lines = ({"episode_index": k, "tasks": [], "length": ROWS[k]} for k in range(3))
+        (meta / "episodes.jsonl").write_text("".join(f"{json.dumps(line)}\n" for line in lines))
     info = {
         "codebase_version": f"v{version}.0", "robot_type": "fr3", "fps": FPS, "total_episodes": 3,
         "chunks_size": 2,
         "features": {name: {"names": names} for name, (_, names) in features.items()},
     }  # fmt: skip
-    (folder / "meta" / "info.json").write_text(json.dumps(info))
+    (meta / "info.json").write_text(json.dumps(info))
     return folder
 
 
@@ -86,14 +80,16 @@ def dataset(
 def test_an_episode_is_its_rows(version: int, episode: int, tmp_path: Path) -> None:
     recording = read(dataset(tmp_path, version=version), episode=episode)
     rows = slice(sum(ROWS[:episode]), sum(ROWS[: episode + 1]))
-    np.testing.assert_array_equal(recording.q, LOG["q"][rows])
-    np.testing.assert_array_equal(recording.dq, LOG["dq"][rows])
-    np.testing.assert_array_equal(recording.torque, LOG["tau"][rows])
+    for signal, name in (("q", "q"), ("dq", "dq"), ("torque", "tau")):
+        np.testing.assert_array_equal(getattr(recording, signal), LOG[name][rows])
     # frame_index / fps, not its rounding to 32 bits.
     np.testing.assert_array_equal(recording.t, np.arange(ROWS[episode]) * (1 / FPS))
     assert recording.joint_names == tuple(JOINTS)
     assert (recording.robot_hint, recording.source.remarks) == ("fr3", ())
     assert recording.source.clock == "column frame_index at 25 Hz"
+    turned = read(tmp_path, columns="-tau", episode=episode)
+    np.testing.assert_array_equal(turned.torque, -recording.torque)
+    np.testing.assert_array_equal(turned.q, recording.q)
 
 
 def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
@@ -108,16 +104,16 @@ def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
 
 
 def test_the_first_is_taken_and_said(tmp_path: Path) -> None:
-    recording = read(dataset(tmp_path / "set"))
+    path = dataset(tmp_path / "set")
+    recording = read(path)
     assert recording.source.warnings == ("episode 0, of 3 in all: --episode K|all",)
     assert recording.name == "set episode 0"
-    with pytest.raises(LogError, match="no episode 3; it holds 3, from 0 to 2"):
-        read(tmp_path / "set", episode=3)
-
-
-def test_a_free_run_is_not_the_log_s_episode() -> None:
-    choice = ReadChoice(episode=2, arm="left", interval=(0.0, 1.0))
-    assert choice.whole == ReadChoice(arm="left")
+    file = path / "data" / "chunk-000" / "file-000.parquet"
+    alone = read(file, columns="t=timestamp,q=observation.state[0:7]", episode=1)
+    np.testing.assert_array_equal(alone.q, LOG["q"][30:50])
+    for place, words in ((path, "it holds 3, from 0 to 2"), (file, "it holds 2, from 0 to 1")):
+        with pytest.raises(LogError, match=f"no episode 3; {words}"):
+            read(place, episode=3)
 
 
 def test_a_file_elsewhere_than_the_table_says_is_found(tmp_path: Path) -> None:
@@ -172,9 +168,8 @@ def test_two_arms_are_reported_apart(tmp_path: Path) -> None:
         "observation.torque.right": (-LOG["tau"], None),
     }
     path = dataset(tmp_path / "set", features)
-    with pytest.raises(
-        LogError, match=r"two arms \(by name\); say which with --arm left or --arm right"
-    ):
+    words = r"two arms \(by name\); say which with --arm left or --arm right"
+    with pytest.raises(LogError, match=words):
         read(path)
     right = read(path, arm="right", episode=1)
     np.testing.assert_array_equal(right.q, -LOG["q"][30:50])
@@ -207,12 +202,6 @@ def test_a_wrench_is_named_and_taken_where_it_is_said_to_be_one(tmp_path: Path) 
     assert taken.source.remarks == ()
 
 
-def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:
-    recording = read(dataset(tmp_path), columns="-tau", episode=0)
-    np.testing.assert_array_equal(recording.torque, -LOG["tau"][:30])
-    np.testing.assert_array_equal(recording.q, LOG["q"][:30])
-
-
 @pytest.mark.parametrize("text", ["{", "\xe5", "[]", '{"features": []}'])
 def test_a_damaged_description_is_refused(text: str, tmp_path: Path) -> None:
     path = dataset(tmp_path, version=2)
@@ -225,7 +214,7 @@ def test_a_description_beyond_64_mebibytes_is_refused_unread(tmp_path: Path) -> 
     path = dataset(tmp_path, version=2) / "meta" / "info.json"
     text = path.read_bytes()
     path.write_bytes(text.ljust(1 << 20))
-    assert read(tmp_path, episode=0).samples == 30
+    assert read(tmp_path, episode=0).samples == 30  # it may be as long as a mebibyte
     with path.open("r+b") as file:
         file.truncate((64 << 20) + 1)  # a hole, no bytes
     with pytest.raises(LogError, match=r"info\.json: larger than 64 MiB; no description is\.$"):

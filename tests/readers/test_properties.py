@@ -7,16 +7,16 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from seed_logs import rows_of
 
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.reading import read
 from vftcli.signals.errors import VftError
 from vftcli.signals.parsing import HIDDEN, printable
 
-NUMBERS = st.floats(-6, 6, allow_subnormal=False)
-TABLES = st.integers(2, 40).flatmap(
-    lambda rows: st.integers(1, 7).flatmap(
-        lambda joints: arrays(np.float64, (rows, 2 * joints), elements=NUMBERS)
+TABLES = st.tuples(st.integers(2, 40), st.integers(1, 7)).flatmap(
+    lambda shape: arrays(
+        np.float64, (shape[0], 2 * shape[1]), elements=st.floats(-6, 6, allow_subnormal=False)
     )
 )
 QUICK = settings(
@@ -54,10 +54,9 @@ def test_a_text_table_reads_back(
     """All rows and all digits, whatever separates them; an open last row may be dropped, said."""
     rows, joints = len(values), values.shape[1] // 2
     t = start + step * np.arange(rows)
-    matrix = np.column_stack([t, values])
-    lines = [separator.join(repr(float(v)) for v in row) for row in matrix]
+    lines = rows_of(t, values, separator=separator)
     if headed:
-        names = ["t", *(f"q_{j}" for j in range(joints)), *(f"dq_{j}" for j in range(joints))]
+        names = ["t", *(f"{name}_{j}" for name in ("q", "dq") for j in range(joints))]
         lines.insert(0, separator.join(names))
     path = tmp_path / "x"
     path.write_bytes((end.join(lines) + (end if closed else "")).encode())

@@ -51,10 +51,7 @@ def test_joint_states_are_the_bytes_that_rosbags_writes(names, joints, frame, se
 def test_parts_and_constants_go_to_their_fields():
     force, torque = np.random.default_rng(0).normal(size=(2, 3, 3))
     values = {**stamped(TIMES), "header.frame_id": "tool"}
-    values |= {
-        **in_parts("wrench.force", "xyz", force),
-        **in_parts("wrench.torque", "xyz", torque),
-    }
+    values |= in_parts("wrench.force", "xyz", force) | in_parts("wrench.torque", "xyz", torque)
     found = serialised("geometry_msgs/WrenchStamped", values, 3)
     message = STORE.deserialize_cdr(found[2].tobytes(), "geometry_msgs/msg/WrenchStamped")
     assert message.header.stamp.sec == 4

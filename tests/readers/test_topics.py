@@ -1,28 +1,34 @@
 """Topics of a bag on one clock: which leads, whose joints, what effort is, what is interpolated."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from vftcli.readers.aliases import UR_NAMES
 from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError
+from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
 
+Message = dict[str, Any]
 
-def write_joint_states(path: Path, messages: list[dict[str, object]]) -> Path:
+
+def write_joint_states(path: Path, messages: list[Message]) -> Path:
     """A ROS 1 bag of joint states; each dictionary holds a message's fields and its time."""
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC)
     types = store.types
+    path.unlink(missing_ok=True)
     with Writer(path) as writer:
-        connections: dict[str, object] = {}
+        connections: dict[str, Any] = {}
         for k, given in enumerate(messages):
             message = {"topic": "/joint_states", "stamp": True} | given
-            time = int(message["time"])  # type: ignore[call-overload]
-            stamp = time + int(message.get("ahead", 0)) if message["stamp"] else 0  # type: ignore[call-overload]
+            topic, time = message["topic"], message["time"]
+            stamp = time + message.get("ahead", 0) if message["stamp"] else 0
             header = types["std_msgs/msg/Header"](
                 seq=k,
                 stamp=types["builtin_interfaces/msg/Time"](
@@ -30,7 +36,6 @@ def write_joint_states(path: Path, messages: list[dict[str, object]]) -> Path:
                 ),
                 frame_id=message.get("frame", ""),
             )
-            topic = str(message["topic"])
             if "force" in message:
                 kind = "geometry_msgs/msg/WrenchStamped"
                 vector = types["geometry_msgs/msg/Vector3"]
@@ -40,38 +45,57 @@ def write_joint_states(path: Path, messages: list[dict[str, object]]) -> Path:
                 typed = types[kind](header=header, wrench=body)
             else:
                 kind = "sensor_msgs/msg/JointState"
-                typed = types[kind](
-                    header=header,
-                    name=message["name"],
-                    position=np.array(message.get("position", []), dtype=float),
-                    velocity=np.array(message.get("velocity", []), dtype=float),
-                    effort=np.array(message.get("effort", []), dtype=float),
-                )
+                fields = {
+                    name: np.array(message.get(name, []), dtype=float)
+                    for name in ("position", "velocity", "effort")
+                }
+                typed = types[kind](header=header, name=message["name"], **fields)
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            content = bytes(store.serialize_ros1(typed, kind)) + bytes(message.get("padding", 0))  # type: ignore[call-overload]
+            content = bytes(store.serialize_ros1(typed, kind)) + bytes(message.get("padding", 0))
             writer.write(connections[topic], time + 100, content)
     return path
 
 
-ALPHABETICAL = ["elbow_joint", "shoulder_lift_joint", "shoulder_pan_joint", "wrist_1_joint",
-                "wrist_2_joint", "wrist_3_joint"]  # fmt: skip
+ALPHABETICAL = sorted(UR_NAMES)
 START = 1_700_000_000 * 10**9
 
 
-def ur_message(k: int, **more: object) -> dict[str, object]:
+def ur_message(k: int, **more: object) -> Message:
     position = [2.0, 1.0, 0.0, 3.0, 4.0, 5.0]
     base = {"time": START + k * 8_000_000, "name": ALPHABETICAL, "position": position}
     return base | {"velocity": [0.0] * 6, "effort": [0.2, 0.1, 0.0, 0.3, 0.4, 0.5]} | more
 
 
-def test_ur_joints_by_name_and_effort_as_current(tmp_path: Path) -> None:
-    recording = read(write_joint_states(tmp_path / "x", [ur_message(k) for k in range(20)]))
+def arm_topic(
+    name: str, count: int, joints: str = "abcdef", step: int = 8_000_000, **more: object
+) -> list[Message]:
+    """So many messages of one topic, every 8 ms, of joints of one letter each at 1, 2, … rad."""
+    values = [1.0 + j for j in range(len(joints))]
+    base = {"topic": name, "name": list(joints), "position": values} | more
+    return [base | {"time": START + k * step} for k in range(count)]
+
+
+def recorded(path: Path, *topics: list[Message], **how: Any) -> Recording:
+    """What is read of a bag of some topics, in the order of time."""
+    messages = sorted((m for topic in topics for m in topic), key=lambda message: message["time"])
+    return read(write_joint_states(path, messages), **how)
+
+
+UR_TOPIC = [ur_message(k) for k in range(20)]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "x"
+
+
+def test_ur_joints_by_name_and_effort_as_current(path: Path) -> None:
+    recording = recorded(path, UR_TOPIC)
     assert recording.q[0].tolist() == [0, 1, 2, 3, 4, 5]
-    assert recording.joint_names[:2] == ("shoulder_pan_joint", "shoulder_lift_joint")
+    assert recording.joint_names == UR_NAMES
     assert recording.torque is None
-    assert recording.current is not None
-    np.testing.assert_allclose(recording.current[0], 0.1 * np.arange(6), rtol=1e-12)
+    np.testing.assert_allclose(recording.require("current")[0], 0.1 * np.arange(6), rtol=1e-12)
     assert any("motor current [A]" in repair for repair in recording.source.repairs)
     assert "header stamps" in recording.source.clock
 
@@ -80,18 +104,16 @@ def test_ur_joints_by_name_and_effort_as_current(tmp_path: Path) -> None:
     ("columns", "signal", "sign"),
     [("tau=effort", "torque", 1), ("-current=effort", "current", -1)],
 )
-def test_columns_say_what_effort_is(tmp_path: Path, columns: str, signal: str, sign: int) -> None:
-    path = write_joint_states(tmp_path / "x", [ur_message(k) for k in range(20)])
-    recording = read(path, columns=columns)
-    np.testing.assert_allclose(
-        getattr(recording, signal)[0], sign * 0.1 * np.arange(6), rtol=1e-12
-    )
+def test_columns_say_what_effort_is(path: Path, columns: str, signal: str, sign: int) -> None:
+    recording = recorded(path, UR_TOPIC, columns=columns)
+    expected = sign * 0.1 * np.arange(6)
+    np.testing.assert_allclose(getattr(recording, signal)[0], expected, rtol=1e-12)
     assert len({"torque", "current"} & set(recording.signals)) == 1
     with pytest.raises(LogError, match="no field 'nonsense'; it has position"):
         read(path, columns="tau=nonsense")
 
 
-def test_merged_topics_with_a_gripper_and_changing_order(tmp_path: Path) -> None:
+def test_merged_topics_with_a_gripper_and_changing_order(path: Path) -> None:
     """Messages of one topic in two orders, with fingers, and gripper-only ones in between."""
     arm = [f"panda_joint{j}" for j in range(1, 8)]
     messages = []
@@ -105,112 +127,80 @@ def test_merged_topics_with_a_gripper_and_changing_order(tmp_path: Path) -> None
             messages.append({"time": time, "name": fingers + arm, "position": [9, 9, *values]})
     messages = [m | {"velocity": m["position"], "effort": m["position"]} for m in messages]
     messages += [{"time": START + 10**9 + k, "name": ["f"], "position": [1.0]} for k in range(5)]
-    recording = read(write_joint_states(tmp_path / "x", messages))
+    recording = recorded(path, messages)
     expected = np.arange(7.0) + 0.001 * np.arange(40)[:, None]
     np.testing.assert_allclose(recording.q, expected, rtol=1e-15)
     assert recording.robot_hint == "panda"
 
 
-def test_bytes_behind_a_message_are_counted(tmp_path: Path) -> None:
-    messages = [ur_message(k, padding=5 * (k == 9)) for k in range(20)]
-    with pytest.raises(
-        LogError, match=r"sensor_msgs/JointState \(5 bytes too many\)\. The bag is"
-    ):
-        read(write_joint_states(tmp_path / "x", messages))
+def test_bytes_behind_a_message_are_counted(path: Path) -> None:
+    words = r"sensor_msgs/JointState \(5 bytes too many\)\. The bag is"
+    with pytest.raises(LogError, match=words):
+        recorded(path, [ur_message(k, padding=5 * (k == 9)) for k in range(20)])
 
 
-def test_empty_and_nan_velocities_are_missing_signals(tmp_path: Path) -> None:
+def test_empty_and_nan_velocities_are_missing_signals(path: Path) -> None:
     messages = [ur_message(k, velocity=[], effort=[np.nan] * 6) for k in range(20)]
-    recording = read(write_joint_states(tmp_path / "x", messages))
+    recording = recorded(path, messages)
     assert recording.signals == ("q",)
     assert any("NaN in every message" in repair for repair in recording.source.repairs)
 
 
-def test_receive_stamps_where_headers_are_unset(tmp_path: Path) -> None:
+def test_receive_stamps_where_headers_are_unset(path: Path) -> None:
     messages = [ur_message(40 * k, stamp=False) for k in range(20)]
-    recording = read(write_joint_states(tmp_path / "x", messages))
+    recording = recorded(path, messages)
     np.testing.assert_allclose(recording.t, 0.32 * np.arange(20), atol=1e-9)
     assert recording.source.t0_ns == START + 100
+    assert "receive stamps" in recording.source.clock
     for message in messages:  # stamps that begin twice alike are set all the same
         message["stamp"] = True
     messages[1]["time"] = START
-    clock = read(write_joint_states(tmp_path / "y", messages)).source.clock
-    assert clock == "header stamps of /joint_states"
-    assert "receive stamps" in recording.source.clock
+    assert recorded(path, messages).source.clock == "header stamps of /joint_states"
 
 
-def test_a_wrench_of_another_rate_is_interpolated(tmp_path: Path) -> None:
-    messages = [ur_message(k) for k in range(50)]
-    for k in range(400):
-        time = START + k * 1_000_000 + 300_000
-        force = (0.001 * (time - START) * 1e-6, 0.0, -5.0)
-        messages.append({"topic": "/wrench", "time": time, "force": force, "frame": "tool0"})
-    messages.sort(key=lambda message: message["time"])
-    recording = read(write_joint_states(tmp_path / "x", messages))
-    assert recording.wrench is not None
+def test_a_wrench_of_another_rate_is_interpolated(path: Path) -> None:
+    wrench = arm_topic("/wrench", 400, step=1_000_000, frame="tool0")
+    for k, message in enumerate(wrench):
+        message["time"] += 300_000
+        message["force"] = (0.001 * (k + 0.3), 0.0, -5.0)
+    recording = recorded(path, arm_topic("/arm", 50), wrench)
     inner = slice(1, -1)  # the ends are held
-    np.testing.assert_allclose(
-        recording.wrench[inner, 0], 0.001 * 8 * np.arange(50)[inner], atol=1e-9
-    )
+    expected = 0.001 * 8 * np.arange(50)[inner]
+    np.testing.assert_allclose(recording.require("wrench")[inner, 0], expected, atol=1e-9)
     assert recording.wrench_frame == WrenchFrame("tool0", "tool0")
     assert any("interpolated wrench of /wrench (1000 Hz)" in r for r in recording.source.repairs)
 
 
-def test_columns_state_the_frame_and_sign_of_a_bags_wrench(tmp_path: Path) -> None:
+def test_columns_state_the_frame_and_sign_of_a_bags_wrench(path: Path) -> None:
     """What a refused frame asks for, "--columns wrench[base]=…", without a field's name."""
-    messages = [ur_message(k) for k in range(50)]
-    for k in range(50):
-        time = START + k * 8_000_000
-        messages.append(
-            {"topic": "/wrench", "time": time, "force": (1.0, 0, -5.0), "frame": "ft"}
-        )
-    messages.sort(key=lambda message: message["time"])
-    bag = write_joint_states(tmp_path / "x", messages)
-    plain = read(bag).wrench
-    stated = read(bag, columns="wrench[base@tool,by-robot]")
+    wrench = arm_topic("/wrench", 20, force=(1.0, 0, -5.0), frame="ft")
+    plain = recorded(path, UR_TOPIC, wrench).require("wrench")
+    stated = read(path, columns="wrench[base@tool,by-robot]")
     assert stated.wrench_frame == WrenchFrame("base", "tool", "by-robot")
     np.testing.assert_array_equal(stated.wrench, plain)
-    turned = read(bag, columns="-wrench[sensor],-dq")
+    turned = read(path, columns="-wrench[sensor],-dq")
     assert turned.wrench_frame == WrenchFrame("sensor", "sensor")
     np.testing.assert_array_equal(turned.wrench, -plain)
-    without = write_joint_states(tmp_path / "y", [ur_message(k) for k in range(20)])
     with pytest.raises(LogError, match="no topic has one"):
-        read(without, columns="wrench[base]")
+        recorded(path, UR_TOPIC, columns="wrench[base]")
 
 
-def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(tmp_path: Path) -> None:
+def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(path: Path) -> None:
     """Its frame_id is a sentence, which was refused as the user's mistake."""
-    more = {"topic": "/vftcli/wrench", "force": (1.0, 0.0, 0.0)}
-    more["frame"] = "base axes, moment about the flange point"
-    messages = [ur_message(k) for k in range(20)]
-    messages += [{**more, "time": message["time"]} for message in messages]
-    messages.sort(key=lambda message: message["time"])
-    recording = read(write_joint_states(tmp_path / "x", messages))
-    assert recording.wrench is not None
-    assert recording.wrench_frame is None
+    sentence = "base axes, moment about the flange point"
+    wrench = arm_topic("/vftcli/wrench", 20, force=(1.0, 0.0, 0.0), frame=sentence)
+    recording = recorded(path, UR_TOPIC, wrench)
+    assert (recording.wrench is None, recording.wrench_frame) == (False, None)
 
 
-def test_bags_without_joints_say_what_they_hold(tmp_path: Path) -> None:
-    messages = [{"topic": "/wrench", "time": START + k, "force": (0.0, 0, 1)} for k in range(9)]
+def test_bags_without_joints_say_what_they_hold(path: Path) -> None:
+    wrench = arm_topic("/wrench", 9, force=(0.0, 0, 1))
     with pytest.raises(LogError, match=r"no topic with joint positions among /wrench"):
-        read(write_joint_states(tmp_path / "x", messages))
-    more = [messages[0] | {"topic": f"/w{k:02}", "time": START + 50 + k} for k in range(15)]
+        recorded(path, wrench)
+    more = [arm_topic(f"/w{k:02}", 1, force=(0.0, 0, 1)) for k in range(15)]
     # Twelve topics are named.
     with pytest.raises(LogError, match=r", /w10 \(geometry_msgs/WrenchStamped\)\. Record a"):
-        read(write_joint_states(tmp_path / "y", messages + more))
-
-
-def arm_topic(
-    name: str, count: int, joints: str = "abcdef", step: int = 8_000_000, **more: object
-) -> list[dict[str, object]]:
-    """So many messages of one topic, every 8 ms, of joints of one letter each at 1, 2, … rad."""
-    values = [1.0 + j for j in range(len(joints))]
-    base = {"topic": name, "name": list(joints), "position": values} | more
-    return [base | {"time": START + k * step} for k in range(count)]
-
-
-def in_time(*topics: list[dict[str, object]]) -> list[dict[str, object]]:
-    return sorted((m for topic in topics for m in topic), key=lambda message: message["time"])
+        recorded(path, wrench, *more)
 
 
 @pytest.mark.parametrize(
@@ -227,25 +217,21 @@ def in_time(*topics: list[dict[str, object]]) -> list[dict[str, object]]:
         ([("/pair", 5, {"joints": "uv"})], "/pair"),
     ],
 )
-def test_the_topic_of_the_arm_leads(tmp_path: Path, topics, lead: str) -> None:
+def test_the_topic_of_the_arm_leads(path: Path, topics, lead: str) -> None:
     """The measured one of most joints and messages; of one rate the one with efforts."""
-    messages = in_time(*(arm_topic(name, count, **more) for name, count, more in topics))
-    recording = read(write_joint_states(tmp_path / "x", messages))
+    made = (arm_topic(name, count, **more) for name, count, more in topics)
+    recording = recorded(path, *made)
     assert recording.source.clock.startswith(f"header stamps of {lead}")
     assert recording.samples == next(count for name, count, _ in topics if name == lead)
 
 
-def test_one_of_two_arms_is_read_where_columns_name_it(tmp_path: Path) -> None:
+def test_one_of_two_arms_is_read_where_columns_name_it(path: Path) -> None:
     left, right = (arm_topic(f"/{side}", 20, side[:1] + "bcdef") for side in ("left", "right"))
-    bag = write_joint_states(tmp_path / "x", in_time(left, right))
-    with pytest.raises(
-        LogError,
-        match=r"two arms were recorded: /left, /right \(l, b… and r, b…\).*'q=/left.position'",
-    ):
-        read(bag)
+    words = r"two arms were recorded: /left, /right \(l, b… and r, b…\).*'q=/left.position'"
+    with pytest.raises(LogError, match=words):
+        recorded(path, left, right)
     for side in ("left", "right"):
-        recording = read(bag, columns=f"q=/{side}.position")
-        assert recording.joint_names[0] == side[:1]
+        assert read(path, columns=f"q=/{side}.position").joint_names[0] == side[:1]
 
 
 @pytest.mark.parametrize(
@@ -265,14 +251,13 @@ def test_one_of_two_arms_is_read_where_columns_name_it(tmp_path: Path) -> None:
     ],
 )
 def test_another_topic_gives_the_velocities_of_the_leading_one_s_joints(
-    tmp_path: Path, joints: str, given: str, found: list[int] | None
+    path: Path, joints: str, given: str, found: list[int] | None
 ) -> None:
     """By their names, whatever their order and whatever other joints it has."""
     count = len(joints) or 6 + given.endswith("more")
     values = {name: [1.0 + j for j in range(count)] for name in given.split()}
     other = arm_topic("/other", 40, joints, 10_000_000, **{"position": []} | values)
-    messages = in_time(arm_topic("/arm", 50), other)
-    recording = read(write_joint_states(tmp_path / "x", messages))
+    recording = recorded(path, arm_topic("/arm", 50), other)
     assert recording.q[0].tolist() == [1, 2, 3, 4, 5, 6]
     assert recording.signals == (("q",) if found is None else ("q", "dq"))
     if found is not None:
@@ -282,28 +267,27 @@ def test_another_topic_gives_the_velocities_of_the_leading_one_s_joints(
     assert codes == {"topics-left-out" if found is None else "signal-interpolated"}
 
 
-def test_what_other_topics_command_is_no_measurement(tmp_path: Path) -> None:
-    messages = in_time(arm_topic("/arm", 50), arm_topic("/arm/command", 50, velocity=[1.0] * 6))
-    assert read(write_joint_states(tmp_path / "x", messages)).dq is None
+def test_what_other_topics_command_is_no_measurement(path: Path) -> None:
+    command = arm_topic("/arm/command", 50, velocity=[1.0] * 6)
+    assert recorded(path, arm_topic("/arm", 50), command).dq is None
 
 
 @pytest.mark.parametrize(("lead", "other"), [(0, 0), (5, 5), (5, None), (None, 5), (None, None)])
 def test_stamps_are_compared_with_stamps_of_one_clock(
-    tmp_path: Path, lead: int | None, other: int | None
+    path: Path, lead: int | None, other: int | None
 ) -> None:
     """Headers that run 5 s ahead of the recorder, or are unset: what is of one instant meets."""
-    messages = in_time(arm_topic("/arm", 50), arm_topic("/wrench", 200, step=2_000_000))
-    for message in messages:
-        ahead = lead if message["topic"] == "/arm" else other
-        message["stamp"] = ahead is not None
-        message["ahead"] = (ahead or 0) * 10**9
-        if message["topic"] == "/wrench":
-            message["force"] = ((message["time"] - START) * 1e-9, 0.0, 0.0)
-    recording = read(write_joint_states(tmp_path / "x", messages))
+    arm, wrench = (
+        arm_topic(name, count, step=step, stamp=ahead is not None, ahead=(ahead or 0) * 10**9)
+        for name, count, step, ahead in (
+            ("/arm", 50, 8_000_000, lead), ("/wrench", 200, 2_000_000, other)
+        )
+    )  # fmt: skip
+    for k, message in enumerate(wrench):
+        message["force"] = (0.002 * k, 0.0, 0.0)
+    found = recorded(path, arm, wrench).require("wrench")[:, 0]
     # stamps are whole nanoseconds
-    np.testing.assert_allclose(
-        recording.require("wrench")[:, 0], 0.008 * np.arange(50), atol=2e-9
-    )
+    np.testing.assert_allclose(found, 0.008 * np.arange(50), atol=2e-9)
 
 
 @pytest.mark.parametrize(
@@ -311,14 +295,14 @@ def test_stamps_are_compared_with_stamps_of_one_clock(
     [(0, 320, True), (0, 300, False), (76, 396, True), (84, 404, False)],
 )
 def test_a_wrench_is_held_where_it_misses_no_more_than_a_twentieth_of_the_motion(
-    tmp_path: Path, first: int, last: int, kept: bool
+    path: Path, first: int, last: int, kept: bool
 ) -> None:
     """Joints every 8 ms up to 392 ms, a wrench every 20 ms: 4 or 6 % lie more than 60 ms away."""
-    messages = arm_topic("/arm", 50)
-    for time in range(first, last + 1, 20):
-        at = {"time": START + 10**6 * time, "force": (float(time), 0.0, 0.0)}
-        messages.append({"topic": "/wrench"} | at)
-    recording = read(write_joint_states(tmp_path / "x", in_time(messages)))
+    wrench = [
+        {"topic": "/wrench", "time": START + 10**6 * time, "force": (float(time), 0.0, 0.0)}
+        for time in range(first, last + 1, 20)
+    ]
+    recording = recorded(path, arm_topic("/arm", 50), wrench)
     codes = {remark.code for remark in recording.source.remarks}
     assert ("topic-too-short" in codes) != kept
     if not kept:
@@ -338,33 +322,30 @@ def test_a_wrench_is_held_where_it_misses_no_more_than_a_twentieth_of_the_motion
     ],
 )
 def test_the_sensor_s_fullest_topic_gives_the_wrench(
-    tmp_path: Path, topics: dict[str, int], taken: str
+    path: Path, topics: dict[str, int], taken: str
 ) -> None:
     forces = [
         arm_topic(name, count, step=10_000_000, force=(float(count), 0.0, 0.0))
         for name, count in topics.items()
     ]
-    recording = read(write_joint_states(tmp_path / "x", in_time(arm_topic("/arm", 50), *forces)))
+    recording = recorded(path, arm_topic("/arm", 50), *forces)
     assert recording.require("wrench")[0, 0] == topics[taken]
     left = sorted(topics.keys() - {taken})
     found = [r.values["topics"] for r in recording.source.remarks if r.code == "topics-left-out"]
     assert found == ([tuple(left)] if left else [])
 
 
-def test_topics_that_are_left_out_are_named_those_with_forces_first(tmp_path: Path) -> None:
-    others = [arm_topic(f"/g{k}", 20, "uv") for k in range(6)] + [arm_topic("/z/force", 20, "uv")]
-    messages = in_time(arm_topic("/arm", 20), *others)
-    (left,) = read(write_joint_states(tmp_path / "x", messages)).source.remarks
+def test_topics_that_are_left_out_are_named_those_with_forces_first(path: Path) -> None:
+    others = [arm_topic(name, 20, "uv") for name in (*(f"/g{k}" for k in range(6)), "/z/force")]
+    (left,) = recorded(path, arm_topic("/arm", 20), *others).source.remarks
     assert left.values["topics"] == ("/z/force", "/g0", "/g1", "/g2", "/g3", "/g4")
 
 
-def test_messages_of_the_leading_topic_with_other_signals_are_left_out_and_said(
-    tmp_path: Path,
-) -> None:
+def test_messages_of_the_leading_topic_with_other_signals_are_left_out(path: Path) -> None:
     messages = arm_topic("/arm", 50, velocity=[0.5] * 6)
     for message in messages[10:14]:
         message["velocity"] = []
-    recording = read(write_joint_states(tmp_path / "x", messages))
+    recording = recorded(path, messages)
     assert recording.samples == 46
     (said,) = (r for r in recording.source.remarks if r.code == "messages-left-out")
     assert (said.values["messages"], said.values["signals"]) == (4, ("q",))

@@ -1,6 +1,5 @@
 """The vendors' own files: UR's RTDE clients, libfranka, panda-py, LeRobot."""
 
-import json
 import os
 import pickle
 import tomllib
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from seed_containers import json_arrays, json_lines
 from seed_logs import (
     HEADERLESS_COLUMNS,
     ROWS,
@@ -17,10 +17,8 @@ from seed_logs import (
     libfranka_json,
     matrix_npy,
     motion,
-    panda_py_log,
     panda_py_npz,
     panda_py_pickle,
-    parquet,
     ur_binary,
     ur_csv,
 )
@@ -33,25 +31,13 @@ SIX_DIGITS = 1e-5
 """libfranka prints six significant digits; the largest value of the motion is below ten."""
 
 
-def test_official_text_keeps_every_digit(tmp_path: Path) -> None:
-    recording = read(ur_csv(tmp_path / "x"))
-    log = motion()
-    assert recording.source.format == "ur-csv"
+@pytest.mark.parametrize("end", ["\r\n", "\r\r\n", "\r", "\n"])
+def test_official_text_keeps_every_digit(tmp_path: Path, end: str) -> None:
+    recording, log = read(ur_csv(tmp_path / "x", end=end)), motion()
+    assert (recording.source.format, recording.source.t0) == ("ur-csv", 1000)
     np.testing.assert_array_equal(recording.q, log["q"])
     np.testing.assert_array_equal(recording.current, log["current"])
-    assert recording.torque is None
-    assert recording.robot_hint is None
-    assert recording.source.t0 == 1000
-
-
-@pytest.mark.parametrize("end", ["\r\r\n", "\r", "\n"])
-def test_official_text_of_every_line_end(tmp_path: Path, end: str) -> None:
-    recording = read(ur_csv(tmp_path / "x", end=end))
-    np.testing.assert_array_equal(recording.q, motion()["q"])
-
-
-def test_commas_show_ur_rtde(tmp_path: Path) -> None:
-    assert read(ur_csv(tmp_path / "x", separator=",", end="\n")).source.format == "ur-rtde"
+    assert (recording.torque, recording.robot_hint) == (None, None)
 
 
 @pytest.mark.parametrize(
@@ -76,6 +62,7 @@ def test_the_point_of_the_controllers_moment(
         cells[clock] = f"{1000.0 + 0.008 * k + shift:.6f}"
         out.append(",".join([*cells, "1,2,3,.1,.2,.3", "0"]))
     path.write_text("\n".join(out) + "\n")
+    assert read(path).source.format == "ur-rtde"
     assert read(path).wrench_frame == WrenchFrame("base", point)
     stated = read(path, columns="wrench[base@tool]")
     assert stated.wrench_frame == WrenchFrame("base", "tool")
@@ -89,21 +76,23 @@ def test_payload_that_the_controller_was_reported_of(tmp_path: Path) -> None:
     lines[1:] = [f"{line},1.5,0,0.01,0.05" for line in lines[1:]]
     path.write_text("\n".join(lines) + "\n")
     recording = read(path)
-    assert recording.payload_mass == 1.5
-    assert recording.payload_com == (0, 0.01, 0.05)
+    assert (recording.payload_mass, recording.payload_com) == (1.5, (0, 0.01, 0.05))
 
 
-def test_missing_positions_or_clock_say_what_to_record(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "other", "words"),
+    [
+        ("timestamp", "time_stamp", "t@125Hz"),
+        ("actual_q_5", "target_q_0", "dq has 6 columns, q has 5"),
+        ("actual_q_", "target_q_", "Add timestamp and actual_q to the recipe"),
+    ],
+)
+def test_missing_positions_or_clock_say_what_to_record(
+    tmp_path: Path, name: str, other: str, words: str
+) -> None:
     path = ur_csv(tmp_path / "x")
-    text = path.read_text()
-    path.write_text(text.replace("timestamp", "time_stamp"))
-    with pytest.raises(LogError, match="t@125Hz"):
-        read(path)
-    path.write_text(text.replace("actual_q_5", "target_q_0"))
-    with pytest.raises(LogError, match="dq has 6 columns, q has 5"):
-        read(path)
-    path.write_text(text.replace("actual_q_", "target_q_"))
-    with pytest.raises(LogError, match="Add timestamp and actual_q to the recipe"):
+    path.write_text(path.read_text().replace(name, other))
+    with pytest.raises(LogError, match=words):
         read(path)
 
 
@@ -121,15 +110,12 @@ def test_a_table_with_targets_of_its_own_is_no_recording_of_ur(tmp_path: Path) -
 def test_binary_records(tmp_path: Path) -> None:
     path = ur_binary(tmp_path / "x.csv")
     np.testing.assert_array_equal(read(path).q, motion()["q"])
-    path.write_bytes(path.read_bytes()[:-10])
+    content = path.read_bytes()
+    path.write_bytes(content[:-10])
     recording = read(path)
     assert recording.samples == ROWS - 1
     assert "dropped the last record, 50 bytes" in recording.source.repairs[0]
-
-
-def test_binary_records_with_a_leading_identifier(tmp_path: Path) -> None:
-    path = ur_binary(tmp_path / "x")
-    names, types, body = path.read_bytes().split(b"\n", 2)
+    names, types, body = content.split(b"\n", 2)
     records = np.frombuffer(body, dtype="V60")
     # 119 records, because 120 of 61 bytes would also be 122 of 60
     joined = b"".join(b"\1" + record.tobytes() for record in records[:119])
@@ -162,20 +148,22 @@ def test_states_as_json_lines(tmp_path: Path) -> None:
         read(path)
 
 
-def test_json_that_is_nested_or_endless_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("state", ["[" * 50_000, '"' + "x" * (1 << 20) + '"'])
+def test_json_that_is_nested_or_endless_is_refused(tmp_path: Path, state: str) -> None:
     path = tmp_path / "x"
-    for line in ('{"O_T_EE": ' + "[" * 50_000, '{"O_T_EE": "' + "x" * (1 << 20) + '"}'):
-        path.write_text(f"{line}\n{line}\n")
-        with pytest.raises(LogError, match="line 1 is not one JSON object"):
-            read(path)
+    path.write_text(f'{{"O_T_EE": {state}\n' * 2)
+    with pytest.raises(LogError, match="line 1 is not one JSON object"):
+        read(path)
 
 
-def test_panda_py_bundle_and_pickle_read_the_same(tmp_path: Path) -> None:
-    log = panda_py_log()
-    for recording in (read(panda_py_npz(tmp_path / "x")), read(panda_py_pickle(tmp_path / "y"))):
-        np.testing.assert_array_equal(recording.torque, log["tau_J"])
-        np.testing.assert_array_equal(recording.tau_ext, -log["tau_ext_hat_filtered"])
-        np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), rtol=1e-12)
+@pytest.mark.parametrize("make", [panda_py_npz, panda_py_pickle, json_arrays, json_lines])
+def test_panda_pys_log_reads_the_same_in_every_container(tmp_path: Path, make) -> None:
+    recording, log = read(make(tmp_path / "x")), motion(7)
+    for signal in ("q", "dq"):
+        np.testing.assert_array_equal(getattr(recording, signal), log[signal])
+    np.testing.assert_array_equal(recording.torque, log["tau"])
+    np.testing.assert_array_equal(recording.tau_ext, 0.0 - log["tau_ext"])  # libfranka's sign
+    np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), atol=1e-12)  # ms as float64
 
 
 def test_array_files(tmp_path: Path) -> None:
@@ -239,43 +227,6 @@ def test_a_pickle_cannot_fill_memory_through_ndarray(tmp_path: Path) -> None:
     )
     with pytest.raises(LogError, match="Pickles are opened only"):
         read(tmp_path / "x")
-
-
-def test_parquet_with_lists_by_alias(tmp_path: Path) -> None:
-    recording = read(parquet(tmp_path / "x"))
-    np.testing.assert_array_equal(recording.q, motion(7)["q"])
-    assert recording.source.format == "parquet"
-
-
-def test_lerobot_reads_the_first_episode(tmp_path: Path) -> None:
-    import polars as pl
-
-    log = motion(7, rows=60)
-    state = np.hstack([log["q"], np.zeros((60, 1))]).astype(np.float32)
-    data = tmp_path / "data" / "chunk-000"
-    data.mkdir(parents=True)
-    pl.DataFrame(
-        {
-            "timestamp": np.tile(np.arange(30) / 30, 2).astype(np.float32),
-            "observation.state": state.tolist(),
-            "episode_index": np.repeat([0, 1], 30),
-        }
-    ).write_parquet(data / "file-000.parquet")
-    (tmp_path / "meta").mkdir()
-    names = [*(f"joint_{j}" for j in range(7)), "gripper"]
-    info = {"fps": 30, "total_episodes": 2, "features": {"observation.state": {"names": names}}}
-    (tmp_path / "meta" / "info.json").write_text(json.dumps(info))
-    recording = read(tmp_path)
-    assert recording.source.format == "lerobot"
-    assert (recording.samples, recording.joints) == (30, 7)
-    np.testing.assert_allclose(recording.q, log["q"][:30], atol=1e-7)  # float32
-    assert recording.source.warnings[0] == "episode 0, of 2 in all: --episode K|all"
-    second = read(
-        data / "file-000.parquet", columns="t=timestamp,q=observation.state[0:7]", episode=1
-    )
-    np.testing.assert_allclose(second.q, log["q"][30:], atol=1e-7)  # float32
-    with pytest.raises(LogError, match="no episode 2; it holds 2, from 0 to 1"):
-        read(data / "file-000.parquet", episode=2)
 
 
 def test_a_format_that_nobody_has_yet_is_one_entry(
