@@ -7,26 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bytes_mutants import mutate_bytes
+from bytes_mutants import bytes_mutant
 from tokens import NUMBERS, WORDS, Mutant, Rng, Seed, pick, some
 
 Arrays = dict[str, Any]
 DTYPES = (
-    "f4",
-    "f2",
-    "i1",
-    "i8",
-    "u1",
-    "?",
-    ">f8",
-    "c16",
-    "O",
-    "U8",
-    "S4",
-    "M8[ms]",
-    "m8[s]",
-    ">i4",
-)
+    "f4", "f2", "i1", "i8", "u1", "?", ">f8", "c16", "O", "U8", "S4", "M8[ms]", "m8[s]", ">i4",
+)  # fmt: skip
 
 
 def numbers_changed(value: np.ndarray, rng: Rng) -> np.ndarray:
@@ -59,8 +46,7 @@ def shape_changed(value: np.ndarray, rng: Rng) -> np.ndarray:
         return np.zeros((3, 3))
     shapes = (
         lambda: value.T, lambda: value[:0], lambda: value[:1], lambda: value[0],
-        lambda: value[None],
-        lambda: value[: len(value) // 2], lambda: np.asarray(value.reshape(-1)[0]),
+        lambda: value[None], lambda: value[: len(value) // 2], lambda: value.reshape(-1)[0],
         lambda: value[..., None], lambda: np.concatenate([value, value]),
     )  # fmt: skip
     return np.asarray(shapes[kind]())
@@ -102,11 +88,9 @@ def arrays_changed(arrays: Arrays, rng: Rng) -> tuple[Arrays, str]:
 
 def archive_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     """An .npz of named arrays, a pickle of them, or one matrix."""
-    data = seed.path.read_bytes()
     if rng.random() < 0.2:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
+        return bytes_mutant(seed, rng, path)
+    data = seed.path.read_bytes()
     if seed.family == "npy":
         matrix = np.load(io.BytesIO(data))
         change = pick(rng, (numbers_changed, shape_changed, type_changed))
@@ -171,21 +155,16 @@ def parquet_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    data = seed.path.read_bytes()
     if rng.random() < 0.2:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
+        return bytes_mutant(seed, rng, path)
     try:
-        table = pq.read_table(io.BytesIO(data), use_threads=False)
+        table = pq.read_table(io.BytesIO(seed.path.read_bytes()), use_threads=False)
         table, how, same_rows = table_changed(table, rng)
         codec = pick(rng, ("snappy", "zstd", "gzip", "none", "lz4"))
-        pq.write_table(
-            table, path, compression=codec, row_group_size=int(pick(rng, (7, 100, 10**6)))
-        )
+        group = pick(rng, (7, 100, 10**6))
+        pq.write_table(table, path, compression=codec, row_group_size=group)
     except (pa.ArrowException, TypeError, ValueError, OverflowError):
-        path.write_bytes(mutate_bytes(data, rng)[0])
-        return Mutant("bytes")
+        return bytes_mutant(seed, rng, path)
     return Mutant(f"parquet {how}", table.num_rows if same_rows else None)
 
 
@@ -240,51 +219,41 @@ def cells_changed(values: list[Any], rng: Rng) -> list[Any]:
 
 def recast(values: list[Any], kind: Any) -> list[Any]:
     """A column's values as another Arrow type takes them."""
-    text = str(kind)
-    out: list[Any] = []
-    for value in values:
-        first = value[0] if isinstance(value, list) and value else value
-        number = float(first) if isinstance(first, int | float) else 0.0
-        if text.startswith(("list", "fixed")):
-            out.append([number] * 3)
-        elif text.startswith("struct"):
-            out.append({"x": number})
-        elif text == "null":
-            out.append(None)
-        elif text == "string":
-            out.append(str(value))
-        elif text in {"int8", "bool"}:
-            out.append(bool(number) if text == "bool" else int(number) % 100)
-        elif text.startswith("timestamp"):
-            out.append(int(number * 1e6))
-        else:
-            out.append(np.float16(number) if text == "halffloat" else number)
-    return out
+    makes: dict[str, Any] = {
+        "list": lambda _, number: [number] * 3,
+        "fixed": lambda _, number: [number] * 3,
+        "struct": lambda _, number: {"x": number},
+        "null": lambda *_: None,
+        "string": lambda value, _: str(value),
+        "int8": lambda _, number: int(number) % 100,
+        "bool": lambda _, number: bool(number),
+        "timestamp": lambda _, number: int(number * 1e6),
+        "halffloat": lambda _, number: np.float16(number),
+    }
+    make = next((makes[k] for k in makes if str(kind).startswith(k)), lambda _, number: number)
+    firsts = (value[0] if isinstance(value, list) and value else value for value in values)
+    numbers = (float(first) if isinstance(first, int | float) else 0.0 for first in firsts)
+    return [make(value, number) for value, number in zip(values, numbers, strict=True)]
+
+
+RECORD_KINDS = (b"DOUBLE", b"INT32", b"VECTOR6D", b"BOOL", b"UINT64", b"NONE", b"", b"UINT8")
 
 
 def record_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     """A UR binary: its names, its types, or its records changed."""
-    data = seed.path.read_bytes()
     if rng.random() < 0.3:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
-    names, types, body = data.split(b"\n", 2)
+        return bytes_mutant(seed, rng, path)
+    names, types, body = seed.path.read_bytes().split(b"\n", 2)
     kind = int(rng.integers(6))
     words, kinds = names.split(b" "), types.split(b" ")
     if kind == 0:
         words[int(rng.integers(len(words)))] = pick(rng, WORDS).encode("utf-8", "replace")[:50]
     elif kind == 1:
-        kinds[int(rng.integers(len(kinds)))] = pick(
-            rng, (b"DOUBLE", b"INT32", b"VECTOR6D", b"BOOL", b"UINT64", b"NONE", b"", b"UINT8")
-        )
+        kinds[int(rng.integers(len(kinds)))] = pick(rng, RECORD_KINDS)
     elif kind == 2:
         place = int(rng.integers(len(body) // 8)) * 8
-        body = (
-            body[:place]
-            + np.array([pick(rng, NUMBERS)], dtype=object).astype(">f8").tobytes()
-            + (body[place + 8 :])
-        )
+        number = np.array([pick(rng, NUMBERS)], dtype=object).astype(">f8").tobytes()
+        body = body[:place] + number + body[place + 8 :]
     elif kind == 3:
         body = body[: int(rng.integers(0, len(body)))]
     elif kind == 4:

@@ -1,10 +1,9 @@
 """Mutations of any file: bytes flipped, cut, moved, repeated, a count blown up, a word put in."""
 
 from collections.abc import Callable
+from pathlib import Path
 
-import numpy as np
-
-Rng = np.random.Generator
+from tokens import Mutant, Rng, Seed
 
 TOKENS = (
     b"nan", b"inf", b"-", b"1e999", b"", b"\n", b"\r", b",", b" ", b'"', b"#", b"\0", b"{",
@@ -71,3 +70,10 @@ def mutate_bytes(data: bytes, rng: Rng) -> tuple[bytes, str]:
         data = mutation(data, rng) or b"\0"
         how.append(mutation.__name__)
     return data, "+".join(how)
+
+
+def bytes_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
+    """The file with some of its bytes changed."""
+    data, how = mutate_bytes(seed.path.read_bytes(), rng)
+    path.write_bytes(data)
+    return Mutant(how)

@@ -40,28 +40,13 @@ BROKEN = 70
 """Exit code of a command that ended in an exception."""
 
 MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
-    "table": table_mutant,
-    "lines": lines_mutant,
-    "parquet": parquet_mutant,
-    "arrow": arrow_mutant,
-    "json": json_mutant,
-    "mat": matlab_mutant,
-    "hdf5": hdf5_mutant,
-    "npz": archive_mutant,
-    "npy": archive_mutant,
-    "pickle": archive_mutant,
-    "records": record_mutant,
-    "mcap": mcap_mutant,
-    "bag": bag_mutant,
-    "folder": folder_mutant,
-    "dataset": dataset_mutant,
-    "robot": toml_mutant,
-    "gains": toml_mutant,
-    "scenario": toml_mutant,
-    "urdf": urdf_mutant,
-    "mjcf": urdf_mutant,
-    "long": long_mutant,
-}
+    "table": table_mutant, "lines": lines_mutant, "parquet": parquet_mutant, "arrow": arrow_mutant,
+    "json": json_mutant, "mat": matlab_mutant, "hdf5": hdf5_mutant, "npz": archive_mutant,
+    "npy": archive_mutant, "pickle": archive_mutant, "records": record_mutant,
+    "mcap": mcap_mutant, "bag": bag_mutant, "folder": folder_mutant, "dataset": dataset_mutant,
+    "robot": toml_mutant, "gains": toml_mutant, "scenario": toml_mutant, "urdf": urdf_mutant,
+    "mjcf": urdf_mutant, "long": long_mutant,
+}  # fmt: skip
 WEIGHTS = {
     "table": 15, "lines": 5, "parquet": 8, "npz": 6, "npy": 2, "pickle": 5, "records": 4,
     "mcap": 10, "bag": 6, "folder": 6, "arrow": 5, "json": 3, "mat": 4, "hdf5": 6,
@@ -81,34 +66,22 @@ LARGEST_TORQUE = 1e9
 
 
 class Attempt(NamedTuple):
-    """One input.
-
-    Attributes:
-        family: Of the file, or "options".
-        seed: What it started from.
-        how: What was changed.
-        words: The command line.
-        rows: Rows of the file, None where they are not known.
-    """
+    """One input: its family or "options", what it started from, what was changed, its command."""
 
     family: str
     seed: str
     how: str
     words: tuple[str, ...]
     rows: int | None
+    """Rows of the file, None where they are not known."""
 
 
 def attempt(
     number: int, index: int, families: Sequence[str], seeds: dict[str, list[Seed]], folder: Path
 ) -> Attempt:
-    """Write the input of an index, and say how it is tried; the same for the same numbers.
+    """Write the input of an index into a folder, and say how it is tried.
 
-    Args:
-        number: The seed of the run.
-        index: Which input.
-        families: Those to draw from.
-        seeds: The sound files.
-        folder: Where it is written.
+    The same for the same number of a run, index, families to draw from and seeds.
     """
     rng = np.random.default_rng([number, index])
     there = [family for family in families if family in seeds or family == "options"]

@@ -7,16 +7,9 @@ from typing import Any
 
 import numpy as np
 from array_mutants import Arrays, arrays_changed, changed_inside, parquet_mutant, table_changed
-from bytes_mutants import mutate_bytes
+from bytes_mutants import bytes_mutant
 from text_mutants import lines_mutant
 from tokens import Mutant, Rng, Seed, pick
-
-
-def bytes_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """The file with some of its bytes changed."""
-    data, how = mutate_bytes(seed.path.read_bytes(), rng)
-    path.write_bytes(data)
-    return Mutant(how)
 
 
 def arrow_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:

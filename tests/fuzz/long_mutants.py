@@ -21,15 +21,14 @@ RATE, SECONDS = 50.0, 12.0
 ENDINGS = {"identify": "out.toml"}
 CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
     "report": {
-        "--reference": ("zero", "two-cycle", "vendor"),
-        "recording.detail": ("levels", "none"),
+        "--reference": ("zero", "two-cycle", "vendor"), "recording.detail": ("levels", "none"),
     },
     "identify": {"--method": ("friction", "base", "targets", "payload", "gains")},
     "admit": {"admittance.controller": ("variable", "traditional")},
     "contacts": {"--free": ("0:3", "9:12")},
     "thresholds": {"--rate": ("1", "60")},
     "batch": {"--do": ("estimate", "compare", "report", "contacts"), "--jobs": ("0",)},
-}
+}  # fmt: skip
 """Command → its options and their values, one of each is drawn."""
 
 

@@ -34,11 +34,8 @@ def mcap_messages(path: Path) -> list[Message]:
     with path.open("rb") as file:
         for schema, channel, message in make_reader(file).iter_messages():
             about = (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
-            found.append(
-                Message(
-                    channel.topic, channel.message_encoding, about, message.log_time, message.data
-                )
-            )
+            how = channel.topic, channel.message_encoding, about
+            found.append(Message(*how, message.log_time, message.data))
     return found
 
 
@@ -50,11 +47,9 @@ def write_mcap(path: Path, messages: list[Message], rng: Rng | None = None) -> N
         chosen: dict[str, Any] = {"chunk_size": 16 * 1024}
         if rng is not None:
             chosen = {
-                "chunk_size": int(pick(rng, (256, 4096, 10**6))),
+                "chunk_size": pick(rng, (256, 4096, 10**6)),
                 "use_chunking": rng.random() < 0.8,
-            }
-            chosen["compression"] = pick(rng, tuple(CompressionType))
-            chosen |= {
+                "compression": pick(rng, tuple(CompressionType)),
                 "use_statistics": rng.random() < 0.7,
                 "use_summary_offsets": rng.random() < 0.7,
             }
@@ -216,19 +211,19 @@ BagRecord = tuple[dict[bytes, bytes], bytes]
 
 def bag_records(data: bytes) -> Iterator[BagRecord]:
     """The records of a bag or of a chunk: their header fields and their data."""
+    pieces = sized(data)
+    for head, body in zip(pieces, pieces, strict=False):
+        named = (field.partition(b"=") for field in sized(head))
+        yield {name: value for name, _, value in named}, body
+
+
+def sized(data: bytes) -> Iterator[bytes]:
+    """Pieces that each stand behind their length."""
     place = 0
-    while place + 8 <= len(data):
+    while place + 4 <= len(data):
         (size,) = struct.unpack_from("<I", data, place)
-        head, place = data[place + 4 : place + 4 + size], place + 4 + size
-        (size,) = struct.unpack_from("<I", data, place)
-        body, place = data[place + 4 : place + 4 + size], place + 4 + size
-        fields, at = {}, 0
-        while at + 4 <= len(head):
-            (length,) = struct.unpack_from("<I", head, at)
-            name, _, value = head[at + 4 : at + 4 + length].partition(b"=")
-            fields[name] = value
-            at += 4 + length
-        yield fields, body
+        yield data[place + 4 : place + 4 + size]
+        place += 4 + size
 
 
 def bag_bytes(fields: dict[bytes, bytes], body: bytes) -> bytes:
@@ -295,20 +290,8 @@ STATEMENTS = (
 )
 
 VALUES = (
-    "",
-    "x",
-    "-1",
-    "0",
-    "{}",
-    "[]",
-    "null",
-    "1e20",
-    "[1, 2]",
-    "2026-01-02",
-    "*a",
-    "!!python/x",
-    "'",
-)
+    "", "x", "-1", "0", "{}", "[]", "null", "1e20", "[1, 2]", "2026-01-02", "*a", "!!python/x", "'",
+)  # fmt: skip
 
 
 def folder_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
@@ -335,12 +318,9 @@ def folder_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
                 database.execute(statement)
             except sqlite3.Error:
                 continue
-        if rng.random() < 0.4:
-            rows = (
-                database.execute("SELECT id, data FROM messages LIMIT 20").fetchall()
-                if ("DROP" not in "".join(how) and "RENAME" not in "".join(how))
-                else []
-            )
+        there = "DROP" not in "".join(how) and "RENAME" not in "".join(how)
+        if rng.random() < 0.4 and there:
+            rows = database.execute("SELECT id, data FROM messages LIMIT 20").fetchall()
             for number, blob in rows:
                 if isinstance(blob, bytes) and blob:
                     changed = (flip(blob, rng), number)
@@ -372,11 +352,9 @@ def yaml_changed(path: Path, rng: Rng) -> str:
     return f"yaml {key.strip()}"
 
 
-def shrunk_mcap(source: Path, target: Path, most: int) -> list[Message]:
-    """The first messages of an MCAP as a file of their own, and they themselves."""
-    messages = mcap_messages(source)[:most]
-    write_mcap(target, messages)
-    return messages
+def shrunk_mcap(source: Path, target: Path, most: int) -> None:
+    """The first messages of an MCAP as a file of their own."""
+    write_mcap(target, mcap_messages(source)[:most])
 
 
 def shrunk_database(source: Path, target: Path, most: int) -> None:

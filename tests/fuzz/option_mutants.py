@@ -3,33 +3,17 @@
 from tokens import NUMBERS, WORDS, Rng, pick
 
 SIGNALS = (
-    "t",
-    "q",
-    "dq",
-    "current",
-    "tau",
-    "effort",
-    "tau_ext",
-    "wrench",
-    "target_q",
-    "_",
+    "t", "q", "dq", "current", "tau", "effort", "tau_ext", "wrench", "target_q", "_",
     "temperature",
-)
+)  # fmt: skip
 UNITS = ("", "", "", "[deg]", "[ms]", "[ns]", "[mA]", "[base]", "[x]", "[", "[]")
 PATTERNS = (
-    "q_{i}",
-    "dq_{i}",
-    "tau_{i}",
-    "t",
-    "{i}",
-    "q_{i}{i}",
-    "q[0:6]",
-    "q[",
-    "q_0|q_1",
-    "",
-    "*",
-    "q_*",
-)
+    "q_{i}", "dq_{i}", "tau_{i}", "t", "{i}", "q_{i}{i}", "q[0:6]", "q[", "q_0|q_1", "", "*", "q_*",
+)  # fmt: skip
+SETTINGS = (
+    "gmo.gain", "fdo.omega", "kfo.r_diag", "kfo.q_tau_diag", "kfo.q_p_diag", "kfo.decay",
+    "kfo-fe.r_diag", "kfo.noise_convention", "gmo", "x.y", "gmo.gain.x",
+)  # fmt: skip
 
 
 def columns(rng: Rng) -> str:
@@ -52,10 +36,7 @@ def span(rng: Rng) -> str:
 
 
 def setting(rng: Rng) -> str:
-    name = pick(rng, ("gmo.gain", "fdo.omega", "kfo.r_diag", "kfo.q_tau_diag", "kfo.q_p_diag",
-                          "kfo.decay",
-                      "kfo-fe.r_diag", "kfo.noise_convention", "gmo", "x.y",
-                      "gmo.gain.x"))  # fmt: skip
+    name = pick(rng, SETTINGS)
     value = ",".join(str(pick(rng, NUMBERS)) for _ in range(int(pick(rng, (1, 1, 6, 7)))))
     return f"{name}={value if rng.random() < 0.8 else pick(rng, WORDS)[:40]}"
 

@@ -4,28 +4,29 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from bytes_mutants import mutate_bytes
+from bytes_mutants import bytes_mutant
 from tokens import NUMBERS, WORDS, Mutant, Rng, Seed, pick
 
 ASSIGNS = re.compile(r"^\s*([\w\"'.-]+)\s*=\s*(.*?)(\s*#.*)?$")
 
 VALUES = (
     "true", "[]", "{}", "[[]]", "{a = 1}", '""', '"x"', '"1.0"', "nan", "inf", "-inf", "1e308",
-    "1e20",
-    "-1", "0", "1e-320", "99999999999999999999", "9" * 5000, "2026-01-02", "03:04:05", "[1, 2]",
-    '["a", "b"]', "[nan, nan, nan]", "[0, 0, 0, 0, 0, 0]", "[1e20, 0, 0]", "[" * 3000, "[true, 1]",
-    '"\\u0000"', '"<b>"', "0x10", "1_000", "[{a = 1}]", "[[1, 2], [3]]", "180.0", "-0.0", "1e5",
+    "1e20", "-1", "0", "1e-320", "99999999999999999999", "9" * 5000, "2026-01-02", "03:04:05",
+    "[1, 2]", '["a", "b"]', "[nan, nan, nan]", "[0, 0, 0, 0, 0, 0]", "[1e20, 0, 0]", "[" * 3000,
+    "[true, 1]", '"\\u0000"', '"<b>"', "0x10", "1_000", "[{a = 1}]", "[[1, 2], [3]]",
+    "180.0", "-0.0", "1e5",
 )  # fmt: skip
+
+
+HEADERS = ("[joints]", "[[payload]]", "[payload]", "[observers.gmo]", "[a.b]")
+TAGS = ("link", "joint", "mass", "axis", "x", "inertial", "robot", "limit")
 
 
 def toml_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     """A TOML file with a value, a key, a line or a table changed."""
-    data = seed.path.read_bytes()
     if rng.random() < 0.1:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
-    lines = data.decode().split("\n")
+        return bytes_mutant(seed, rng, path)
+    lines = seed.path.read_bytes().decode().split("\n")
     for _ in range(int(pick(rng, (1, 1, 1, 2)))):
         assigning = [k for k, line in enumerate(lines) if ASSIGNS.match(line)]
         headers = [k for k, line in enumerate(lines) if line.startswith("[")]
@@ -46,9 +47,7 @@ def toml_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
             del lines[int(pick(rng, headers))]
         elif headers:
             h = int(pick(rng, headers))
-            lines[h] = pick(
-                rng, ("[joints]", "[[payload]]", "[payload]", "[observers.gmo]", "[a.b]")
-            )
+            lines[h] = pick(rng, HEADERS)
     path.write_text("\n".join(lines), encoding="utf-8")
     return Mutant(f"toml {key}")
 
@@ -67,12 +66,9 @@ def new_value(old: str, rng: Rng) -> str:
 
 def urdf_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     """A URDF or MJCF with an attribute, an element or names changed."""
-    data = seed.path.read_bytes()
     if rng.random() < 0.15:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
-    root = ET.fromstring(data)
+        return bytes_mutant(seed, rng, path)
+    root = ET.fromstring(seed.path.read_bytes())
     parents = [element for element in root.iter() if len(element)]
     element = pick(rng, [e for e in root.iter() if e.attrib])
     key = pick(rng, list(element.attrib))
@@ -94,9 +90,7 @@ def urdf_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
         parent = pick(rng, parents)
         parent.append(pick(rng, list(parent)))
     elif kind == 6:
-        element.tag = pick(
-            rng, ("link", "joint", "mass", "axis", "x", "inertial", "robot", "limit")
-        )
+        element.tag = pick(rng, TAGS)
     elif kind >= 8:
         misname(root, rng, kind - 7)
     else:

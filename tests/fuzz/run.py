@@ -48,19 +48,18 @@ READ = ("read", "read with a word", "refused", "usage")
 
 
 class Verdict(NamedTuple):
-    """What became of one input.
-
-    Attributes:
-        index: Which.
-        attempt: What it was.
-        kind: One of `READ`, or what went wrong.
-        words: What the command said of it.
-    """
+    """What became of one input: its index, itself, one of `READ` or what went wrong, the words."""
 
     index: int
     attempt: Attempt
     kind: str
     words: str
+
+    @classmethod
+    def parsed(cls, line: str) -> "Verdict":
+        """The verdict that a child wrote down."""
+        index, made, *found = json.loads(line)
+        return cls(index, Attempt(*made), *found)
 
 
 Seeds = dict[str, list[Seed]]
@@ -81,15 +80,13 @@ RESUMED = {"annotate", "batch"}
 ENDED_BY_LIMIT = (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
 
 
-def forked(work: Any, *arguments: Any) -> tuple[int, Any]:
-    """Run a function in a forked child; its status and what it used."""
+def forked(work: Any, *arguments: Any) -> int:
+    """Run a function in a forked child; its status."""
     sys.stdout.flush()
-    child = os.fork()
-    if child == 0:
+    if (child := os.fork()) == 0:
         work(*arguments)
         os._exit(0)
-    _, status, used = os.wait4(child, 0)
-    return status, used
+    return os.waitpid(child, 0)[1]
 
 
 def prepared(folder: Path) -> Seeds:
@@ -100,7 +97,7 @@ def prepared(folder: Path) -> Seeds:
             pickle.dump(make_seeds(folder / "seeds"), file)
 
     (folder / "seeds").mkdir()
-    if forked(make)[0]:
+    if forked(make):
         raise SystemExit("the seeds could not be made")
     seeds = pickle.loads((folder / "seeds.pickle").read_bytes())
     import_all(folder, seeds)
@@ -193,9 +190,8 @@ def judged(status: int, index: int, folder: Path) -> Verdict:
 def failure(status: int, made: Attempt, folder: Path, said: str) -> tuple[str, str]:
     """The verdict on a command that ended, and the words that show it."""
     if status < 0:
-        return (
-            "hang" if -status in ENDED_BY_LIMIT else "signal"
-        ), f"signal {-status} {said[-300:]}"
+        kind = "hang" if -status in ENDED_BY_LIMIT else "signal"
+        return kind, f"signal {-status} {said[-300:]}"
     if status == BROKEN or OF_PYTHON.search(said):
         return "traceback", text(folder / "trace") or said
     if (peak := peak_memory()) > MEMORY or "out of memory" in said:
@@ -288,74 +284,47 @@ def verdicts(
             os._exit(0)
         os.close(write)
         with os.fdopen(read, encoding="utf-8") as lines:
-            done = [json.loads(line) for line in lines]
+            done = [Verdict.parsed(line) for line in lines]
+        yield from done
         _, status = os.waitpid(child, 0)
-        for index, made, kind, words in done:
-            yield Verdict(index, Attempt(*made), kind, words)
         if status:
-            last = indices[len(done)]
-            verdict = judged(
-                -os.WTERMSIG(status) if os.WIFSIGNALED(status) else BROKEN, last, folder
-            )
+            code = -os.WTERMSIG(status) if os.WIFSIGNALED(status) else BROKEN
+            verdict = judged(code, indices[len(done)], folder)
             keep(verdict, asked, folder)
             yield verdict
         indices = indices[len(done) + (status != 0) :]
 
 
-def worker(job: int, asked: argparse.Namespace, seeds: Seeds, top: Path) -> None:
-    """Try every job-th input; write the counts, and a line for each failure."""
-    counts: Counter[str] = Counter()
-    folder = top / f"job{job}"
-    indices = range(asked.first + job, asked.first + asked.inputs, asked.jobs)
-    with (top / f"failures{job}").open("w", encoding="utf-8") as file:
-        for verdict in verdicts(indices, asked, seeds, folder):
-            counts[f"{verdict.attempt.family}\t{verdict.kind}"] += 1
-            if verdict.kind not in READ:
-                file.write(json.dumps(verdict) + "\n")
-                file.flush()
-            if asked.progress is not None and verdict.index // asked.jobs % 500 == 499:
-                line = f"{verdict.index} {time.strftime('%H:%M:%S')}\n{table(counts)}\n"
-                asked.progress.with_suffix(f".{job}").write_text(line, encoding="utf-8")
-    (top / f"counts{job}").write_text(json.dumps(counts), encoding="utf-8")
-
-
-def run(asked: argparse.Namespace, top: Path) -> tuple[Counter[str], list[Verdict]]:
-    """Try the inputs; how often each family got each verdict, and the failures."""
+def run(asked: argparse.Namespace, top: Path) -> list[Verdict]:
+    """Try the inputs, every job-th of them in a process of its own; what became of each."""
     seeds = prepared(top)
     children = []
     for job in range(asked.jobs):
         if (child := os.fork()) == 0:
-            worker(job, asked, seeds, top)
+            indices = range(asked.first + job, asked.first + asked.inputs, asked.jobs)
+            with (top / f"verdicts{job}").open("w", encoding="utf-8") as file:
+                for verdict in verdicts(indices, asked, seeds, top / f"job{job}"):
+                    file.write(json.dumps(verdict) + "\n")
             os._exit(0)
         children.append(child)
     for child in children:
         os.waitpid(child, 0)
-    counts: Counter[str] = Counter()
-    failures = []
-    for job in range(asked.jobs):
-        counts.update(json.loads((top / f"counts{job}").read_text(encoding="utf-8")))
-        for line in (top / f"failures{job}").read_text(encoding="utf-8").splitlines():
-            index, made, kind, words = json.loads(line)
-            failures.append(Verdict(index, Attempt(*made), kind, words))
-    return counts, sorted(failures)
+    lines = (text(path).splitlines() for path in top.glob("verdicts*"))
+    return sorted(Verdict.parsed(line) for each in lines for line in each)
 
 
-def table(counts: Counter[str]) -> str:
+def table(found: list[Verdict]) -> str:
     """The counts as a table: a line a family, a column a verdict."""
-    families = sorted({key.split("\t")[0] for key in counts})
-    kinds = [*READ, *sorted({key.split("\t")[1] for key in counts} - set(READ))]
+    counts = Counter((verdict.attempt.family, verdict.kind) for verdict in found)
+    counts.update(("all", verdict.kind) for verdict in found)
+    kinds = [*READ, *sorted({kind for _, kind in counts} - set(READ))]
     rows = [["family", "inputs", *kinds]]
-    for family in [*families, "all"]:
-        own = [
-            sum(n for key, n in counts.items() if key == f"{family}\t{kind}" or (
-                family == "all" and key.endswith(f"\t{kind}")))
-            for kind in kinds
-        ]  # fmt: skip
+    for family in [*sorted({family for family, _ in counts} - {"all"}), "all"]:
+        own = [counts[family, kind] for kind in kinds]
         rows.append([family, str(sum(own)), *map(str, own)])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in rows
-    )
+    padded = ([c.rjust(w) for c, w in zip(row, widths, strict=True)] for row in rows)
+    return "\n".join("  ".join(row) for row in padded)
 
 
 def main() -> int:
@@ -367,28 +336,21 @@ def main() -> int:
     parser.add_argument("--family", action="append", choices=WEIGHTS, help="of these only")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="folder for the inputs that failed")
-    parser.add_argument("--progress", type=Path, help="file for the counts so far")
     asked = parser.parse_args()
-    for name in (
-        "POLARS_MAX_THREADS",
-        "RAYON_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "OMP_NUM_THREADS",
-    ):
-        os.environ[name] = "1"
+    for name in ("POLARS_MAX", "RAYON_NUM", "OPENBLAS_NUM", "OMP_NUM"):
+        os.environ[f"{name}_THREADS"] = "1"
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="vftcli-fuzz-") as name:
-        counts, failures = run(asked, Path(name))
-    lines = [table(counts), ""]
+        found = run(asked, Path(name))
+    failures = [verdict for verdict in found if verdict.kind not in READ]
+    lines = [table(found), ""]
     for verdict in failures[:500]:
         about = " ".join([*verdict.attempt[:3], "·", verdict.attempt.words[0]])
-        lines.append(
-            f"{verdict.index}: {verdict.kind}: {about}: {' '.join(verdict.words.split())[-300:]}"
-        )
-    lines.append(
-        f"{asked.inputs} inputs of seed {asked.seed} in {time.perf_counter() - start:.0f} s, "
-        f"{len(failures)} failures"
-    )
+        words = " ".join(verdict.words.split())[-300:]
+        lines.append(f"{verdict.index}: {verdict.kind}: {about}: {words}")
+    took = f"{time.perf_counter() - start:.0f} s"
+    counted = f"{asked.inputs} inputs of seed {asked.seed}"
+    lines.append(f"{counted} in {took}, {len(failures)} failures")
     sys.stdout.write("\n".join(lines) + "\n")
     return 1 if failures else 0
 

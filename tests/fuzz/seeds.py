@@ -44,8 +44,8 @@ noise_convention = "density"
 """
 
 
-def urdf(joints: int = 6) -> str:
-    """A serial arm of revolute joints."""
+def urdf() -> str:
+    """A serial arm of six revolute joints."""
     parts = ['<robot name="arm"><link name="l0"/>']
     parts += [
         f'<link name="l{k}"><inertial><origin xyz="0 0 0.1" rpy="0 0 0"/>'
@@ -53,41 +53,39 @@ def urdf(joints: int = 6) -> str:
         f'<joint name="j{k}" type="revolute"><parent link="l{k - 1}"/><child link="l{k}"/>'
         f'<origin xyz="0 0 0.3" rpy="0.1 0 0"/><axis xyz="0 {k % 2} {1 - k % 2}"/>'
         '<limit lower="-6" upper="6" velocity="3" effort="150"/></joint>'
-        for k in range(1, joints + 1)
+        for k in range(1, 7)
     ]
     return "\n".join([*parts, "</robot>"])
 
 
 def with_hand() -> str:
     """The arm with a hand of two sliding fingers, the second a follower, and a head beside it."""
-    parts = [f'<link name="{name}"/>' for name in ("tool0", "head")]
-    held = '<joint name="mount" type="fixed"><parent link="l6"/><child link="tool0"/></joint>'
-    parts += [
-        held,
+    parts = [
+        '<link name="tool0"/>',
+        '<link name="head"/>',
+        '<joint name="mount" type="fixed"><parent link="l6"/><child link="tool0"/></joint>',
         '<joint name="pan" type="revolute"><parent link="l0"/><child link="head"/></joint>',
     ]
-    for k, follows in (
-        ("left", ""),
-        ("right", '<mimic joint="left" multiplier="-1" offset="0"/>'),
-    ):
-        parts.append(
-            f'<link name="{k}_finger"><inertial><mass value="0.05"/><inertia {TENSOR}/></inertial>'
-            f'</link><joint name="{k}" type="prismatic"><parent link="tool0"/>'
-            f'<child link="{k}_finger"/><axis xyz="0 1 0"/>{follows}</joint>'
-        )
+    follows = '<mimic joint="left" multiplier="-1" offset="0"/>'
+    parts += [
+        f'<link name="{k}_finger"><inertial><mass value="0.05"/><inertia {TENSOR}/></inertial>'
+        f'</link><joint name="{k}" type="prismatic"><parent link="tool0"/>'
+        f'<child link="{k}_finger"/><axis xyz="0 1 0"/>{more}</joint>'
+        for k, more in (("left", ""), ("right", follows))
+    ]
     return urdf().replace("</robot>", "\n".join([*parts, "</robot>"]))
 
 
-def mjcf(joints: int = 6) -> str:
+def mjcf() -> str:
     """The same arm in the language of MuJoCo."""
-    body = (
-        '<body name="b{0}" pos="0 0 0.3" quat="1 0.1 0 0"><inertial mass="1.5" pos="0 0 0.1" '
-        'diaginertia="0.02 0.02 0.02"/><joint name="j{0}" axis="0 {1} {2}" armature="0.1" '
-        'damping="1" range="-6 6"/>'
+    arm = "".join(
+        f'<body name="b{k}" pos="0 0 0.3" quat="1 0.1 0 0"><inertial mass="1.5" pos="0 0 0.1" '
+        f'diaginertia="0.02 0.02 0.02"/><joint name="j{k}" axis="0 {k % 2} {1 - k % 2}" '
+        'armature="0.1" damping="1" range="-6 6"/>'
+        for k in range(1, 7)
     )
-    arm = "".join(body.format(k, k % 2, 1 - k % 2) for k in range(1, joints + 1))
     site = '<site name="attachment_site" pos="0 0 0.1"/>'
-    return f'<mujoco model="arm"><worldbody>{arm}{site}{"</body>" * joints}</worldbody></mujoco>'
+    return f'<mujoco model="arm"><worldbody>{arm}{site}{"</body>" * 6}</worldbody></mujoco>'
 
 
 def make_seeds(folder: Path) -> list[Seed]:
@@ -105,13 +103,10 @@ def seeds_in_code(folder: Path) -> Iterator[Seed]:
         if name in seed_containers.NEED_H5PY and find_spec("h5py") is None:
             continue
         make, columns = (seed_logs.SEEDS | seed_containers.SEEDS)[name]
-        path = folder / name
-        made = make(path)
-        yield Seed(name, family, made, columns)
+        yield Seed(name, family, make(folder / name), columns)
     for version in (2, 3):
-        yield Seed(
-            f"lerobot-{version}", "dataset", dataset(folder / f"set{version}", version=version)
-        )
+        path = dataset(folder / f"set{version}", version=version)
+        yield Seed(f"lerobot-{version}", "dataset", path)
     if find_spec("h5py") is not None:
         seed_containers.droid(folder / "droid" / "a")
         seed_containers.droid(folder / "droid" / "b")
@@ -153,18 +148,17 @@ def robot_seeds(folder: Path) -> Iterator[Seed]:
         path = folder / f"{name}.toml"
         shutil.copyfile(vftcli.robots.PROFILES[name], path)
         yield Seed(f"robot-{name}", "robot", path)
-    (folder / "arm.urdf").write_text(urdf(), encoding="utf-8")
-    yield Seed("urdf", "urdf", folder / "arm.urdf")
-    (folder / "hand.urdf").write_text(with_hand(), encoding="utf-8")
-    yield Seed("urdf-hand", "urdf", folder / "hand.urdf")
-    (folder / "arm.mjcf.xml").write_text(mjcf(), encoding="utf-8")
-    yield Seed("mjcf", "mjcf", folder / "arm.mjcf.xml")
-    (folder / "gains.toml").write_text(GAINS, encoding="utf-8")
-    yield Seed("gains", "gains", folder / "gains.toml")
+    for name, family, file, text in (
+        ("urdf", "urdf", "arm.urdf", urdf()),
+        ("urdf-hand", "urdf", "hand.urdf", with_hand()),
+        ("mjcf", "mjcf", "arm.mjcf.xml", mjcf()),
+        ("gains", "gains", "gains.toml", GAINS),
+    ):
+        (folder / file).write_text(text, encoding="utf-8")
+        yield Seed(name, family, folder / file)
     for name in ("ur5-circle", "panda-bearing", "ur5-sensor"):
         path = folder / f"{name}.scenario.toml"
-        text = (vftcli.simulation.scenario.FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-        path.write_text(text, encoding="utf-8")
+        shutil.copyfile(vftcli.simulation.scenario.FOLDER / f"{name}.toml", path)
         yield Seed(f"scenario-{name}", "scenario", path)
 
 
@@ -173,24 +167,18 @@ def sample_seeds(samples: Path, folder: Path) -> Iterator[Seed]:
     for path in sorted(samples.rglob("*")):
         name = "-".join(path.relative_to(samples).parts)
         target = folder / f"sample-{name}"
-        if path.suffix == ".csv":
+        if path.suffix in {".csv", ".jsonl"}:
+            family, most = ("table", MOST + 1) if path.suffix == ".csv" else ("lines", MOST // 2)
             lines = path.read_bytes().splitlines(keepends=True)
-            target.write_bytes(b"".join(lines[: MOST + 1]))
-            yield Seed(name, "table", target)
-        elif path.suffix == ".jsonl":
-            lines = path.read_bytes().splitlines(keepends=True)
-            target.write_bytes(b"".join(lines[: MOST // 2]))
-            yield Seed(name, "lines", target)
+            target.write_bytes(b"".join(lines[:most]))
+            yield Seed(name, family, target)
         elif path.suffix == ".npz":
             target.write_bytes(shrunk_archive(path.read_bytes(), MOST))
             yield Seed(name, "npz", target)
         elif path.suffix == ".pkl":
             log = pickle.loads(path.read_bytes())
-            log = (
-                {k: v[:MOST] if isinstance(v, list) else v for k, v in log.items()}
-                if isinstance(log, dict)
-                else log
-            )
+            if isinstance(log, dict):
+                log = {k: v[:MOST] if isinstance(v, list) else v for k, v in log.items()}
             target.write_bytes(pickle.dumps(log))
             yield Seed(name, "pickle", target)
         elif path.suffix == ".parquet" and "truth" not in name and "meta" not in name:

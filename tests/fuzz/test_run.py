@@ -47,42 +47,37 @@ def attempt(*words: str, family: str = "table", rows: int | None = None) -> Atte
     return Attempt(family, "seed", "how", words, rows)
 
 
+INSPECT, ESTIMATE = attempt("inspect"), attempt("estimate")
+COUNTED = attempt("inspect", "--json", rows=9)
+LOST = '{"samples": 8, "repairs": ["one dropped"]}'
+
+
 @pytest.mark.parametrize(
     ("status", "made", "files", "kind"),
     [
-        (1, attempt("inspect"), {"stderr": "error: no log"}, "refused"),
-        (1, attempt("estimate"), {"stderr": "log health: sound\nerror: no current"}, "refused"),
-        (1, attempt("estimate"), {"stderr": "note: at 35 °C\nerror: no current"}, "refused"),
-        (0, attempt("estimate"), {}, "read"),
-        (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 9}'}, "read"),
-        (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 8}'}, "rows lost"),
-        (
-            0,
-            attempt("inspect", "--json", rows=9),
-            {"stdout": '{"samples": 8, "repairs": ["one dropped"]}'},
-            "read with a word",
-        ),
-        (0, attempt("inspect", "--json"), {"stdout": '{"misfit": Infinity}'}, "json"),
-        (0, attempt("estimate"), {"numbers": "not finite: tau_ext/gmo/1"}, "numbers"),
-        (BROKEN, attempt("inspect"), {"trace": "ValueError"}, "traceback"),
-        (-24, attempt("inspect"), {}, "hang"),
-        (-11, attempt("inspect"), {}, "signal"),
-        (1, attempt("inspect"), {"stderr": "error: out of memory"}, "memory"),
-        (1, attempt("inspect"), {"stderr": "Error: C++\nerror: no robot"}, "several lines"),
-        (1, attempt("estimate"), {"stderr": "error: no", "out": ""}, "left behind"),
+        (1, INSPECT, {"stderr": "error: no log"}, "refused"),
+        (1, ESTIMATE, {"stderr": "log health: sound\nerror: no current"}, "refused"),
+        (1, ESTIMATE, {"stderr": "note: at 35 °C\nerror: no current"}, "refused"),
+        (0, ESTIMATE, {}, "read"),
+        (0, COUNTED, {"stdout": '{"samples": 9}'}, "read"),
+        (0, COUNTED, {"stdout": '{"samples": 8}'}, "rows lost"),
+        (0, COUNTED, {"stdout": LOST}, "read with a word"),
+        (0, COUNTED, {"stdout": '{"misfit": Infinity}'}, "json"),
+        (0, ESTIMATE, {"numbers": "not finite: tau_ext/gmo/1"}, "numbers"),
+        (BROKEN, INSPECT, {"trace": "ValueError"}, "traceback"),
+        (-24, INSPECT, {}, "hang"),
+        (-11, INSPECT, {}, "signal"),
+        (1, INSPECT, {"stderr": "error: out of memory"}, "memory"),
+        (1, INSPECT, {"stderr": "Error: C++\nerror: no robot"}, "several lines"),
+        (1, ESTIMATE, {"stderr": "error: no", "out": ""}, "left behind"),
         (0, attempt("report"), {"stderr": "a.py:7: RuntimeWarning: overflow"}, "traceback"),
         (1, attempt("batch"), {"stderr": "error: x: no\n1 log: 1 failed", "out": ""}, "refused"),
-        (2, attempt("inspect"), {"stderr": "Usage"}, "exit code 2"),
+        (2, INSPECT, {"stderr": "Usage"}, "exit code 2"),
         (2, attempt("inspect", family="options"), {"stderr": "Usage"}, "usage"),
     ],
 )
 def test_each_kind_of_failure_is_seen(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    status: int,
-    made: Attempt,
-    files: dict[str, str],
-    kind: str,
+    tmp_path: Path, monkeypatch, status: int, made: Attempt, files: dict[str, str], kind: str
 ) -> None:
     # What ran in this process before is no part of it.
     monkeypatch.setattr(fuzz, "peak_memory", lambda: 0)

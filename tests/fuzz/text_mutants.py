@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from bytes_mutants import mutate_bytes
+from bytes_mutants import bytes_mutant, mutate_bytes
 from tokens import NUMBERS, WORDS, Mutant, Rng, Seed, pick, some
 
 Cells = list[list[str]]
@@ -57,11 +57,12 @@ def cell(cells: Cells, rng: Rng, headed: int) -> Cells:
     return cells
 
 
+CLOCKS = ("constant", "whole", "back", "repeat", "jump", "huge", "scale", "reset", "tiny")
+
+
 def time_column(cells: Cells, rng: Rng, headed: int) -> Cells:
     """The first column as other clocks would have it."""
-    kind = pick(
-        rng, ("constant", "whole", "back", "repeat", "jump", "huge", "scale", "reset", "tiny")
-    )
+    kind = pick(rng, CLOCKS)
     rows = cells[headed:]
     for i, row in enumerate(rows):
         try:
@@ -222,12 +223,9 @@ KEEP_ROWS = {byte_order_mark, no_last_end}
 
 def lines_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     """JSON lines with one thing changed."""
-    data = seed.path.read_bytes()
     if rng.random() < 0.15:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
-    lines = data.decode(errors="replace").splitlines()
+        return bytes_mutant(seed, rng, path)
+    lines = seed.path.read_bytes().decode(errors="replace").splitlines()
     records: list[State] = [json.loads(line) for line in lines if line.startswith("{")]
     change = pick(rng, STATE_CHANGES)
     key = pick(rng, list(records[0]))
@@ -240,9 +238,8 @@ def lines_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
         records, rows = records[: int(rng.integers(0, 3))], None
     lines = [json.dumps(record) for record in records]
     if rng.random() < 0.2:
-        lines.insert(
-            int(rng.integers(len(lines) + 1)), pick(rng, ("", "{", "[]", "3", "Done.", "{}"))
-        )
+        place = int(rng.integers(len(lines) + 1))
+        lines.insert(place, pick(rng, ("", "{", "[]", "3", "Done.", "{}")))
         rows = None
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="replace")
     return Mutant(f"{change.__name__} {key}", rows)
