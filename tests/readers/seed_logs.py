@@ -4,7 +4,7 @@ import gzip
 import json
 import pickle
 import shutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -260,6 +260,16 @@ def rosbag1(path: Path, *, compression: str = "") -> Path:
     writer.chunk_threshold = 16 * 1024
     write_messages(writer, messages, store, store.serialize_ros1)
     return path
+
+
+def bag_records(content: bytes) -> Iterator[bytes]:
+    """The records of a ROS 1 bag, each a header and data behind their lengths."""
+    place = len(b"#ROSBAG V2.0\n")
+    while place < len(content):
+        head = place + 4 + int.from_bytes(content[place : place + 4], "little")
+        end = head + 4 + int.from_bytes(content[head : head + 4], "little")
+        yield content[place:end]
+        place = end
 
 
 def write_messages(

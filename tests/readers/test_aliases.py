@@ -30,15 +30,13 @@ def write(path: Path, columns: dict[str, object]) -> Path:
 @pytest.mark.parametrize(
     ("word", "effort"), [("effort", "current"), ("eff", "current"), ("tau", "torque")]
 )
-def test_a_joints_name_beside_the_signals_gives_its_place(
-    tmp_path: Path, pattern: str, word: str, effort: str
-) -> None:
+def test_a_joints_name_beside_the_signals_gives_its_place(path, pattern, word, effort):
     """UR's drivers publish currents as effort; what is called torque is one."""
     columns = dict(CLOCK)
     for k, signal in enumerate(("pos", "vel", word)):
         for joint in reversed(UR_NAMES):
             columns[pattern.format(signal=signal, joint=joint)] = k + 0.1 * UR_NAMES.index(joint)
-    log = read(write(tmp_path / "log", columns))
+    log = read(write(path, columns))
     assert log.joint_names == UR_NAMES
     assert log.signals == ("q", "dq", effort)
     for k, signal in enumerate(("q", "dq", effort)):
@@ -46,19 +44,19 @@ def test_a_joints_name_beside_the_signals_gives_its_place(
 
 
 @pytest.mark.parametrize("pattern", ["{signal}_{k}", "{signal}_joint{k}", "joint{k}_{signal}"])
-def test_numbered_joints_are_ordered_by_number(tmp_path: Path, pattern: str) -> None:
+def test_numbered_joints_are_ordered_by_number(path, pattern):
     columns = dict(CLOCK)
     for signal in ("pos", "vel", "eff"):
         columns |= {pattern.format(signal=signal, k=k): 0.1 * k for k in (3, 1, 2)}
-    log = read(write(tmp_path / "log", columns))
+    log = read(write(path, columns))
     np.testing.assert_allclose(log.q[0], [0.1, 0.2, 0.3])
     assert log.signals == ("q", "dq", "torque")
 
 
-def test_a_pose_has_no_joints(tmp_path: Path) -> None:
+def test_a_pose_has_no_joints(path):
     columns = {f"{signal}_{axis}": 0.5 for signal in ("pos", "vel") for axis in "xyz"}
     with pytest.raises(LogError, match="no joint positions"):
-        read(write(tmp_path / "log", CLOCK | columns))
+        read(write(path, CLOCK | columns))
 
 
 @pytest.mark.parametrize(
@@ -71,48 +69,48 @@ def test_a_pose_has_no_joints(tmp_path: Path) -> None:
         ("/joint_states/header/stamp/sec", "/joint_states/header/stamp/nanosec"),
     ],
 )
-def test_seconds_and_nanoseconds_are_one_clock(tmp_path: Path, sec: str, nsec: str) -> None:
+def test_seconds_and_nanoseconds_are_one_clock(path, sec, nsec):
     stamps = 1_750_000_000_999_999_999 + np.arange(ROWS) * 8_000_001
     columns = {sec: stamps // 10**9, nsec: stamps % 10**9, "q1": 0.1, "q2": 0.2}
-    log = read(write(tmp_path / "log", columns))
+    log = read(write(path, columns))
     assert log.source.t0_ns == stamps[0]
     np.testing.assert_array_equal(log.t, (stamps - stamps[0]) * 1e-9)
-    stated = read(tmp_path / "log", columns=f"t={sec}|{nsec},q=q{{i}}")
+    stated = read(path, columns=f"t={sec}|{nsec},q=q{{i}}")
     np.testing.assert_array_equal(stated.t, log.t)
 
 
-def test_a_messages_stamp_goes_before_the_recorders_time(tmp_path: Path) -> None:
+def test_a_messages_stamp_goes_before_the_recorders_time(path):
     stamps = np.arange(ROWS) * 8_000_000
     columns = {"Time": np.arange(ROWS) * 0.0081, "q1": np.linspace(0, 1, ROWS)}
     columns |= {"header.stamp.secs": stamps // 10**9, "header.stamp.nsecs": stamps % 10**9}
-    np.testing.assert_array_equal(read(write(tmp_path / "log", columns)).t, stamps * 1e-9)
+    np.testing.assert_array_equal(read(write(path, columns)).t, stamps * 1e-9)
 
 
 @pytest.mark.parametrize("nanoseconds", [0.5, 2e9, -1.0])
-def test_a_pair_that_is_none_is_refused(tmp_path: Path, nanoseconds: float) -> None:
+def test_a_pair_that_is_none_is_refused(path, nanoseconds):
     columns = {"sec": np.arange(ROWS), "nsec": nanoseconds, "q1": np.linspace(0, 1, ROWS)}
     with pytest.raises(LogError, match="no whole seconds and the nanoseconds"):
-        read(write(tmp_path / "log", columns))
+        read(write(path, columns))
 
 
-def test_a_rate_alone_leaves_the_signals_to_their_names(tmp_path: Path) -> None:
+def test_a_rate_alone_leaves_the_signals_to_their_names(path):
     columns = {"q1": np.linspace(0, 1, ROWS), "dq1": 0.5, "current1": 2.0}
-    log = read(write(tmp_path / "log", columns), columns="t@125Hz,current[mA]")
+    log = read(write(path, columns), columns="t@125Hz,current[mA]")
     assert log.signals == ("q", "dq", "current")
     assert log.median_step == pytest.approx(0.008)
     assert log.require("current")[0, 0] == pytest.approx(2e-3)
 
 
-def test_what_a_text_leaves_out_is_found_where_one_group_fits(tmp_path: Path) -> None:
+def test_what_a_text_leaves_out_is_found_where_one_group_fits(path):
     columns = {"time": CLOCK["t"], "arm_1": 0.1, "dq_1": 0.2, "tau_1": 0.3, "tau_ext_1": 0.4}
-    log = read(write(tmp_path / "log", columns), columns="q=arm_{i}")
+    log = read(write(path, columns), columns="q=arm_{i}")
     # A vendor's estimate may have either sign: it is not taken unasked.
     assert log.signals == ("q", "dq", "torque")
     assert [r.code for r in log.source.remarks].count("signal-by-name") == 2
     # Of two efforts neither is.
-    write(tmp_path / "log", {**columns, "current_1": 0.5})
-    assert read(tmp_path / "log", columns="q=arm_{i}").signals == ("q", "dq")
-    stated = read(tmp_path / "log", columns="q=arm_{i},tau=tau_{i}")
+    write(path, {**columns, "current_1": 0.5})
+    assert read(path, columns="q=arm_{i}").signals == ("q", "dq")
+    stated = read(path, columns="q=arm_{i},tau=tau_{i}")
     assert stated.signals == ("q", "dq", "torque")
 
 
@@ -126,7 +124,7 @@ def test_what_a_text_leaves_out_is_found_where_one_group_fits(tmp_path: Path) ->
         (["joint_1", "joint_2", "joint_10"], []),
     ],
 )
-def test_an_arms_joints_are_found_in_any_order_and_among_others(arm, others) -> None:
+def test_an_arms_joints_are_found_in_any_order_and_among_others(arm, others):
     names = [*arm, *others]
     random.Random(1).shuffle(names)
     assert [names[k] for k in kinematic_order(names)] == list(arm)
@@ -137,7 +135,7 @@ def test_an_arms_joints_are_found_in_any_order_and_among_others(arm, others) -> 
     [["b", "a"], ["joint1", "joint1"], ["joint1", "hand"], [],
      [*FRANKA, *(f"left_{name}" for name in FRANKA)]],
 )  # fmt: skip
-def test_names_that_tell_nothing_keep_the_files_order(names) -> None:
+def test_names_that_tell_nothing_keep_the_files_order(names):
     assert kinematic_order(names) == tuple(range(len(names)))
 
 
@@ -151,12 +149,12 @@ def test_names_that_tell_nothing_keep_the_files_order(names) -> None:
         (UR_NAMES, None),
     ],
 )
-def test_the_robot_that_names_settle(names, robot) -> None:
+def test_the_robot_that_names_settle(names, robot):
     assert robot_of(names) == robot
 
 
 @pytest.mark.parametrize("field", ALIASES)
-def test_the_document_has_every_alias_and_every_name_of_the_clock(field: str) -> None:
+def test_the_document_has_every_alias_and_every_name_of_the_clock(field):
     text = (Path(__file__).parents[2] / "docs" / "formats.md").read_text("utf-8")
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
     signal = next(name for name, target in SIGNALS.items() if target == field)

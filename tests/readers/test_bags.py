@@ -12,7 +12,7 @@ import lz4.frame
 import numpy as np
 import pytest
 import zstandard
-from seed_logs import ROWS, bare_db3, bare_mcap, motion, rosbag1, rosbag2, write_mcap
+from seed_logs import ROWS, bag_records, bare_db3, bare_mcap, motion, rosbag1, rosbag2, write_mcap
 
 from vftcli.readers.bags.container import ReadBudget, unpacked
 from vftcli.readers.reading import read
@@ -26,7 +26,7 @@ STORAGES = [
 
 
 @pytest.mark.parametrize("name", ["lz4", "bz2", "zstd"])
-def test_a_chunk_unpacks_to_the_size_that_it_claims_or_not_at_all(name: str) -> None:
+def test_a_chunk_unpacks_to_the_size_that_it_claims_or_not_at_all(name):
     content, budget = bytes(range(100)), ReadBudget(Path("x"), 1000)
     pack = {"lz4": lz4.frame.compress, "bz2": bz2.compress, "zstd": zstandard.compress}[name]
     assert unpacked(budget, name, pack(content), 100) == content
@@ -48,27 +48,27 @@ def assert_is_the_motion(recording: Recording) -> None:
 
 
 @pytest.mark.parametrize("compression", ["", "LZ4", "BZ2"])
-def test_ros1_bags(tmp_path: Path, compression: str) -> None:
-    recording = read(rosbag1(tmp_path / "x", compression=compression))
+def test_ros1_bags(path, compression):
+    recording = read(rosbag1(path, compression=compression))
     assert recording.source.format == "rosbag1"
     assert_is_the_motion(recording)
     assert "robot clock" in recording.source.clock
 
 
 @pytest.mark.parametrize(("storage", "mode", "method"), STORAGES)
-def test_ros2_bags(tmp_path: Path, storage: str, mode: str, method: str) -> None:
-    folder = rosbag2(tmp_path / "x", storage=storage, mode=mode, method=method)
+def test_ros2_bags(path, storage, mode, method):
+    folder = rosbag2(path, storage=storage, mode=mode, method=method)
     recording = read(folder)
     assert recording.source.format == "rosbag2"
     assert_is_the_motion(recording)
 
 
 @pytest.mark.parametrize("make", [bare_mcap, bare_db3])
-def test_bare_files(tmp_path: Path, make: Callable[[Path], Path]) -> None:
-    assert_is_the_motion(read(make(tmp_path / "x")))
+def test_bare_files(path, make):
+    assert_is_the_motion(read(make(path)))
 
 
-def test_metadata_is_not_needed_and_cannot_choose_a_path(tmp_path: Path) -> None:
+def test_metadata_is_not_needed_and_cannot_choose_a_path(tmp_path):
     metadata = rosbag2(tmp_path / "x") / "metadata.yaml"
     text = metadata.read_text()
     (tmp_path / "secret.mcap").write_bytes(b"not to be opened")
@@ -84,7 +84,7 @@ def test_metadata_is_not_needed_and_cannot_choose_a_path(tmp_path: Path) -> None
         read(tmp_path / "x")
 
 
-def test_bulk_and_typed_decoding_agree(tmp_path: Path) -> None:
+def test_bulk_and_typed_decoding_agree(tmp_path):
     """Every number of 240 messages against rosbags' typed decoder."""
     from rosbags.highlevel import AnyReader
 
@@ -102,10 +102,8 @@ def test_bulk_and_typed_decoding_agree(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("make", [rosbag1, bare_mcap])
-def test_cut_files_are_read_up_to_their_last_whole_chunk(
-    tmp_path: Path, make: Callable[[Path], Path]
-) -> None:
-    path = make(tmp_path / "x")
+def test_cut_files_are_read_up_to_their_last_whole_chunk(path, make):
+    make(path)
     content = path.read_bytes()
     lengths = []
     for share in (0.9, 0.6, 0.4):
@@ -126,18 +124,12 @@ def test_cut_files_are_read_up_to_their_last_whole_chunk(
 def changed_index(path: Path, entry: Callable[[bytes], bytes]) -> Path:
     """A closed ROS 1 bag whose records behind each chunk, its index, are changed."""
     content = path.read_bytes()
-    place, out = len(b"#ROSBAG V2.0\n"), [content[:13]]
-    while place < len(content):
-        head = place + 4 + int.from_bytes(content[place : place + 4], "little")
-        end = head + 4 + int.from_bytes(content[head : head + 4], "little")
-        record = content[place:end]
-        out.append(entry(record) if b"op=\x04" in record[:60] else record)
-        place = end
-    path.write_bytes(b"".join(out))
+    records = (entry(r) if b"op=\x04" in r[:60] else r for r in bag_records(content))
+    path.write_bytes(content[:13] + b"".join(records))
     return path
 
 
-def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path: Path) -> None:
+def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path):
     """A recorder that stopped between a chunk and its index, and never closed the bag."""
     path = changed_index(rosbag1(tmp_path / "x"), lambda _: b"")
     assert_is_the_motion(read(path))
@@ -150,9 +142,9 @@ def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path: Path) -> None:
     assert any("was never closed" in reported for reported in recording.source.warnings)
 
 
-def test_a_bag_cut_within_the_index_of_a_chunk_is_read(tmp_path: Path) -> None:
+def test_a_bag_cut_within_the_index_of_a_chunk_is_read(path):
     """Behind each chunk is a record of index a topic; the last one is gone."""
-    path = rosbag1(tmp_path / "x")
+    rosbag1(path)
     content = path.read_bytes()
     places = [k for k in range(len(content)) if content.startswith(b"op=\x04", k)]
     path.write_bytes(content[: places[3] - 8])  # before its header's and its first field's length
@@ -161,27 +153,30 @@ def test_a_bag_cut_within_the_index_of_a_chunk_is_read(tmp_path: Path) -> None:
     assert [r.code for r in recording.source.remarks if r.level == "warning"] == ["bag-cut"]
 
 
-@pytest.mark.parametrize("by", [1, 100, 2**31])
-def test_an_index_that_points_elsewhere_is_damage(tmp_path: Path, by: int) -> None:
-    def moved(record: bytes) -> bytes:
-        place = int.from_bytes(record[-4:], "little") + by
-        return record[:-4] + place.to_bytes(4, "little")
-
-    with pytest.raises(LogError, match="damaged"):
-        read(changed_index(rosbag1(tmp_path / "x"), moved))
+def moved(by: int) -> Callable[[bytes], bytes]:
+    """An entry of an index that points elsewhere."""
+    return lambda r: r[:-4] + (int.from_bytes(r[-4:], "little") + by).to_bytes(4, "little")
 
 
-def test_messages_that_an_index_leaves_out_are_damage(tmp_path: Path) -> None:
-    def shortened(record: bytes) -> bytes:
-        size = int.from_bytes(record[51:55], "little") - 12
-        return record[:51] + size.to_bytes(4, "little") + record[55:-12]
-
-    with pytest.raises(LogError, match="a chunk and its index count differently"):
-        read(changed_index(rosbag1(tmp_path / "x"), shortened))
+def shortened(record: bytes) -> bytes:
+    size = int.from_bytes(record[51:55], "little") - 12
+    return record[:51] + size.to_bytes(4, "little") + record[55:-12]
 
 
-def test_databases_without_definitions_know_the_usual_types(tmp_path: Path) -> None:
-    path = bare_db3(tmp_path / "x")
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        *((moved(by), "damaged") for by in (1, 100, 2**31)),
+        (shortened, "a chunk and its index count differently"),
+    ],
+)
+def test_an_index_that_points_elsewhere_or_leaves_out_is_damage(path, change, words):
+    with pytest.raises(LogError, match=words):
+        read(changed_index(rosbag1(path), change))
+
+
+def test_databases_without_definitions_know_the_usual_types(path):
+    bare_db3(path)
     with closing(sqlite3.connect(path)) as db, db:
         db.execute("DROP TABLE message_definitions")
     with pytest.raises(LogError, match="no definition of franka_msgs/FrankaState"):
@@ -192,9 +187,9 @@ def test_databases_without_definitions_know_the_usual_types(tmp_path: Path) -> N
     np.testing.assert_array_equal(read(path).q, motion(7)["q"])
 
 
-def test_a_definition_is_read_once_for_all_topics_of_its_type(tmp_path: Path) -> None:
+def test_a_definition_is_read_once_for_all_topics_of_its_type(path):
     """More definitions than the file has bytes, if each topic came with its own."""
-    path = bare_db3(tmp_path / "x")
+    bare_db3(path)
     with closing(sqlite3.connect(path)) as db, db:
         first = db.execute("SELECT * FROM topics WHERE id = 1").fetchone()
         rows = [(k, f"{first[1]}_{k}", *first[2:]) for k in range(10, 1010)]
@@ -227,10 +222,10 @@ def varint(value: int) -> bytes:
     return out + bytes([value])
 
 
-def test_foxglove_joint_states(tmp_path: Path) -> None:
+def test_foxglove_joint_states(path):
     messages = (("/joints", k, foxglove_joint_states(k)) for k in range(30))
     schemas = {"/joints": ("foxglove.JointStates", "protobuf", b"")}
-    path = write_mcap(tmp_path / "x", messages, encoding="protobuf", schemas=schemas)
+    path = write_mcap(path, messages, encoding="protobuf", schemas=schemas)
     recording = read(path)
     np.testing.assert_allclose(recording.q[5], [1.05, 2.05, 3.05], rtol=1e-15)
     assert recording.require("torque")[0].tolist() == [-1, -2, -3]

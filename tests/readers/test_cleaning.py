@@ -44,9 +44,7 @@ def made(stamps: Any, q: Any, **more: Any) -> Recording:
         ({200: 1000.0}, (0,), 1),
     ],
 )
-def test_what_lies_before_the_clocks_last_jump_goes_with_the_garbage(
-    jumps: dict[int, float], absurd: tuple[int, ...], dropped: int
-) -> None:
+def test_what_lies_before_the_clocks_last_jump_goes_with_the_garbage(jumps, absurd, dropped):
     """500 Hz, stamped in nanoseconds; the clock jumps by so many seconds before some rows."""
     steps = np.full(ROWS, 2_000_000, dtype=np.int64)
     for row, seconds in jumps.items():
@@ -61,7 +59,7 @@ def test_what_lies_before_the_clocks_last_jump_goes_with_the_garbage(
     assert found == ([dropped] if dropped else [])
 
 
-def test_a_clock_may_jump_back_behind_garbage_and_a_bad_value_later_is_none() -> None:
+def test_a_clock_may_jump_back_behind_garbage_and_a_bad_value_later_is_none():
     q, t = np.full((ROWS, 6), 0.5), 5 + 0.002 * np.arange(ROWS)
     q[0] = GARBAGE
     assert made(np.r_[5.0 + t[:4], t[4:]], q).samples == ROWS - 4
@@ -73,7 +71,7 @@ def test_a_clock_may_jump_back_behind_garbage_and_a_bad_value_later_is_none() ->
     ("joints", "reach", "refused"),
     [(6, 12.9, False), (6, 13.1, True), (7, 6.3, False), (7, 6.5, True)],
 )
-def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, reach, refused) -> None:
+def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, reach, refused):
     """Two turns are 12.6 rad; joints of seven-joint arms stay within one, 6.28 rad."""
     q = np.zeros((10, joints))
     q[5, 2] = reach
@@ -84,14 +82,14 @@ def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, reach, r
         made(np.arange(10.0), q, degrees_possible=True)
 
 
-def test_a_span_wider_than_two_turns_is_refused_too() -> None:
+def test_a_span_wider_than_two_turns_is_refused_too():
     q = np.zeros((10, 6))
     q[3], q[6] = -6.8, 6.8
     with pytest.raises(LogError, match=r"travel 13\.6"):
         made(np.arange(10.0), q, degrees_possible=True)
 
 
-def test_a_named_joint_without_numbers_is_left_out_and_said() -> None:
+def test_a_named_joint_without_numbers_is_left_out_and_said():
     """A gripper's effort is NaN throughout; of a whole signal that is NaN no joint is left out."""
     t, q, effort = 0.01 * np.arange(ROWS), np.full((ROWS, 3), 0.5), np.full((ROWS, 3), 2.0)
     effort[:, 1] = np.nan
@@ -110,7 +108,7 @@ def test_a_named_joint_without_numbers_is_left_out_and_said() -> None:
         made(t, q, signals={"torque": effort}, **named)
 
 
-def test_a_log_of_more_years_than_nanoseconds_count_is_refused() -> None:
+def test_a_log_of_more_years_than_nanoseconds_count_is_refused():
     """From the farthest start on 64 bits count 2.2e8 s: a cast to whole ones overflowed."""
     with pytest.raises(ClockError, match="over 3e\\+08 s, which no robot's log is"):
         made(np.linspace(0.0, 3e8, 10), np.zeros((10, 6)))
@@ -124,9 +122,7 @@ def test_a_log_of_more_years_than_nanoseconds_count_is_refused() -> None:
         ([], None, 20),
     ],
 )
-def test_rows_with_an_unknown_value_are_left_out_and_counted(
-    tmp_path: Path, empty: list[tuple[int, int]], first: int | None, samples: int
-) -> None:
+def test_rows_with_an_unknown_value_are_left_out_and_counted(tmp_path, empty, first, samples):
     cells = [[f"{0.01 * k:.2f}", f"{0.1 * k:.1f}", "0.2", f"{k}"] for k in range(20)]
     for row, column in empty:
         cells[row][column] = "nan"
@@ -144,7 +140,7 @@ def test_rows_with_an_unknown_value_are_left_out_and_counted(
     assert (list(range(20)) if rows is None else rows.tolist()) == expected
 
 
-def test_arrays_are_cleaned_like_a_log_that_is_read() -> None:
+def test_arrays_are_cleaned_like_a_log_that_is_read():
     t = [0.0, 0.1, 0.1, 0.2]
     log = assemble(t, name="mine", q=np.zeros((4, 6)), torque=np.ones((4, 6)))
     assert (log.name, log.samples, log.source.duplicates) == ("mine", 3, 1)
@@ -152,7 +148,7 @@ def test_arrays_are_cleaned_like_a_log_that_is_read() -> None:
 
 
 @pytest.mark.parametrize("signals", [{"dq": np.zeros((2, 6))}, {"q": [[0.0], [0.0]], "tau": [1]}])
-def test_positions_are_needed_and_names_are_those_of_a_recording(signals) -> None:
+def test_positions_are_needed_and_names_are_those_of_a_recording(signals):
     with pytest.raises(MissingSignalError):
         assemble([0.0, 0.1], **signals)
 
@@ -161,7 +157,7 @@ MADE = re.compile(r"(?:fact|caution|warning)\(\s*\"([a-z-]+)\"")
 CHOSEN = re.compile(r"\"([a-z]+(?:-[a-z]+)*)\" if .* else \"([a-z]+(?:-[a-z]+)*)\"")
 
 
-def test_every_code_of_a_remark_has_words_and_every_word_a_use() -> None:
+def test_every_code_of_a_remark_has_words_and_every_word_a_use():
     paths = Path(vftcli.readers.__file__).parent.rglob("*.py")
     text = "".join(path.read_text(encoding="utf-8") for path in paths)
     chosen = {code for pair in CHOSEN.findall(text) for code in pair}

@@ -15,12 +15,7 @@ from vftcli.signals.wrench import WrenchFrame
 DEGREE = np.pi / 180
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "x"
-
-
-def test_one_joint_of_several_is_turned(path: Path) -> None:
+def test_one_joint_of_several_is_turned(path):
     path.write_text(
         "t q_0 q_1 dq_0 dq_1\n0 0.1 0.2 0.3 0.0\n1 0.2 0.3 0.4 0.5\n2 0.3 0.4 0.5 0.6\n"
     )
@@ -37,7 +32,7 @@ def test_one_joint_of_several_is_turned(path: Path) -> None:
             read(path, columns=columns)
 
 
-def test_minus_turns_the_sign_and_is_said(path: Path) -> None:
+def test_minus_turns_the_sign_and_is_said(path):
     plain = read(matrix_npy(path), columns="t,q:6,dq:6,current:6")
     turned = read(path, columns="t,q:6,_:6,-current:6")
     np.testing.assert_array_equal(turned.current, -plain.current)
@@ -59,7 +54,7 @@ FIELDS = {"tau": "torque", "tau+g": "torque_without_gravity"}
 
 
 @pytest.mark.parametrize(("signal", "unit"), [(s, u) for s, each in UNITS.items() for u in each])
-def test_every_unit_becomes_that_of_the_si(signal: str, unit: str, path: Path) -> None:
+def test_every_unit_becomes_that_of_the_si(signal, unit, path):
     given = {"t": 1000.0 * np.arange(10), "q": np.arange(10) / 50}
     given[signal] = given.get(signal, np.arange(10) / 8)
     np.savetxt(path, np.column_stack([*given.values()]), delimiter=",")
@@ -69,14 +64,14 @@ def test_every_unit_becomes_that_of_the_si(signal: str, unit: str, path: Path) -
     np.testing.assert_allclose(values, given[signal] * UNITS[signal][unit], rtol=1e-12)
 
 
-def test_degrees_without_a_unit_are_refused(path: Path) -> None:
+def test_degrees_without_a_unit_are_refused(path):
     path.write_text("".join(f"{k / 100},{90 + k}\n" for k in range(10)))
     with pytest.raises(LogError, match=r"q\[deg\]"):
         read(path, columns="t,q")
     assert read(path, columns="t,q[rad]").joints == 1
 
 
-def test_named_columns_start_at_the_smallest_index(path: Path) -> None:
+def test_named_columns_start_at_the_smallest_index(path):
     rows = "".join(f"{k / 10},{k},{2 * k},{0.1 * k},{0.2 * k}\n" for k in range(4))
     path.write_text("clock,eff_3,eff_4,pos_3,pos_4\n" + rows)
     recording = read(path, columns="t=clock,q=pos_{i},tau=eff_{i}")
@@ -84,7 +79,7 @@ def test_named_columns_start_at_the_smallest_index(path: Path) -> None:
     np.testing.assert_array_equal(recording.require("torque")[:, 1], 2 * np.arange(4))
 
 
-def test_wrench_by_names_carries_its_frame(path: Path) -> None:
+def test_wrench_by_names_carries_its_frame(path):
     rows = "".join(f"{k},0,1,2,3,4,5,{k}\n" for k in range(4))
     path.write_text("t,q1,Fx,Fy,Fz,Mx,My,Mz\n" + rows)
     recording = read(path, columns="t=t,q=q{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz")
@@ -92,7 +87,7 @@ def test_wrench_by_names_carries_its_frame(path: Path) -> None:
     np.testing.assert_array_equal(recording.require("wrench")[3], [1, 2, 3, 4, 5, 3])
 
 
-def test_slices_of_list_columns(path: Path) -> None:
+def test_slices_of_list_columns(path):
     recording, log = read(parquet(path)), motion(7)
     assert recording.source.format == "parquet"  # its names alone give all joints
     np.testing.assert_array_equal(recording.q, log["q"])
@@ -101,14 +96,14 @@ def test_slices_of_list_columns(path: Path) -> None:
     np.testing.assert_array_equal(recording.dq, log["dq"][:, 1:4])
 
 
-def test_a_table_without_clock_takes_a_rate(path: Path) -> None:
+def test_a_table_without_clock_takes_a_rate(path):
     path.write_text("".join(f"{0.1 * k},{k}\n" for k in range(5)))
     recording = read(path, columns="t@125Hz,q,current")
     np.testing.assert_allclose(recording.t, np.arange(5) / 125, rtol=1e-15)
     assert "125 Hz as stated" in recording.source.clock
 
 
-def test_one_of_several_recordings(path: Path) -> None:
+def test_one_of_several_recordings(path):
     rows = "".join(f"{k / 100},{j + 0.001 * k}\n" for j in range(3) for k in range(30))
     path.write_text("t,q1\n" + rows)
     with pytest.raises(ClockError, match="segment=1"):
@@ -144,7 +139,7 @@ def test_one_of_several_recordings(path: Path) -> None:
         ("t,_:*,q:6,_:*", "give it once"),
     ],
 )
-def test_what_cannot_be_understood_is_said(text: str, reported: str) -> None:
+def test_what_cannot_be_understood_is_said(text, reported):
     with pytest.raises(LogError, match=reported):
         parse_columns(text)
 
@@ -152,7 +147,7 @@ def test_what_cannot_be_understood_is_said(text: str, reported: str) -> None:
 @pytest.mark.parametrize(
     "columns", ["t,q:6,dq:6,current:6", "t,q:6,dq:6,_:6", "t,q:6,dq:6,_:*", "t,q:6,_:*,current:6"]
 )
-def test_columns_are_counted_in_file_order_and_some_skipped(path: Path, columns: str) -> None:
+def test_columns_are_counted_in_file_order_and_some_skipped(path, columns):
     recording, log = read(headerless_csv(path), columns=columns), motion()
     assert (recording.source.format, recording.torque) == ("headerless", None)
     np.testing.assert_allclose(recording.t, log["t"], atol=1e-9)
@@ -181,12 +176,12 @@ HEADED, HEADERLESS = table_csv, headerless_csv
         (HEADED, "-tau=effort", "no column 'effort' for tau; the table has t, q_0, q_1"),
     ],
 )
-def test_a_table_that_is_described_wrongly(path: Path, make, columns: str, reported: str) -> None:
+def test_a_table_that_is_described_wrongly(path, make, columns, reported):
     with pytest.raises(LogError, match=reported):
         read(make(path), columns=columns)
 
 
-def test_columns_of_lists_hold_the_clock_or_are_no_numbered_columns(path: Path) -> None:
+def test_columns_of_lists_hold_the_clock_or_are_no_numbered_columns(path):
     """A pair of seconds and nanoseconds may be one list; q_{i} finds no lists."""
     stamps, q = [[k, 5 * 10**8] for k in range(9)], [[0.1 * k, 0.2] for k in range(9)]
     pl.DataFrame({"stamp": stamps, "q_0": q}).write_parquet(path)
@@ -196,7 +191,7 @@ def test_columns_of_lists_hold_the_clock_or_are_no_numbered_columns(path: Path) 
         read(path, columns="t=stamp,q=q_{i}")
 
 
-def test_a_torque_without_gravity_is_no_torque(path: Path) -> None:
+def test_a_torque_without_gravity_is_no_torque(path):
     """By its name in --columns, and by UR's own name in a recording of its client."""
     rows = "\n".join(f"{0.1 * k},{','.join(str(k + j) for j in range(12))}" for k in range(4))
     q, efforts = (",".join(f"{name}{j}" for j in range(6)) for name in "qe")
@@ -232,7 +227,7 @@ def test_a_text_without_positions_says_something_of_its_signals_alone(
     assert recording.median_step == pytest.approx(1e-4 if columns.startswith("t[") else 0.1)
 
 
-def test_an_error_lists_24_columns_and_counts_the_others(path: Path) -> None:
+def test_an_error_lists_24_columns_and_counts_the_others(path):
     """A name of more than 40 letters is cut to 37."""
     names = ["t", "q1", "x" * 40, "y" * 41, *(f"c{k}" for k in range(22))]
     path.write_text(f"{','.join(names)}\n{','.join('1' * len(names))}\n")

@@ -32,11 +32,6 @@ NO_H5PY = "h5py, the extra hdf5, is not installed"
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "x"
-
-
-@pytest.fixture
 def h5py() -> None:
     pytest.importorskip("h5py", reason=NO_H5PY)
 
@@ -53,7 +48,7 @@ WHOLE = ("arrow", "arrow-stream", "mat", "mat-struct", "mat-73", "hdf5")
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_the_content_decides_and_every_number_is_read(name: str, tmp_path: Path) -> None:
+def test_the_content_decides_and_every_number_is_read(name, tmp_path):
     path, log = made(name, tmp_path / "log.csv"), motion()
     assert recognise(path).name == FORMATS[name]
     if name in WHOLE:
@@ -62,7 +57,7 @@ def test_the_content_decides_and_every_number_is_read(name: str, tmp_path: Path)
             np.testing.assert_array_equal(getattr(recording, signal), log[signal])
 
 
-def test_joints_by_samples_are_turned_and_said(path: Path) -> None:
+def test_joints_by_samples_are_turned_and_said(path):
     recording = read(seeds.matlab(path, turned=True))
     (turned,) = recording.source.remarks
     assert (turned.code, turned.values["signals"]) == ("signals-turned", "q, dq, current")
@@ -74,14 +69,14 @@ def test_joints_by_samples_are_turned_and_said(path: Path) -> None:
     np.testing.assert_array_equal(unpacked.q, recording.q)
 
 
-def test_a_square_log_is_not_turned(path: Path) -> None:
+def test_a_square_log_is_not_turned(path):
     q = np.arange(36.0).reshape(6, 6) / 36  # six samples of six joints: which is which?
     with path.open("wb") as file:
         savemat(file, {"t": np.arange(6.0), "q": q})
     np.testing.assert_array_equal(read(path).q, q)
 
 
-def test_a_pickled_clock_of_numpy_scalars_is_a_clock(path: Path) -> None:
+def test_a_pickled_clock_of_numpy_scalars_is_a_clock(path):
     t = 0.01 * np.arange(30)
     q = np.outer(np.sin(t), np.ones(7))
     path.write_bytes(pickle.dumps({"time": [*t], "q": [*q]}))
@@ -90,20 +85,20 @@ def test_a_pickled_clock_of_numpy_scalars_is_a_clock(path: Path) -> None:
     np.testing.assert_array_equal(recording.q, q)
 
 
-def test_lines_without_a_state_are_counted(path: Path) -> None:
+def test_lines_without_a_state_are_counted(path):
     libfranka_json(path)  # which ends with "Done."
     path.write_text("Ready.\n" + path.read_text() + "Bye.\n")
     (remark,) = [r for r in read(path).source.remarks if r.code == "lines-skipped"]
     assert str(remark) == "skipped lines that hold no state: 3"
 
 
-def test_json_takes_columns(path: Path) -> None:
+def test_json_takes_columns(path):
     recording = read(seeds.json_lines(path), columns="t[ms]=time,q[mrad]=q,-tau=tau_J")
     np.testing.assert_allclose(recording.q, 1e-3 * motion(7)["q"], rtol=1e-15)
     np.testing.assert_array_equal(recording.torque, -motion(7)["tau"])
 
 
-def test_a_list_of_objects_and_a_list_of_rows(path: Path) -> None:
+def test_a_list_of_objects_and_a_list_of_rows(path):
     lines = seeds.json_lines(path).read_text().splitlines()
     path.write_text(json.dumps([json.loads(line) for line in lines]))
     np.testing.assert_array_equal(read(path).q, motion(7)["q"])
@@ -111,13 +106,13 @@ def test_a_list_of_objects_and_a_list_of_rows(path: Path) -> None:
     np.testing.assert_array_equal(read(path, columns="t,q:6").q, motion()["q"])
 
 
-def test_a_column_of_wrenches_is_a_wrench(path: Path) -> None:
+def test_a_column_of_wrenches_is_a_wrench(path):
     log = motion()
     held = {"t": log["t"], "q": log["q"].tolist(), "wrench": log["dq"].tolist()}
     np.testing.assert_array_equal(read(seeds.write_arrow(path, pa.table(held))).wrench, log["dq"])
 
 
-def test_a_line_that_is_cut_is_dropped_at_the_end_and_refused_elsewhere(path: Path) -> None:
+def test_a_line_that_is_cut_is_dropped_at_the_end_and_refused_elsewhere(path):
     text = seeds.json_lines(path).read_text()
     path.write_text(text[:-30])
     recording = read(path)
@@ -129,7 +124,7 @@ def test_a_line_that_is_cut_is_dropped_at_the_end_and_refused_elsewhere(path: Pa
         read(path)
 
 
-def test_the_blocks_of_a_long_file_are_joined(path: Path) -> None:
+def test_the_blocks_of_a_long_file_are_joined(path):
     line = '{{"t": {}, "q": [{}, 0.5], "state": {{"dq": 1}}}}'
     rows = 20_001  # two whole blocks and a part of one
     path.write_text("\n".join(line.format(k, k % 3) for k in range(rows)))
@@ -153,13 +148,19 @@ def test_the_blocks_of_a_long_file_are_joined(path: Path) -> None:
         ("[" * 200_000, "nested too deeply"),
     ],
 )
-def test_what_is_no_log_in_json_is_refused_in_a_line(text: str, words: str, path: Path) -> None:
+def test_what_is_no_log_in_json_is_refused_in_a_line(text, words, path):
     path.write_text(text)
     with pytest.raises(LogError, match=words):
         read(path)
 
 
-def test_skills_are_episodes(path: Path) -> None:
+def test_a_document_that_would_fill_memory_is_not_parsed(path):
+    path.write_bytes(b'{"q": [' + b"[]," * (8 << 20) + b"[]]}")  # 24 MiB, which would be .8 GB
+    with pytest.raises(LogError, match="a JSON document of 24 MiB, too many values to hold"):
+        read(path)
+
+
+def test_skills_are_episodes(path):
     seeds.json_skills(path, skills=3)
     assert list(episode_numbers(path, ReadChoice())) == [0, 1, 2]
     first, third = read(path), read(path, episode=2)
@@ -170,12 +171,12 @@ def test_skills_are_episodes(path: Path) -> None:
 
 
 @given(st.lists(st.integers(0, 99), min_size=1, max_size=9, unique=True).map(sorted))
-def test_episodes_are_sorted_as_numbers_and_called_by_them(numbers: list[int]) -> None:
+def test_episodes_are_sorted_as_numbers_and_called_by_them(numbers):
     groups = sorted((f"data/demo_{k}/" for k in numbers), key=natural)
     assert list(numbers_of(groups)) == numbers
 
 
-def test_groups_without_numbers_are_counted() -> None:
+def test_groups_without_numbers_are_counted():
     assert list(numbers_of(("a/", "b/"))) == [0, 1]
     assert list(numbers_of(("run2/x1/", "run3/x1/"))) == [0, 1]
     assert list(numbers_of(("",))) == [0]
@@ -185,7 +186,7 @@ def test_groups_without_numbers_are_counted() -> None:
 class TestHdf5:
     """HDF5 files."""
 
-    def test_an_arm_of_two_is_asked_for_but_to_examine(self, path: Path) -> None:
+    def test_an_arm_of_two_is_asked_for_but_to_examine(self, path):
         seeds.aloha(path)
         log = motion()
         with pytest.raises(LogError, match="say which with --arm left or --arm right"):
@@ -201,7 +202,7 @@ class TestHdf5:
         assert "arm-side-chosen" in {remark.code for remark in seen.source.remarks}
         np.testing.assert_array_equal(seen.q, log["q"])
 
-    def test_a_text_of_columns_goes_before_the_layout(self, path: Path) -> None:
+    def test_a_text_of_columns_goes_before_the_layout(self, path):
         named = read(seeds.aloha(path), columns="t@25Hz,q=observations/qpos[7:13]")
         assert named.source.clock == "none: 25 Hz as stated"
         np.testing.assert_array_equal(named.q, motion()["q"] / 2)
@@ -209,7 +210,7 @@ class TestHdf5:
         turned = read(path, columns="-current", arm="left")
         np.testing.assert_allclose(turned.current, -motion()["current"], rtol=1e-15)
 
-    def test_a_file_of_several_is_read_by_episode(self, path: Path) -> None:
+    def test_a_file_of_several_is_read_by_episode(self, path):
         seeds.aloha_set(path)
         assert list(episode_numbers(path, ReadChoice())) == [0, 2, 10]
         first, last = read(path, arm="left"), read(path, episode=10, arm="left")
@@ -224,23 +225,21 @@ class TestHdf5:
         ("project", "place"),
         [("robomimic", "data/demo_0/obs/robot0_joint_pos"), ("roboset", "Trial0/data/qp_arm")],
     )
-    def test_projects_that_record_no_torque_are_refused_by_name(
-        self, project: str, place: str, path: Path
-    ) -> None:
+    def test_projects_that_record_no_torque_are_refused_by_name(self, project, place, path):
         seeds.hdf5(path, {place: motion(7)["q"]})
         with pytest.raises(LogError, match=f"laid out as {project}'s, which hold no torque"):
             read(path)
         named = read(path, columns=f"t@20Hz,q={place}")
         np.testing.assert_array_equal(named.q, motion(7)["q"])
 
-    def test_droid_takes_the_robots_clock_and_the_measured_torque(self, tmp_path: Path) -> None:
+    def test_droid_takes_the_robots_clock_and_the_measured_torque(self, tmp_path):
         recording, log = read(seeds.droid(tmp_path / "a")), motion(7, rows=60, step=1 / 15)
         np.testing.assert_allclose(recording.t, log["t"], atol=1e-9)  # whole nanoseconds
         np.testing.assert_array_equal(recording.torque, log["tau"])
         assert recording.robot_hint == "panda"
         assert "computed-torque-left-out" in {remark.code for remark in recording.source.remarks}
 
-    def test_a_release_is_a_folder_of_episodes(self, tmp_path: Path) -> None:
+    def test_a_release_is_a_folder_of_episodes(self, tmp_path):
         for day in ("2023-07-07", "2023-07-08"):
             seeds.droid(tmp_path / "LAB" / "success" / day / "name", serial="fr3-1")
         second = read(tmp_path, episode=1)
@@ -249,7 +248,7 @@ class TestHdf5:
         with pytest.raises(LogError, match="no episode 2; it holds 2, from 0 to 1"):
             read(tmp_path, episode=2)
 
-    def test_names_are_found_in_one_group_alone(self, path: Path) -> None:
+    def test_names_are_found_in_one_group_alone(self, path):
         t, q, dq = (motion()[name] for name in ("t", "q", "dq"))
         one = seeds.hdf5(path, {"time": t, "run/q": q, "run/dq": dq})
         np.testing.assert_array_equal(read(one).dq, dq)
@@ -268,22 +267,18 @@ class TestHdf5:
             (("action", "sensor/ft"), r"among action, sensor/ft.*--columns"),
         ],
     )
-    def test_layouts_that_cannot_be_told_are_refused(
-        self, path: Path, places: tuple[str, ...], words: str
-    ) -> None:
+    def test_layouts_that_cannot_be_told_are_refused(self, path, places, words):
         with pytest.raises(LogError, match=words):
             read(seeds.hdf5(path, dict.fromkeys(places, motion(7)["q"])))
 
-    def test_without_h5py_the_file_is_named_with_the_remedy(
-        self, path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_without_h5py_the_file_is_named_with_the_remedy(self, path, monkeypatch):
         seeds.aloha(path)
         monkeypatch.setitem(sys.modules, "h5py", None)
         with pytest.raises(LogError, match=r"an HDF5 file needs h5py, .*'vftcli\[hdf5\]'"):
             read(path)
 
 
-def test_an_option_that_does_not_apply_is_refused(path: Path) -> None:
+def test_an_option_that_does_not_apply_is_refused(path):
     with pytest.raises(LogError, match="no episode 1; it holds 1, from 0 to 0"):
         read(seeds.arrow(path), episode=1)
     with pytest.raises(ParameterError, match="--episode K"):
@@ -294,9 +289,7 @@ def test_an_option_that_does_not_apply_is_refused(path: Path) -> None:
 
 @pytest.mark.parametrize("stream", [False, True])
 @pytest.mark.parametrize("codec", ["lz4", "zstd", None])
-def test_the_claims_of_a_batch_are_what_it_unpacks_to(
-    stream: bool, codec: str | None, path: Path
-) -> None:
+def test_the_claims_of_a_batch_are_what_it_unpacks_to(stream, codec, path):
     table = pa.table({"t": motion()["t"], "q": motion()["q"].tolist()})
     seeds.write_arrow(path, table, stream=stream, codec=codec)
     found = list(claims(pa.py_buffer(path.read_bytes()[0 if stream else 8 :])))
@@ -306,7 +299,7 @@ def test_the_claims_of_a_batch_are_what_it_unpacks_to(
     assert ArrowTable(open_log(path)).names == ("t", "q")
 
 
-def test_episodes_of_a_table_are_read_one_by_one(path: Path) -> None:
+def test_episodes_of_a_table_are_read_one_by_one(path):
     table = pa.table({"t": np.tile(np.arange(5) / 5, 2), "q": motion()["q"][:10].tolist(),
                       "episode_index": np.repeat([3, 7], 5)})  # fmt: skip
     seeds.write_arrow(path, table)

@@ -46,9 +46,7 @@ def settled(signals: Table, *names: str) -> bool:
 
 
 @pytest.mark.parametrize("order", list(permutations((3, 4, 5))))
-def test_a_controllers_targets_settle_three_efforts_in_their_usual_order(
-    order: tuple[int, ...],
-) -> None:
+def test_a_controllers_targets_settle_three_efforts_in_their_usual_order(order):
     names = list(table())
     assert settled(table(), *names[:3], *(names[k] for k in order)) == (order == (3, 4, 5))
 
@@ -56,7 +54,7 @@ def test_a_controllers_targets_settle_three_efforts_in_their_usual_order(
 @pytest.mark.parametrize(
     ("joints", "fits"), [(2, False), (3, True), (5, True), (12, True), (13, False)]
 )
-def test_positions_with_velocities_alone_are_settled(joints: int, fits: bool) -> None:
+def test_positions_with_velocities_alone_are_settled(joints, fits):
     """Of three to twelve joints."""
     columns = ",".join(["t", f"q:{joints}", f"dq:{joints}"])
     expected = Guess(columns, "the first steps evenly, dq is the derivative of q")
@@ -64,9 +62,7 @@ def test_positions_with_velocities_alone_are_settled(joints: int, fits: bool) ->
 
 
 @pytest.mark.parametrize(("pause", "fits"), [(19.5, True), (20.5, False)])
-def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(
-    pause: float, fits: bool
-) -> None:
+def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(pause, fits):
     t = np.cumsum(np.where(np.arange(2000) % 16 == 5, pause, 1.0)) * 0.001  # 6 % of the steps
     phase, w = np.outer(t, 0.6 + 0.2 * np.arange(6)), 0.6 + 0.2 * np.arange(6)
     found = guess({"t": t[:, None], "q": np.sin(phase), "dq": w * np.cos(phase)})
@@ -89,9 +85,7 @@ def test_a_clock_waits_less_than_twenty_steps_but_for_a_twentieth(
         (0.30, 0.0, 410 / 12.0, False),
     ],
 )
-def test_how_well_targets_and_currents_have_to_fit(
-    current: float, target: float, constant: float, expected: bool
-) -> None:
+def test_how_well_targets_and_currents_have_to_fit(current, target, constant, expected):
     signals, rng = table(), np.random.default_rng(7)
     clean = signals["target_current"]
     for name, noise in (("current", current), ("target_current", target)):
@@ -104,15 +98,13 @@ def test_how_well_targets_and_currents_have_to_fit(
 @pytest.mark.parametrize(
     ("gain", "expected"), [(0.45, False), (0.55, True), (1.9, True), (2.1, False), (-1.0, False)]
 )
-def test_a_measured_current_is_between_half_and_twice_its_target(
-    gain: float, expected: bool
-) -> None:
+def test_a_measured_current_is_between_half_and_twice_its_target(gain, expected):
     signals = table()
     signals["current"] = gain * signals["current"]
     assert settled(signals) == expected
 
 
-def test_one_effort_may_be_torque_or_current_and_what_follows_is_skipped() -> None:
+def test_one_effort_may_be_torque_or_current_and_what_follows_is_skipped():
     names = ["t", "q", "dq", "current"]
     for more, skipped in (([], ""), (["more"], ",_:2")):
         found = guess(table() | {"more": np.ones((2000, 2))}, *names, *more)
@@ -130,11 +122,11 @@ def test_one_effort_may_be_torque_or_current_and_what_follows_is_skipped() -> No
         ("t", "dq", "q"),  # the velocities first
     ],
 )
-def test_what_has_no_clock_or_no_velocities_behind_positions_is_not_guessed(names) -> None:
+def test_what_has_no_clock_or_no_velocities_behind_positions_is_not_guessed(names):
     assert guess(table(), *names) is None
 
 
-def test_a_joint_that_stands_is_counted_and_one_that_moves_without_velocity_is_not() -> None:
+def test_a_joint_that_stands_is_counted_and_one_that_moves_without_velocity_is_not():
     signals = table()
     first = signals["q"][:, 0].copy()
     signals["q"][:, [0, 5]], signals["dq"][:, [0, 5]] = 0.3, 0.0
@@ -157,9 +149,7 @@ def check_read_as_described(path: Path) -> None:
     assert str(reported).startswith(f"31 columns read as {T31}: the first steps evenly")
 
 
-def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(
-    tmp_path: Path,
-) -> None:
+def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(tmp_path):
     signals = np.hstack(list(table().values()))
     np.save(tmp_path / "log.npy", signals)
     np.savetxt(tmp_path / "log.csv", signals, delimiter=",")
@@ -170,7 +160,7 @@ def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(
         read(tmp_path / "log.csv")
 
 
-def test_real_tables_are_read_as_their_description_says(logs: Path) -> None:
+def test_real_tables_are_read_as_their_description_says(logs):
     files = sorted((logs / "ur10e").iterdir())
     assert len(files) == 11
     for file in files:
@@ -181,6 +171,6 @@ def test_real_tables_are_read_as_their_description_says(logs: Path) -> None:
     ("name", "line"),
     [("fr3/run_a.npy", "t,q:7,dq:7,tau:7,_:20"), ("ur10_link4/link4.csv.gz", "t,q:6,dq:6,tau:6")],
 )
-def test_other_real_tables_are_reported_what_fits(logs: Path, name: str, line: str) -> None:
+def test_other_real_tables_are_reported_what_fits(logs, name, line):
     with pytest.raises(LogError, match=line):
         read(logs / name)

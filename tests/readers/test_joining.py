@@ -3,7 +3,7 @@
 import importlib
 import re
 import resource
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
@@ -49,11 +49,6 @@ def one_piece() -> AbstractContextManager[None]:
     return constants(dict.fromkeys(PARTS, 1 << 30))
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "log"
-
-
 def table(rows: int = 300, **changed: Any) -> pl.DataFrame:
     """A log of two joints at 100 Hz, some of its columns changed."""
     t = np.arange(rows) / 100
@@ -85,7 +80,7 @@ def check_same(path: Path) -> tuple[Recording, Recording]:
 
 
 @pytest.mark.parametrize("ending", ["parquet", "csv"])
-def test_same_in_parts(path: Path, ending: str) -> None:
+def test_same_in_parts(path, ending):
     """The numbers of the whole, and its blocks are those of both."""
     if ending == "csv":
         table().write_csv(path)
@@ -98,14 +93,14 @@ def test_same_in_parts(path: Path, ending: str) -> None:
         np.testing.assert_array_equal(np.concatenate([block.q for block in blocks]), whole.q)
 
 
-def test_same_of_formats_of_their_own(path: Path) -> None:
+def test_same_of_formats_of_their_own(path):
     """Their payload and clocks; of every topic of a bag each batch of messages is a part."""
     check_same(FIXTURES / "ur5_circle.csv")
     for make in (bare_mcap, bare_db3):
         check_same(make(path))
 
 
-def test_repeated_stamps_over_a_border(path: Path) -> None:
+def test_repeated_stamps_over_a_border(path):
     """A row that repeats the last stamp of the block before is dropped; another one is reported.
 
     Parquet comes seven rows at a time, so row 7 is the first of a block.
@@ -116,7 +111,7 @@ def test_repeated_stamps_over_a_border(path: Path) -> None:
     assert whole.source.duplicates == 2
 
 
-def test_gaps_and_jitter(path: Path) -> None:
+def test_gaps_and_jitter(path):
     """Gaps are counted over the whole log, the median of an uneven clock is that of all."""
     steps = 0.01 + 0.001 * np.random.default_rng(3).random(400)
     steps[[50, 51, 300]] = 0.3, 0.2, 0.5
@@ -135,9 +130,7 @@ def test_gaps_and_jitter(path: Path) -> None:
         ("t", np.r_[np.arange(270), np.arange(30)] / 100, "the clock starts anew 1×"),
     ],
 )
-def test_odd_logs_are_refused_in_the_words_of_the_whole(
-    path: Path, column: str, values: np.ndarray, word: str
-) -> None:
+def test_odd_logs_are_refused_in_the_words_of_the_whole(path, column, values, word):
     table(**{column: values}).write_parquet(path)
     with pytest.raises(VftError, match=word) as refusal, one_piece():
         read(path)
@@ -147,9 +140,7 @@ def test_odd_logs_are_refused_in_the_words_of_the_whole(
 
 @pytest.mark.parametrize("room", [0, 2000])
 @pytest.mark.parametrize("made", [bare_mcap, lambda path: table().write_csv(path) or path])
-def test_what_temporary_files_have_no_room_for_stays_in_memory(
-    path: Path, made: Callable[[Path], Path], room: int
-) -> None:
+def test_what_temporary_files_have_no_room_for_stays_in_memory(path, made, room):
     made(path)
     _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, most))
@@ -159,7 +150,7 @@ def test_what_temporary_files_have_no_room_for_stays_in_memory(
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
 
 
-def test_a_quoted_table_is_not_cut_at_line_ends_and_a_cut_row_is_said(path: Path) -> None:
+def test_a_quoted_table_is_not_cut_at_line_ends_and_a_cut_row_is_said(path):
     path.write_text(table().write_csv().replace("t,q/1", '"t",q/1'), encoding="utf-8")
     check_same(path)
     path.write_bytes(table().write_csv().encode()[:-5])

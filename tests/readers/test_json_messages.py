@@ -47,8 +47,8 @@ def mcap(path: Path, **topics: Any) -> Path:
     ))  # fmt: skip
 
 
-def test_effort_names_and_wrench_are_taken_as_from_ros_messages(tmp_path: Path) -> None:
-    log = read(mcap(tmp_path / "x", joint_states=joint_state, ft=wrench))
+def test_effort_names_and_wrench_are_taken_as_from_ros_messages(path):
+    log = read(mcap(path, joint_states=joint_state, ft=wrench))
     assert log.joint_names == UR_NAMES
     np.testing.assert_array_equal(log.q, Q)
     np.testing.assert_array_equal(log.require("current"), 2 + Q)
@@ -57,21 +57,21 @@ def test_effort_names_and_wrench_are_taken_as_from_ros_messages(tmp_path: Path) 
     np.testing.assert_array_equal(log.require("wrench"), expected)
     assert str(log.wrench_frame).startswith("tool0 axes at tool0")
     assert log.source.t0_ns == START
-    stated = read(tmp_path / "x", columns="tau=effort")
+    stated = read(path, columns="tau=effort")
     np.testing.assert_array_equal(stated.require("torque"), 2 + Q)
     assert stated.current is None
 
 
-def test_plain_documents(tmp_path: Path) -> None:
-    log = read(mcap_json(tmp_path / "x"))
+def test_plain_documents(path):
+    log = read(mcap_json(path))
     np.testing.assert_array_equal(log.q, motion()["q"])
     np.testing.assert_array_equal(log.torque, motion()["tau"])
     assert log.source.t0_ns == 10**9
 
 
 @pytest.mark.parametrize("state", [joint_state, lambda k: {"q": Q[k].tolist()}])
-def test_a_wrench_that_is_not_taken_is_named(tmp_path: Path, state: Any) -> None:
-    path = mcap(tmp_path / "x", joints=state, wrench_of_hand=lambda k: {"force": [k, 0.0, 0.0]})
+def test_a_wrench_that_is_not_taken_is_named(path, state):
+    path = mcap(path, joints=state, wrench_of_hand=lambda k: {"force": [k, 0.0, 0.0]})
     (left,) = [r for r in read(path).source.remarks if r.code == "topics-left-out"]
     assert left.values["topics"] == ("/wrench_of_hand",)
 
@@ -86,13 +86,11 @@ def test_a_wrench_that_is_not_taken_is_named(tmp_path: Path, state: Any) -> None
         ({"sec": 1.5, "nanosec": 5}, "log time of the recorder"),
     ],
 )
-def test_a_stamp_is_whole_seconds_and_nanoseconds_of_some_centuries(
-    tmp_path: Path, own: dict[str, Any], clock: str
-) -> None:
+def test_a_stamp_is_whole_seconds_and_nanoseconds_of_some_centuries(path, own, clock):
     def stamped(k: int) -> dict[str, Any]:
         later = own | {"nanosec": own["nanosec"] + 8_000_000 * k}
         return joint_state(k) | {"header": {"stamp": later, "frame_id": ""}}
 
-    log = read(mcap(tmp_path / "x", joint_states=stamped))
+    log = read(mcap(path, joint_states=stamped))
     assert log.source.clock.startswith(clock)
     np.testing.assert_allclose(log.t, 0.008 * np.arange(ROWS), atol=1e-9)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from seed_logs import motion
 
@@ -77,7 +78,7 @@ def dataset(
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("episode", [0, 1, 2])
-def test_an_episode_is_its_rows(version: int, episode: int, tmp_path: Path) -> None:
+def test_an_episode_is_its_rows(version, episode, tmp_path):
     recording = read(dataset(tmp_path, version=version), episode=episode)
     rows = slice(sum(ROWS[:episode]), sum(ROWS[: episode + 1]))
     for signal, name in (("q", "q"), ("dq", "dq"), ("torque", "tau")):
@@ -92,7 +93,7 @@ def test_an_episode_is_its_rows(version: int, episode: int, tmp_path: Path) -> N
     np.testing.assert_array_equal(turned.q, recording.q)
 
 
-def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
+def test_all_episodes_are_logs_of_their_own(tmp_path):
     path = dataset(tmp_path / "set")
     logs = list(Library([path]).open_each([path], ReadChoice(episode=ALL)))
     assert [log.name for log in logs] == ["set episode 0", "set episode 1", "set episode 2"]
@@ -103,7 +104,7 @@ def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
         refuse_repeated_logs(list(Library([path]).open_each([path, path], ReadChoice(episode=1))))
 
 
-def test_the_first_is_taken_and_said(tmp_path: Path) -> None:
+def test_the_first_is_taken_and_said(tmp_path):
     path = dataset(tmp_path / "set")
     recording = read(path)
     assert recording.source.warnings == ("episode 0, of 3 in all: --episode K|all",)
@@ -116,14 +117,23 @@ def test_the_first_is_taken_and_said(tmp_path: Path) -> None:
             read(place, episode=3)
 
 
-def test_a_file_elsewhere_than_the_table_says_is_found(tmp_path: Path) -> None:
+def test_a_file_elsewhere_than_the_table_says_is_found(tmp_path):
     path = dataset(tmp_path)
     data = path / "data" / "chunk-000"
     (data / "file-001.parquet").rename(data / "episode_000002.parquet")
     np.testing.assert_array_equal(read(path, episode=2).q, LOG["q"][50:])
 
 
-def test_rows_count_and_not_what_is_said_of_them_beside(tmp_path: Path) -> None:
+def test_stamps_are_the_clock_of_rows_without_numbers_of_frames(tmp_path):
+    path = dataset(tmp_path)
+    for file in path.rglob("data/*/*.parquet"):
+        pl.read_parquet(file).drop("frame_index").write_parquet(file)
+    recording = read(path, episode=0)
+    assert recording.source.clock == "column timestamp"
+    np.testing.assert_allclose(recording.t, np.arange(30) / FPS, atol=1e-7)  # float32
+
+
+def test_rows_count_and_not_what_is_said_of_them_beside(tmp_path):
     """Episodes are those of the rows; a file of one that holds another's is refused."""
     path = dataset(tmp_path, version=2)
     (path / "meta" / "episodes.jsonl").write_text('{"episode_index": 7}')
@@ -136,7 +146,7 @@ def test_rows_count_and_not_what_is_said_of_them_beside(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(path, episode=1).q, LOG["q"][30:50])
 
 
-def test_numbers_of_the_state_are_reported_apart_by_their_names(tmp_path: Path) -> None:
+def test_numbers_of_the_state_are_reported_apart_by_their_names(tmp_path):
     """One state for all, joints in no order, a wrist's wrench behind them."""
     order = [3, 0, 6, 1, 5, 2, 4]
     parts = {"positions": LOG["q"], "velocities": LOG["dq"], "efforts": LOG["tau"]}
@@ -151,7 +161,7 @@ def test_numbers_of_the_state_are_reported_apart_by_their_names(tmp_path: Path) 
     assert [remark.code for remark in recording.source.remarks] == ["wrench-left-out"]
 
 
-def test_signals_are_laid_together_by_the_joints_names(tmp_path: Path) -> None:
+def test_signals_are_laid_together_by_the_joints_names(tmp_path):
     turned = {"observation.effort": (LOG["tau"][:, ::-1], [f"{j}.effort" for j in JOINTS[::-1]])}
     recording = read(dataset(tmp_path, USUAL | turned), episode=0)
     np.testing.assert_array_equal(recording.torque, LOG["tau"][:30])
@@ -160,7 +170,7 @@ def test_signals_are_laid_together_by_the_joints_names(tmp_path: Path) -> None:
         read(dataset(tmp_path / "other", USUAL | other))
 
 
-def test_two_arms_are_reported_apart(tmp_path: Path) -> None:
+def test_two_arms_are_reported_apart(tmp_path):
     names = [f"{side}_{joint}.pos" for side in ("left", "right") for joint in JOINTS]
     features: Features = {
         "observation.state": (np.hstack([LOG["q"], -LOG["q"]]), names),
@@ -177,14 +187,14 @@ def test_two_arms_are_reported_apart(tmp_path: Path) -> None:
     assert right.name == "set episode 1 right arm"
 
 
-def test_a_pose_is_no_joints(tmp_path: Path) -> None:
+def test_a_pose_is_no_joints(tmp_path):
     names = ["x", "y", "z", "roll", "pitch", "yaw", "gripper"]
     path = dataset(tmp_path, {"observation.state": (LOG["q"], names)})
     with pytest.raises(LogError, match=r"no joint positions among observation\.state"):
         read(path)
 
 
-def test_degrees_are_refused_until_they_are_said(tmp_path: Path) -> None:
+def test_degrees_are_refused_until_they_are_said(tmp_path):
     names = [f"{name}.pos" for name in ("pan", "lift", "elbow", "flex", "roll_", "turn", "end")]
     path = dataset(tmp_path, {"observation.state": (90 * LOG["q"], names)})
     with pytest.raises(LogError, match="degrees"):
@@ -193,7 +203,7 @@ def test_degrees_are_refused_until_they_are_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(said.q, np.radians(90 * LOG["q"][:30]), rtol=1e-15)
 
 
-def test_a_wrench_is_named_and_taken_where_it_is_said_to_be_one(tmp_path: Path) -> None:
+def test_a_wrench_is_named_and_taken_where_it_is_said_to_be_one(tmp_path):
     path = dataset(tmp_path, USUAL | {"observation.wrench": (LOG["q"][:, :6], None)})
     (remark,) = read(path, episode=0).source.remarks
     assert (remark.code, remark.values["features"]) == ("wrench-left-out", "observation.wrench")
@@ -203,14 +213,14 @@ def test_a_wrench_is_named_and_taken_where_it_is_said_to_be_one(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("text", ["{", "\xe5", "[]", '{"features": []}'])
-def test_a_damaged_description_is_refused(text: str, tmp_path: Path) -> None:
+def test_a_damaged_description_is_refused(text, tmp_path):
     path = dataset(tmp_path, version=2)
     (path / "meta" / "info.json").write_text(text, encoding="latin-1")
     with pytest.raises(LogError, match="not a readable description"):
         read(path)
 
 
-def test_a_description_beyond_64_mebibytes_is_refused_unread(tmp_path: Path) -> None:
+def test_a_description_beyond_64_mebibytes_is_refused_unread(tmp_path):
     path = dataset(tmp_path, version=2) / "meta" / "info.json"
     text = path.read_bytes()
     path.write_bytes(text.ljust(1 << 20))

@@ -125,7 +125,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_folder_is_searched_and_what_is_no_log_left_out(folder: Path) -> None:
+def test_a_folder_is_searched_and_what_is_no_log_left_out(folder):
     collection = LogCollection(ReadChoice())
     entries = [e.path.relative_to(folder).as_posix() for e in collection.find([folder])]
     # A recording that failed is reported when it is read.
@@ -139,14 +139,14 @@ def test_a_folder_is_searched_and_what_is_no_log_left_out(folder: Path) -> None:
     assert names(found(folder, choice=ReadChoice(episode=ALL))) == ["b.csv", "b.csv", "empty.csv"]
 
 
-def test_a_pattern_fits_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pattern_fits_files(folder, monkeypatch):
     assert names(found(folder / "**" / "b.?sv")) == ["b.csv"] * 3
     assert found(folder / "*.nothing") == []
     monkeypatch.chdir(folder)
     assert [e.path for e in found(Path("a/*.csv"))] == [folder / "a" / "b.csv"]
 
 
-def test_what_we_wrote_is_not_searched(folder: Path) -> None:
+def test_what_we_wrote_is_not_searched(folder):
     record = {"versions": {"vftcli": "1"}, "files": {"b.csv": "…"}}
     (folder / "a" / "run.json").write_text(json.dumps(record))
     (folder / "c").mkdir()
@@ -156,7 +156,7 @@ def test_what_we_wrote_is_not_searched(folder: Path) -> None:
     assert names(found(folder, leave=folder / "a")) == ["b.csv", "empty.csv"]
 
 
-def test_a_bag_is_one_log_and_bags_without_their_list_are_logs_each(tmp_path: Path) -> None:
+def test_a_bag_is_one_log_and_bags_without_their_list_are_logs_each(tmp_path):
     (entry,) = found(FIXTURES / "panda_bag")
     assert (entry.episode, len(entry.files) > 1) == (None, True)
     (bag,) = (FIXTURES / "panda_bag").glob("*.mcap")
@@ -175,9 +175,7 @@ def test_a_bag_is_one_log_and_bags_without_their_list_are_logs_each(tmp_path: Pa
         ("droid_raw", None, [None, None]),
     ],
 )
-def test_an_episode_of_a_data_set_is_a_log(
-    samples: Path, name: str, episode: int | None, expected: list[int | None]
-) -> None:
+def test_an_episode_of_a_data_set_is_a_log(samples, name, episode, expected):
     """The samples' episodes; DROID's are files of their own."""
     if name == "droid_raw":
         pytest.importorskip("h5py")

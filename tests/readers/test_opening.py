@@ -5,7 +5,6 @@ import hashlib
 import shlex
 import zipfile
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,10 +22,8 @@ PACK: dict[str | None, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("wrapping", PACK)
-def test_the_content_is_the_same_whatever_it_is_wrapped_in(
-    tmp_path: Path, wrapping: str | None
-) -> None:
-    path, pack = tmp_path / "x", PACK[wrapping]
+def test_the_content_is_the_same_whatever_it_is_wrapped_in(path, wrapping):
+    pack = PACK[wrapping]
     path.write_bytes(pack(CONTENT))
     file = open_log(path)
     assert (file.head, file.wrapping) == (CONTENT[:HEAD_BYTES], wrapping)
@@ -37,8 +34,7 @@ def test_the_content_is_the_same_whatever_it_is_wrapped_in(
     np.testing.assert_array_equal(read(path).q, motion()["q"])
 
 
-def test_a_cut_wrapping_yields_what_there_is_and_says_so(tmp_path: Path) -> None:
-    path = tmp_path / "x"
+def test_a_cut_wrapping_yields_what_there_is_and_says_so(path):
     packed = gzip.compress(hashlib.shake_256(b"noise").digest(100_000))
     path.write_bytes(packed[: len(packed) // 2])
     file = open_log(path)
@@ -56,7 +52,7 @@ def test_a_cut_wrapping_yields_what_there_is_and_says_so(tmp_path: Path) -> None
         read(path)
 
 
-def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path: Path) -> None:
+def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path):
     (tmp_path / "bag" / "sub").mkdir(parents=True)
     for name, content in {"b": b"2", "a": b"1", "sub/c": b"3"}.items():
         (tmp_path / "bag" / name).write_bytes(content)
@@ -66,9 +62,7 @@ def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", [n for n, layout in FORMATS.items() if not layout.folder])
-def test_a_folder_read_as_a_format_of_files_is_refused_in_one_line(
-    tmp_path: Path, name: str
-) -> None:
+def test_a_folder_read_as_a_format_of_files_is_refused_in_one_line(tmp_path, name):
     (tmp_path / "log.csv").write_text("t,q_1\n0,1\n1,2\n", encoding="utf-8")
     with pytest.raises(LogError, match=f"^{tmp_path}: [^\n]+$") as refusal:
         read(tmp_path, format=name)
@@ -103,22 +97,21 @@ def test_a_folder_read_as_a_format_of_files_is_refused_in_one_line(
         (bytes(range(200)), "a binary file of no kind that is known .*00 01 02 03"),
     ],
 )
-def test_a_file_that_is_no_log_is_named(tmp_path: Path, content: bytes, words: str) -> None:
-    path = tmp_path / "file"
+def test_a_file_that_is_no_log_is_named(path, content, words):
     path.write_bytes(content)
     with pytest.raises(UnknownFormatError, match=f"not recognised as a log: .*{words}"):
         read(path)
 
 
-def test_a_workbook_is_named(tmp_path: Path) -> None:
-    with zipfile.ZipFile(tmp_path / "x", "w") as bundle:
+def test_a_workbook_is_named(path):
+    with zipfile.ZipFile(path, "w") as bundle:
         bundle.writestr("[Content_Types].xml", "<Types/>")
         bundle.writestr("xl/workbook.xml", "<workbook/>")
     with pytest.raises(UnknownFormatError, match="an Excel workbook; save the sheet as CSV"):
-        read(tmp_path / "x")
+        read(path)
 
 
-def test_a_folder_of_logs_says_how_to_run_all(tmp_path: Path) -> None:
+def test_a_folder_of_logs_says_how_to_run_all(tmp_path):
     with pytest.raises(UnknownFormatError, match="an empty folder"):
         read(tmp_path)
     for name in ("a.csv", "b.csv", "c.npy", "readme.md"):
@@ -135,9 +128,8 @@ def test_a_folder_of_logs_says_how_to_run_all(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("first", ["MZ", "BM", "%!PS"])
-def test_a_table_is_not_taken_for_a_document(tmp_path: Path, first: str) -> None:
+def test_a_table_is_not_taken_for_a_document(path, first):
     """Columns called as other files begin: MZ of a moment."""
     rows = "".join(f"{k / 100},.{k},.{k},.{k}\n" for k in range(30))
-    path = tmp_path / "log.csv"
     path.write_text(f"{first},q_1,q_2,q_3\n{rows}", "utf-8")
     assert read(path, columns=f"t={first},q=q_{{i}}").joints == 3

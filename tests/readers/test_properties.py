@@ -1,7 +1,6 @@
 """Properties that hold for any numbers: a written table reads back as it was written."""
 
 import unicodedata
-from pathlib import Path
 
 import numpy as np
 from hypothesis import HealthCheck, given, settings
@@ -41,16 +40,7 @@ def check_message(error: VftError) -> None:
     headed=st.booleans(),
     closed=st.booleans(),
 )
-def test_a_text_table_reads_back(
-    tmp_path: Path,
-    values: np.ndarray,
-    step: float,
-    start: float,
-    separator: str,
-    end: str,
-    headed: bool,
-    closed: bool,
-) -> None:
+def test_a_text_table_reads_back(path, values, step, start, separator, end, headed, closed):
     """All rows and all digits, whatever separates them; an open last row may be dropped, said."""
     rows, joints = len(values), values.shape[1] // 2
     t = start + step * np.arange(rows)
@@ -58,7 +48,6 @@ def test_a_text_table_reads_back(
     if headed:
         names = ["t", *(f"{name}_{j}" for name in ("q", "dq") for j in range(joints))]
         lines.insert(0, separator.join(names))
-    path = tmp_path / "x"
     path.write_bytes((end.join(lines) + (end if closed else "")).encode())
     recording = read(path, columns=None if headed else f"t[s],q[rad]:{joints},dq:{joints}")
     kept = recording.samples
@@ -69,7 +58,7 @@ def test_a_text_table_reads_back(
 
 @QUICK
 @given(text=st.text(alphabet="tqdcurentaw_:=-[]{}i@,|0123456789Hz ", max_size=40))
-def test_any_columns_text_is_parsed_or_refused_on_one_line(text: str) -> None:
+def test_any_columns_text_is_parsed_or_refused_on_one_line(text):
     try:
         spec = parse_columns(text)
     except VftError as error:
@@ -80,8 +69,7 @@ def test_any_columns_text_is_parsed_or_refused_on_one_line(text: str) -> None:
 
 @QUICK
 @given(content=st.binary(min_size=1, max_size=600))
-def test_any_bytes_are_read_or_refused_on_one_line(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "x"
+def test_any_bytes_are_read_or_refused_on_one_line(path, content):
     path.write_bytes(content)
     try:
         recording = read(path)

@@ -85,7 +85,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_samples(samples: Path, name: str) -> None:
+def test_samples(samples, name):
     recording = read(samples / name)
     found = (recording.source.format, recording.joints, recording.samples)
     assert found == SAMPLES[name][:3]
@@ -93,7 +93,7 @@ def test_samples(samples: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_real_logs(logs: Path, name: str) -> None:
+def test_real_logs(logs, name):
     columns, *expected, rate = LOGS[name]
     recording = read(logs / name, columns=columns)
     assert [recording.source.format, recording.joints, recording.samples] == expected
@@ -101,7 +101,7 @@ def test_real_logs(logs: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_files_that_hold_no_log_or_need_a_word(logs: Path, samples: Path, name: str) -> None:
+def test_files_that_hold_no_log_or_need_a_word(logs, samples, name):
     kind, _, name_there = name.partition("/")
     with pytest.raises(VftError, match=REFUSED[name]):
         read((samples if kind == "samples" else logs) / name_there)
@@ -109,9 +109,7 @@ def test_files_that_hold_no_log_or_need_a_word(logs: Path, samples: Path, name: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["logs", "samples"])
-def test_every_file_there_is_read_or_refused_in_one_line(
-    request: pytest.FixtureRequest, kind: str
-) -> None:
+def test_every_file_there_is_read_or_refused_in_one_line(request, kind):
     """Files that no table above names, too: whatever is put there, nothing ends in a traceback."""
     folder: Path = request.getfixturevalue(kind)
     paths = [path for path in sorted(folder.rglob("*")) if path.suffix not in {".toml", ".md"}]
@@ -125,14 +123,14 @@ def test_every_file_there_is_read_or_refused_in_one_line(
             assert "\n" not in said, path
 
 
-def test_text_and_binary_of_one_recording_agree(samples: Path) -> None:
+def test_text_and_binary_of_one_recording_agree(samples):
     text, binary = read(samples / "ur_official.csv"), read(samples / "ur_official.bin")
     for name in text.signals:
         np.testing.assert_array_equal(getattr(text, name), getattr(binary, name))
 
 
 @pytest.mark.parametrize("name", ["ros2_mcap", "ros2_db3", "franka_ros1.bag"])
-def test_bulk_and_typed_decoding_agree_on_samples(samples: Path, name: str) -> None:
+def test_bulk_and_typed_decoding_agree_on_samples(samples, name):
     from rosbags.highlevel import AnyReader
 
     recording = read(samples / name)
@@ -149,7 +147,7 @@ def test_bulk_and_typed_decoding_agree_on_samples(samples: Path, name: str) -> N
     np.testing.assert_array_equal(recording.tau_ext, 0.0 - np.array(residual))
 
 
-def test_bulk_and_typed_decoding_agree_on_a_real_bag(logs: Path) -> None:
+def test_bulk_and_typed_decoding_agree_on_a_real_bag(logs):
     from rosbags.highlevel import AnyReader
 
     path = logs / "ur3" / "identification.bag"
@@ -162,7 +160,7 @@ def test_bulk_and_typed_decoding_agree_on_a_real_bag(logs: Path) -> None:
     assert recording.source.t0_ns == stamp.sec * 10**9 + stamp.nanosec
 
 
-def test_ur3_repeats_differ_by_noise_once_the_sign_is_turned(logs: Path) -> None:
+def test_ur3_repeats_differ_by_noise_once_the_sign_is_turned(logs):
     """repeat_a and repeat_b follow one free motion for 9.8 s: their difference is the noise."""
     from vftcli.free_motion.alignment import align
 
@@ -184,7 +182,7 @@ def test_ur3_repeats_differ_by_noise_once_the_sign_is_turned(logs: Path) -> None
         assert np.sqrt(np.mean(difference**2)) < 1.5 * floor[j]
 
 
-def test_of_two_arms_the_first_is_described(samples: Path) -> None:
+def test_of_two_arms_the_first_is_described(samples):
     pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
     recording = read_first_recording(samples / "reach" / "aloha_episode_0.hdf5")
     assert "arm-side-chosen" in {remark.code for remark in recording.source.remarks}
@@ -194,9 +192,7 @@ def test_of_two_arms_the_first_is_described(samples: Path) -> None:
     ("name", "episodes"),
     [("lerobot_v3_effort", [700, 600, 650]), ("lerobot_v21_effort", [700, 600])],
 )
-def test_a_lerobot_sample_is_read_by_episode(
-    name: str, episodes: list[int], samples: Path
-) -> None:
+def test_a_lerobot_sample_is_read_by_episode(name, episodes, samples):
     import pyarrow.parquet as pq
 
     logs = list(Library().open_each([samples / name], ReadChoice(episode=ALL)))
@@ -215,14 +211,14 @@ def test_a_lerobot_sample_is_read_by_episode(
         assert (log.robot_hint, len(log.joint_names)) == ("panda", 7)
 
 
-def test_an_effort_of_zeros_is_refused(samples: Path) -> None:
+def test_an_effort_of_zeros_is_refused(samples):
     recording = read(samples / "lerobot_v3_effort_zero")
     codes = {finding.code for finding in examine(recording, load_robot("panda")).refusals()}
     assert "zero-effort" in codes
 
 
 @pytest.mark.parametrize("episode", [0, 1])
-def test_the_droid_sample_is_read_by_its_robot_s_clock(episode: int, samples: Path) -> None:
+def test_the_droid_sample_is_read_by_its_robot_s_clock(episode, samples):
     h5py = pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
     recording = read(samples / "droid_raw", episode=episode)
     path = sorted((samples / "droid_raw").rglob("trajectory.h5"))[episode]

@@ -30,20 +30,20 @@ def write(tmp_path: Path) -> Callable[..., Path]:
     return made
 
 
-def test_torques_are_found_by_the_end_of_their_name(write) -> None:
+def test_torques_are_found_by_the_end_of_their_name(write):
     found = read_reference(write("t", "true_tau_ext_1", "true_tau_ext_2", "note"))
     np.testing.assert_allclose(found.stamps, [0.0, 0.1, 0.2, 0.3])
     np.testing.assert_allclose(found.signals["tau_ext"][:, 1], found.stamps + 2)
     assert "wrench" not in found.signals
 
 
-def test_a_wrench_alone_is_a_reference_too(write) -> None:
+def test_a_wrench_alone_is_a_reference_too(write):
     found = read_reference(write("t", "fx", "fy", "fz", "mx", "my", "mz"))
     np.testing.assert_allclose(found.signals["wrench"][:, 5], found.stamps + 6)
     assert "tau_ext" not in found.signals
 
 
-def test_columns_are_scaled_as_described(write) -> None:
+def test_columns_are_scaled_as_described(write):
     found = read_reference(write("ms", "a", "b"), "t[ms]=ms,-tau_ext[mNm]=a|b")
     np.testing.assert_allclose(found.stamps, [0.0, 1e-4, 2e-4, 3e-4])
     np.testing.assert_allclose(found.signals["tau_ext"][0], [-1e-3, -2e-3])
@@ -56,12 +56,12 @@ def test_columns_are_scaled_as_described(write) -> None:
         (("t", "a_tau_ext_1", "b_tau_ext_1"), "a_tau_ext and b_tau_ext"),
     ],
 )
-def test_torques_that_cannot_be_reported_are_refused(write, names, said: str) -> None:
+def test_torques_that_cannot_be_reported_are_refused(write, names, said):
     with pytest.raises(LogError, match=said):
         read_reference(write(*names))
 
 
-def test_a_cell_without_a_number_and_a_clock_that_stands_are_refused(write) -> None:
+def test_a_cell_without_a_number_and_a_clock_that_stands_are_refused(write):
     path = write("t", "tau_ext_1", "tau_ext_2")
     path.write_text(path.read_text().replace("2.2", "nan"))
     with pytest.raises(LogError, match="tau_ext 2 is not a number in row 3"):
@@ -71,7 +71,7 @@ def test_a_cell_without_a_number_and_a_clock_that_stands_are_refused(write) -> N
 
 
 @pytest.mark.parametrize("inner", ["", "mine/"])
-def test_a_band_is_one_deviation_of_the_error(tmp_path: Path, inner: str) -> None:
+def test_a_band_is_one_deviation_of_the_error(tmp_path, inner):
     path = tmp_path / "a.csv"
     path.write_text(f"t,tau_ext/{inner}1,band/{inner}1\n0.0,1.0,0.5\n0.1,2.0,0.25\n")
     torque, wrench = read_outside(path, "mine")
@@ -80,7 +80,7 @@ def test_a_band_is_one_deviation_of_the_error(tmp_path: Path, inner: str) -> Non
     assert np.array_equal(torque.error_sd[:, 0], [0.5, 0.25])
 
 
-def test_a_list_needs_no_forces(tmp_path: Path) -> None:
+def test_a_list_needs_no_forces(tmp_path):
     path = tmp_path / "a.contacts.csv"
     path.write_text("start_s,stop_s\n1,2.5\n")
     assert read_list(path) == [(1.0, 2.5, 0.0, 0.0, False)]
@@ -92,7 +92,7 @@ def test_a_list_needs_no_forces(tmp_path: Path) -> None:
             read_list(path)
 
 
-def test_the_columns_of_an_observer_are_reported_of_our_own_files_alone(tmp_path: Path) -> None:
+def test_the_columns_of_an_observer_are_reported_of_our_own_files_alone(tmp_path):
     path = tmp_path / "x"
     path.write_text("t,q1\n0,0\n", encoding="utf-8")
     assert estimates_columns(path, "gmo") is None

@@ -69,8 +69,8 @@ WRITERS = {"bagpy": bagpy, "rostopic": rostopic, "ros2-echo": ros2_echo}
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_the_names_give_the_order_and_the_header_the_clock(name: str, tmp_path: Path) -> None:
-    path = WRITERS[name](tmp_path / "log")
+def test_the_names_give_the_order_and_the_header_the_clock(name, path):
+    WRITERS[name](path)
     assert recognise(path).name == name
     log = read(path)
     assert log.joint_names == UR_NAMES
@@ -89,23 +89,23 @@ def test_the_names_give_the_order_and_the_header_the_clock(name: str, tmp_path: 
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_a_gripper_beside_urs_joints_is_set_aside(name: str, tmp_path: Path) -> None:
-    log = read(WRITERS[name](tmp_path / "log", ("finger", *ALPHABETICAL)))
+def test_a_gripper_beside_urs_joints_is_set_aside(name, path):
+    log = read(WRITERS[name](path, ("finger", *ALPHABETICAL)))
     assert log.joint_names == UR_NAMES
     np.testing.assert_allclose(log.q, Q, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_rows_of_other_joints_are_refused(name: str, tmp_path: Path) -> None:
-    path = WRITERS[name](tmp_path / "log")
+def test_rows_of_other_joints_are_refused(name, path):
+    WRITERS[name](path)
     *lines, last = path.read_text("utf-8").splitlines()
     written(path, *lines, last.replace("elbow_joint", "other"))
     with pytest.raises(LogError, match="rows name different joints"):
         read(path)
 
 
-def test_a_list_of_names_that_is_none_is_refused(tmp_path: Path) -> None:
-    path = bagpy(tmp_path / "log")
+def test_a_list_of_names_that_is_none_is_refused(path):
+    bagpy(path)
     path.write_text(path.read_text("utf-8").replace("['elbow_joint'", "[elbow"), "utf-8")
     with pytest.raises(LogError, match="holds no list of joints"):
         read(path)

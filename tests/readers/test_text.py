@@ -15,11 +15,6 @@ from vftcli.signals.recording import Recording
 HEAD = "t,q1,q2"
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "x"
-
-
 def written(path: Path, text: str | bytes) -> Recording:
     """What is read of a text."""
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -34,19 +29,29 @@ def table(lines: list[str], end: str = "\n") -> str:
     return end.join([HEAD, *lines]) + end
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r\r\n", "\r", "\n\n", "\r\n\r\n", "\n \n"])
-def test_every_line_end_reads_the_same(path: Path, end: str) -> None:
-    recording = written(path, table(rows(), end))
-    assert recording.samples == 30
+PLAIN = table(rows())
+DECIMAL_COMMAS = PLAIN.replace(",", ";").replace(".", ",")
+DRESSES = {
+    **{f"ends {end!r}": table(rows(), end) for end in (
+        "\n", "\r\n", "\r\r\n", "\r", "\n\n", "\r\n\r\n", "\n \n")},
+    **{f"separated {by!r}": PLAIN.replace(",", by) for by in (";", "\t", " ", "  ")},
+    **{f"behind {first!r}": first + PLAIN for first in ("\ufeff", "# made by hand\n", "\n\n")},
+    "quoted": PLAIN.replace(HEAD, '"t","q1","q2"'),
+    "decimal commas": DECIMAL_COMMAS,
+    # Behind tabs a name may hold a comma: the second line tells that it separates nothing.
+    "tabs": DECIMAL_COMMAS.replace("q2", "wrist,deg").replace(";", "\t"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DRESSES)
+def test_a_table_reads_the_same_however_it_is_dressed(path, name):
+    recording = written(path, DRESSES[name])
+    assert (recording.samples, recording.joints) == (30, 1 if name == "tabs" else 2)
+    np.testing.assert_allclose(recording.t, 0.01 * np.arange(30), rtol=1e-12)
     np.testing.assert_allclose(recording.q[:, 0], 0.1 + 0.001 * np.arange(30), rtol=1e-12)
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "  "])
-def test_every_separator_reads_the_same(path: Path, separator: str) -> None:
-    assert written(path, table(rows()).replace(",", separator)).joints == 2
-
-
-def test_rows_longer_than_the_names_are_counted_by_the_separator_of_the_names(path: Path) -> None:
+def test_rows_longer_than_the_names_are_counted_by_the_separator_of_the_names(path):
     for separator in (",", " "):
         text = table([f"{row},7" for row in rows()]).replace(",", separator)
         with pytest.raises(LogError, match="row 1 has 4 cells, the first line 3"):
@@ -55,26 +60,13 @@ def test_rows_longer_than_the_names_are_counted_by_the_separator_of_the_names(pa
         written(path, "t q1\n0 0.1 0.2\n1 0.1 0.2\n")
 
 
-def test_decimal_commas_between_semicolons(path: Path) -> None:
-    semicolons = table(rows()).replace(",", ";").replace(".", ",")
-    # Behind tabs a name may hold a comma: the second line tells that it separates nothing.
-    tabs = semicolons.replace("q2", "wrist,deg").replace(";", "\t")
-    for text in (semicolons, tabs):
-        np.testing.assert_allclose(written(path, text).t, 0.01 * np.arange(30), rtol=1e-12)
-
-
-@pytest.mark.parametrize("prefix", ["\ufeff", "# made by hand\n", "\n\n"])
-def test_what_may_stand_before_a_table(path: Path, prefix: str) -> None:
-    assert written(path, prefix + table(rows())).samples == 30
-
-
-def test_savetxt_header_is_understood(path: Path) -> None:
+def test_savetxt_header_is_understood(path):
     matrix = np.column_stack([0.01 * np.arange(20), 0.1 * np.arange(20)])
     np.savetxt(path, matrix, header="t q1")
     np.testing.assert_allclose(read(path).q[:, 0], matrix[:, 1], rtol=1e-15)
 
 
-def test_a_row_that_the_first_64_kib_cut_does_not_tell_the_separator(path: Path) -> None:
+def test_a_row_that_the_first_64_kib_cut_does_not_tell_the_separator(path):
     """Line 200 of as many is cut inside its second cell, so that it seems to have two."""
     lines = [f"{line}\n" for line in table(rows()).replace(",", ";").split()]
     room = 64 * 1024 - len(lines[0]) - len("0.000;0.1")
@@ -85,11 +77,7 @@ def test_a_row_that_the_first_64_kib_cut_does_not_tell_the_separator(path: Path)
     assert written(path, text).joints == 2
 
 
-def test_quoted_cells(path: Path) -> None:
-    assert written(path, table(rows()).replace("t,q1,q2", '"t","q1","q2"')).joints == 2
-
-
-def test_columns_that_begin_with_whole_numbers_stay_numbers(path: Path) -> None:
+def test_columns_that_begin_with_whole_numbers_stay_numbers(path):
     lines = [f"{k / 100},0,0" for k in range(2000)]
     lines += [f"{20 + k / 100},-0.00068,1e-5" for k in range(10)]
     assert written(path, table(lines)).q[-1, 0] == -0.00068
@@ -101,7 +89,7 @@ INDEXED = ["q_0 q_1", "q[0] q[1]", "q.0 q.1", "q0 q1", "q1 q2", "qj1 qj2", "Q_jo
 
 
 @pytest.mark.parametrize("names", INDEXED)
-def test_index_forms(path: Path, names: str) -> None:
+def test_index_forms(path, names):
     recording = written(path, table(rows()).replace("q1,q2", names.replace(" ", ",")))
     assert recording.q[0].tolist() == [0.1, 0.2]
 
@@ -110,15 +98,13 @@ def test_index_forms(path: Path, names: str) -> None:
     ("names", "words"),
     [("t,q_1,actual_q_1", "could both be q"), ("t,time,q1", "could each be the clock")],
 )
-def test_two_candidates_are_refused(path: Path, names: str, words: str) -> None:
+def test_two_candidates_are_refused(path, names, words):
     with pytest.raises(LogError, match=words):
         written(path, table(rows()).replace(HEAD, names))
 
 
 @pytest.mark.parametrize(("name", "value"), [("tau_ext1", 2.5), ("tau_ext_hat_filtered_0", -2.5)])
-def test_vendor_residual_is_turned_and_plain_tau_ext_is_not(
-    path: Path, name: str, value: float
-) -> None:
+def test_vendor_residual_is_turned_and_plain_tau_ext_is_not(path, name, value):
     recording = written(
         path, table([f"{k / 100},0.1,2.5" for k in range(20)]).replace("q2", name)
     )
@@ -132,9 +118,7 @@ def test_vendor_residual_is_turned_and_plain_tau_ext_is_not(
     [(0, 1, 1e-3), (1_700_000_000_000, 8, 8e-3), (0, 2, 2.0), (1_700_000_000_000_000, 8000, 8e-3),
      (1_700_000_000_000_000_001, 1_000_003, 1.000003e-3)],
 )  # fmt: skip
-def test_time_units_are_reported_by_size(
-    path: Path, first: int, step: int, seconds: float
-) -> None:
+def test_time_units_are_reported_by_size(path, first, step, seconds):
     lines = [f"{first + k * step},0.1,0.2" for k in range(20)]
     recording = written(path, table(lines))
     np.testing.assert_allclose(recording.t, seconds * np.arange(20), rtol=1e-12)
@@ -142,7 +126,7 @@ def test_time_units_are_reported_by_size(
         assert recording.source.t0_ns == first
 
 
-def test_dates_are_a_clock(path: Path) -> None:
+def test_dates_are_a_clock(path):
     lines = [f"2024-05-01 12:00:{k / 100:09.6f},0.1,0.2" for k in range(20)]
     np.testing.assert_allclose(written(path, table(lines)).t, 0.01 * np.arange(20), rtol=1e-9)
 
@@ -151,21 +135,19 @@ CUT = ["0.300,0.13", "0.300,0.1", "0.3", "0.300,0.1300,", "0.300,0.1300,0.1"]
 
 
 @pytest.mark.parametrize("last", CUT)
-def test_a_cut_last_row_is_dropped_and_said(path: Path, last: str) -> None:
+def test_a_cut_last_row_is_dropped_and_said(path, last):
     recording = written(path, table(rows()) + last)
     assert recording.samples == 30
     assert "dropped the last row: it is cut off" in recording.source.repairs
 
 
 @pytest.mark.parametrize("count", [2, 20, 30])
-def test_a_last_row_without_line_end_is_kept_if_its_digits_are_all_there(
-    path: Path, count: int
-) -> None:
+def test_a_last_row_without_line_end_is_kept_if_its_digits_are_all_there(path, count):
     recording = written(path, table(rows(count)).rstrip("\n"))
     assert (recording.samples, recording.source.repairs) == (count, ())
 
 
-def test_repeated_stamps_are_dropped_and_counted(path: Path) -> None:
+def test_repeated_stamps_are_dropped_and_counted(path):
     lines = rows()
     for place in (10, 20, 20):
         lines.insert(place, lines[place])
@@ -179,7 +161,7 @@ def test_repeated_stamps_are_dropped_and_counted(path: Path) -> None:
     assert "carry other values" in written(path, table(lines)).source.warnings[0]
 
 
-def test_gaps_are_kept_and_reported_with_their_place(path: Path) -> None:
+def test_gaps_are_kept_and_reported_with_their_place(path):
     lines = rows(30) + [f"{5 + k / 100},0.1,0.2" for k in range(30)]
     recording = written(path, table(lines))
     assert recording.samples == 60
@@ -192,7 +174,7 @@ def test_gaps_are_kept_and_reported_with_their_place(path: Path) -> None:
 
 @pytest.mark.parametrize("garbage", ["1e154,0.1,0.2", "0,1e154,3", "nan,0.1,0.2", "0,nan,2",
                                      "3.1e-310,5e-320,1e9"])  # fmt: skip
-def test_leading_garbage_is_dropped_and_said(path: Path, garbage: str) -> None:
+def test_leading_garbage_is_dropped_and_said(path, garbage):
     lines = [garbage] * 8 + [f"{12621 + k / 100},0.1,0.2" for k in range(300)]
     recording = written(path, table(lines))
     assert (recording.samples, recording.source.t0) == (300, 12621)
@@ -212,21 +194,19 @@ BAD_CELLS = [
 
 
 @pytest.mark.parametrize(("row", "reported"), BAD_CELLS)
-def test_a_bad_cell_in_the_middle_is_refused_with_its_place(
-    path: Path, row: str, reported: str
-) -> None:
+def test_a_bad_cell_in_the_middle_is_refused_with_its_place(path, row, reported):
     lines = rows(200, step=0.001)
     lines[150] = row
     with pytest.raises(LogError, match=reported):
         written(path, table(lines))
 
 
-def test_a_column_without_numbers_is_refused(path: Path) -> None:
+def test_a_column_without_numbers_is_refused(path):
     with pytest.raises(LogError, match="q of joint 2 holds no numbers at all"):
         written(path, table([f"{k / 100},0.1,nan" for k in range(30)]))
 
 
-def test_time_that_runs_backwards_is_refused(path: Path) -> None:
+def test_time_that_runs_backwards_is_refused(path):
     lines = rows()
     lines[10], lines[11] = lines[11], lines[10]
     said = r"runs backwards 1×, first at sample 12 \(from 0\.110000 to 0\.100000 s\)"
@@ -245,7 +225,7 @@ def test_time_that_runs_backwards_is_refused(path: Path) -> None:
         (b"\x28\xb5\x2f\xfdnonsense", "zstd file is damaged"),
     ],
 )
-def test_what_is_no_log_is_refused(path: Path, content: bytes, reported: str) -> None:
+def test_what_is_no_log_is_refused(path, content, reported):
     with pytest.raises((LogError, ClockError), match=reported) as error:
         written(path, content)
     assert "\n" not in str(error.value)
@@ -254,12 +234,12 @@ def test_what_is_no_log_is_refused(path: Path, content: bytes, reported: str) ->
 @pytest.mark.parametrize(
     ("name", "words"), [("missing", "no such file"), ("/dev/null", "neither a file nor a folder")]
 )
-def test_paths_that_are_no_files(tmp_path: Path, name: str, words: str) -> None:
+def test_paths_that_are_no_files(tmp_path, name, words):
     with pytest.raises(LogError, match=words):
         read(tmp_path / name)
 
 
-def test_the_content_decides_but_where_a_format_is_named(tmp_path: Path) -> None:
+def test_the_content_decides_but_where_a_format_is_named(tmp_path):
     path = ur_csv(tmp_path / "log.parquet")
     assert recognise(path).name == "ur-csv"
     with pytest.raises(UnknownFormatError, match="known formats: ur-csv"):
@@ -269,23 +249,23 @@ def test_the_content_decides_but_where_a_format_is_named(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("name", ["table", "headerless", "ur-csv", "bagpy", "ros2-echo"])
-def test_what_is_no_text_is_refused_by_each_format_of_text(path: Path, name: str) -> None:
+def test_what_is_no_text_is_refused_by_each_format_of_text(path, name):
     path.write_bytes(bytes(range(256)))
     with pytest.raises(LogError, match="not a table of text"):
         read(path, format=name)
 
 
-def test_signals_that_nobody_asked_for_stay_unread(path: Path) -> None:
+def test_signals_that_nobody_asked_for_stay_unread(path):
     assert read(ur_csv(path), signals={"current"}).signals == ("q", "current")
 
 
-def test_every_format_is_described() -> None:
+def test_every_format_is_described():
     for name, form in FORMATS.items():
         assert form.name == name
         assert all(len(t) > 5 for t in (form.title, form.recording, form.takes, form.pitfalls))
 
 
-def test_a_text_loads_no_reader_of_another_container(path: Path) -> None:
+def test_a_text_loads_no_reader_of_another_container(path):
     script = (
         "import sys; from vftcli.readers.reading import read; read(sys.argv[1]); "
         "heavy = 'h5py', 'mcap', 'pyarrow', 'rosbags', 'scipy'; "

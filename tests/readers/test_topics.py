@@ -85,12 +85,7 @@ def recorded(path: Path, *topics: list[Message], **how: Any) -> Recording:
 UR_TOPIC = [ur_message(k) for k in range(20)]
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "x"
-
-
-def test_ur_joints_by_name_and_effort_as_current(path: Path) -> None:
+def test_ur_joints_by_name_and_effort_as_current(path):
     recording = recorded(path, UR_TOPIC)
     assert recording.q[0].tolist() == [0, 1, 2, 3, 4, 5]
     assert recording.joint_names == UR_NAMES
@@ -104,7 +99,7 @@ def test_ur_joints_by_name_and_effort_as_current(path: Path) -> None:
     ("columns", "signal", "sign"),
     [("tau=effort", "torque", 1), ("-current=effort", "current", -1)],
 )
-def test_columns_say_what_effort_is(path: Path, columns: str, signal: str, sign: int) -> None:
+def test_columns_say_what_effort_is(path, columns, signal, sign):
     recording = recorded(path, UR_TOPIC, columns=columns)
     expected = sign * 0.1 * np.arange(6)
     np.testing.assert_allclose(getattr(recording, signal)[0], expected, rtol=1e-12)
@@ -113,7 +108,7 @@ def test_columns_say_what_effort_is(path: Path, columns: str, signal: str, sign:
         read(path, columns="tau=nonsense")
 
 
-def test_merged_topics_with_a_gripper_and_changing_order(path: Path) -> None:
+def test_merged_topics_with_a_gripper_and_changing_order(path):
     """Messages of one topic in two orders, with fingers, and gripper-only ones in between."""
     arm = [f"panda_joint{j}" for j in range(1, 8)]
     messages = []
@@ -133,20 +128,20 @@ def test_merged_topics_with_a_gripper_and_changing_order(path: Path) -> None:
     assert recording.robot_hint == "panda"
 
 
-def test_bytes_behind_a_message_are_counted(path: Path) -> None:
+def test_bytes_behind_a_message_are_counted(path):
     words = r"sensor_msgs/JointState \(5 bytes too many\)\. The bag is"
     with pytest.raises(LogError, match=words):
         recorded(path, [ur_message(k, padding=5 * (k == 9)) for k in range(20)])
 
 
-def test_empty_and_nan_velocities_are_missing_signals(path: Path) -> None:
+def test_empty_and_nan_velocities_are_missing_signals(path):
     messages = [ur_message(k, velocity=[], effort=[np.nan] * 6) for k in range(20)]
     recording = recorded(path, messages)
     assert recording.signals == ("q",)
     assert any("NaN in every message" in repair for repair in recording.source.repairs)
 
 
-def test_receive_stamps_where_headers_are_unset(path: Path) -> None:
+def test_receive_stamps_where_headers_are_unset(path):
     messages = [ur_message(40 * k, stamp=False) for k in range(20)]
     recording = recorded(path, messages)
     np.testing.assert_allclose(recording.t, 0.32 * np.arange(20), atol=1e-9)
@@ -158,7 +153,7 @@ def test_receive_stamps_where_headers_are_unset(path: Path) -> None:
     assert recorded(path, messages).source.clock == "header stamps of /joint_states"
 
 
-def test_a_wrench_of_another_rate_is_interpolated(path: Path) -> None:
+def test_a_wrench_of_another_rate_is_interpolated(path):
     wrench = arm_topic("/wrench", 400, step=1_000_000, frame="tool0")
     for k, message in enumerate(wrench):
         message["time"] += 300_000
@@ -171,7 +166,7 @@ def test_a_wrench_of_another_rate_is_interpolated(path: Path) -> None:
     assert any("interpolated wrench of /wrench (1000 Hz)" in r for r in recording.source.repairs)
 
 
-def test_columns_state_the_frame_and_sign_of_a_bags_wrench(path: Path) -> None:
+def test_columns_state_the_frame_and_sign_of_a_bags_wrench(path):
     """What a refused frame asks for, "--columns wrench[base]=…", without a field's name."""
     wrench = arm_topic("/wrench", 20, force=(1.0, 0, -5.0), frame="ft")
     plain = recorded(path, UR_TOPIC, wrench).require("wrench")
@@ -185,7 +180,7 @@ def test_columns_state_the_frame_and_sign_of_a_bags_wrench(path: Path) -> None:
         recorded(path, UR_TOPIC, columns="wrench[base]")
 
 
-def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(path: Path) -> None:
+def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(path):
     """Its frame_id is a sentence, which was refused as the user's mistake."""
     sentence = "base axes, moment about the flange point"
     wrench = arm_topic("/vftcli/wrench", 20, force=(1.0, 0.0, 0.0), frame=sentence)
@@ -193,7 +188,7 @@ def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(path: Path)
     assert (recording.wrench is None, recording.wrench_frame) == (False, None)
 
 
-def test_bags_without_joints_say_what_they_hold(path: Path) -> None:
+def test_bags_without_joints_say_what_they_hold(path):
     wrench = arm_topic("/wrench", 9, force=(0.0, 0, 1))
     with pytest.raises(LogError, match=r"no topic with joint positions among /wrench"):
         recorded(path, wrench)
@@ -217,7 +212,7 @@ def test_bags_without_joints_say_what_they_hold(path: Path) -> None:
         ([("/pair", 5, {"joints": "uv"})], "/pair"),
     ],
 )
-def test_the_topic_of_the_arm_leads(path: Path, topics, lead: str) -> None:
+def test_the_topic_of_the_arm_leads(path, topics, lead):
     """The measured one of most joints and messages; of one rate the one with efforts."""
     made = (arm_topic(name, count, **more) for name, count, more in topics)
     recording = recorded(path, *made)
@@ -225,7 +220,7 @@ def test_the_topic_of_the_arm_leads(path: Path, topics, lead: str) -> None:
     assert recording.samples == next(count for name, count, _ in topics if name == lead)
 
 
-def test_one_of_two_arms_is_read_where_columns_name_it(path: Path) -> None:
+def test_one_of_two_arms_is_read_where_columns_name_it(path):
     left, right = (arm_topic(f"/{side}", 20, side[:1] + "bcdef") for side in ("left", "right"))
     words = r"two arms were recorded: /left, /right \(l, b… and r, b…\).*'q=/left.position'"
     with pytest.raises(LogError, match=words):
@@ -267,15 +262,13 @@ def test_another_topic_gives_the_velocities_of_the_leading_one_s_joints(
     assert codes == {"topics-left-out" if found is None else "signal-interpolated"}
 
 
-def test_what_other_topics_command_is_no_measurement(path: Path) -> None:
+def test_what_other_topics_command_is_no_measurement(path):
     command = arm_topic("/arm/command", 50, velocity=[1.0] * 6)
     assert recorded(path, arm_topic("/arm", 50), command).dq is None
 
 
 @pytest.mark.parametrize(("lead", "other"), [(0, 0), (5, 5), (5, None), (None, 5), (None, None)])
-def test_stamps_are_compared_with_stamps_of_one_clock(
-    path: Path, lead: int | None, other: int | None
-) -> None:
+def test_stamps_are_compared_with_stamps_of_one_clock(path, lead, other):
     """Headers that run 5 s ahead of the recorder, or are unset: what is of one instant meets."""
     arm, wrench = (
         arm_topic(name, count, step=step, stamp=ahead is not None, ahead=(ahead or 0) * 10**9)
@@ -321,9 +314,7 @@ def test_a_wrench_is_held_where_it_misses_no_more_than_a_twentieth_of_the_motion
         ({"/franka/F_ext": 50}, "/franka/F_ext"),
     ],
 )
-def test_the_sensor_s_fullest_topic_gives_the_wrench(
-    path: Path, topics: dict[str, int], taken: str
-) -> None:
+def test_the_sensor_s_fullest_topic_gives_the_wrench(path, topics, taken):
     forces = [
         arm_topic(name, count, step=10_000_000, force=(float(count), 0.0, 0.0))
         for name, count in topics.items()
@@ -335,13 +326,13 @@ def test_the_sensor_s_fullest_topic_gives_the_wrench(
     assert found == ([tuple(left)] if left else [])
 
 
-def test_topics_that_are_left_out_are_named_those_with_forces_first(path: Path) -> None:
+def test_topics_that_are_left_out_are_named_those_with_forces_first(path):
     others = [arm_topic(name, 20, "uv") for name in (*(f"/g{k}" for k in range(6)), "/z/force")]
     (left,) = recorded(path, arm_topic("/arm", 20), *others).source.remarks
     assert left.values["topics"] == ("/z/force", "/g0", "/g1", "/g2", "/g3", "/g4")
 
 
-def test_messages_of_the_leading_topic_with_other_signals_are_left_out(path: Path) -> None:
+def test_messages_of_the_leading_topic_with_other_signals_are_left_out(path):
     messages = arm_topic("/arm", 50, velocity=[0.5] * 6)
     for message in messages[10:14]:
         message["velocity"] = []

@@ -32,8 +32,8 @@ SIX_DIGITS = 1e-5
 
 
 @pytest.mark.parametrize("end", ["\r\n", "\r\r\n", "\r", "\n"])
-def test_official_text_keeps_every_digit(tmp_path: Path, end: str) -> None:
-    recording, log = read(ur_csv(tmp_path / "x", end=end)), motion()
+def test_official_text_keeps_every_digit(path, end):
+    recording, log = read(ur_csv(path, end=end)), motion()
     assert (recording.source.format, recording.source.t0) == ("ur-csv", 1000)
     np.testing.assert_array_equal(recording.q, log["q"])
     np.testing.assert_array_equal(recording.current, log["current"])
@@ -48,11 +48,9 @@ def test_official_text_keeps_every_digit(tmp_path: Path, end: str) -> None:
         ("joint_mode_0", 0.002, "controller"),
     ],
 )
-def test_the_point_of_the_controllers_moment(
-    tmp_path: Path, field: str, shift: float, point: str
-) -> None:
+def test_the_point_of_the_controllers_moment(path, field, shift, point):
     """Of actual_TCP_force: the TCP on CB3, by its sensor on e-Series; fields or clock say which."""
-    path = ur_csv(tmp_path / "x", separator=",", end="\n")
+    path = ur_csv(path, separator=",", end="\n")
     lines = path.read_text().splitlines()
     clock = lines[0].split(",").index("timestamp")
     wrench = ",".join(f"actual_TCP_force_{k}" for k in range(6))
@@ -69,8 +67,8 @@ def test_the_point_of_the_controllers_moment(
     np.testing.assert_array_equal(stated.wrench, read(path).wrench)
 
 
-def test_payload_that_the_controller_was_reported_of(tmp_path: Path) -> None:
-    path = ur_csv(tmp_path / "x", separator=",", end="\n")
+def test_payload_that_the_controller_was_reported_of(path):
+    path = ur_csv(path, separator=",", end="\n")
     lines = path.read_text().splitlines()
     lines[0] += ",payload,payload_cog_0,payload_cog_1,payload_cog_2"
     lines[1:] = [f"{line},1.5,0,0.01,0.05" for line in lines[1:]]
@@ -87,16 +85,14 @@ def test_payload_that_the_controller_was_reported_of(tmp_path: Path) -> None:
         ("actual_q_", "target_q_", "Add timestamp and actual_q to the recipe"),
     ],
 )
-def test_missing_positions_or_clock_say_what_to_record(
-    tmp_path: Path, name: str, other: str, words: str
-) -> None:
-    path = ur_csv(tmp_path / "x")
+def test_missing_positions_or_clock_say_what_to_record(path, name, other, words):
+    ur_csv(path)
     path.write_text(path.read_text().replace(name, other))
     with pytest.raises(LogError, match=words):
         read(path)
 
 
-def test_a_table_with_targets_of_its_own_is_no_recording_of_ur(tmp_path: Path) -> None:
+def test_a_table_with_targets_of_its_own_is_no_recording_of_ur(tmp_path):
     """`target_q_0` beside names that are not RTDE's; it was refused for want of a timestamp."""
     names = [f"{name}_{j}" for name in ("q", "dq", "tau", "target_q") for j in range(6)]
     path = tmp_path / "own.csv"
@@ -107,8 +103,8 @@ def test_a_table_with_targets_of_its_own_is_no_recording_of_ur(tmp_path: Path) -
     assert {"q", "dq", "torque", "target_q"} <= set(log.signals)
 
 
-def test_binary_records(tmp_path: Path) -> None:
-    path = ur_binary(tmp_path / "x.csv")
+def test_binary_records(path):
+    ur_binary(path)
     np.testing.assert_array_equal(read(path).q, motion()["q"])
     content = path.read_bytes()
     path.write_bytes(content[:-10])
@@ -126,8 +122,8 @@ def test_binary_records(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("old", [False, True])
-def test_libfranka_csv_turns_the_residual(tmp_path: Path, old: bool) -> None:
-    recording = read(libfranka_csv(tmp_path / "x", old=old))
+def test_libfranka_csv_turns_the_residual(path, old):
+    recording = read(libfranka_csv(path, old=old))
     log = motion(7)
     assert recording.source.format == ("libfranka-csv-old" if old else "libfranka-csv")
     assert [remark.code for remark in recording.source.remarks] == ["residual-turned"]
@@ -136,8 +132,8 @@ def test_libfranka_csv_turns_the_residual(tmp_path: Path, old: bool) -> None:
     np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), rtol=1e-12)
 
 
-def test_states_as_json_lines(tmp_path: Path) -> None:
-    path = libfranka_json(tmp_path / "x")
+def test_states_as_json_lines(path):
+    libfranka_json(path)
     recording = read(path)
     np.testing.assert_array_equal(recording.q, motion(7)["q"])
     assert recording.wrench_frame == WrenchFrame("base", "base", "by-robot")
@@ -149,16 +145,15 @@ def test_states_as_json_lines(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("state", ["[" * 50_000, '"' + "x" * (1 << 20) + '"'])
-def test_json_that_is_nested_or_endless_is_refused(tmp_path: Path, state: str) -> None:
-    path = tmp_path / "x"
+def test_json_that_is_nested_or_endless_is_refused(path, state):
     path.write_text(f'{{"O_T_EE": {state}\n' * 2)
     with pytest.raises(LogError, match="line 1 is not one JSON object"):
         read(path)
 
 
 @pytest.mark.parametrize("make", [panda_py_npz, panda_py_pickle, json_arrays, json_lines])
-def test_panda_pys_log_reads_the_same_in_every_container(tmp_path: Path, make) -> None:
-    recording, log = read(make(tmp_path / "x")), motion(7)
+def test_panda_pys_log_reads_the_same_in_every_container(path, make):
+    recording, log = read(make(path)), motion(7)
     for signal in ("q", "dq"):
         np.testing.assert_array_equal(getattr(recording, signal), log[signal])
     np.testing.assert_array_equal(recording.torque, log["tau"])
@@ -166,8 +161,8 @@ def test_panda_pys_log_reads_the_same_in_every_container(tmp_path: Path, make) -
     np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), atol=1e-12)  # ms as float64
 
 
-def test_array_files(tmp_path: Path) -> None:
-    path = matrix_npy(tmp_path / "x")
+def test_array_files(path):
+    matrix_npy(path)
     np.testing.assert_array_equal(read(path, columns=HEADERLESS_COLUMNS).q, motion()["q"])
     with pytest.raises(LogError, match="without a header"):
         read(path)
@@ -176,14 +171,14 @@ def test_array_files(tmp_path: Path) -> None:
         read(path, columns=HEADERLESS_COLUMNS)
 
 
-def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
+def test_arrays_of_objects_are_refused(tmp_path):
     np.save(tmp_path / "x.npy", np.array([[1, "a"]], dtype=object), allow_pickle=True)
     with pytest.raises(LogError, match=r"not a readable|cut, damaged"):
         read(tmp_path / "x.npy", columns="t,q")
 
 
 @pytest.mark.slow
-def test_a_bundle_that_unpacks_beyond_reason_is_refused(tmp_path: Path) -> None:
+def test_a_bundle_that_unpacks_beyond_reason_is_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "x.npz", "w", zipfile.ZIP_DEFLATED) as bundle:
         bundle.writestr("q.npy", bytes(300 << 20))
     with pytest.raises(LogError, match="unpacks to more than 128 MiB"):
@@ -203,7 +198,7 @@ class Evil:
 @pytest.mark.parametrize(
     "held", ["evil", {"q": OrderedDict}, {"q": np.ndarray}, {"q": Path("x")}, [1, 2], {}]
 )
-def test_pickles_of_anything_but_arrays_are_refused(tmp_path: Path, held: object) -> None:
+def test_pickles_of_anything_but_arrays_are_refused(tmp_path, held):
     trap = tmp_path / "trap"
     (tmp_path / "x").write_bytes(pickle.dumps({"q": Evil(trap)} if held == "evil" else held))
     with pytest.raises(LogError, match=r"np\.savez|no arrays|not a dictionary"):
@@ -211,27 +206,21 @@ def test_pickles_of_anything_but_arrays_are_refused(tmp_path: Path, held: object
     assert not trap.exists()
 
 
-def test_a_pickle_larger_than_what_is_held_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pickle_larger_than_what_is_held_is_refused(path, monkeypatch):
     monkeypatch.setattr("vftcli.readers.objects.PICKLE_LIMIT", 1 << 21)
-    (tmp_path / "x").write_bytes(pickle.dumps({"q": bytes(3 << 20)}))
+    (path).write_bytes(pickle.dumps({"q": bytes(3 << 20)}))
     with pytest.raises(LogError, match=r"x: a pickle of 3 MiB\. Save it with np\.savez\.$"):
-        read(tmp_path / "x")
+        read(path)
 
 
-def test_a_pickle_cannot_fill_memory_through_ndarray(tmp_path: Path) -> None:
+def test_a_pickle_cannot_fill_memory_through_ndarray(path):
     # cnumpy\nndarray\n (I1000000000\n t R . : numpy.ndarray((10**9,)) without any data
-    (tmp_path / "x").write_bytes(
-        b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.".replace(b" ", b"")
-    )
+    (path).write_bytes(b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.".replace(b" ", b""))
     with pytest.raises(LogError, match="Pickles are opened only"):
-        read(tmp_path / "x")
+        read(path)
 
 
-def test_a_format_that_nobody_has_yet_is_one_entry(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_format_that_nobody_has_yet_is_one_entry(path, monkeypatch):
     """A table of a maker's own names, unit, sign and payload: an entry as in layouts.toml."""
     entry = tomllib.loads(
         """
@@ -254,7 +243,6 @@ def test_a_format_that_nobody_has_yet_is_one_entry(
     lines = [";".join(["tick", *names, "load"])]
     for k, row in enumerate(np.hstack([log["q"], log["tau"]])):
         lines.append(";".join([str(8 * k), *map(repr, row.tolist()), "1.25"]))
-    path = tmp_path / "x"
     path.write_text("\n".join(lines) + "\n")
     recording = read(path)
     assert (recording.source.format, recording.source.clock) == ("acme", "controller clock [ms]")
