@@ -66,13 +66,10 @@ SINGLE = {"convert", "gains"}
 
 
 class Outcome(NamedTuple):
-    """What a kill left.
+    """What a kill left: "old", "new", "incomplete" or what is wrong; whether temporary files.
 
-    Attributes:
-        state: old, new, incomplete, or what is wrong.
-        left: Whether temporary files were left.
-        kept: Whether they are still there after a good run, None if there was none.
-        again: Whether that run succeeded and is whole.
+    Whether they are still there after a good run, and whether that run succeeded and is whole;
+    None if there was none.
     """
 
     state: str
@@ -87,11 +84,10 @@ class Trial:
     def __init__(self, name: str, folder: Path) -> None:
         self.name, self.folder = name, folder
         folder.mkdir()
-        lines = FIXTURE.read_text(encoding="utf-8").splitlines(keepends=True)
+        head, *rows = FIXTURE.read_text(encoding="utf-8").splitlines(keepends=True)
         for k, log in enumerate(("one", "two", "three")):
-            head, *rows = lines
-            part = rows[100 * k : 100 * k + 500]
-            (folder / f"{log}.csv").write_text("".join([head, *part]), encoding="utf-8")
+            part = "".join([head, *rows[100 * k : 100 * k + 500]])
+            (folder / f"{log}.csv").write_text(part, encoding="utf-8")
         self.old_words = COMMANDS[name].format("one", "three", 1).split()
         self.new_words = [*COMMANDS[name].format("two", "one", 2).split(), "--force"]
         (folder / "out").mkdir()
@@ -106,17 +102,12 @@ class Trial:
     def start(self, words: list[str], copies: str = "") -> subprocess.Popen[bytes]:
         """Start the command; it copies what there is before every change into `copies`."""
         environment = os.environ | {
-            "CRASH_COPIES": copies,
-            "PYTHONPATH": str(ROOT),
-            "PYTHONDONTWRITEBYTECODE": "1",
+            "CRASH_COPIES": copies, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1",
             "OPENBLAS_NUM_THREADS": "1",
-        }
+        }  # fmt: skip
+        command, quiet = [sys.executable, "-c", CHILD, *words], subprocess.DEVNULL
         return subprocess.Popen(
-            [sys.executable, "-c", CHILD, *words],
-            cwd=self.folder,
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
+            command, cwd=self.folder, env=environment, stdout=quiet, stderr=subprocess.PIPE
         )
 
     def finish(self, words: list[str], copies: str = "") -> None:
@@ -185,11 +176,8 @@ class Trial:
         listed = json.loads((self.folder / "out" / top).read_text(encoding="utf-8"))["files"]
         whole = listed == {name: sha for name, sha in found.items() if name != top}
         # Recordings differ from run to run, and so do the seals that hold their digests.
-        alike = all(
-            found.get(name) == sha
-            for name, sha in self.new.items()
-            if not name.endswith((".rrd", "run.json"))
-        )
+        fixed = (name for name in self.new if not name.endswith((".rrd", "run.json")))
+        alike = all(found.get(name) == self.new[name] for name in fixed)
         return "new" if whole and alike and found.keys() == self.new.keys() else "mixed"
 
 

@@ -63,11 +63,8 @@ COMMANDS = {
 
 def logs(folder: Path) -> None:
     """Put short logs into a folder."""
-    for name, fixture, first in (
-        ("a", "ur5_circle", 0),
-        ("b", "ur5_circle", 300),
-        ("panda", "panda_bearing", 0),
-    ):
+    starts = (("a", "ur5_circle", 0), ("b", "ur5_circle", 300), ("panda", "panda_bearing", 0))
+    for name, fixture, first in starts:
         text = (FIXTURES / f"{fixture}.csv").read_text(encoding="utf-8")
         head, *rows = text.splitlines(keepends=True)
         (folder / f"{name}.csv").write_text("".join([head, *rows[first : first + 500]]))
@@ -79,13 +76,8 @@ def run(words: Sequence[str], folder: Path, setting: dict[str, str]) -> dict[str
     logs(folder)
     given = set(folder.iterdir())
     environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"} | setting
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *words],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        check=False,
-    )
+    command = [sys.executable, "-c", PROGRAM, *words]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)
     if done.returncode != 0:
         sys.exit(f"{' '.join(words)}: {done.stderr.decode()}")
     files = [path for path in folder.rglob("*") if path.is_file() and path not in given]
@@ -100,15 +92,9 @@ def comparable(name: str, content: bytes) -> bytes:
     if not name.endswith("run.json"):
         return content
     record = json.loads(content)
-    record["files"] = {
-        k: v for k, v in record["files"].items() if not k.endswith((".rrd", "run.json"))
-    }
+    for file in [file for file in record["files"] if file.endswith((".rrd", "run.json"))]:
+        del record["files"][file]
     return json.dumps(record).encode()
-
-
-def same_recording(one: Path, other: Path) -> bool:
-    """Whether two recordings have one identity and the same content."""
-    return recorded(one) == recorded(other)
 
 
 def recorded(path: Path) -> list[object]:
@@ -148,13 +134,12 @@ def main() -> None:
                 total += 1
                 contents = [found.get(file) for found in made.values()]
                 if file.endswith(".rrd"):
-                    paths = [folder / k / file for k in SURROUNDINGS]
-                    fine = all(same_recording(paths[0], other) for other in paths[1:])
-                    recordings += fine
+                    known = [recorded(folder / k / file) for k in SURROUNDINGS]
                 else:
                     known = [c if c is None else comparable(file, c) for c in contents]
-                    fine = all(content == known[0] for content in known)
-                    equal += fine
+                fine = all(content == known[0] for content in known)
+                recordings += fine and file.endswith(".rrd")
+                equal += fine and not file.endswith(".rrd")
                 if not fine:
                     differ.append(f"{name}: {file}")
             print(f"{name}: {len(first)} outputs", flush=True)

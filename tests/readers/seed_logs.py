@@ -4,7 +4,8 @@ import gzip
 import json
 import pickle
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import struct
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -60,13 +61,9 @@ def ur_binary(path: Path) -> Path:
     """A log as the official client's --binary writes it."""
     log = motion()
     names = ["timestamp", *(f"actual_q_{j}" for j in range(6)), "robot_mode"]
-    kinds = [">f8"] * 7 + [">i4"]
-    records = np.zeros(ROWS, dtype=list(zip(names, kinds, strict=True)))
-    records["timestamp"] = 1000 + log["t"]
-    for j in range(6):
-        records[f"actual_q_{j}"] = log["q"][:, j]
     header = " ".join(names) + "\n" + " ".join(["DOUBLE"] * 7 + ["INT32"]) + "\n"
-    path.write_bytes(header.encode() + records.tobytes())
+    rows = (struct.pack(">7di", 1000 + t, *q, 0) for t, q in zip(log["t"], log["q"], strict=True))
+    path.write_bytes(header.encode() + b"".join(rows))
     return path
 
 
@@ -262,14 +259,12 @@ def rosbag1(path: Path, *, compression: str = "") -> Path:
     return path
 
 
-def bag_records(content: bytes) -> Iterator[bytes]:
-    """The records of a ROS 1 bag, each a header and data behind their lengths."""
-    place = len(b"#ROSBAG V2.0\n")
-    while place < len(content):
-        head = place + 4 + int.from_bytes(content[place : place + 4], "little")
-        end = head + 4 + int.from_bytes(content[head : head + 4], "little")
-        yield content[place:end]
-        place = end
+def patched(path: Path, place: bytes, put: bytes, *, behind: bool = True) -> Path:
+    """The file with some of its bytes replaced: where it holds others, or behind them."""
+    content = path.read_bytes()
+    at = content.index(place) + behind * len(place)
+    path.write_bytes(content[:at] + put + content[at + len(put) :])
+    return path
 
 
 def write_messages(

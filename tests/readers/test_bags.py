@@ -12,17 +12,37 @@ import lz4.frame
 import numpy as np
 import pytest
 import zstandard
-from seed_logs import ROWS, bag_records, bare_db3, bare_mcap, motion, rosbag1, rosbag2, write_mcap
+from message_mutants import bag_bytes, bag_records
+from seed_logs import (
+    ROWS,
+    bare_db3,
+    bare_mcap,
+    motion,
+    patched,
+    rosbag1,
+    rosbag2,
+    write_mcap,
+)
 
 from vftcli.readers.bags.container import ReadBudget, unpacked
 from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import Recording
 
-STORAGES = [
-    ("mcap", "", ""), ("sqlite3", "", ""), ("mcap", "FILE", "ZSTD"), ("sqlite3", "FILE", "ZSTD"),
-    ("sqlite3", "MESSAGE", "ZSTD"), ("mcap", "STORAGE", "ZSTD"),
-]  # fmt: skip
+BAGS = {
+    "rosbag1": (rosbag1, {}),
+    "rosbag1 lz4": (rosbag1, {"compression": "LZ4"}),
+    "rosbag1 bz2": (rosbag1, {"compression": "BZ2"}),
+    "rosbag2 mcap": (rosbag2, {"storage": "mcap"}),
+    "rosbag2 sqlite3": (rosbag2, {"storage": "sqlite3"}),
+    "rosbag2 mcap file": (rosbag2, {"storage": "mcap", "mode": "FILE"}),
+    "rosbag2 mcap storage": (rosbag2, {"storage": "mcap", "mode": "STORAGE"}),
+    "rosbag2 sqlite3 file": (rosbag2, {"storage": "sqlite3", "mode": "FILE"}),
+    "rosbag2 sqlite3 message": (rosbag2, {"storage": "sqlite3", "mode": "MESSAGE"}),
+    "mcap": (bare_mcap, {}),
+    "db3": (bare_db3, {}),
+}
+"""Format, storage and compression → how a bag is made."""
 
 
 @pytest.mark.parametrize("name", ["lz4", "bz2", "zstd"])
@@ -47,25 +67,14 @@ def assert_is_the_motion(recording: Recording) -> None:
     assert recording.source.t0 == pytest.approx(100)
 
 
-@pytest.mark.parametrize("compression", ["", "LZ4", "BZ2"])
-def test_ros1_bags(path, compression):
-    recording = read(rosbag1(path, compression=compression))
-    assert recording.source.format == "rosbag1"
+@pytest.mark.parametrize("name", BAGS)
+def test_every_kind_of_bag_holds_the_motion(path, name):
+    make, how = BAGS[name]
+    recording = read(make(path, **how))
     assert_is_the_motion(recording)
+    if how:
+        assert recording.source.format == name.split()[0]
     assert "robot clock" in recording.source.clock
-
-
-@pytest.mark.parametrize(("storage", "mode", "method"), STORAGES)
-def test_ros2_bags(path, storage, mode, method):
-    folder = rosbag2(path, storage=storage, mode=mode, method=method)
-    recording = read(folder)
-    assert recording.source.format == "rosbag2"
-    assert_is_the_motion(recording)
-
-
-@pytest.mark.parametrize("make", [bare_mcap, bare_db3])
-def test_bare_files(path, make):
-    assert_is_the_motion(read(make(path)))
 
 
 def test_metadata_is_not_needed_and_cannot_choose_a_path(tmp_path):
@@ -121,22 +130,23 @@ def test_cut_files_are_read_up_to_their_last_whole_chunk(path, make):
         read(path)
 
 
-def changed_index(path: Path, entry: Callable[[bytes], bytes]) -> Path:
-    """A closed ROS 1 bag whose records behind each chunk, its index, are changed."""
-    content = path.read_bytes()
-    records = (entry(r) if b"op=\x04" in r[:60] else r for r in bag_records(content))
-    path.write_bytes(content[:13] + b"".join(records))
+def changed_index(path: Path, change: Callable[[bytes], bytes] | None) -> Path:
+    """A closed ROS 1 bag whose records behind each chunk, its index, are changed or gone."""
+    content, out = rosbag1(path).read_bytes(), []
+    for fields, body in bag_records(content[13:]):
+        if fields[b"op"] != b"\x04":
+            out.append(bag_bytes(fields, body))
+        elif change is not None:
+            out.append(bag_bytes(fields, change(body)))
+    path.write_bytes(content[:13] + b"".join(out))
     return path
 
 
 def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path):
     """A recorder that stopped between a chunk and its index, and never closed the bag."""
-    path = changed_index(rosbag1(tmp_path / "x"), lambda _: b"")
+    path = changed_index(tmp_path / "x", None)
     assert_is_the_motion(read(path))
-    content = bytearray(rosbag1(tmp_path / "y").read_bytes())
-    place = content.index(b"index_pos=") + 10
-    content[place : place + 8] = bytes(8)
-    path.write_bytes(content)
+    path = patched(rosbag1(tmp_path / "y"), b"index_pos=", bytes(8))
     recording = read(path)
     assert_is_the_motion(recording)
     assert any("was never closed" in reported for reported in recording.source.warnings)
@@ -144,35 +154,30 @@ def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path):
 
 def test_a_bag_cut_within_the_index_of_a_chunk_is_read(path):
     """Behind each chunk is a record of index a topic; the last one is gone."""
-    rosbag1(path)
-    content = path.read_bytes()
-    places = [k for k in range(len(content)) if content.startswith(b"op=\x04", k)]
-    path.write_bytes(content[: places[3] - 8])  # before its header's and its first field's length
+    content = rosbag1(path).read_bytes()
+    records = list(bag_records(content[13:]))
+    places = [k for k, (fields, _) in enumerate(records) if fields[b"op"] == b"\x04"]
+    path.write_bytes(content[:13] + b"".join(bag_bytes(*r) for r in records[: places[3]]))
     recording = read(path)
     np.testing.assert_array_equal(recording.q, motion(7)["q"][: recording.samples])
     assert [r.code for r in recording.source.remarks if r.level == "warning"] == ["bag-cut"]
 
 
 def moved(by: int) -> Callable[[bytes], bytes]:
-    """An entry of an index that points elsewhere."""
-    return lambda r: r[:-4] + (int.from_bytes(r[-4:], "little") + by).to_bytes(4, "little")
-
-
-def shortened(record: bytes) -> bytes:
-    size = int.from_bytes(record[51:55], "little") - 12
-    return record[:51] + size.to_bytes(4, "little") + record[55:-12]
+    """An index whose last entry points elsewhere."""
+    return lambda b: b[:-4] + (int.from_bytes(b[-4:], "little") + by).to_bytes(4, "little")
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         *((moved(by), "damaged") for by in (1, 100, 2**31)),
-        (shortened, "a chunk and its index count differently"),
+        (lambda body: body[:-12], "a chunk and its index count differently"),
     ],
 )
 def test_an_index_that_points_elsewhere_or_leaves_out_is_damage(path, change, words):
     with pytest.raises(LogError, match=words):
-        read(changed_index(rosbag1(path), change))
+        read(changed_index(path, change))
 
 
 def test_databases_without_definitions_know_the_usual_types(path):

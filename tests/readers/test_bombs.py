@@ -17,7 +17,7 @@ import seed_containers as seeds
 from pyarrow.parquet import write_table
 from reading_child import Reading, read_apart
 from scipy.io import savemat
-from seed_logs import ROWS, motion
+from seed_logs import ROWS, motion, patched
 from test_hostile import database, mcap_of_type
 
 h5py: Any = import_module("h5py") if find_spec("h5py") else None
@@ -137,11 +137,8 @@ def parquet_bomb(path: Path) -> Path:
 
 def arrow_lies(path: Path) -> Path:
     """A buffer that says to unpack to half of all memory there is."""
-    data = bytearray(seeds.arrow(path).read_bytes())
-    place = data.index(struct.pack("<q", 8 * 50), 300)  # what the clock of a batch unpacks to
-    data[place : place + 8] = struct.pack("<q", 1 << 62)
-    path.write_bytes(data)
-    return path
+    claims = struct.pack("<q", 8 * 50)  # what the clock of a batch unpacks to
+    return patched(seeds.arrow(path), claims, struct.pack("<q", 1 << 62), behind=False)
 
 
 def held(path: Path, content: bytes) -> Path:

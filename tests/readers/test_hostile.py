@@ -14,15 +14,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 import zstandard
-from message_mutants import mcap_records
+from message_mutants import bag_bytes, bag_records, mcap_records
 from pyarrow.parquet import write_table
 from seed_logs import (
     ROWS,
-    bag_records,
     bare_db3,
     bare_mcap,
     motion,
     panda_py_log,
+    patched,
     rosbag1,
     rows_of,
     ur_csv,
@@ -32,15 +32,6 @@ from seed_logs import (
 from vftcli.readers.bags import container
 from vftcli.readers.reading import read
 from vftcli.signals.errors import LogError, VftError
-
-
-def bag_cut_at_record(path: Path, compression: str = "") -> Path:
-    """A closed bag of which all behind its second chunk and that one's index is gone."""
-    content = rosbag1(path, compression=compression).read_bytes()
-    records = list(bag_records(content))
-    chunks = [k for k, record in enumerate(records) if b"op=\x05" in record[:100]]
-    path.write_bytes(content[:13] + b"".join(records[: chunks[2]]))
-    return path
 
 
 def mcap_without_its_middle(path: Path, keep_summary: bool) -> Path:
@@ -56,23 +47,7 @@ def mcap_without_its_middle(path: Path, keep_summary: bool) -> Path:
     return path
 
 
-JOINT_STATE = """std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
-
-
-def mcap_of_type(path: Path, definition: str, position: float = 0.1) -> Path:
+def mcap_of_type(path: Path, definition: str | None = None, position: float = 0.1) -> Path:
     """Twenty joint states in an MCAP that says their type is what a text defines."""
     from rosbags.typesys import Stores, get_typestore
 
@@ -88,6 +63,8 @@ def mcap_of_type(path: Path, definition: str, position: float = 0.1) -> Path:
             effort=np.zeros(6),
         )
         messages.append(("/j", 8_000_000 * k, bytes(store.serialize_cdr(message, kind))))
+    if definition is None:
+        definition, _ = store.generate_msgdef(kind, ros_version=2)
     schemas = {"/j": (kind, "ros2msg", definition.encode())}
     return write_mcap(path, messages, encoding="cdr", schemas=schemas)
 
@@ -104,13 +81,6 @@ def database(path: Path, messages: str, *more: str) -> Path:
         for statement in more:
             db.execute(statement)
         db.commit()
-    return path
-
-
-def pickled_with_byte_order(path: Path) -> Path:
-    """panda-py's log in the other byte order than most machines have."""
-    log = panda_py_log()
-    path.write_bytes(pickle.dumps({name: a.astype(">f8") for name, a in log.items()}))
     return path
 
 
@@ -151,7 +121,7 @@ def peak_mib() -> float:
 @pytest.mark.parametrize("pack", [gzip.compress, zstandard.compress])
 def test_decompression_bombs_are_bounded(path, pack):
     bomb = b"t,q1\n" + b"0.1,0.2\n" * (64 << 20)  # half a gibibyte, shrinks a thousandfold
-    (path).write_bytes(pack(bomb))
+    path.write_bytes(pack(bomb))
     del bomb
     before = peak_mib()
     with pytest.raises(LogError, match="unpacks to more than 128 MiB"):
@@ -160,11 +130,7 @@ def test_decompression_bombs_are_bounded(path, pack):
 
 
 def test_a_chunk_that_claims_too_much_is_refused(path):
-    path = rosbag1(path, compression="LZ4")
-    content = bytearray(path.read_bytes())
-    place = content.index(b"size=") + 5
-    content[place : place + 4] = struct.pack("<I", 2**32 - 1)
-    path.write_bytes(content)
+    patched(rosbag1(path, compression="LZ4"), b"size=", b"\xff" * 4)
     with pytest.raises(LogError, match="unpacks to more than 128 MiB"):
         read(path)
 
@@ -198,7 +164,7 @@ def test_nothing_is_written_beside_a_log(tmp_path):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda path: mcap_of_type(path, JOINT_STATE, position=np.nan), "NaN in all 20 messages"),
+        (lambda path: mcap_of_type(path, position=np.nan), "NaN in all 20 messages"),
         (lambda path: parquet(path, q=lists([])), "q holds no number in its first row"),
         (lambda path: parquet(path, dq=lists([])), "dq holds no number in its first row"),
         (lambda path: parquet(path, q=lists(None)), "q holds no number in its first row"),
@@ -230,11 +196,8 @@ def test_tables_that_are_no_log_are_refused_by_what_is_wrong(path, make, words):
 
 def test_a_name_of_many_digits_is_a_name(path):
     """A number was tried from each of its digits on, and one of 5000 digits is none of Python's."""
-    path = table(path, lambda k: 0.008 * k)
-    head, _, rows = path.read_text().partition("\n")
-    path.write_text(head.replace("dq5", "1" * 40_000 + "x").replace("dq4", "dq" + "4" * 5000))
-    with path.open("a") as file:
-        file.write("\n" + rows)
+    text = table(path, lambda k: 0.008 * k).read_text()
+    path.write_text(text.replace("dq5", "1" * 40_000 + "x").replace("dq4", "dq" + "4" * 5000))
     assert read(path).signals == ("q",)
 
 
@@ -256,7 +219,12 @@ def test_one_row_and_steps_down_to_a_tenth_of_a_microsecond_are_a_clock(path):
 
 @pytest.mark.parametrize("compression", ["", "LZ4"])
 def test_a_bag_cut_between_records_says_what_was_kept(path, compression):
-    recording = read(bag_cut_at_record(path, compression))
+    """All behind its second chunk and that one's index is gone."""
+    content = rosbag1(path, compression=compression).read_bytes()
+    records = list(bag_records(content[13:]))
+    chunks = [k for k, (fields, _) in enumerate(records) if fields[b"op"] == b"\x05"]
+    path.write_bytes(content[:13] + b"".join(bag_bytes(*r) for r in records[: chunks[2]]))
+    recording = read(path)
     [cut] = [r for r in recording.source.remarks if r.level == "warning"]
     assert cut.code == "bag-cut"
     assert 0 < recording.samples < ROWS
@@ -275,33 +243,24 @@ def test_an_mcap_without_its_middle_says_what_was_kept(tmp_path):
     assert placed.samples == counted.samples < ROWS
 
 
-COLUMNS = "id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB"
+PLAIN = "id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB"
 
 
 def test_no_function_of_a_database_runs(path):
     """Also where the table is plain: an index on an expression is never computed for a query."""
-    path = database(
-        path,
-        f"CREATE TABLE messages ({COLUMNS}, "
-        "more BLOB GENERATED ALWAYS AS (zeroblob(900000000)) VIRTUAL)",
-        "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 0, x'0001')",
-    )
+    more = "more BLOB GENERATED ALWAYS AS (zeroblob(900000000)) VIRTUAL"
+    insert = "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 0, x'0001')"
+    database(path, f"CREATE TABLE messages ({PLAIN}, {more})", insert)
     with pytest.raises(LogError, match="does not fit the definition"):
         read(path)  # the message itself was reached, and it is none
 
 
 def test_a_message_longer_than_its_file_is_damage(path):
     """A row that claims a length of 2³¹ or so: SQLite would make room for it first."""
-    path = database(
-        path,
-        f"CREATE TABLE messages ({COLUMNS})",
-        "INSERT INTO messages VALUES (1, 1, 7, zeroblob(200000))",
-    )
-    content = bytearray(path.read_bytes())
+    insert = "INSERT INTO messages VALUES (1, 1, 7, zeroblob(200000))"
+    database(path, f"CREATE TABLE messages ({PLAIN})", insert)
     # A blob of n bytes has the number 2 n + 12, in groups of seven bits: 200 000 is 0x98 0xb5 0x0c.
-    place = content.index(bytes([0x98, 0xB5, 0x0C]))
-    content[place : place + 3] = bytes([0xFF, 0xFF, 0x7C])  # about a million bytes
-    path.write_bytes(content)
+    patched(path, b"\x98\xb5\x0c", b"\xff\xff\x7c", behind=False)  # about a million bytes
     with pytest.raises(LogError, match=r"damaged|not a readable"):
         read(path)
 
@@ -320,14 +279,15 @@ def test_a_journal_beside_a_database_is_said(tmp_path):
 
 
 def test_pickled_arrays_keep_their_byte_order(path):
-    recording = read(pickled_with_byte_order(path))
-    np.testing.assert_array_equal(recording.q, motion(7)["q"])
-    np.testing.assert_array_equal(recording.torque, motion(7)["tau"])
+    """Also in the other one than most machines have."""
+    log = panda_py_log()
+    path.write_bytes(pickle.dumps({name: a.astype(">f8") for name, a in log.items()}))
+    recording = read(path)
+    np.testing.assert_array_equal(recording.q, log["q"])
+    np.testing.assert_array_equal(recording.torque, log["tau_J"])
 
 
 @pytest.mark.parametrize("make", [ur_csv, parquet, rosbag1, bare_db3, npz])
 def test_a_name_that_is_not_utf8_is_no_hindrance(tmp_path, make):
-    plain = make(tmp_path / "x")
-    odd = tmp_path / os.fsdecode(b"bad\xff")
-    plain.rename(odd)
+    odd = make(tmp_path / "x").rename(tmp_path / os.fsdecode(b"bad\xff"))
     assert read(odd).samples == ROWS

@@ -58,16 +58,11 @@ def table(rows: int = 300, **changed: Any) -> pl.DataFrame:
     return pl.DataFrame(columns | changed)
 
 
-def both_ways(path: Path) -> tuple[Recording, Recording]:
-    """The log in one piece, and in parts."""
-    with one_piece():
-        whole = read(path)
-    return whole, read(path)
-
-
 def check_same(path: Path) -> tuple[Recording, Recording]:
     """Check that a log in parts is the whole log, and that the same is said of it."""
-    whole, long = both_ways(path)
+    with one_piece():
+        whole = read(path)
+    long = read(path)
     assert long.signals == whole.signals
     for name in ("t", *whole.signals):
         np.testing.assert_array_equal(getattr(long, name), getattr(whole, name))

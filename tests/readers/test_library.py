@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import vftcli.readers.reading
-from vftcli.readers.library import Library, LogCollection, LogEntry, absolute, labelled
+from vftcli.batch.run import LogCollection, LogEntry
+from vftcli.readers.library import Library, absolute, labelled
 from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.signals.recording import same_run
 

@@ -8,7 +8,7 @@ import pytest
 from vftcli.doctor import examine
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ALL, ReadChoice
-from vftcli.readers.reading import read, read_first_recording
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.signals.errors import VftError
 
@@ -180,12 +180,6 @@ def test_ur3_repeats_differ_by_noise_once_the_sign_is_turned(logs):
         difference = (partner - a.torque)[moving, j]
         # white noise alone gives 1; wrist 3's is not quite white
         assert np.sqrt(np.mean(difference**2)) < 1.5 * floor[j]
-
-
-def test_of_two_arms_the_first_is_described(samples):
-    pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
-    recording = read_first_recording(samples / "reach" / "aloha_episode_0.hdf5")
-    assert "arm-side-chosen" in {remark.code for remark in recording.source.remarks}
 
 
 @pytest.mark.parametrize(

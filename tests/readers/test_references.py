@@ -7,12 +7,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.readers.references import (
-    estimates_columns,
-    read_list,
-    read_outside,
-    read_reference,
-)
+from vftcli.readers.references import estimates_columns, read_reference
+from vftcli.reproduction.manifest import read_list
+from vftcli.reproduction.scoring import read_outside
 from vftcli.signals.errors import ClockError, LogError
 
 

@@ -50,15 +50,11 @@ def test_official_text_keeps_every_digit(path, end):
 )
 def test_the_point_of_the_controllers_moment(path, field, shift, point):
     """Of actual_TCP_force: the TCP on CB3, by its sensor on e-Series; fields or clock say which."""
-    path = ur_csv(path, separator=",", end="\n")
-    lines = path.read_text().splitlines()
-    clock = lines[0].split(",").index("timestamp")
-    wrench = ",".join(f"actual_TCP_force_{k}" for k in range(6))
-    out = [f"{lines[0]},{wrench},{field}"]
-    for k, line in enumerate(lines[1:]):
-        cells = line.split(",")
-        cells[clock] = f"{1000.0 + 0.008 * k + shift:.6f}"
-        out.append(",".join([*cells, "1,2,3,.1,.2,.3", "0"]))
+    head, *lines = ur_csv(path, separator=",", end="\n").read_text().splitlines()
+    out = [",".join([head, *(f"actual_TCP_force_{k}" for k in range(6)), field])]
+    for k, line in enumerate(lines):
+        _, *cells = line.split(",")  # the clock is the first
+        out.append(",".join([f"{1000.0 + 0.008 * k + shift:.6f}", *cells, "1,2,3,.1,.2,.3", "0"]))
     path.write_text("\n".join(out) + "\n")
     assert read(path).source.format == "ur-rtde"
     assert read(path).wrench_frame == WrenchFrame("base", point)
@@ -68,11 +64,9 @@ def test_the_point_of_the_controllers_moment(path, field, shift, point):
 
 
 def test_payload_that_the_controller_was_reported_of(path):
-    path = ur_csv(path, separator=",", end="\n")
-    lines = path.read_text().splitlines()
-    lines[0] += ",payload,payload_cog_0,payload_cog_1,payload_cog_2"
-    lines[1:] = [f"{line},1.5,0,0.01,0.05" for line in lines[1:]]
-    path.write_text("\n".join(lines) + "\n")
+    head, *lines = ur_csv(path, separator=",", end="\n").read_text().splitlines()
+    head += ",payload,payload_cog_0,payload_cog_1,payload_cog_2"
+    path.write_text("\n".join([head, *(f"{line},1.5,0,0.01,0.05" for line in lines)]) + "\n")
     recording = read(path)
     assert (recording.payload_mass, recording.payload_com) == (1.5, (0, 0.01, 0.05))
 
@@ -144,7 +138,7 @@ def test_states_as_json_lines(path):
         read(path)
 
 
-@pytest.mark.parametrize("state", ["[" * 50_000, '"' + "x" * (1 << 20) + '"'])
+@pytest.mark.parametrize("state", ["[" * 50_000, '"' + "x" * (1 << 20) + '"}'])
 def test_json_that_is_nested_or_endless_is_refused(path, state):
     path.write_text(f'{{"O_T_EE": {state}\n' * 2)
     with pytest.raises(LogError, match="line 1 is not one JSON object"):
@@ -208,14 +202,14 @@ def test_pickles_of_anything_but_arrays_are_refused(tmp_path, held):
 
 def test_a_pickle_larger_than_what_is_held_is_refused(path, monkeypatch):
     monkeypatch.setattr("vftcli.readers.objects.PICKLE_LIMIT", 1 << 21)
-    (path).write_bytes(pickle.dumps({"q": bytes(3 << 20)}))
+    path.write_bytes(pickle.dumps({"q": bytes(3 << 20)}))
     with pytest.raises(LogError, match=r"x: a pickle of 3 MiB\. Save it with np\.savez\.$"):
         read(path)
 
 
 def test_a_pickle_cannot_fill_memory_through_ndarray(path):
     # cnumpy\nndarray\n (I1000000000\n t R . : numpy.ndarray((10**9,)) without any data
-    (path).write_bytes(b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.".replace(b" ", b""))
+    path.write_bytes(b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.".replace(b" ", b""))
     with pytest.raises(LogError, match="Pickles are opened only"):
         read(path)
 
