@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
+from vftcli.signals.remarks import Remark
 
 TENSOR = (0.03, 0.001, 0.002, 0.028, -0.001, 0.025)
 
@@ -158,8 +159,8 @@ def mobile() -> str:
 def two_armed() -> str:
     return robot(
         link("base", 20.0),
-        arm(7, "left_", "base"),
         arm(7, "right_", "base"),
+        arm(7, "left_", "base"),
         fixed("left_tool0", "left_link7"),
         fixed("right_tool0", "right_link7"),
         name="two_armed",
@@ -174,6 +175,12 @@ def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def said(robot: Robot, code: str) -> Remark:
+    """The robot's remark of a code."""
+    (remark,) = (remark for remark in robot.remarks if remark.code == code)
+    return remark
 
 
 def reduced_model(

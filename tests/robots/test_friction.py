@@ -344,8 +344,7 @@ def test_what_no_joint_has_is_refused(old: str, new: str, words: str, tmp_path: 
 
 
 LOADED = JointFriction(
-    model="coulomb-viscous-load",
-    parameters={"coulomb": 2.0, "viscous": 1.0, "load_coulomb": 0.1},
+    model="coulomb-viscous-load", parameters={"coulomb": 2.0, "viscous": 1.0, "load_coulomb": 0.1}
 )
 PLAIN = JointFriction(model="coulomb-viscous", parameters={"coulomb": 2.0, "viscous": 1.0})
 

@@ -12,7 +12,6 @@ from vftcli.robots import PROFILES, Payload, Robot, kernels, load_robot
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import (
     chain_parameters,
-    felt_bodies,
     load_regressor,
     momentum_chunks,
     momentum_terms,
@@ -45,21 +44,21 @@ def states(robot: Robot, seed: int, samples: int = 300) -> tuple[np.ndarray, np.
     return rng.uniform(-np.pi, np.pi, shape), rng.uniform(-2.0, 2.0, shape)
 
 
-@pytest.mark.parametrize("name", PROFILES)
-def test_agrees_with_pinocchio_under_payload_and_tilted_base(name: str) -> None:
-    robot = loaded(name)
-    q, dq = states(robot, seed=1)
-    terms = momentum_terms(robot.loaded_chain, q, dq)
-    model, data = robot.model, robot.model.createData()
+def agrees_with_pinocchio(chain: Chain, q: np.ndarray, dq: np.ndarray) -> None:
+    terms, model = momentum_terms(chain, q, dq), chain.to_pinocchio()
+    data = model.createData()
     for k in range(len(q)):
         M = pin.crba(model, data, q[k])
         C = pin.computeCoriolisMatrix(model, data, q[k], dq[k])
         g = pin.computeGeneralizedGravity(model, data, q[k])
-        np.testing.assert_allclose(terms.p[k], M @ dq[k], atol=ROUNDING, rtol=0)
-        np.testing.assert_allclose(
-            terms.coriolis_transpose_dq[k], C.T @ dq[k], atol=ROUNDING, rtol=0
-        )
-        np.testing.assert_allclose(terms.gravity[k], g, atol=ROUNDING, rtol=0)
+        expected = [M @ dq[k], C.T @ dq[k], g]
+        np.testing.assert_allclose([term[k] for term in terms], expected, atol=ROUNDING, rtol=0)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_agrees_with_pinocchio_under_payload_and_tilted_base(name: str) -> None:
+    robot = loaded(name)
+    agrees_with_pinocchio(robot.loaded_chain, *states(robot, seed=1))
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -79,23 +78,6 @@ def test_the_papers_literal_method_agrees_within_its_own_step(name: str) -> None
     )
 
 
-def test_momentum_rate_splits_as_the_paper_says() -> None:
-    """Ṁq̇ = Cq̇ + Cᵀq̇ (13), with Ṁq̇ by central differences along the motion."""
-    robot = loaded("ur5")
-    q, dq = states(robot, seed=3, samples=50)
-    h = 1e-5
-    ahead = momentum_terms(robot.loaded_chain, q + h * dq, dq).p
-    behind = momentum_terms(robot.loaded_chain, q - h * dq, dq).p
-    weightless = tilted(robot, np.zeros(3)).model
-    data = weightless.createData()
-    coriolis = np.array(
-        [pin.rnea(weightless, data, a, v, np.zeros(6)) for a, v in zip(q, dq, strict=True)]
-    )
-    transpose = momentum_terms(robot.loaded_chain, q, dq).coriolis_transpose_dq
-    # central differences: error of order h² = 1e-10 times third derivatives of order 100
-    np.testing.assert_allclose((ahead - behind) / (2 * h), coriolis + transpose, atol=1e-7)
-
-
 def test_chunks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = load_robot("panda")
     q, dq = states(robot, seed=4, samples=1000)
@@ -104,27 +86,6 @@ def test_chunks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     parts = momentum_terms(robot.loaded_chain, q, dq)
     for one, other in zip(whole, parts, strict=True):
         np.testing.assert_array_equal(other, one)
-
-
-def test_arm_at_rest_without_gravity_has_no_torque() -> None:
-    robot = tilted(load_robot("ur10e"), np.zeros(3))
-    q, dq = states(robot, seed=5, samples=20)
-    terms = momentum_terms(robot.loaded_chain, q, np.zeros_like(dq))
-    assert not np.any(terms.p)
-    assert not np.any(terms.coriolis_transpose_dq)
-    np.testing.assert_allclose(terms.gravity, 0.0, atol=1e-15)
-
-
-def test_rotor_inertia_counts_in_the_momentum() -> None:
-    """One joint turning alone: p_j − (arm without rotors) = J_j q̇_j."""
-    from dataclasses import replace
-
-    robot = load_robot("ur5")
-    bare = replace(robot.chain, rotor_inertia=np.zeros(6))
-    q, dq = states(robot, seed=6, samples=20)
-    with_rotor = momentum_terms(robot.chain, q, dq).p
-    without = momentum_terms(bare, q, dq).p
-    np.testing.assert_allclose(with_rotor - without, dq * robot.chain.rotor_inertia, atol=1e-13)
 
 
 def dense(robot: Robot, seed: int) -> Chain:
@@ -143,27 +104,7 @@ def test_general_rotations_agree_with_pinocchio(joints: int) -> None:
     if joints == 1:
         cut = {k: v[:1] for k, v in vars(chain).items() if k in PER_JOINT}
         chain = replace(chain, **cut)
-    rng = np.random.default_rng(10)
-    q, dq = rng.normal(0.0, 3.0, (2, 50, joints))
-    terms = momentum_terms(chain, q, dq)
-    model = chain.to_pinocchio()
-    data = model.createData()
-    for k in range(len(q)):
-        M = pin.crba(model, data, q[k])
-        C = pin.computeCoriolisMatrix(model, data, q[k], dq[k])
-        g = pin.computeGeneralizedGravity(model, data, q[k])
-        np.testing.assert_allclose(terms.p[k], M @ dq[k], atol=ROUNDING, rtol=0)
-        np.testing.assert_allclose(
-            terms.coriolis_transpose_dq[k], C.T @ dq[k], atol=ROUNDING, rtol=0
-        )
-        np.testing.assert_allclose(terms.gravity[k], g, atol=ROUNDING, rtol=0)
-
-
-def test_bodies_hand_on_what_their_joint_cannot_feel() -> None:
-    """No mass, no first moment along the axis and no J_yy is left, so that little is computed."""
-    inertia, moment = felt_bodies(load_robot("ur5").with_payload(LOAD).loaded_chain)
-    assert not moment[:, 2].any()
-    assert not inertia[:, 1, 1].any()
+    agrees_with_pinocchio(chain, *np.random.default_rng(10).normal(0.0, 3.0, (2, 50, joints)))
 
 
 @pytest.mark.parametrize("samples", [0, 1, 2])
@@ -205,35 +146,20 @@ def moving_states(joints, seed, count=40):
 
 @pytest.mark.parametrize("name", ["ur5", "ur10e", "panda", "fr3"])
 def test_equals_pinocchios_regressor(name):
-    robot = load_robot(name)
+    """On a tilted base; times the chain's parameters it is inverse dynamics without rotors."""
+    robot = tilted(load_robot(name), TILTED)
     q, dq, ddq = moving_states(robot.joints, 1)
     model, data = robot.model, robot.model.createData()
-    expected = [
-        pin.computeJointTorqueRegressor(model, data, *state).copy()
-        for state in zip(q, dq, ddq, strict=True)
-    ]
+    expected, torque = [], []
+    for state in zip(q, dq, ddq, strict=True):
+        expected.append(pin.computeJointTorqueRegressor(model, data, *state).copy())
+        torque.append(pin.rnea(model, data, *state).copy())
+    found = torque_regressor(robot.chain, q, dq, ddq)
     # both are sums of some hundred products of numbers of order 10: rounding at 1e-13
-    np.testing.assert_allclose(torque_regressor(robot.chain, q, dq, ddq), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_times_parameters_is_inverse_dynamics_without_rotors(name):
-    robot = load_robot(name)
-    q, dq, ddq = moving_states(robot.joints, 2)
-    model, data = robot.model, robot.model.createData()
-    torque = [pin.rnea(model, data, *state).copy() for state in zip(q, dq, ddq, strict=True)]
-    rigid = torque_regressor(robot.chain, q, dq, ddq) @ chain_parameters(robot.chain)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
     # Pinocchio's rnea includes the rotors' armature
+    rigid = found @ chain_parameters(robot.chain)
     np.testing.assert_allclose(rigid + robot.chain.rotor_inertia * ddq, torque, atol=1e-11)
-
-
-def test_a_tilted_base_turns_gravity():
-    robot = tilted(load_robot("ur5"), [4.0, -3.0, -8.0])
-    q, zero = moving_states(6, 3)[0], np.zeros((40, 6))
-    model, data = robot.model, robot.model.createData()
-    expected = [pin.computeGeneralizedGravity(model, data, x).copy() for x in q]
-    gravity = torque_regressor(robot.chain, q, zero, zero) @ chain_parameters(robot.chain)
-    np.testing.assert_allclose(gravity, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["ur10e", "panda"])

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.robots import JointFriction, load_robot
-from vftcli.robots.friction import (
-    friction_factor,
-    friction_torque,
-    lawless,
-    warmth,
-)
+from vftcli.robots.friction import friction_factor, friction_torque, lawless, warmth
 from vftcli.robots.running_friction import measured_temperature
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.recording import Recording

@@ -82,8 +82,7 @@ def test_friction_is_taken_off_and_literal_dynamics_agree() -> None:
 
 
 @pytest.mark.parametrize(
-    ("missing", "words"),
-    [("dq", "no joint velocities"), ("current", "no motor currents")],
+    ("missing", "words"), [("dq", "no joint velocities"), ("current", "no motor currents")]
 )
 def test_a_missing_signal_is_named(missing: str, words: str) -> None:
     t, q, dq, _ = motion(6)

@@ -7,7 +7,6 @@ import pytest
 from made_urdfs import arm, fixed, link, robot, written
 
 from vftcli.robots import described, load_robot
-from vftcli.robots.described import DEEPEST, xml_root
 from vftcli.signals.errors import RobotError
 
 HEAD = """<robot name="$(arg name)" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -36,10 +35,7 @@ def test_a_xacro_is_expanded_with_its_arguments(tmp_path: Path) -> None:
     held = load_robot(f"{path} name:=made gripper:=true")
     assert held.chain.mass[-1] - bare.chain.mass[-1] == pytest.approx(0.5)
     assert bare.remarks[0].code == "xacro-run"
-
-
-@pytest.mark.usefixtures("_xacro_installed")
-def test_a_file_that_holds_macros_is_a_xacro_whatever_it_is_called(tmp_path: Path) -> None:
+    # A file that holds macros is a xacro whatever it is called.
     assert load_robot(f"{written(tmp_path, xacro())} name:=made").name == "made"
 
 
@@ -65,44 +61,24 @@ def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("text", "arguments", "words"),
     [
-        (xacro(), [], "the xacro needs name: .*name:=VALUE'; it takes name, gripper"),
-        (
-            xacro(),
-            ["name:=made", "griper:=true"],
-            r"no argument 'griper'\. Did you mean gripper\? Behind its name it takes name, gri",
-        ),
-        (xacro("$(arg tool)"), ["name:=made"], "the xacro needs tool: .*tool:=VALUE"),
-        (
-            xacro('<xacro:include filename="$(find nowhere)/x.xacro"/>'),
-            ["name:=made"],
-            "cannot be expanded: .*nowhere",
-        ),
-        (xacro("${1 / 0}"), ["name:=made"], "cannot be expanded: .*division by zero"),
-        (xacro("${__import__('os')}"), ["name:=made"], "cannot be expanded: "),
-        (xacro('<xacro:include filename="arm.xacro"/>'), ["name:=made"], "cannot be expanded: "),
-        (xacro("${'a' * 10 ** 12}"), ["name:=made"], r"cannot be expanded: .*10 \*\* 12"),
-        (xacro("$(env HOME)"), ["name:=made"], "it reads the environment variable HOME"),
-        (
-            xacro("${xacro.load_yaml('/etc/passwd')}"),
-            ["name:=made"],
-            "it loads /etc/passwd, which is outside of its folder",
-        ),
-        (
-            xacro("${load_yaml('../beside.yaml')}"),
-            ["name:=made"],
-            r"it loads \.\./beside\.yaml, which is outside of its folder",
-        ),
+        (xacro(), "", "the xacro needs name: .*name:=VALUE'; it takes name, gripper"),
+        (xacro(), "name:=m griper:=1", r"no argument 'griper'\. Did you .* takes name, gripper"),
+        (xacro("$(arg tool)"), "name:=made", "the xacro needs tool: .*tool:=VALUE"),
+        (xacro('<xacro:include filename="$(find nowhere)/x.xacro"/>'), "name:=made", "nowhere"),
+        (xacro("${1 / 0}"), "name:=made", "cannot be expanded: .*division by zero"),
+        (xacro("${__import__('os')}"), "name:=made", "cannot be expanded: "),
+        (xacro('<xacro:include filename="arm.xacro"/>'), "name:=made", "cannot be expanded: "),
+        (xacro("${'a' * 10 ** 12}"), "name:=made", r"cannot be expanded: .*10 \*\* 12"),
+        (xacro("$(env HOME)"), "name:=made", "it reads the environment variable HOME"),
+        (xacro("${xacro.load_yaml('/etc/passwd')}"), "name:=made", "/etc/passwd, which is out"),
+        (xacro("${load_yaml('../beside.yaml')}"), "name:=made", r"\./beside\.yaml, which is out"),
     ],
 )
 def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
-    text: str,
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    text, arguments, words, tmp_path, capfd
 ) -> None:
     with pytest.raises(RobotError, match=words) as caught:
-        load_robot(" ".join([str(written(tmp_path, text, "arm.xacro")), *arguments]))
+        load_robot(f"{written(tmp_path, text, 'arm.xacro')} {arguments}".strip())
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
 
@@ -110,9 +86,7 @@ def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
 @pytest.mark.slow
 @pytest.mark.usefixtures("_xacro_installed")
 @pytest.mark.parametrize("name", ["arm.xacro", "arm.urdf"])
-def test_a_xacro_that_never_ends_is_ended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
+def test_a_xacro_that_never_ends_is_ended(tmp_path, monkeypatch, name: str) -> None:
     """9^9^9 has 370 million digits: hours of a processor, in one step of the interpreter."""
     monkeypatch.setattr(described, "SECONDS", 1)
     path = written(tmp_path, xacro("${9**9**9}"), name)
@@ -154,15 +128,11 @@ def test_a_maker_s_package_loads_its_tables_and_those_of_a_package_beside_it(
     assert robot.chain.mass[-1] == pytest.approx(1.0 + 0.25)
 
 
-def test_without_the_package_the_line_that_expands_it_is_reported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_package_the_line_that_expands_it_is_reported(tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)
     path = written(tmp_path, xacro(), "arm.urdf.xacro")
-    with pytest.raises(
-        RobotError,
-        match=r"pip install 'vftcli\[xacro\]'.*xacro arm\.urdf\.xacro name:=made > arm\.urdf$",
-    ):
+    line = r"pip install 'vftcli\[xacro\]'.*xacro arm\.urdf\.xacro name:=made > arm\.urdf$"
+    with pytest.raises(RobotError, match=line):
         load_robot(f"{path} name:=made")
 
 
@@ -186,19 +156,14 @@ BOMB = (
         (BOMB, "has a document type 'r', which defines XML entities"),
         ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', "has a document type 'r'"),
         ("<a>" * 100_000, "more than 500 elements within one another"),
+        ("<a>" * 500 + "</a>" * 500, "its first element is <a>, not <robot> or <mujoco>"),
         ("", "which is XML: no element found"),
-        ("robot", "which is XML: syntax error"),
+        ("<robot", "which is XML: unclosed token"),
         ("<robot>&undefined;</robot>", "which is XML: undefined entity"),
         ("<x:robot/>", "which is XML: unbound prefix"),
         ("<robot>\x00</robot>", "which is XML: "),
     ],
 )
-def test_a_hostile_text_is_refused(text: str, words: str) -> None:
+def test_a_hostile_text_is_refused(text: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(RobotError, match=words):
-        xml_root(text, Path("arm.urdf"))
-
-
-def test_a_plain_text_is_its_elements() -> None:
-    text = "<a>" * DEEPEST + "</a>" * DEEPEST
-    assert sum(1 for _ in xml_root(text, Path("arm.urdf")).iter()) == DEEPEST
-    assert xml_root("<a><b/><b x='1'/></a>", Path("arm.urdf"))[1].get("x") == "1"
+        load_robot(written(tmp_path, text))

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import MissingSignalError, ParameterError
-from vftcli.signals.recording import (
-    Recording,
-    Source,
-    refuse_repeated_logs,
-    same_run,
-)
+from vftcli.signals.recording import Recording, Source, refuse_repeated_logs, same_run
 
 T = np.arange(4.0)
 Q = np.zeros((4, 6))

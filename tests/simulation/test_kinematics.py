@@ -8,12 +8,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.robot import FlangeSolver
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.trajectories import (
-    HOMES,
-    check_limits,
-    check_start,
-    follow,
-)
+from vftcli.simulation.trajectories import HOMES, check_limits, check_start, follow
 
 
 def test_the_usual_poses_are_those_of_the_paper_and_of_franka():

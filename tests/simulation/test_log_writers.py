@@ -49,12 +49,7 @@ CASES = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("who", "form", "name", "kept"), CASES)
 def test_readers_read_back_what_is_written(
-    who: str,
-    form: str,
-    name: str,
-    kept: float,
-    tmp_path: Path,
-    request: pytest.FixtureRequest,
+    who: str, form: str, name: str, kept: float, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     run: Simulation = request.getfixturevalue(who)
     save({tmp_path / name: run}, form)

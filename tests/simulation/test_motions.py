@@ -156,8 +156,7 @@ def base_columns(robot):
 
 
 @pytest.mark.parametrize(
-    ("name", "rank", "condition"),
-    [("", 58, 13.9), ("panda-", 69, 10.1), ("fr3-load-", 69, 11.8)],
+    ("name", "rank", "condition"), [("", 58, 13.9), ("panda-", 69, 10.1), ("fr3-load-", 69, 11.8)]
 )
 def test_excitation_is_well_conditioned_inside_the_limits(name, rank, condition):
     scenario = load_scenario(f"{name}free-excitation")
