@@ -54,16 +54,16 @@ SMALL = {
 """Pendulums and fingers of two and three joints."""
 
 TWO_ARMS = {
-    "alex_description/urdf/alex_nub_hands": ("LeftGripperYawLink", "RightGripperYawLink"),
-    "alex_description/urdf/alex_psyonic_hands": ("LeftGripperYawLink", "RightGripperYawLink"),
-    "alex_description/urdf/alex_sake_hands": ("LeftGripperYawLink", "RightGripperYawLink"),
+    **dict.fromkeys(
+        [f"alex_description/urdf/alex_{hand}_hands" for hand in ("nub", "psyonic", "sake")],
+        ("LeftGripperYawLink", "RightGripperYawLink"),
+    ),
     "alexander_description/urdf/alexander_v1.lowerBodyOnly": ("LEFT_FOOT", "RIGHT_FOOT"),
     "baxter_description/urdf/baxter": ("left_wrist", "right_wrist"),
     "centauro_description/urdf/centauro": ("arm1_6", "arm2_6"),
-    "g1_description/urdf/g1_29dof_rev_1_0": ("left_wrist_yaw_link", "right_wrist_yaw_link"),
-    "g1_description/urdf/g1_29dof_with_hand_rev_1_0": (
-        "left_wrist_yaw_link",
-        "right_wrist_yaw_link",
+    **dict.fromkeys(
+        [f"g1_description/urdf/g1_29dof_{hand}rev_1_0" for hand in ("", "with_hand_")],
+        ("left_wrist_yaw_link", "right_wrist_yaw_link"),
     ),
     "icub_description/robots/icub": ("l_hand", "r_hand"),
     "icub_description/robots/icub_reduced": ("l_hand", "r_hand"),

@@ -1,181 +1,131 @@
-"""Friction models at the points where their value is plain."""
+"""Friction models where their value is plain, their dry part, their temperature, their file."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vftcli.robots import PROFILES, JointFriction, load_robot
 from vftcli.robots.friction import (
-    bent_line,
-    coulomb_logarithmic,
-    coulomb_viscous,
     dry_friction,
     dry_torque,
     falling_friction,
     falling_speed,
+    friction_factor,
     friction_torque,
-    sigmoid,
     steady_torque,
+    warmth,
 )
-from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.profile import robot_toml
-from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.recording import Recording
-
-
-def test_coulomb_viscous_at_speed_is_the_sum_of_its_parts() -> None:
-    # tanh(0.5/0.01) is 1 to the last bit
-    torque = coulomb_viscous(np.array([0.5, -0.5]), 6.3, 14.2, -4.5, 0.2)
-    np.testing.assert_allclose(
-        torque, [0.2 + 6.3 + 7.1 - 1.125, 0.2 - 6.3 - 7.1 + 1.125], rtol=1e-14
-    )
-
-
-def test_coulomb_is_smoothed_through_zero() -> None:
-    assert coulomb_viscous(np.array([0.0]), 6.3, 14.2)[0] == 0.0
-    np.testing.assert_allclose(
-        coulomb_viscous(np.array([0.01]), 6.3, 0.0), 6.3 * np.tanh(1.0), rtol=1e-15
-    )
-
 
 # Joint test of a UR5e, mean of its size-3 joints [rad/s, N·m].
 SPEEDS, TORQUES = (0.01, 0.5, 1.5, 3.2), (5.73, 9.32, 13.58, 18.72)
+STRIBECK = {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity": 0.1}
+SIGMOID = {"amplitude": -1.5, "slope": 10.0, "shift": 0.1}
+
+
+def joint(model: str, **values: float) -> JointFriction:
+    return JointFriction(model=model, parameters=values)
+
+
+def points(torques=TORQUES, speeds=SPEEDS, **values: float) -> JointFriction:
+    return JointFriction(model="points", parameters=values, speeds=speeds, torques=torques)
+
+
+LOADED = joint("coulomb-viscous-load", coulomb=2.0, viscous=1.0, load_coulomb=0.1)
+LOGARITHMIC = joint("coulomb-logarithmic", coulomb=2.0, logarithmic=3.0, logarithmic_velocity=1.2)
+
+
+@pytest.mark.parametrize(
+    ("friction", "expected"),
+    [
+        (joint("coulomb-viscous", coulomb=6.3, viscous=14.2), 6.3 + 7.1),
+        (joint("coulomb-viscous", coulomb=6.3, viscous=0.0, smoothing=0.5), 6.3 * np.tanh(1.0)),
+        (joint("coulomb-viscous-quadratic", coulomb=6.3, viscous=14.2, quadratic=-4.5), 12.275),
+        (joint("coulomb-viscous-stribeck", **STRIBECK), 3.5 + 2.0 * np.exp(-25.0)),
+        (
+            joint("coulomb-viscous-stribeck", **STRIBECK | {"stribeck_velocity": 0.5}),
+            4.2357588823,
+        ),
+        (LOGARITHMIC, 2.0 + 3.0 * np.log(1.0 + 0.5 / 1.2)),
+        (LOADED, 2.0 + 0.1 * 30.0 + 0.5),
+        (points(), 9.32),
+        (points((1.0, 2.0), (0.1, 1.0), load_coulomb=0.1), 1.0 + 0.4 / 0.9 + 3.0),
+        (JointFriction(), 0.0),
+    ],
+)
+def test_friction_at_half_a_radian_a_second_under_a_load(friction, expected) -> None:
+    """The same backwards and under the opposite load, none at rest; beside it a constant offset.
+
+    tanh(50) of the smoothing is 1 to rounding.
+    """
+    dq, load = np.array([[0.5], [-0.5], [0.0]]), np.array([[30.0], [-30.0], [30.0]])
+    torque = friction_torque((friction,), dq, load)
+    np.testing.assert_allclose(torque[:, 0], [expected, -expected, 0.0], rtol=1e-9)
+    if friction.model != "none":
+        off = JointFriction(
+            model=friction.model,
+            parameters={**friction.parameters, "offset": 0.2},
+            speeds=friction.speeds,
+            torques=friction.torques,
+        )
+        np.testing.assert_allclose(friction_torque((off,), dq, load), torque + 0.2, rtol=1e-12)
+
+
+def test_joints_are_kept_apart_and_feel_their_own_load() -> None:
+    """A sigmoid is zero at rest and runs over its amplitude."""
+    arm = (LOADED, JointFriction(), joint("sigmoid", **SIGMOID), points())
+    dq = np.array([[1.0, 1.0, 1e3, 1.0], [-1.0, -1.0, -1e3, -1.0], [0.0] * 4])
+    torque = friction_torque(arm, dq, np.full((3, 4), -30.0))
+    np.testing.assert_allclose(torque[:, 0], [6.0, -6.0, 0.0], rtol=1e-14)
+    begin = -1.5 / (1.0 + np.exp(-1.0))
+    np.testing.assert_allclose(torque[:, 2], [-1.5 - begin, -begin, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(torque[:, 3], [11.45, -11.45, 0.0], rtol=1e-14)
+    assert not torque[:, 1].any()
+    with pytest.raises(ParameterError, match="no friction model 'sticky'; there is"):
+        friction_torque((joint("sticky", x=1.0),), np.ones((2, 1)))
 
 
 def test_the_bent_line_runs_through_its_points_and_on() -> None:
     """Between the points as `numpy.interp`, constant below, the last stretch's slope beyond."""
-    speed = np.concatenate([np.linspace(0.001, 3.2, 400), SPEEDS])
-    for sign in (1.0, -1.0):
-        # the sign is there at .001 rad/s already
-        torque = bent_line(sign * speed, SPEEDS, TORQUES, smoothing=1e-5)
-        # sums of a dozen N·m: rounding
-        np.testing.assert_allclose(torque, sign * np.interp(speed, SPEEDS, TORQUES), atol=1e-13)
-    slope = (18.72 - 13.58) / 1.7
-    beyond = bent_line(np.array([4.0]), SPEEDS, TORQUES)
-    np.testing.assert_allclose(beyond, 18.72 + 0.8 * slope, rtol=1e-14)
-    slow = bent_line(np.array([0.004]), SPEEDS, TORQUES, smoothing=0.01)
-    np.testing.assert_allclose(slow, 5.73 * np.tanh(0.4), rtol=1e-14)
-
-
-def test_joints_of_points_are_taken_together_and_feel_their_load() -> None:
-    one = JointFriction(model="points", speeds=SPEEDS, torques=TORQUES)
-    other = JointFriction(
-        model="points",
-        parameters={"load_coulomb": 0.1, "offset": 0.5},
-        speeds=(0.1, 1.0),
-        torques=(1.0, 2.0),
-    )
-    last = JointFriction(model="points", speeds=SPEEDS, torques=(1.0, 1.0, 1.0, 1.0))
-    torque = friction_torque((one, other, last), np.ones((1, 3)), np.full((1, 3), -30.0))
-    # between the second and third point; 2 + .1·30 + .5; constant (tanh(100) is 1)
-    np.testing.assert_allclose(torque, [[9.32 + 0.5 * 4.26, 5.5, 1.0]], rtol=1e-14)
-    np.testing.assert_array_equal(dry_friction((one, other, last), 3), [5.73, 1.0, 1.0])
+    speed = np.concatenate([np.linspace(0.001, 3.2, 400), SPEEDS, [4.0]])
+    # the sign is there at .001 rad/s already
+    torque = friction_torque((points(smoothing=1e-5),), speed[:, None])[:, 0]
+    # sums of a dozen N·m: rounding
+    np.testing.assert_allclose(torque[:-1], np.interp(speed[:-1], SPEEDS, TORQUES), atol=1e-13)
+    assert torque[-1] == pytest.approx(18.72 + 0.8 * (18.72 - 13.58) / 1.7, rel=1e-14)
 
 
 def test_presliding_friction_holds_and_falls_nowhere() -> None:
     values = {"coulomb": 2.0, "viscous": 1.0, "presliding": 3.0, "presliding_length": 1e-3}
-    joint = JointFriction(model="coulomb-viscous", parameters=values)
-    np.testing.assert_array_equal(dry_friction((joint,), 1), [5.0])  # a + b
-    np.testing.assert_allclose(steady_torque(joint, np.array([-0.5, 0.5])), [-5.5, 5.5])
-    assert np.isnan(falling_speed(joint, 2.0))
-    falling = JointFriction(model="coulomb-viscous", parameters={**values, "viscous": -1.0})
+    giving = joint("coulomb-viscous", **values)
+    np.testing.assert_array_equal(dry_friction((giving,), 1), [5.0])  # a + b
+    np.testing.assert_allclose(steady_torque(giving, np.array([-0.5, 0.5])), [-5.5, 5.5])
+    assert np.isnan(falling_speed(giving, 2.0))
+    falling = joint("coulomb-viscous", **values | {"viscous": -1.0})
     assert np.isfinite(falling_speed(falling, 2.0))
 
 
-def test_sigmoid_is_zero_at_rest_and_spans_its_amplitude() -> None:
-    assert sigmoid(np.array([0.0]), 0.5, 5.0, 0.04)[0] == 0.0
-    span = sigmoid(np.array([1e3]), 0.5, 5.0, 0.04) - sigmoid(np.array([-1e3]), 0.5, 5.0, 0.04)
-    np.testing.assert_allclose(span, 0.5, rtol=1e-12)  # the tails of the exponential are gone
-
-
-def test_joints_of_different_models_are_kept_apart() -> None:
-    friction = (
-        JointFriction(model="coulomb-viscous", parameters={"coulomb": 2.0, "viscous": 1.0}),
-        JointFriction(),
-        JointFriction(model="sigmoid", parameters={"amplitude": 1.0, "slope": 9.0, "shift": 0.0}),
-    )
-    dq = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0]])
-    torque = friction_torque(friction, dq)
-    np.testing.assert_allclose(torque[:, 0], [3.0, -3.0], rtol=1e-14)
-    assert not np.any(torque[:, 1])
-    np.testing.assert_allclose(torque[:, 2], sigmoid(dq[:, 2], 1.0, 9.0, 0.0))
-
-
-def test_an_unknown_model_is_named() -> None:
-    with pytest.raises(ParameterError, match="no friction model 'sticky'; there is"):
-        friction_torque((JointFriction(model="sticky", parameters={"x": 1.0}),), np.ones((2, 1)))
-
-
-@pytest.mark.parametrize("smoothing", [0.001, 0.01, 0.2])
-def test_dry_friction_is_half_the_step_whatever_smooths_it(smoothing: float) -> None:
+def test_dry_friction_is_half_the_step_whatever_smooths_it() -> None:
     """Taken at some low speed it was .46 of a sign smoothed over 0.1 rad/s, and viscous in part."""
-    values = {"coulomb": 4.0, "viscous": 30.0, "smoothing": smoothing, "offset": 1.0}
-    robot = (JointFriction(model="coulomb-viscous-offset", parameters=values),)
-    fast = 20.0 * smoothing  # tanh(20) is 1 to the last digit
-    there, back = (friction_torque(robot, np.array([[v]]))[0, 0] for v in (fast, -fast))
-    step = 0.5 * (there - back) - values["viscous"] * fast
-    np.testing.assert_allclose(dry_friction(robot, 1), [step], rtol=1e-12)
-
-
-STRIBECK = {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity": 0.1}
-
-
-def test_dry_friction_of_every_model() -> None:
-    robot = (
-        JointFriction(model="coulomb-viscous-stribeck", parameters=STRIBECK),
-        JointFriction(
-            model="sigmoid", parameters={"amplitude": -1.5, "slope": 10.0, "shift": 0.1}
-        ),
+    values = {"coulomb": 4.0, "viscous": 30.0, "smoothing": 0.2, "offset": 1.0}
+    arm = (
+        joint("coulomb-viscous-offset", **values),
+        joint("coulomb-viscous-stribeck", **STRIBECK),  # at breakaway
+        joint("sigmoid", **SIGMOID),  # its two saturations lie its amplitude apart
+        points(),
         JointFriction(),
     )
-    # at breakaway; a sigmoid's two saturations lie its amplitude apart
-    np.testing.assert_array_equal(dry_friction(robot, 3), [5.0, 0.75, 0.0])
-    ends = sigmoid(np.array([-50.0, 50.0]), -1.5, 10.0, 0.1)
-    np.testing.assert_allclose(0.5 * abs(ends[1] - ends[0]), 0.75)
+    np.testing.assert_array_equal(dry_friction(arm, 5), [4.0, 5.0, 0.75, 5.73, 0.0])
     np.testing.assert_array_equal(dry_friction((), 4), np.zeros(4))
-
-
-def test_dry_friction_grows_with_the_load_either_way() -> None:
-    joint = JointFriction(
-        model="coulomb-viscous-load", parameters={"coulomb": 3.0, "load_coulomb": 0.1}
-    )
-    np.testing.assert_allclose(dry_torque(joint, np.array([-20.0, 0.0, 20.0])), [5.0, 3.0, 5.0])
-
-
-SIZE = st.floats(0.01, 50.0)
-"""Of a friction parameter; the UR's are .4 to 17. [N·m, rad/s]"""
-
-SPEED = st.floats(0.0, 7.0)
-"""Up to what the fastest UR joint does, 6.48 rad/s. [rad/s]"""
-
-
-@given(SIZE, SIZE, SIZE, SPEED, SPEED)
-def test_the_logarithmic_friction_takes_energy_and_never_falls(c, a, b, one, other) -> None:
-    slow, fast = sorted((one, other))
-    dq = np.array([-fast, -slow, 0.0, slow, fast])
-    torque = coulomb_logarithmic(dq, a, b, coulomb=c)
-    assert np.all(torque * dq >= 0.0)
-    assert np.all(np.diff(torque) >= -1e-13 * (1.0 + torque[-1]))  # rounding of equal speeds
-    np.testing.assert_array_equal(torque, -torque[::-1])
-    assert torque[2] == 0.0
-
-
-@given(SIZE, SIZE, st.floats(0.2, 7.0))
-def test_the_logarithmic_friction_rises_as_its_derivative_says(a, b, speed) -> None:
-    h = 1e-5
-    ends = coulomb_logarithmic(np.array([speed - h, speed + h]), a, b, coulomb=1.0)
-    # central differences: h²/3 of the third derivative, 2a/(b + v)³, and rounding of the torque
-    error = h**2 * a / (b + speed) ** 3 + 1e-15 * ends[1] / h
-    assert (ends[1] - ends[0]) / (2 * h) == pytest.approx(a / (b + speed), abs=error, rel=1e-9)
+    # it grows with the load either way
+    np.testing.assert_allclose(dry_torque(LOADED, np.array([-20.0, 0.0, 20.0])), [4.0, 2.0, 4.0])
 
 
 @pytest.mark.parametrize("name", ["ur5", "ur5e"])
 @pytest.mark.parametrize(
-    ("joint", "points", "scale", "at"),
+    ("number", "points", "scale", "at"),
     [
         # joint test of a UR5e at 44.6 and 43.8 °C [N·m]; the profiles stand at 35 °C
         *((j, TORQUES, 1.128, 44.6) for j in (0, 2)),
@@ -184,29 +134,26 @@ def test_the_logarithmic_friction_rises_as_its_derivative_says(a, b, speed) -> N
         (1, TORQUES, 0.88 * 1.128, 44.6),
     ],
 )
-def test_profiles_rub_as_the_joint_test_says(name, joint, points, scale, at) -> None:
+def test_profiles_rub_as_the_joint_test_says(name, number, points, scale, at) -> None:
     """The points carried to 35 °C, and on a UR5e back again at the temperature of the test."""
-    friction = load_robot(name).friction[joint]
+    friction = load_robot(name).friction[number]
     assert friction.speeds == SPEEDS
     # the scales have four digits
     np.testing.assert_allclose(friction.torques, scale * np.array(points), rtol=5e-4)
     if name == "ur5e":
-        back = friction_torque(
-            (friction,), np.array(SPEEDS[1:])[:, None], temperature=np.full((3, 1), at)
-        )
-        share = 0.88 if joint == 1 else 1.0
+        dq, T = np.array(SPEEDS[1:])[:, None], np.full((3, 1), at)
+        back = friction_torque((friction,), dq, temperature=T)
+        share = 0.88 if number == 1 else 1.0
         # three decimals of the torques; tanh(50) is 1 to rounding
         np.testing.assert_allclose(back[:, 0], share * np.array(points[1:]), rtol=5e-4)
 
 
 def test_loaded_joints_of_a_ur5e_rub_more() -> None:
+    """By .067 of the torque on joint 2, .01 to .02 on joint 3."""
     robot = load_robot("ur5e")
     dq, carried = np.full((1, 6), 0.5), np.array([[0.0, 45.0, 20.0, 0.0, 0.0, 0.0]])
     more = friction_torque(robot.friction, dq, carried) - friction_torque(robot.friction, dq)
-    # .067 of the torque on joint 2, .01 to .02 on joint 3
-    np.testing.assert_allclose(
-        more, [[0.0, 0.067 * 45.0, 0.015 * 20.0, 0.0, 0.0, 0.0]], atol=1e-12
-    )
+    np.testing.assert_allclose(more, carried * [[0, 0.067, 0.015, 0, 0, 0]], atol=1e-12)
 
 
 def test_the_ur10e_profile_rubs_as_its_controller_does() -> None:
@@ -214,53 +161,86 @@ def test_the_ur10e_profile_rubs_as_its_controller_does() -> None:
     speeds = (0.01, 0.5, 1.5, 1.9)
     points = [(17.66, 29.59, 40.47, 44.2), (16.82, 28.75, 38.74), (6.61, 12.57, 20.06)]
     points += [(3.09, 5.17, 7.12, 8.0), (3.42, 4.81, 6.62), (3.09, 5.13, 7.64)]
-    for joint, expected, rms in zip(
+    for own, expected, rms in zip(
         load_robot("ur10e").friction, points, (0.37, 0.34, 0.13, 0.09, 0.04, 0.05), strict=True
     ):
         known = np.array(speeds[: len(expected)])
         dq = np.linspace(known[0], known[-1], 400)
-        curve = coulomb_logarithmic(dq, **{**joint.parameters, "smoothing": 1e-4})
-        found = np.sqrt(np.mean((curve - np.interp(dq, known, expected)) ** 2))
+        curve = friction_torque(
+            (joint(own.model, **{**own.parameters, "smoothing": 1e-4}),), dq[:, None]
+        )
+        found = np.sqrt(np.mean((curve[:, 0] - np.interp(dq, known, expected)) ** 2))
         assert found == pytest.approx(rms, abs=0.01)
 
 
 def test_a_parabola_turns_down_where_its_slope_is_zero() -> None:
     # wrist 1 of the UR10e as it was: 5.246 − 2·2.15 v = 0 at 1.22 rad/s
-    values = {"coulomb": 2.95, "viscous": 5.246, "quadratic": -2.15}
-    joint = JointFriction(model="coulomb-viscous-quadratic", parameters=values)
+    down = joint("coulomb-viscous-quadratic", coulomb=2.95, viscous=5.246, quadratic=-2.15)
     step = np.pi / 500  # of the speeds looked at
-    assert falling_speed(joint, np.pi) == pytest.approx(5.246 / 4.3, abs=2 * step)
-    assert np.isnan(falling_speed(joint, 1.2))
-    assert np.isnan(falling_speed(joint, np.nan))
-    (remark,) = falling_friction((joint, joint), np.array([1.2, np.pi]))
+    assert falling_speed(down, np.pi) == pytest.approx(5.246 / 4.3, abs=2 * step)
+    assert np.isnan(falling_speed(down, np.nan))
+    (remark,) = falling_friction((down, down), np.array([1.2, np.pi]))
     assert (remark.code, remark.level) == ("falling-friction", "warning")
     assert remark.where.joints == (2,)
     assert "1.2 rad/s" in str(remark)
 
 
 @pytest.mark.parametrize(
-    ("model", "values", "falls"),
+    ("friction", "falls"),
     [
-        ("coulomb-viscous", {"coulomb": -1.0, "viscous": 5.0}, True),
-        ("coulomb-viscous", {"coulomb": 0.0, "viscous": -1.0}, True),
-        ("coulomb-viscous-offset", {"coulomb": 1.0, "viscous": 0.0, "offset": -3.0}, False),
-        ("coulomb-viscous-stribeck", STRIBECK, False),
-        ("sigmoid", {"amplitude": 1.0, "slope": 9.0, "shift": 0.1}, False),
-        ("sigmoid", {"amplitude": 1.0, "slope": -9.0, "shift": 0.1}, True),
-        ("none", {}, False),
+        (joint("coulomb-viscous", coulomb=-1.0, viscous=5.0), True),
+        (joint("coulomb-viscous", coulomb=0.0, viscous=-1.0), True),
+        (joint("coulomb-viscous-offset", coulomb=1.0, viscous=0.0, offset=-3.0), False),
+        (joint("coulomb-viscous-stribeck", **STRIBECK), False),
+        (joint("sigmoid", amplitude=1.0, slope=9.0, shift=0.1), False),
+        (joint("sigmoid", amplitude=1.0, slope=-9.0, shift=0.1), True),
+        (JointFriction(), False),
     ],
 )
-def test_what_falls_and_what_does_not(model, values, falls) -> None:
-    assert np.isfinite(falling_speed(JointFriction(model=model, parameters=values), 2.0)) == falls
+def test_what_falls_and_what_does_not(friction: JointFriction, falls: bool) -> None:
+    assert np.isfinite(falling_speed(friction, 2.0)) == falls
 
 
-@pytest.mark.parametrize("name", PROFILES)
-def test_no_profile_has_friction_that_falls(name: str) -> None:
-    robot = load_robot(name)
-    assert falling_friction(robot.friction, robot.limits.qd_max) == []
+# p1 to p4 of the controller's configuration by joint size, and s(28), s(45) relative to 35 °C.
+LAWS = {
+    "1": ((0.402, -0.09083, 0.9553, -0.01831), 1.161, 0.819),
+    "2": ((0.00062, -0.37098, 0.90936, -0.01168), 1.085, 0.890),
+    "3 e": ((3.637679, -0.011074, 1.362321, -0.085741), 1.100, 0.883),
+    "3 CB3": ((1.858278, -0.017289, 4.273737, -0.231437), 1.134, 0.840),
+    "4 e": ((2.0864784, -0.0067425, 1.1497692, -0.0534681), 1.088, 0.901),
+    "4 CB3": ((1.584479, -0.075955, 5.968238, -0.015598), 1.134, 0.844),
+}
 
 
-POINTS = """model = "points"
+@pytest.mark.parametrize("size", LAWS)
+def test_all_but_the_offset_follows_the_law_of_the_joint_s_size(size: str) -> None:
+    """At 28 and 45 °C; where no temperature is measured, and at 35 °C, it is the reference's."""
+    law, cold, hot = LAWS[size]
+    values = {"coulomb": 2.0, "viscous": 1.0, "presliding": 1.0, "presliding_length": 1e-3}
+    warm = JointFriction(
+        model="coulomb-viscous-offset",
+        parameters=values | {"offset": 0.5},
+        temperature=law,
+        temperature_at=35.0,
+    )
+    T = np.array([[28.0], [45.0], [35.0], [np.nan]])
+    one = np.ones((4, 1))
+    torque = friction_torque((warm,), 0.5 * one, deflection=one, temperature=T)
+    # the table has three decimals; tanh(50) is 1 to rounding
+    share = np.array([cold, hot, 1.0, 1.0])
+    np.testing.assert_allclose(torque[:, 0], 0.5 + share * 3.5, atol=3.5 * 6e-4)
+    plain = friction_torque((warm,), 0.5 * one, deflection=one)
+    np.testing.assert_array_equal(torque[2:], plain[2:])
+    assert np.all(np.diff(warmth(law, np.linspace(1.0, 100.0, 500))) < 0.0)
+    # a joint without a law keeps its friction
+    factor = friction_factor((JointFriction(), warm), np.full((3, 2), 20.0))
+    assert factor is not None
+    np.testing.assert_array_equal(factor[:, 0], 1.0)
+    assert friction_factor((JointFriction(),), T) is None
+
+
+LAW = "[3.637679, -0.011074, 1.362321, -0.085741]"
+POINTS = f"""model = "points"
 speeds = [0.01, 0.5, 1.5, 3.2]
 torques = [5.73, 9.32, 13.58, 18.72]
 load_coulomb = 0.067
@@ -268,7 +248,7 @@ smoothing = 0.003
 offset = -0.2
 presliding = 2.0
 presliding_length = 3e-4
-temperature = [3.637679, -0.011074, 1.362321, -0.085741]
+temperature = {LAW}
 temperature_at = 44.6
 """
 
@@ -283,55 +263,49 @@ def arm_with(friction: str, folder: Path) -> Path:
 
 
 def test_they_are_read_and_written_back(tmp_path: Path) -> None:
+    """Presliding and temperature stand beside any model."""
     robot = load_robot(arm_with(POINTS, tmp_path))
-    joint = robot.friction[0]
-    assert joint.model == "points"
-    assert joint.speeds == (0.01, 0.5, 1.5, 3.2)
-    assert joint.torques == (5.73, 9.32, 13.58, 18.72)
-    assert joint.temperature == (3.637679, -0.011074, 1.362321, -0.085741)
-    assert joint.temperature_at == 44.6
     values = {"load_coulomb": 0.067, "smoothing": 0.003, "offset": -0.2}
-    assert joint.parameters == values | {"presliding": 2.0, "presliding_length": 3e-4}
+    giving = {"presliding": 2.0, "presliding_length": 3e-4}
+    law = (3.637679, -0.011074, 1.362321, -0.085741)
+    expected = JointFriction(
+        model="points",
+        parameters=values | giving,
+        speeds=SPEEDS,
+        torques=TORQUES,
+        temperature=law,
+        temperature_at=44.6,
+    )
+    assert robot.friction[0] == expected
     again = tmp_path / "again.toml"
     again.write_text(robot_toml(robot), encoding="utf-8")
     assert load_robot(again).friction == robot.friction
-
-
-def test_presliding_and_temperature_stand_beside_any_model(tmp_path: Path) -> None:
-    more = "".join(POINTS.partition("presliding")[1:])
     sigmoid = 'model = "sigmoid"\namplitude = 1.0\nslope = 5.0\nshift = 0.1\n'
-    joint = load_robot(arm_with(sigmoid + more, tmp_path)).friction[0]
-    assert (joint.parameters["presliding"], joint.temperature_at) == (2.0, 44.6)
+    more = "".join(POINTS.partition("presliding")[1:])
+    own = load_robot(arm_with(sigmoid + more, tmp_path)).friction[0]
+    assert (own.parameters["presliding"], own.temperature_at) == (2.0, 44.6)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
         ("presliding = 2.0", "presliding = -2.0", r"presliding is -2 N·m; on a robot it is"),
-        (
-            "presliding_length = 3e-4",
-            "presliding_length = 0.0",
-            "presliding_length is 0 rad; on a",
-        ),
-        (
-            "presliding_length = 3e-4",
-            "presliding_length = 3.0",
-            "presliding_length is 3 rad; on a",
-        ),
+        ("presliding_length = 3e-4", "presliding_length = 0.0", "presliding_length is 0 rad; on"),
+        ("presliding_length = 3e-4", "presliding_length = 3.0", "presliding_length is 3 rad; on"),
         ("presliding_length = 3e-4\n", "", "presliding_length is missing; presliding needs it"),
         ("presliding = 2.0\n", "", "presliding is missing; presliding_length needs it"),
+        ("smoothing = 0.003", "stribeck_velocity = 0.0", "stribeck_velocity is 0 rad/s; on"),
         ("temperature_at = 44.6\n", "", "temperature_at is missing; temperature needs it"),
         ("temperature_at = 44.6", "temperature_at = 308", "temperature_at is 308 °C; on a robot"),
-        ("3.637679", "-3.637679", "line .*temperature makes friction"),
+        (LAW, "[-1.0, -0.01, 0.5, -0.01]", "line .*temperature makes friction"),
+        (LAW, "[0.0, 0.0, 0.0, 0.0]", "temperature makes friction"),
+        (LAW, "[1.0, 10.0, 0.0, 0.0]", "temperature makes friction"),
+        (LAW, "[1e3, 1e3, 1e3, 1e3]", "temperature makes friction"),
         ("-0.085741]", "-0.085741, 1.0]", "temperature is .*; it must be 4 finite numbers"),
         ("speeds = [0.01, 0.5, 1.5, 3.2]\n", "", "speeds is missing; it must be a list of at"),
         ("0.01, 0.5, 1.5, 3.2", "0.01", r"speeds is \[0.01\]; it must be a list of at least 2"),
-        (
-            "0.01, 0.5, 1.5, 3.2",
-            "0.01, 0.5, 0.5, 3.2",
-            "speeds is .*; each must be above the one",
-        ),
-        ("0.01, 0.5, 1.5, 3.2", "0.0, 0.5, 1.5, 3.2", "speeds is 0 rad/s; on a robot it is"),
+        ("0.01, 0.5, 1.5", "0.01, 0.5, 0.5", "speeds is .*; each must be above the one"),
+        ("0.01, 0.5, 1.5", "0.0, 0.5, 1.5", "speeds is 0 rad/s; on a robot it is"),
         ("0.01, 0.5, 1.5, 3.2", "0.01, 0.5, 1.5", "there are 4 torques for 3 speeds"),
         ("5.73, 9.32", "nan, 9.32", "torques is .*; it must be a list of at least 2 finite"),
         ("5.73, 9.32", "1e9, 9.32", r"torques is 1e\+09 N·m; on a robot it is"),
@@ -341,64 +315,3 @@ def test_what_no_joint_has_is_refused(old: str, new: str, words: str, tmp_path: 
     assert old in POINTS
     with pytest.raises(RobotError, match=words):
         load_robot(arm_with(POINTS.replace(old, new), tmp_path))
-
-
-LOADED = JointFriction(
-    model="coulomb-viscous-load", parameters={"coulomb": 2.0, "viscous": 1.0, "load_coulomb": 0.1}
-)
-PLAIN = JointFriction(model="coulomb-viscous", parameters={"coulomb": 2.0, "viscous": 1.0})
-
-
-def test_the_load_adds_to_the_coulomb_torque_of_its_own_joints_whatever_its_sign():
-    dq, friction = np.array([[0.5, -0.5, 0.5]]), (LOADED, LOADED, PLAIN)
-    for load in (30.0, -30.0):
-        torque = friction_torque(friction, dq, np.full((1, 3), load))
-        # 2 + 0.1·30 + 1·0.5; tanh(50) is 1 to rounding
-        np.testing.assert_allclose(torque, [[5.5, -5.5, 2.5]], rtol=1e-14)
-    assert np.array_equal(friction_torque(friction, dq), friction_torque((PLAIN,) * 3, dq))
-
-
-def test_the_stribeck_term_fades():
-    slow, fast = coulomb_viscous(
-        np.array([0.05, 2.0]), 2.0, 0.0, smoothing=1e-3, stribeck=1.0, stribeck_velocity=0.05
-    )
-    # e⁻¹ at the Stribeck velocity, nothing far above it (analytic)
-    assert slow == pytest.approx(2.0 + np.exp(-1.0), rel=1e-12)
-    assert fast == pytest.approx(2.0, rel=1e-12)
-
-
-def test_the_terms_use_the_gravity_torque_as_load():
-    from dataclasses import replace
-
-    robot = load_robot("ur5")
-    rng = np.random.default_rng(0)
-    q, dq, current = rng.uniform(-1, 1, (3, 20, 6))
-    recording = Recording(t=0.008 * np.arange(20), q=q, dq=dq, current=current)
-    rough = replace(robot, friction=(LOADED,) * 6)
-    gravity = momentum_terms(robot.loaded_chain, q, dq).gravity
-    expected = friction_torque(rough.friction, dq, gravity)
-    smooth = dynamics_terms(recording, robot.without_friction())
-    # differences of torques of 10²: rounding
-    np.testing.assert_allclose(
-        smooth.mu - dynamics_terms(recording, rough).mu, expected, atol=1e-12
-    )
-    literal = dynamics_terms(recording, rough, literal=True)
-    # the paper's numeric method is good to 5e-6 N·m
-    np.testing.assert_allclose(literal.mu, dynamics_terms(recording, rough).mu, atol=5e-5)
-
-
-def test_a_file_needs_the_models_keys(tmp_path):
-    from vftcli.robots import PROFILES
-
-    text = PROFILES["ur10e"].read_text(encoding="utf-8")
-    path = tmp_path / "arm.toml"
-    model = 'model = "coulomb-logarithmic"'
-    path.write_text(text.replace(model, 'model = "coulomb-viscous-load"', 1), encoding="utf-8")
-    with pytest.raises(RobotError, match="viscous is missing"):
-        load_robot(path)
-    with_velocity = 'model = "coulomb-logarithmic"\nstribeck = 1.0\nstribeck_velocity = 0.0'
-    path.write_text(text.replace(model, with_velocity, 1), encoding="utf-8")
-    with pytest.raises(
-        RobotError, match=r"stribeck_velocity is 0 rad/s; on a robot it is within"
-    ):
-        load_robot(path)

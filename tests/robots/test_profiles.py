@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_urdfs import written
 
 from vftcli.robots import PROFILES, load_robot
 from vftcli.robots.chain import link_poses, unphysical
@@ -28,12 +29,12 @@ POSITION, TORQUE = 1e-6, 1e-6
 @pytest.mark.parametrize("name", PROFILES)
 def test_flange_and_gravity_are_the_makers(name: str) -> None:
     robot = load_robot(name)
+    lines = csv.reader(POSES.read_text("utf-8").splitlines())
     rows = [
-        row[1:] for row in csv.reader(POSES.read_text("utf-8").splitlines()) if row[0] == name
+        [np.array(text.split(), float) for text in row[1:]] for row in lines if row[0] == name
     ]
     assert len(rows) == 2
-    for numbers in rows:
-        q, position, gravity = (np.array(text.split(), float) for text in numbers)
+    for q, position, gravity in rows:
         at = q[None]
         flange = link_poses(robot.chain, at).translation[0, -1]
         np.testing.assert_allclose(flange, position, atol=POSITION)
@@ -45,6 +46,7 @@ def test_flange_and_gravity_are_the_makers(name: str) -> None:
 def test_every_number_has_a_source_and_every_body_is_physical(name: str) -> None:
     robot = load_robot(name)
     assert robot.sources
+    assert "falling-friction" not in {remark.code for remark in robot.remarks}
     for mass, inertia in zip(robot.chain.mass, robot.chain.inertia, strict=True):
         assert unphysical(float(mass), inertia) == ""
     assert robot.joints == robot.document["dof"]
@@ -69,9 +71,7 @@ def test_the_hand_is_mounted_turned_as_the_maker_mounts_it() -> None:
     ("name", "meant"),
     [("pnada", "panda"), ("ru5e", "ur5e"), ("ur6e", ""), ("ur9", ""), ("fr4", "")],
 )
-def test_a_misspelt_name_suggests_the_arm_it_means_and_never_another(
-    name: str, meant: str
-) -> None:
+def test_a_misspelt_name_suggests_the_arm_it_means_and_never_another(name, meant) -> None:
     """A profile of another arm gives wrong newtons, however near its name is."""
     words = f"Did you mean {meant}?" if meant else "Built in: ur3"
     with pytest.raises(RobotError, match=rf"no robot '{name}'\. {re.escape(words)}"):
@@ -83,20 +83,12 @@ def test_a_name_is_understood_however_it_is_written(word: str) -> None:
     assert load_robot(word).name == "ur5e"
 
 
-def test_an_unknown_payload_lists_what_there_is() -> None:
-    with pytest.raises(RobotError, match="the robot file has franka_hand"):
-        load_robot("panda").with_payload("bucket")
-
-
 def test_tools_sensors_and_admittance_are_typed(tmp_path):
-    text = PROFILES["ur5"].read_text(encoding="utf-8")
-    path = tmp_path / "own.toml"
-    path.write_text(
-        text + "\n[tool]\nxyz = [0, 0, 0.1]\n[tool.gripper]\nrpy = [0, 0, 1.0]\n"
-        "[sensor.wrist]\nxyz = [0, 0, 0.03]\n",
-        encoding="utf-8",
+    text = PROFILES["ur5"].read_text("utf-8") + (
+        "\n[tool]\nxyz = [0, 0, 0.1]\n[tool.gripper]\nrpy = [0, 0, 1.0]\n"
+        "[sensor.wrist]\nxyz = [0, 0, 0.03]\n"
     )
-    robot = load_robot(path)
+    robot = load_robot(written(tmp_path, text, "own.toml"))
     assert sorted(robot.tools) == ["", "gripper"]
     assert list(robot.sensors) == ["wrist"]  # no plain [sensor], so none is mounted
     np.testing.assert_array_equal(robot.tools[""].translation, [0.0, 0.0, 0.1])
@@ -113,7 +105,6 @@ def test_tools_sensors_and_admittance_are_typed(tmp_path):
     ],
 )
 def test_a_pose_that_is_none_is_refused_with_its_line(tmp_path, section, words):
-    path = tmp_path / "own.toml"
-    path.write_text(PROFILES["ur5"].read_text(encoding="utf-8") + f"\n{section}\n")
+    text = PROFILES["ur5"].read_text("utf-8") + f"\n{section}\n"
     with pytest.raises(RobotError, match=words):
-        load_robot(path)
+        load_robot(written(tmp_path, text, "own.toml"))

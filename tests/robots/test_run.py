@@ -18,7 +18,7 @@ from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
-ROBOT = load_robot("ur5")
+UR, PANDA = load_robot("ur5"), load_robot("panda")
 T = 0.002 * np.arange(2000)
 
 
@@ -33,8 +33,8 @@ def swing(speed: float = 1.0) -> Recording:
 def test_the_model_s_torque_does_not_depend_on_the_currents() -> None:
     """It is what the motion takes; the drive's torque is what the currents say."""
     log = swing()
-    quiet = Run(recording=log, robot=ROBOT)
-    driven = Run(recording=replace(log, current=np.ones_like(log.q)), robot=ROBOT)
+    quiet = Run(recording=log, robot=UR)
+    driven = Run(recording=replace(log, current=np.ones_like(log.q)), robot=UR)
     np.testing.assert_allclose(driven.model_torque, quiet.model_torque, atol=1e-9)
     assert np.all(quiet.drive_torque == 0.0)
     assert np.all(driven.drive_torque != 0.0)
@@ -44,7 +44,7 @@ def test_a_joint_that_stands_is_marked() -> None:
     log = swing()
     dq = log.dq.copy()
     dq[500:800, 2] = 0.0
-    run = Run(recording=replace(log, dq=dq), robot=ROBOT)
+    run = Run(recording=replace(log, dq=dq), robot=UR)
     assert run.standstill[600, 2] == pytest.approx(0.6)
     assert run.standing[600].tolist() == [False, False, True, False, False, False]
     assert run.step == pytest.approx(0.002)
@@ -54,7 +54,7 @@ def test_a_joint_that_stands_is_marked() -> None:
 def test_smooth_series_end_below_half_the_rate(step: float, edge: float, path: float) -> None:
     """At .22 and .2 of the rate of a slow log, so that its noise is left out."""
     log = replace(swing(), t=T * step / 0.002)
-    run = Run(recording=log, robot=ROBOT)
+    run = Run(recording=log, robot=UR)
     assert (signal_edge(step), signal_edge(step, 4.0)) == pytest.approx((edge, 4.0))
     np.testing.assert_allclose(run.smooth_dq, low_pass(log.t, log.dq, path), atol=1e-9)
     np.testing.assert_allclose(
@@ -65,7 +65,7 @@ def test_smooth_series_end_below_half_the_rate(step: float, edge: float, path: f
 
 
 def test_a_part_of_a_run_keeps_what_belongs_to_joints() -> None:
-    run = Run(recording=swing(), robot=ROBOT)
+    run = Run(recording=swing(), robot=UR)
     part = run.part(slice(100, 300))
     for name in ("t", "q", "dq", *SERIES):
         np.testing.assert_array_equal(getattr(part, name), getattr(run, name)[100:300])
@@ -75,7 +75,7 @@ def test_a_part_of_a_run_keeps_what_belongs_to_joints() -> None:
 
 def test_a_run_less_a_torque_is_a_run_whose_disturbance_is_less_by_it() -> None:
     """ṗ = μ + τ_ext: with μ larger by τ the disturbance is smaller by τ; the motion stays."""
-    run, torque = Run(recording=swing(), robot=ROBOT), np.linspace(0.0, 3.0, 12000).reshape(-1, 6)
+    run, torque = Run(recording=swing(), robot=UR), np.linspace(0.0, 3.0, 12000).reshape(-1, 6)
     less = run.less(torque)
     np.testing.assert_array_equal(less.terms.mu, run.terms.mu + torque)
     np.testing.assert_array_equal(less.terms.p, run.terms.p)
@@ -85,16 +85,14 @@ def test_a_run_less_a_torque_is_a_run_whose_disturbance_is_less_by_it() -> None:
 
 def test_a_run_is_made_once_for_a_recording_and_a_robot() -> None:
     circle, runs = read(FIXTURE), Runs()
-    first = runs.of(circle, ROBOT)
-    assert runs.of(circle, ROBOT) is first
+    first = runs.of(circle, UR)
+    assert runs.of(circle, UR) is first
     assert first.terms is first.terms
-    assert runs.of(circle, ROBOT, literal=True) is not first
-    assert runs.of(circle, replace(ROBOT)) is not first
-    assert runs.of(replace(circle), ROBOT) is not first
+    assert runs.of(circle, UR, literal=True) is not first
+    assert runs.of(circle, replace(UR)) is not first
+    assert runs.of(replace(circle), UR) is not first
 
 
-UR = load_robot("ur5")
-PANDA = load_robot("panda")
 NAMES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_a", "wrist_b", "wrist_c")
 
 
@@ -142,10 +140,7 @@ def test_joints_are_found_by_name(logged, joints, expected) -> None:
         (("a_1", "a_2", "b_1", "b_2"), ("x", "y")),  # two arms
         (("joint1", "joint3", "joint4"), NAMES[:3]),  # a hole
         (("joint2", "joint3", "joint4"), NAMES[:3]),  # the first is missing
-        (
-            tuple(f"{side}_{name}" for side in ("left", "right") for name in UR_NAMES),
-            UR.chain.names,
-        ),
+        (tuple(f"{side}_{name}" for side in "lr" for name in UR_NAMES), UR.chain.names),
     ],
 )
 def test_names_that_do_not_tell_find_nothing(logged, joints) -> None:
@@ -168,13 +163,10 @@ def test_every_joint_signal_follows_and_what_goes_is_said() -> None:
 
 
 def test_names_that_do_not_cover_the_arm_are_refused_with_both_lists() -> None:
-    with pytest.raises(
-        RobotError, match=r"wrist_c.*are not named as.*shoulder_pan.*\[\[joints\]\]"
-    ):
+    words = r"wrist_c.*are not named as.*shoulder_pan.*\[\[joints\]\]"
+    with pytest.raises(RobotError, match=words):
         paired(log_of(NAMES), UR)
-
-
-def test_without_names_on_either_side_the_order_stays() -> None:
+    # Without names on either side the order stays.
     log = replace(log_of(NAMES), joint_names=())
     assert paired(log, UR) is log
     nameless = replace(UR, document={"joints": [{} for _ in range(6)]})
@@ -196,20 +188,10 @@ def test_a_log_of_the_motors_side_is_brought_to_the_joints_once() -> None:
 
 
 def test_a_gear_is_read_from_the_robot_file(tmp_path) -> None:
-    text = UR.path.read_text("utf-8")
-    path = tmp_path / "geared.toml"
-    path.write_text(text.replace("mass = 3.7\n", "mass = 3.7\ngear = -101.0\n", 1), "utf-8")
-    robot = load_robot(path)
-    np.testing.assert_array_equal(robot.gear, [-101, 1, 1, 1, 1, 1])
-    assert robot.efficiency is None
-    path.write_text(text.replace("mass = 3.7\n", "mass = 3.7\ngear = 0.0\n", 1), "utf-8")
-    with pytest.raises(RobotError, match=r"joint 1 \(shoulder_pan\): gear is 0"):
-        load_robot(path)
-    path.write_text(
-        text.replace("mass = 3.7\n", "mass = 3.7\ngear_efficiency = 1.2\n", 1), "utf-8"
-    )
-    with pytest.raises(RobotError, match=r"gear_efficiency is 1.2; it is above 0, at most 1"):
-        load_robot(path)
+    text = UR.path.read_text("utf-8").replace("mass = 3.7\n", "mass = 3.7\ngear = -101.0\n", 1)
+    found = load_robot(written(tmp_path, text, "geared.toml"))
+    np.testing.assert_array_equal(found.gear, [-101, 1, 1, 1, 1, 1])
+    assert found.efficiency is None
 
 
 def test_a_jump_of_a_turn_is_taken_back_and_said(tmp_path: Path) -> None:

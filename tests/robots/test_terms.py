@@ -17,13 +17,17 @@ from vftcli.robots.terms import (
     drive_torque,
     dynamics_terms,
     effort_name,
-    raw_disturbance,
 )
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import welch
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import clock_of
+
+T = np.arange(3.0)
+Q = np.linspace(0.2, 1.3, 18).reshape(3, 6)
+EFFORT = np.linspace(-4.0, 5.0, 18).reshape(3, 6)
+UR5E, FR3 = load_robot("ur5e"), load_robot("fr3")
 
 
 def motion(joints: int, samples: int = 400, rate: float = 500.0) -> tuple[np.ndarray, ...]:
@@ -48,62 +52,25 @@ def test_mu_integrates_to_the_momentum_of_free_motion() -> None:
 
 
 def test_current_becomes_torque_through_the_drive_constant() -> None:
-    robot = load_robot("ur5")
-    t, q, dq, _ = motion(6)
-    current = np.ones_like(q)
-    torque = drive_torque(Recording(t=t, q=q, dq=dq, current=current), robot)
+    torque = drive_torque(Recording(t=T, q=Q, current=np.ones_like(Q)), load_robot("ur5"))
     np.testing.assert_array_equal(torque[0], [12.625, 12.625, 12.625, 9.3122, 9.3122, 9.3122])
 
 
-def test_a_link_torque_robot_prefers_torque_and_a_current_robot_current() -> None:
-    t, q, dq, _ = motion(6)
-    both = Recording(t=t, q=q, dq=dq, current=np.ones_like(q), torque=np.full_like(q, 7.0))
-    assert drive_torque(both, load_robot("ur5"))[0, 0] == 12.625
-    t, q, dq, _ = motion(7)
-    both = Recording(t=t, q=q, dq=dq, current=np.ones_like(q), torque=np.full_like(q, 7.0))
-    assert drive_torque(both, load_robot("panda"))[0, 0] == 7.0
-
-
-def test_friction_is_taken_off_and_literal_dynamics_agree() -> None:
-    robot = load_robot("panda")
-    t, q, dq, _ = motion(7)
-    recording = Recording(t=t, q=q, dq=dq, torque=np.zeros_like(q))
-    rough, smooth = (
-        dynamics_terms(recording, robot),
-        dynamics_terms(recording, robot.without_friction()),
-    )
-    from vftcli.robots.friction import friction_torque
-
-    np.testing.assert_allclose(
-        smooth.mu - rough.mu, friction_torque(robot.friction, dq), atol=1e-12
-    )
-    literal = dynamics_terms(recording, robot, literal=True)
-    np.testing.assert_allclose(literal.mu, rough.mu, atol=5e-6)  # the literal method's own step
-
-
 @pytest.mark.parametrize(
-    ("missing", "words"), [("dq", "no joint velocities"), ("current", "no motor currents")]
+    ("robot", "joints", "signals", "error", "words"),
+    [
+        ("ur5", 6, "current", MissingSignalError, "no joint velocities"),
+        ("ur5", 6, "dq", MissingSignalError, "no motor currents"),
+        ("ur5", 7, "dq torque", RobotError, "7 joints but robot 'ur5' has 6"),
+        ("panda", 7, "dq current", MissingSignalError, "no torque_constant"),
+    ],
 )
-def test_a_missing_signal_is_named(missing: str, words: str) -> None:
-    t, q, dq, _ = motion(6)
-    signals = {"dq": dq, "current": np.ones_like(q)}
-    del signals[missing]
-    with pytest.raises(MissingSignalError, match=words):
-        dynamics_terms(Recording(t=t, q=q, **signals), load_robot("ur5"))
-
-
-def test_another_number_of_joints_is_refused() -> None:
-    t, q, dq, _ = motion(7)
-    recording = Recording(t=t, q=q, dq=dq, torque=q)
-    with pytest.raises(RobotError, match="7 joints but robot 'ur5' has 6"):
-        dynamics_terms(recording, load_robot("ur5"))
-
-
-def test_current_for_a_robot_without_drive_constants_is_refused() -> None:
-    t, q, dq, _ = motion(7)
-    recording = Recording(t=t, q=q, dq=dq, current=q)
-    with pytest.raises(MissingSignalError, match="no torque_constant"):
-        dynamics_terms(recording, load_robot("panda"))
+def test_what_a_robot_s_log_lacks_is_named(robot, joints, signals, error, words) -> None:
+    q = np.zeros((3, joints))
+    with pytest.raises(error, match=words):
+        dynamics_terms(
+            Recording(t=T, q=q, **dict.fromkeys(signals.split(), q)), load_robot(robot)
+        )
 
 
 @pytest.mark.parametrize("size", [1, 150, 399])
@@ -127,23 +94,6 @@ def test_blocks_of_a_log_have_the_whole_log_s_terms(size: int) -> None:
             np.testing.assert_array_equal(getattr(block, name), getattr(whole, name)[span])
 
 
-def test_the_unexplained_change_of_momentum_is_the_trapezoid() -> None:
-    rng = np.random.default_rng(2)
-    t = np.cumsum(rng.uniform(0.5, 1.5, 50))
-    p, mu = rng.normal(size=(50, 3)), rng.normal(size=(50, 3))
-    terms = DynamicsTerms(t=t, p=p, mu=mu)
-    expected = np.diff(p, axis=0) - 0.5 * np.diff(t)[:, None] * (mu[1:] + mu[:-1])
-    np.testing.assert_allclose(terms.d[1:], expected, atol=1e-14)  # rounding of a few
-    np.testing.assert_array_equal(terms.d[0], 0.0)
-    np.testing.assert_array_equal(replace(terms, mu=0 * mu).d[1:], np.diff(p, axis=0))
-
-
-T = np.arange(3.0)
-Q = np.linspace(0.2, 1.3, 18).reshape(3, 6)
-EFFORT = np.linspace(-4.0, 5.0, 18).reshape(3, 6)
-UR5E, FR3 = load_robot("ur5e"), load_robot("fr3")
-
-
 def test_torque_without_gravity_gets_that_of_the_arm_and_its_payload() -> None:
     load = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.1]), inertia=np.zeros((3, 3)))
     arm = UR5E.with_payload(load)
@@ -163,18 +113,11 @@ def test_torque_without_gravity_gets_that_of_the_arm_and_its_payload() -> None:
         (("current",), "current", "current"),
     ],
 )
-def test_an_arm_takes_what_its_makers_logs_hold(
-    signals: tuple[str, ...], of_ur: str, of_franka: str
-) -> None:
+def test_an_arm_takes_what_its_makers_logs_hold(signals, of_ur, of_franka) -> None:
     """UR measures currents, Franka torques; what is not there is made up for by the other."""
-    log = Recording(t=T, q=Q, **dict.fromkeys(signals, EFFORT))  # type: ignore[arg-type]
+    log = Recording(t=T, q=Q, **dict.fromkeys(signals, EFFORT))
     assert effort_name(log, UR5E) == of_ur
     assert effort_name(log, FR3) == of_franka
-
-
-def test_without_any_effort_a_signal_is_asked_for() -> None:
-    with pytest.raises(MissingSignalError, match="no motor currents"):
-        drive_torque(Recording(t=T, q=Q), UR5E)
 
 
 STEP = 0.004
@@ -186,14 +129,6 @@ def terms_of(t: np.ndarray, torque: np.ndarray) -> DynamicsTerms:
     gained = (torque + 0.5 * (mu[1:] + mu[:-1])) * np.diff(t)[:, None]
     p = np.vstack([np.zeros((1, torque.shape[1])), np.cumsum(gained, axis=0)])
     return DynamicsTerms(t=t, p=p, mu=mu)
-
-
-def test_it_is_the_torque_that_acted() -> None:
-    rng = np.random.default_rng(1)
-    t = np.cumsum(rng.uniform(0.5 * STEP, 1.5 * STEP, 400))
-    torque = rng.standard_normal((399, 2))
-    # p reaches 1, so differences over 4 ms lose three digits
-    np.testing.assert_allclose(raw_disturbance(terms_of(t, torque)), torque, atol=1e-11)
 
 
 def test_an_even_clock_is_only_cut() -> None:
@@ -212,10 +147,15 @@ def test_an_uneven_clock_keeps_the_impulse() -> None:
     rng = np.random.default_rng(3)
     t = np.cumsum(rng.uniform(0.6 * STEP, 1.4 * STEP, 300))
     torque = rng.standard_normal((299, 2))
-    (found,) = disturbance_stretches(terms_of(t, torque), np.ones(300, dtype=bool), STEP)
-    whole = np.sum(torque * np.diff(t)[:, None], axis=0)
+    terms = terms_of(t, torque)
+    (found,) = disturbance_stretches(terms, np.ones(300, dtype=bool), STEP)
+    gained = np.cumsum(torque * np.diff(t)[:, None], axis=0)
     cut = np.abs(torque).max() * STEP  # the last, incomplete step
-    assert np.all(np.abs(np.sum(found, axis=0) * STEP - whole) <= cut)
+    assert np.all(np.abs(np.sum(found, axis=0) * STEP - gained[-1]) <= cut)
+    impulse = disturbance_impulse(terms)
+    assert not impulse[0].any()
+    # sums of 300 numbers up to 1 N·m·s
+    np.testing.assert_allclose(impulse[1:], gained, atol=1e-12)
 
 
 @pytest.mark.parametrize("clock", ["even", "gapped", "uneven"])
@@ -242,17 +182,6 @@ def test_white_noise_has_the_density_of_white_noise_on_any_clock(clock: str) -> 
     assert segments > 500
     # 600 segments and 18 bins, half of them overlapping: 1.5 %
     assert np.mean(low) == pytest.approx(expected, rel=0.05)
-
-
-def test_the_impulse_is_what_the_torque_gave() -> None:
-    t = np.cumsum(np.random.default_rng(5).uniform(0.002, 0.006, 300))
-    torque = np.random.default_rng(6).standard_normal((299, 2))
-    found = disturbance_impulse(terms_of(t, torque))
-    assert not found[0].any()
-    # sums of 300 numbers up to 1 N·m·s
-    np.testing.assert_allclose(
-        found[1:], np.cumsum(torque * np.diff(t)[:, None], axis=0), atol=1e-12
-    )
 
 
 def test_blocks_follow_one_another_and_hold_the_mean_torque() -> None:
