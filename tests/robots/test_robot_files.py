@@ -109,6 +109,11 @@ PLANAR, VISCOUS, MASS, DOF = 'name = "planar"', "viscous = 0.5", "mass = 1.0", "
         (VISCOUS, "vicous = 0.5", "line 22: joint 2 .*viscous is missing"),
         (VISCOUS, "viscous = 1e20", r"line 25: .*viscous is 1e\+20 N·m·s/rad; on a robot"),
         (VISCOUS, "viscous = 0.5\n[observers.gmo]\ngain = nan", "line 27: gain is nan; it"),
+        (
+            VISCOUS,
+            "viscous = 0.5\n[observers.gmo]\ngain = []",
+            r"27: gain is \[\]; it must be a n",
+        ),
         (VISCOUS, "viscous = 0.5\n[observers]\ngmo = 3", "line 27: gmo is 3; it must be a sec"),
         (VISCOUS, "viscous = 0.5\n[admittance]\nperiod = true", "line 27: period is True"),
         (VISCOUS, "viscous = 0.5\n[admittance]\nmass = 3", "line 27: no key 'mass'; it has"),

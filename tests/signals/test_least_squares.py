@@ -8,7 +8,6 @@ from vftcli.signals.least_squares import (
     correlation_time,
     cross_validated,
     fit_column,
-    folds,
     inverse_of,
     left_out,
     robust_sd,
@@ -53,14 +52,11 @@ def test_samples_without_weight_do_not_count_at_all():
     np.testing.assert_allclose(fit_column(A, y, weights).values, x, rtol=1e-6)
 
 
-def test_what_no_column_tells_stays_zero():
-    _, A, _, y = problem(7)
-    assert solve(np.hstack([A, np.zeros((len(y), 1))]), y)[-1] == 0.0
-
-
-def test_an_inverse_is_that_of_the_columns_that_tell():
+def test_what_no_column_tells_stays_zero_and_an_inverse_is_that_of_those_that_tell():
     """Columns a hundredfold apart, one of nothing: the plain inverse, and zeros."""
-    A = np.hstack([problem(10)[1], np.zeros((2000, 1))])
+    _, A, _, y = problem(7)
+    A = np.hstack([A, np.zeros((len(y), 1))])
+    assert solve(A, y)[-1] == 0.0
     expected = np.zeros((5, 5))
     expected[:4, :4] = np.linalg.inv(A[:, :4].T @ A[:, :4])
     # condition number 1e4: rounding below 1e-11
@@ -85,25 +81,30 @@ def test_correlation_time_of_an_autoregressive_series(rho):
     assert correlation_time(series) == pytest.approx((1 + rho) / (1 - rho), rel=0.1)
 
 
+def refitted(A, y, weights, parts):
+    """RMS of the rows of each part by a fit without them."""
+    root, total, count = np.sqrt(weights), 0.0, 0.0
+    for out in parts:
+        keep = np.setdiff1d(np.arange(len(y)), out)
+        x = np.linalg.lstsq(A[keep] * root[keep, None], y[keep] * root[keep], rcond=None)[0]
+        total += np.sum(weights[out] * (y[out] - A[out] @ x) ** 2)
+        count += weights[out].sum()
+    return np.sqrt(total / count)
+
+
 def test_cross_validation_equals_fitting_each_time_anew():
+    """One log in fifths, beside one that tells nothing and is always kept."""
     rng, A, _, y = problem(9, 500)
     y = y + rng.normal(size=len(y))
     weights = rng.uniform(0.2, 1.0, len(y))
-    total = 0.0
-    for out in folds(len(y)):
-        keep = np.ones(len(y), dtype=bool)
-        keep[out] = False
-        root = np.sqrt(weights)
-        x = np.linalg.lstsq(A[keep] * root[keep, None], y[keep] * root[keep], rcond=None)[0]
-        total += np.sum(weights[out] * (y[out] - A[out] @ x) ** 2)
-    expected = np.sqrt(total / weights.sum())
+    parts = [np.arange(k, k + 80) for k in range(0, 400, 80)]
+    expected = refitted(A, y, weights, parts)
+    found = left_out([400, 100], [True, False])
     # normal equations square the condition number, here 1e2: rounding below 1e-11
-    parts = left_out([len(y)], [True])
-    assert cross_validated(A, y, weights, parts) == pytest.approx(expected, rel=1e-9)
+    assert cross_validated(A, y, weights, found) == pytest.approx(expected, rel=1e-9)
     # sums of squares far below 1 count as they are
-    assert cross_validated(A, 1e-6 * y, weights, parts) == pytest.approx(
-        1e-6 * expected, rel=1e-9
-    )
+    small = cross_validated(A, 1e-6 * y, weights, found)
+    assert small == pytest.approx(1e-6 * expected, rel=1e-9)
 
 
 def test_the_robust_spread_of_normal_noise():
@@ -115,27 +116,13 @@ def test_the_robust_spread_of_normal_noise():
 
 
 def test_of_several_logs_each_is_left_out_whole() -> None:
-    """Three logs of 103, 57 and 40 rows, of which the last tells nothing and is always kept."""
+    """Three logs of 103, 57 and 40 rows, of which the last tells nothing; in either order."""
     rng = np.random.default_rng(5)
     A, y, weights = rng.standard_normal((200, 3)), rng.standard_normal(200), np.ones(200)
-    first, second = left_out([103, 57, 40], [True, True, False])
-    np.testing.assert_array_equal(first, np.arange(103))
-    np.testing.assert_array_equal(second, np.arange(103, 160))
-    total = 0.0
-    for out in (first, second):
-        keep = np.setdiff1d(np.arange(200), out)
-        x = np.linalg.lstsq(A[keep], y[keep], rcond=None)[0]
-        total += np.sum((y[out] - A[out] @ x) ** 2)
-    expected = np.sqrt(total / 160)
-    assert cross_validated(A, y, weights, [first, second]) == pytest.approx(expected, rel=1e-9)
-    # the order of the logs does not matter
-    turned = np.r_[103:160, 0:103, 160:200]
-    parts = left_out([57, 103, 40], [True, True, False])
-    other = cross_validated(A[turned], y[turned], weights, parts)
-    assert other == pytest.approx(expected, rel=1e-9)
-
-
-def test_one_log_is_cut_into_fifths() -> None:
-    parts = left_out([100, 50], [True, False])
-    assert [len(part) for part in parts] == [20] * 5
-    np.testing.assert_array_equal(np.concatenate(parts), np.arange(100))
+    expected = refitted(A, y, weights, [np.arange(103), np.arange(103, 160)])
+    for lengths, rows in (([103, 57, 40], np.arange(200)),
+                          ([57, 103, 40], np.r_[103:160, 0:103, 160:200])):  # fmt: skip
+        parts = left_out(lengths, [True, True, False])
+        assert cross_validated(A[rows], y[rows], weights, parts) == pytest.approx(
+            expected, rel=1e-9
+        )

@@ -69,6 +69,8 @@ def test_side_by_side_they_are_the_dense_solve(
     monkeypatch.setattr(module, "STRETCH", 16)
     made = models(3, 1, joints, pinned)
     mean, covariance = smoothed(made)
+    assert not mean[pinned, :, :6].any()  # zero and certain
+    assert not covariance[pinned, :, :6].any()
     likely = log_likelihood(made) - 0.5 * made.d[:, 0].size * np.log(2.0 * np.pi)
     for lane in range(3):
         one = LinearModel(*(series[:, lane] for series in made))
@@ -78,28 +80,6 @@ def test_side_by_side_they_are_the_dense_solve(
         np.testing.assert_allclose(covariance[:, lane], P, atol=1e-9)
         np.testing.assert_allclose(likely[lane], logarithm, rtol=1e-9)
         np.testing.assert_allclose(smoothed(one)[0], exact, atol=1e-9)
-
-
-def test_what_is_pinned_is_zero_and_certain() -> None:
-    mean, covariance = smoothed(models(2, 2, pinned=slice(10, 30)))
-    assert not mean[10:30, :, :6].any()
-    assert not covariance[10:30, :, :6].any()
-    assert not covariance[10:30, :, :, :6].any()
-    assert np.all(np.diagonal(covariance[:10, :, :6, :6], axis1=-2, axis2=-1) > 0.0)
-
-
-def test_blocks_that_say_nothing_leave_the_prior() -> None:
-    made = models(1, 5)
-    blind = made._replace(
-        d=np.zeros_like(made.d),
-        observation=np.zeros_like(made.observation),
-        white=np.ones_like(made.white),
-    )
-    mean, covariance = smoothed(blind)
-    prior = np.array([block.predicted for block in filtered(blind)])
-    np.testing.assert_array_equal(mean, 0.0)
-    np.testing.assert_allclose(covariance, prior, atol=1e-9)  # rounding of numbers up to 400
-    np.testing.assert_array_equal(log_likelihood(blind), [0.0])
 
 
 def test_a_spike_counts_with_its_own_variance() -> None:

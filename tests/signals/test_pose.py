@@ -100,11 +100,13 @@ def test_the_cross_product_is_numpy_s(seed: int) -> None:
 @given(SEEDS)
 def test_angles_are_those_of_the_matrix(seed: int) -> None:
     angles = np.random.default_rng(seed).uniform([-3.1, -1.5, -3.1], [3.1, 1.5, 3.1])
+    R = rpy_matrix(angles.tolist())
+    np.testing.assert_allclose(R, pin.rpy.rpyToMatrix(*angles), atol=ROUNDING)
     # near ±π/2 of pitch, where cos is .07, the angles lose two digits
-    np.testing.assert_allclose(rpy_angles(rpy_matrix(angles.tolist())), angles, atol=1e-12)
+    np.testing.assert_allclose(rpy_angles(R), angles, atol=1e-12)
 
 
-@pytest.mark.parametrize("pitch", [0.4, np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-8])
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-8])
 def test_angles_make_the_rotation_again(pitch: float) -> None:
     R = rpy_matrix([0.3, pitch, -1.1])
     # at ±90° of pitch a 1e-9 threshold decides; half the digits are lost beside it
@@ -118,7 +120,4 @@ def test_z_is_turned_onto_a_direction(x: float, y: float, z: float) -> None:
     np.testing.assert_allclose(R[:, 2], direction / np.linalg.norm(direction), atol=ROUNDING)
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=ROUNDING)
     assert np.linalg.det(R) > 0.0
-
-
-def test_what_is_upright_is_not_turned() -> None:
     np.testing.assert_array_equal(rotation_onto(np.array([0.0, 0.0, 2.0])), np.eye(3))

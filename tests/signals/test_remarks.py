@@ -23,35 +23,23 @@ def catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("catalogue")
 def test_words_are_made_of_values_and_place() -> None:
-    remark = Remark(
-        "joint-rests",
-        "caution",
-        {"share": 0.5, "limits_Nm": [1.25, 2.0]},
-        Where("gmo", (1, 3), (0.5, 2.0)),
-    )
+    values = {"share": 0.5, "limits_Nm": [1.25, 2.0]}
+    remark = Remark("joint-rests", "caution", values, Where("gmo", (1, 3), (0.5, 2.0)))
     assert sentence(remark) == "gmo: J1, J3 rests in 50% of the samples"
     assert sentence(remark, "long") == "gmo: J1, J3 rests from 0.5 to 2 s: 1.2 2.0 N·m"
-
-
-@pytest.mark.usefixtures("catalogue")
-def test_long_words_fall_back_to_the_short_ones_and_lists_are_separated_by_commas() -> None:
-    remark = Remark("left-out", values={"topics": ["/a", "/b"]})
-    assert sentence(remark, "long") == str(remark) == "left out /a, /b"
-
-
-@pytest.mark.usefixtures("catalogue")
-def test_a_band_is_1_96_deviations_and_a_minus_is_a_minus() -> None:
-    load = Remark("load", values={"load_kg": -1.5, "sd_kg": 0.1})
-    assert str(load) == "−1.50 ± 0.20 kg"
-
-
-@pytest.mark.usefixtures("catalogue")
-def test_a_record_holds_code_and_values() -> None:
+    # Long words fall back to the short ones, lists are separated by commas.
+    left = Remark("left-out", values={"topics": ["/a", "/b"]})
+    assert sentence(left, "long") == str(left) == "left out /a, /b"
+    # A band is 1.96 deviations, and a minus is a minus.
+    assert str(Remark("load", values={"load_kg": -1.5, "sd_kg": 0.1})) == "−1.50 ± 0.20 kg"
     record = as_record(Remark("left-out", "warning", {"topics": ["/a"]}, Where(joints=(2,))))
-    assert record["code"] == "left-out"
-    assert record["level"] == "warning"
-    assert record["values"] == {"topics": ["/a"]}
-    assert record["joints"] == [2]
+    expected = {
+        "code": "left-out",
+        "level": "warning",
+        "values": {"topics": ["/a"]},
+        "joints": [2],
+    }
+    assert record.items() >= expected.items()
 
 
 def test_an_unknown_code_is_an_error() -> None:

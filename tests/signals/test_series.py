@@ -22,20 +22,12 @@ from vftcli.signals.series import (
 )
 
 
-@given(st.lists(st.floats(1e-3, 1.0), min_size=1, max_size=40))
-def test_the_step_is_the_median_one(steps: list[float]) -> None:
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    assert median_step(t) == np.median(np.diff(t))
-
-
 def test_a_clock_is_even_or_not_and_has_a_step() -> None:
+    """The median one, of an even clock the mean."""
     even = np.arange(100) * 0.004
     assert clock_of(even) == (True, pytest.approx(0.004, rel=1e-15))
     assert clock_of(np.delete(even, 50)) == (False, pytest.approx(0.004, rel=1e-12))
     assert clock_of(even[:1]) == (True, 1.0)
-
-
-def test_one_sample_has_no_step() -> None:
     with pytest.raises(ClockError, match="no sample time"):
         median_step(np.zeros(1))
 
@@ -61,14 +53,6 @@ def test_columns_on_another_clock_are_interpolated_one_by_one(seed: int) -> None
     assert np.array_equal(open_ended[~away], expected[~away])
 
 
-def test_unknown_samples_are_bridged_by_a_straight_line() -> None:
-    t = np.array([0.0, 1.0, 3.0, 4.0, 5.0])
-    nan = np.nan
-    x = np.array([[0.0, nan, 6.0, 8.0, nan], [nan] * 5]).T
-    assert bridge_unknown(t, x)[:, 0].tolist() == [0.0, 2.0, 6.0, 8.0, 8.0]
-    assert not bridge_unknown(t, x)[:, 1].any()
-
-
 @given(st.integers(0, 2**32 - 1))
 def test_bridging_then_resampling_reads_the_line_between_known_samples(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -80,9 +64,9 @@ def test_bridging_then_resampling_reads_the_line_between_known_samples(seed: int
         known = np.isfinite(x[:, k])
         direct = np.interp(at, t[known], x[known, k])
         # Both are the same line; their arithmetic differs by rounding.
-        np.testing.assert_allclose(
-            resample_columns(at, t, bridge_unknown(t, x))[:, k], direct, atol=1e-12
-        )
+        found = resample_columns(at, t, bridge_unknown(t, x))[:, k]
+        np.testing.assert_allclose(found, direct, atol=1e-12)
+    assert not bridge_unknown(t, np.full((30, 1), np.nan)).any()
 
 
 T = 0.1 * np.arange(8)
@@ -99,17 +83,9 @@ def test_runs_are_the_true_samples_and_nothing_else(flags: list[bool]) -> None:
     assert all(second[0] > first[1] for first, second in pairwise(runs))
 
 
-def test_runs_reach_the_first_and_the_last_sample() -> None:
-    assert runs_of(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
-    assert runs_of(np.zeros(0, dtype=bool)) == []
-
-
-def test_gaps_shorter_than_a_limit_are_closed() -> None:
+def test_runs_are_joined_across_short_gaps_and_may_last_long_enough_together() -> None:
     assert intervals(T, MASK) == [(0, 1), (2, 3), (6, 7)]
     assert intervals(T, MASK, gap=0.25) == [(0, 3), (6, 7)]
-
-
-def test_what_is_joined_may_last_long_enough_together() -> None:
     assert intervals(T, MASK, least=0.15, gap=0.25) == [(0, 3)]
     assert intervals(T, MASK, least=0.15) == []
 

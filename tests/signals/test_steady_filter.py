@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals import steady_filter as module
-from vftcli.signals.steady_filter import Fold, recursion, spans, steady_filter
+from vftcli.signals.steady_filter import recursion, spans, steady_filter
 
 RNG = np.random.default_rng(6)
 
@@ -30,16 +30,6 @@ def test_it_is_the_plain_loop(samples: int, m: int) -> None:
     np.testing.assert_allclose(end, state, atol=1e-11)
 
 
-def test_pieces_carry_their_state(monkeypatch: pytest.MonkeyPatch) -> None:
-    F, g = np.full((1, 1, 2), 0.999), np.ones((1, 2))
-    d, start = RNG.standard_normal((3000, 2)), np.ones((1, 2))
-    whole, end = steady_filter(F, g, d, start, g)
-    monkeypatch.setattr(module, "PIECE", 701)
-    found, state = steady_filter(F, g, d, start, g)
-    np.testing.assert_allclose(found, whole, atol=1e-10)
-    np.testing.assert_allclose(state, end, atol=1e-10)
-
-
 def loop(F: np.ndarray, x: np.ndarray, start: np.ndarray) -> np.ndarray:
     y, state = np.empty_like(x), start
     for k in range(x.shape[1]):
@@ -60,28 +50,21 @@ def test_agrees_with_a_plain_loop(samples: int, m: int) -> None:
     np.testing.assert_allclose(recursion(F, x, start), loop(F, x, start), atol=1e-12)
 
 
-def test_pieces_of_a_recursion_carry_their_state(monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(0)
-    F, x = np.full((1, 1, 3000, 2), 0.999), rng.normal(size=(1, 3000, 2))
-    whole = recursion(F, x, np.ones((1, 2)))
+def test_pieces_carry_their_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    F, g = np.full((1, 1, 2), 0.999), np.ones((1, 2))
+    d, start = RNG.standard_normal((3000, 2)), np.ones((1, 2))
+    each = np.full((1, 1, 3000, 2), 0.999), d[None], start
+    whole, end = steady_filter(F, g, d, start, g)
+    states = recursion(*each)
     monkeypatch.setattr(module, "PIECE", 701)
-    np.testing.assert_allclose(recursion(F, x, np.ones((1, 2))), whole, atol=1e-11)
-
-
-@pytest.mark.parametrize("samples", [1, 5, 64, 1295, 1296, 1297, 4095, 4096, 4097])
-def test_folding_is_undone(samples: int) -> None:
-    x = np.arange(2.0 * samples).reshape(samples, 2)
-    fold = Fold.of(samples)
-    folded = fold.fold(x)
-    np.testing.assert_array_equal(fold.unfold(folded), x)
-    np.testing.assert_array_equal(fold.last(folded), x[-1])
+    found, state = steady_filter(F, g, d, start, g)
+    np.testing.assert_allclose(found, whole, atol=1e-10)
+    np.testing.assert_allclose(state, end, atol=1e-10)
+    np.testing.assert_allclose(recursion(*each), states, atol=1e-11)
 
 
 def test_pieces_end_at_the_same_samples_wherever_a_block_begins() -> None:
-    assert spans(40000, begins=True) == [
-        slice(1, 16384),
-        slice(16384, 32768),
-        slice(32768, 40000),
-    ]
+    expected = [slice(1, 16384), slice(16384, 32768), slice(32768, 40000)]
+    assert spans(40000, begins=True) == expected
     assert spans(40000, begins=False)[0] == slice(0, 16384)
     assert spans(1, begins=True) == []

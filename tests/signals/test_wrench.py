@@ -35,41 +35,30 @@ def test_a_converted_log_of_an_earlier_version_states_no_frame(notation: object)
     assert WrenchFrame.of_conversion("base@tool") == WrenchFrame("base", "tool")
 
 
-def test_a_frame_in_words() -> None:
+def test_a_frame_in_words_and_the_factor_to_force_on_the_robot() -> None:
     assert str(FRANKA_FRAME) == (
         "base axes at the base's origin, as force BY the robot ON the environment"
     )
-    assert (
-        str(WrenchFrame("base", "tool")) == "base axes at the tool's point, as force on the robot"
-    )
-
-
-def test_the_factor_turns_to_force_on_the_robot() -> None:
-    assert FRANKA_FRAME.factor == -1.0
-    assert WrenchFrame("base", "flange").factor == 1.0
+    tool = WrenchFrame("base", "tool")
+    assert str(tool) == "base axes at the tool's point, as force on the robot"
+    assert (FRANKA_FRAME.factor, tool.factor) == (-1.0, 1.0)
 
 
 def wrench(masked: np.ndarray | None = None) -> Wrench:
     values = np.arange(24.0).reshape(4, 6)
-    return Wrench(
-        name="x", t=np.arange(4.0), values=values, frame="base", sd=values, masked=masked
-    )
+    t = np.arange(4.0)
+    return Wrench(name="x", t=t, values=values, frame="base", sd=values, masked=masked)
 
 
 def test_hidden_samples_are_not_known() -> None:
+    """Without a mask all is; it has one entry a sample."""
     found = wrench(np.array([False, True, False, False]))
     assert np.isnan(found.known[1]).all()
     assert np.isnan(found.force[1]).all()
     assert np.isnan(dict(found.columns())["wrench_sd/x/fz"][1])
     np.testing.assert_array_equal(found.moment[2], [15, 16, 17])
     np.testing.assert_array_equal(found.between(0.5, 2.0), [found.values[2]])
-
-
-def test_without_a_mask_all_is_known() -> None:
     assert not wrench().hidden.any()
-
-
-def test_a_mask_has_one_entry_a_sample() -> None:
     with pytest.raises(ShapeError, match="masked of x"):
         wrench(np.zeros(3, dtype=bool))
 
