@@ -53,23 +53,16 @@ def test_warmth_changes_all_but_the_offset():
     np.testing.assert_array_equal(warm.offset, friction.offset)
 
 
-LINE = JointFriction(
-    model="points",
-    parameters={"load_coulomb": 0.1, "presliding": 0.5, "presliding_length": 1e-3},
-    speeds=(0.01, 0.5, 1.5, 3.2),
-    torques=(5.73, 9.32, 13.58, 18.72),
-)
+def joint(model: str, **values: float) -> JointFriction:
+    return JointFriction(model=model, parameters=values)
 
 
+GIVING = {"load_coulomb": 0.1, "presliding": 0.5, "presliding_length": 1e-3}
+SPEEDS, TORQUES = (0.01, 0.5, 1.5, 3.2), (5.73, 9.32, 13.58, 18.72)
+LINE = JointFriction(model="points", parameters=GIVING, speeds=SPEEDS, torques=TORQUES)
 SHORT = JointFriction(model="points", speeds=(0.1, 1.0), torques=(1.0, 3.0))
-FLAT = JointFriction(
-    model="coulomb-logarithmic",
-    parameters={"coulomb": 2.0, "logarithmic": 3.0, "logarithmic_velocity": 1.2},
-)
-SQUARE = JointFriction(
-    model="coulomb-viscous-quadratic",
-    parameters={"coulomb": 2.0, "viscous": 1.0, "quadratic": 0.5},
-)
+FLAT = joint("coulomb-logarithmic", coulomb=2.0, logarithmic=3.0, logarithmic_velocity=1.2)
+SQUARE = joint("coulomb-viscous-quadratic", coulomb=2.0, viscous=1.0, quadratic=0.5)
 MADE = replace(load_robot("ur5"), friction=(LINE, SHORT, FLAT, SQUARE, LINE, JointFriction()))
 
 
@@ -91,12 +84,9 @@ def test_a_sliding_joint_rubs_as_the_model_says_and_its_slope_is_the_derivative(
         np.testing.assert_allclose(friction.smooth(dq)[1], np.maximum(rise, 0.0), atol=2e-8)
 
 
-def test_presliding_of_the_model_is_the_plants():
+def test_presliding_is_the_models_and_a_share_of_the_coulomb_torque():
     found = true_friction(MADE, FrictionSpec()).presliding
     np.testing.assert_array_equal(found, [0.5, 0, 0, 0, 0.5, 0])
-
-
-def test_a_share_of_the_coulomb_torque_gives_before_it_slides():
     robot = load_robot("ur10e")
     whole, part = (true_friction(robot, FrictionSpec(presliding=s)) for s in (0.0, 0.6))
     np.testing.assert_allclose(part.presliding, 0.6 * whole.coulomb)

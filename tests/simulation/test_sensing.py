@@ -112,12 +112,8 @@ def test_the_first_and_the_last_sample_are_always_in_the_log() -> None:
     assert before.sum() == pytest.approx(0.9 * 99, abs=10)  # ± 3 (one sigma)
 
 
-SENSOR = {
-    "position": [0.01, -0.02, 0.03],
-    "rpy": [0.3, -0.4, 0.5],
-    "tool_mass": 0.5,
-    "tool_com": [0.02, 0.01, 0.06],
-}
+SENSOR = {"position": [0.01, -0.02, 0.03], "rpy": [0.3, -0.4, 0.5], "tool_mass": 0.5,
+          "tool_com": [0.02, 0.01, 0.06]}  # fmt: skip
 
 
 def sensed(duration: float = 0.2, **more: object) -> Simulation:
@@ -145,10 +141,9 @@ def test_a_force_sensor_reads_contacts_and_what_its_tool_weighs() -> None:
         wrench = run.truth.wrench[k] - np.linalg.solve(J.T, more - less)
         R, away = data.oMf[frame].rotation @ turn, data.oMf[frame].rotation @ SENSOR["position"]
         moment = wrench[3:] - np.cross(away, wrench[:3])
+        expected = [*(R.T @ wrench[:3]), *(R.T @ moment)]
         # the solve through J, of condition 10, rounds to 1e-13
-        np.testing.assert_allclose(
-            run.measured.signals["wrench"][k], [*(R.T @ wrench[:3]), *(R.T @ moment)], atol=1e-9
-        )
+        np.testing.assert_allclose(run.measured.signals["wrench"][k], expected, atol=1e-9)
     assert np.linalg.norm(run.truth.wrench[-1, :3]) > 20.0
 
 
@@ -170,18 +165,16 @@ def test_the_controllers_targets_and_estimate_are_of_its_nominal_model() -> None
     run = circle("duration=0.1", "sensing.vendor_cutoff=1e5")
     samples, seen, robot = run.samples, run.measured.signals, run.robot
     data, constant = robot.model.createData(), robot.torque_constant
-    target = [
-        pin.rnea(robot.model, data, *row)
-        for row in zip(samples.target_q, samples.target_dq, samples.target_ddq, strict=True)
-    ]
+
+    def rigid(*motion: np.ndarray) -> list[np.ndarray]:
+        return [pin.rnea(robot.model, data, *row).copy() for row in zip(*motion, strict=True)]
+
+    target = rigid(samples.target_q, samples.target_dq, samples.target_ddq)
     np.testing.assert_allclose(seen["target_torque"], target, atol=1e-9)
     load = gravity_torque(robot, samples.target_q)
     rubs = friction_torque(robot.friction, samples.target_dq, load)
     np.testing.assert_allclose(seen["target_current"] * constant, target + rubs, atol=1e-9)
-    model = [
-        pin.rnea(robot.model, data, *row)
-        for row in zip(seen["q"], seen["dq"], samples.target_ddq, strict=True)
-    ]
+    model = rigid(seen["q"], seen["dq"], samples.target_ddq)
     model += friction_torque(robot.friction, seen["dq"], load)
     np.testing.assert_allclose(seen["tau_ext"], model - seen["current"] * constant, atol=1e-9)
 

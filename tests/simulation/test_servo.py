@@ -7,7 +7,7 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.arm import Servo, rigid_torque
+from vftcli.simulation.arm import Servo
 from vftcli.simulation.scenario import ServoSpec
 from vftcli.simulation.trajectories import Reference
 
@@ -16,22 +16,14 @@ RNG = np.random.default_rng(0)
 STATES = Reference(*RNG.uniform(-0.5, 0.5, (3, 4, 6)))
 
 
-def test_feed_forward_is_inverse_dynamics_and_friction():
+def test_feed_forward_is_inverse_dynamics_and_friction_or_gravity_alone():
     data = ROBOT.model.createData()
-    forward = Servo(ServoSpec(), ROBOT, 1e-3).feed_forward(STATES)
-    rigid = [pin.rnea(ROBOT.model, data, *row) for row in zip(*STATES, strict=True)]
-    np.testing.assert_allclose(rigid_torque(ROBOT.model, STATES), rigid, atol=1e-12)
     friction = friction_torque(ROBOT.friction, STATES.dq)
-    np.testing.assert_allclose(forward, rigid + friction, atol=1e-12)
-
-
-def test_without_feed_forward_gravity_alone_is_compensated():
-    servo = Servo(ServoSpec(feed_forward=False), ROBOT, 1e-3)
-    data = ROBOT.model.createData()
-    forward = servo.feed_forward(STATES)
-    for row, q in zip(forward, STATES.q, strict=True):
-        gravity = pin.computeGeneralizedGravity(ROBOT.model, data, q)
-        np.testing.assert_allclose(row, gravity, atol=1e-12)
+    whole, bare = (Servo(ServoSpec(feed_forward=on), ROBOT, 1e-3) for on in (True, False))
+    rigid = [pin.rnea(ROBOT.model, data, *row).copy() for row in zip(*STATES, strict=True)]
+    np.testing.assert_allclose(whole.feed_forward(STATES), rigid + friction, atol=1e-12)
+    gravity = [pin.computeGeneralizedGravity(ROBOT.model, data, q).copy() for q in STATES.q]
+    np.testing.assert_allclose(bare.feed_forward(STATES), gravity, atol=1e-12)
 
 
 @pytest.mark.parametrize(("stiffness", "omega"), [("stiff", 90.0), ("soft", 28.0), (40.0, 40.0)])
@@ -42,9 +34,8 @@ def test_every_mode_has_the_loops_frequency_and_damping(stiffness, omega):
     M = pin.crba(ROBOT.model, ROBOT.model.createData(), q)
     M = np.triu(M) + np.triu(M, 1).T
     # computed torque: M⁻¹τ = ω² e + 2ζω ė
-    np.testing.assert_allclose(
-        np.linalg.solve(M, tau), omega**2 * error + 2 * 0.7 * omega * rate, rtol=1e-9
-    )
+    expected = omega**2 * error + 2 * 0.7 * omega * rate
+    np.testing.assert_allclose(np.linalg.solve(M, tau), expected, rtol=1e-9)
 
 
 def test_torque_and_positions_stay_inside_the_limits():
@@ -54,25 +45,20 @@ def test_torque_and_positions_stay_inside_the_limits():
     assert np.any(np.abs(tau) == ROBOT.limits.tau_max)
     free = Servo(ServoSpec(torque_limits=False), ROBOT, 1e-3)
     assert np.all(np.isinf(free.limit))
-    np.testing.assert_array_equal(
-        [servo.q_min, servo.q_max], [ROBOT.limits.q_min, ROBOT.limits.q_max]
-    )
+    limits = [ROBOT.limits.q_min, ROBOT.limits.q_max]
+    np.testing.assert_array_equal([servo.q_min, servo.q_max], limits)
 
 
 @pytest.mark.parametrize(
-    ("spec", "step", "words"),
+    ("spec", "words"),
     [
-        (ServoSpec(stiffness="hard"), 1e-3, "there is stiff, soft"),
-        (ServoSpec(stiffness=0.0), 1e-3, "must be positive"),
-        (ServoSpec(damping=-0.1), 1e-3, "must be positive and damping not negative"),
-        (
-            ServoSpec(stiffness=401.0),
-            1e-3,
-            "chatters at a step of 0.001 s; it can be at most 400",
-        ),
+        (ServoSpec(stiffness="hard"), "there is stiff, soft"),
+        (ServoSpec(stiffness=0.0), "must be positive"),
+        (ServoSpec(damping=-0.1), "must be positive and damping not negative"),
+        (ServoSpec(stiffness=401.0), "chatters at a step of 0.001 s; it can be at most 400"),
     ],
 )
-def test_impossible_loops_are_refused(spec, step, words):
+def test_impossible_loops_are_refused(spec, words):
     with pytest.raises(ParameterError, match=words):
-        Servo(spec, ROBOT, step)
+        Servo(spec, ROBOT, 1e-3)
     Servo(ServoSpec(stiffness=399.0), ROBOT, 1e-3)

@@ -34,5 +34,6 @@ def test_the_law_takes_the_drift_out_of_the_residual() -> None:
     warming = simulate(load_scenario("ur5-circle", [*UR5E, *drift]), 1).recording
     assert steady.recording.temperature is not None
     np.testing.assert_array_equal(steady.recording.temperature, 35.0)
+    np.testing.assert_allclose(warming.temperature[[0, -1]], [[25.0] * 6, [40.0] * 6])
     assert residual(warming) <= 1.1 * residual(steady.recording)
     assert residual(replace(warming, temperature=None)) > 3.5 * residual(steady.recording)
