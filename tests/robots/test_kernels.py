@@ -18,6 +18,7 @@ from vftcli.robots.kernels import (
     torque_regressor,
     with_parameters,
 )
+from vftcli.robots.tape import Program, Tape, Value
 from vftcli.robots.terms import literal_momentum_terms
 
 TILTED = np.array([3.1, -4.2, -8.3])  # a base on a wall bracket, |g| = 9.81 to 1 %
@@ -105,6 +106,25 @@ def test_general_rotations_agree_with_pinocchio(joints: int) -> None:
         cut = {k: v[:1] for k, v in vars(chain).items() if k in PER_JOINT}
         chain = replace(chain, **cut)
     agrees_with_pinocchio(chain, *np.random.default_rng(10).normal(0.0, 3.0, (2, 50, joints)))
+
+
+def test_what_is_zero_or_one_or_asked_by_nobody_costs_nothing() -> None:
+    """Right angles and zeros of a table make no operations, and few rows are in use at once."""
+    program = kernels.program_of(load_robot("ur5").chain, ("p", "bias"))
+    assert len(program._operations) <= 321
+    assert program._rows <= 65
+
+
+def test_a_constant_that_equals_the_number_of_a_row_is_a_constant() -> None:
+    """4.0 is no row 4, though the two are equal."""
+    tape = Tape(5)
+    program = Program(tape, [tape.plus(tape.times(Value(1.0, 0), Value(4.0)), Value(1.0, 4))])
+    inputs, results = program.bind(3)
+    # Each row begins with a cache line.
+    assert not any(row.ctypes.data % 64 for row in (*inputs, *results))
+    inputs[:] = np.arange(15.0).reshape(5, 3)
+    program.run()
+    np.testing.assert_array_equal(results, [[12.0, 17.0, 22.0]])
 
 
 @pytest.mark.parametrize("samples", [0, 1, 2])

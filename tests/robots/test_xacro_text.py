@@ -39,23 +39,6 @@ def test_a_xacro_is_expanded_with_its_arguments(tmp_path: Path) -> None:
     assert load_robot(f"{written(tmp_path, xacro())} name:=made").name == "made"
 
 
-@pytest.mark.usefixtures("_xacro_installed")
-def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None:
-    parts, own = tmp_path / "parts_description", tmp_path / "own_description" / "urdf"
-    parts.mkdir()
-    own.mkdir(parents=True)
-    written(parts, "<package><name>other_parts</name></package>", "package.xml")
-    argument = '<xacro:arg name="far" default="1"/>'
-    part = (
-        f'<robot xmlns:xacro="http://xacro">{argument}{fixed("far_link", "link5", 0.2)}</robot>'
-    )
-    written(parts, part, "part.xacro")
-    include = '<xacro:include filename="$(find other_parts)/part.xacro"/>'
-    path = written(own, xacro(include), "arm.xacro")
-    found = load_robot(f"{path} name:=made far:=2")
-    assert found.chain.mass[-1] == pytest.approx(1.2)
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("_xacro_installed")
 @pytest.mark.parametrize(
@@ -98,34 +81,37 @@ def test_a_xacro_that_never_ends_is_ended(tmp_path, monkeypatch, name: str) -> N
 def test_a_maker_s_package_loads_its_tables_and_those_of_a_package_beside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As UR's description does: arguments name the files, a macro of another folder loads them."""
+    """As UR's description does: arguments name the files, a macro of another folder loads them.
+
+    A package is found by its manifest, and what it includes may declare arguments.
+    """
     monkeypatch.setenv("ARM_MASS", "9.0")
-    own, other = tmp_path / "own_description", tmp_path / "other_description"
+    own, other = tmp_path / "own_description", tmp_path / "beside"
     for folder in (own / "urdf" / "inc", own / "config", other / "config"):
         folder.mkdir(parents=True)
-    for package in (own, other):
-        written(package, f"<package><name>{package.name}</name></package>", "package.xml")
+    written(own, "<package><name>own_description</name></package>", "package.xml")
+    written(other, "<package><name>other_description</name></package>", "package.xml")
     written(own / "config", "masses: {link: !degrees 57.29577951308232}\n", "physical.yaml")
     written(other / "config", "tool: 0.25\n", "tool.yaml")
     macro = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="far" default="1"/>
 <xacro:macro name="read" params="physical tool">
 <xacro:property name="table" value="${xacro.load_yaml(physical)}" scope="parent"/>
-<xacro:property name="tool" value="${xacro.load_yaml(tool)['tool']}" scope="parent"/>
+<xacro:property name="tool" value="${$(arg far) * xacro.load_yaml(tool)['tool']}" scope="parent"/>
 </xacro:macro></robot>"""
     written(own / "urdf" / "inc", macro, "common.xacro")
     hand = fixed("hand", "link5", 0.5).replace('mass value="0.5"', 'mass value="${tool}"')
-    body = link("base") + arm(5).replace(
-        'mass value="5.0"', "mass value=\"${table['masses']['link'] * $(optenv ARM_MASS 2)}\""
-    )
+    mass = "${table['masses']['link'] * $(optenv ARM_MASS 2)}"
+    body = link("base") + arm(5).replace('mass value="5.0"', f'mass value="{mass}"')
     text = f"""<robot name="made" xmlns:xacro="http://www.ros.org/wiki/xacro">
 <xacro:arg name="physical" default="$(find own_description)/config/physical.yaml"/>
 <xacro:include filename="$(find own_description)/urdf/inc/common.xacro"/>
 <xacro:read physical="$(arg physical)" tool="$(find other_description)/config/tool.yaml"/>
 {body}{hand}</robot>"""
-    robot = load_robot(written(own / "urdf", text, "own.urdf.xacro"))
+    robot = load_robot(f"{written(own / 'urdf', text, 'own.urdf.xacro')} far:=3")
     # The table's own number, and the default of what the environment may hold.
     assert robot.chain.mass[0] == pytest.approx(2.0)
-    assert robot.chain.mass[-1] == pytest.approx(1.0 + 0.25)
+    assert robot.chain.mass[-1] == pytest.approx(1.0 + 3.0 * 0.25)
 
 
 def test_without_the_package_the_line_that_expands_it_is_reported(tmp_path, monkeypatch) -> None:

@@ -18,6 +18,7 @@ def test_the_only_effort_is_taken_for_what_is_said() -> None:
     assert np.array_equal(log.torque_without_gravity, -EFFORT)
     (remark,) = log.source.remarks
     assert (remark.code, remark.level) == ("effort-used", "fact")
+    assert remark.values["factor"] == -1.0
     assert "motor currents of the log are read as joint torques without gravity's" in str(remark)
 
 

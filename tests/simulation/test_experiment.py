@@ -9,7 +9,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
 from vftcli.robots.terms import dynamics_terms
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import root_mean_squares as rms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.progress import heard_by
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
@@ -52,11 +52,6 @@ def many(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
     path = tmp_path_factory.mktemp("scenario") / "many.toml"
     path.write_text(ELSEWHERE)
     return simulate(load_scenario(path), 4)
-
-
-def rms(values: Array) -> Array:
-    result: Array = np.sqrt(np.mean(values**2, axis=0))
-    return result
 
 
 def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:

@@ -150,9 +150,14 @@ def test_what_a_file_leaves_out_is_off_but_for_these(
     assert all(np.array_equal(value, stated[name]) for name, value in found.items())
 
 
-def test_unknown_scenario_lists_them() -> None:
+def test_unknown_scenario_lists_them(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"panda-bearing.*Did you mean ur5-circle\?"):
         load_scenario("ur5-cirle")
+    with pytest.raises(ParameterError, match="cannot be read"):
+        load_scenario(tmp_path / "none.toml")
+
+
+LOAD = "[[contacts]]\nname='a'\nkind='load'\nweight=1.0\nspans=[[0.0,1.0]]\n"
 
 
 @pytest.mark.parametrize(
@@ -161,25 +166,13 @@ def test_unknown_scenario_lists_them() -> None:
         ("name = 'x'\n[servo]\nstiffness = ", "not valid TOML"),
         ("[trajectory]\nradius = 0.2\n", "trajectory.kind ''"),
         ("[[contacts]]\nkind = 'load'\nname = 'l'\n", "contacts.0..weight is missing"),
+        (f"duration = 0.1\n{LOAD}{LOAD}", "two contacts are named 'a'"),
     ],
 )
 def test_broken_files_are_refused(text: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(text)
     with pytest.raises(ParameterError, match=words):
-        load_scenario(path)
-
-
-def test_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="cannot be read"):
-        load_scenario(tmp_path / "none.toml")
-
-
-def test_two_contacts_of_one_name_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "two.toml"
-    one = "[[contacts]]\nname='a'\nkind='load'\nweight=1.0\nspans=[[0.0,1.0]]\n"
-    path.write_text("duration = 0.1\n" + one + one)
-    with pytest.raises(ParameterError, match="two contacts are named 'a'"):
         simulate(load_scenario(path))
 
 
