@@ -152,11 +152,12 @@ def test_impossible_contacts_are_refused(spec: ContactSpec, words: str) -> None:
         started(spec, rng(), 1.0)
 
 
-ROBOT, Q, POINT = load_robot("ur5"), np.linspace(-1.0, 0.8, 6), (0.02, 0.05, 0.1)
+# Its flange is turned against its last joint.
+ROBOT, Q, POINT = load_robot("gen3"), np.linspace(-1.0, 0.8, 7), (0.02, 0.05, 0.1)
 
 
 def wrench_on_arm(spec: ContactSpec, v: Array) -> Array:
-    """A contact's wrench on the UR5 at a pose and velocities."""
+    """A contact's wrench on the arm at a pose and velocities."""
     touching = Touching((spec,), ROBOT.chain, 10.0, np.random.SeedSequence(1))
     data = ROBOT.model.createData()
     pin.computeJointJacobians(ROBOT.model, data, Q)
@@ -177,7 +178,7 @@ def test_a_hand_brakes_how_its_point_moves_and_its_link_turns(link: int) -> None
     """Dampers alone, against the motion of the point by differences."""
     hand = HandSpec(name="h", spans=((0.0, 10.0),), stiffness=0.0, damping=2.0,
                     twist_damping=3.0, link=link, point=POINT)  # fmt: skip
-    v, h = np.linspace(0.5, -0.4, 6), 1e-6
+    v, h = np.linspace(0.5, -0.4, 7), 1e-6
     (ahead, turned), (behind, before) = (point_of(Q + sign * h * v, link) for sign in (1, -1))
     spin = pin.log3(turned @ before.T) / (2 * h)
     # differences of order h²: 1e-9 of a metre a second
@@ -193,4 +194,4 @@ def test_link_axes_turn_with_the_link(link: int) -> None:
                        link=link, point=POINT, axes="link")  # fmt: skip
     rotation = point_of(Q, link)[1]
     expected = [*(rotation @ force), *(rotation @ torque)]
-    np.testing.assert_allclose(wrench_on_arm(spec, np.zeros(6)), expected, atol=1e-12)
+    np.testing.assert_allclose(wrench_on_arm(spec, np.zeros(7)), expected, atol=1e-12)
