@@ -65,7 +65,7 @@ def sines() -> Callable[..., tuple]:
 
 
 @pytest.fixture(scope="session")
-def rubbing_arm() -> Robot:
+def arm() -> Robot:
     """A UR5 with one friction in all joints."""
     parameters = {"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
     rubbing = JointFriction(model="coulomb-viscous-offset", parameters=parameters)
@@ -73,9 +73,8 @@ def rubbing_arm() -> Robot:
 
 
 @pytest.fixture(scope="session")
-def rubbing_log(rubbing_arm) -> Recording:
+def recording(arm) -> Recording:
     """12 s of its motion, noise of 0.1 N·m."""
-    arm = rubbing_arm
     t, q, dq, ddq = three_sines(seconds=12.0, seed=2)
     torque = torque_regressor(arm.chain, q, dq, ddq) @ chain_parameters(arm.loaded_chain)
     torque = torque + arm.chain.rotor_inertia * ddq + friction_torque(arm.friction, dq)
@@ -84,6 +83,6 @@ def rubbing_log(rubbing_arm) -> Recording:
 
 
 @pytest.fixture
-def rubbing_data(rubbing_arm, rubbing_log) -> Training:
+def data(arm, recording) -> Training:
     """That log as training data for its own robot."""
-    return prepare_training([rubbing_log], rubbing_arm)
+    return prepare_training([recording], arm)

@@ -21,38 +21,20 @@ from vftcli.identification.clean_fit import (
 )
 from vftcli.identification.friction_fit import fit_frictions
 from vftcli.identification.training import Training, prepare_training
-from vftcli.robots import JointFriction, Payload, load_robot
+from vftcli.robots import Payload, load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.rest import SLIDES
 
-RUBBING = JointFriction(
-    model="coulomb-viscous-offset", parameters={"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
-)
-UR5 = replace(load_robot("ur5"), friction=(RUBBING,) * 6)
-"""A UR5 with one friction in all joints; the logs are its own."""
-
-
-@pytest.fixture
-def recording(rubbing_log):
-    """12 s of a UR5 that rubs."""
-    return rubbing_log
-
-
-@pytest.fixture
-def data(rubbing_data):
-    """That log as training data for its own robot."""
-    return rubbing_data
-
 
 @pytest.mark.slow
-def test_a_push_is_left_out_of_the_fit(recording):
+def test_a_push_is_left_out_of_the_fit(recording, arm, data):
     push = np.where((recording.t > 5) & (recording.t < 6), 40.0, 0.0)[:, None] * np.eye(6)[1]
-    pushed = replace(recording, current=recording.current + push / UR5.torque_constant)
-    data = prepare_training([pushed], UR5)
-    found, fits, (remark,) = fit_without_contacts(data, strict=False)
+    pushed = replace(recording, current=recording.current + push / arm.torque_constant)
+    touched = prepare_training([pushed], arm)
+    found, fits, (remark,) = fit_without_contacts(touched, strict=False)
     assert remark.code == "suspected-contacts"
-    t, weights = data.logs[0].t, found.logs[0].weights
+    t, weights = touched.logs[0].t, found.logs[0].weights
     np.testing.assert_array_equal(weights[(t > 5) & (t < 6)], 0.0)
     assert weights[(t < 4.5) | (t > 6.5)].all()
     # the samples closer than the margin, steps of 24 ms
@@ -63,7 +45,7 @@ def test_a_push_is_left_out_of_the_fit(recording):
     np.testing.assert_allclose(ends, [5.0, 6.0], atol=0.125)
     assert (remark.values["count"], remark.values["worst_joints"]) == (1, [2])
     assert remark.values["total_s"] == ends[1] - ends[0]
-    clean = fit_without_contacts(prepare_training([recording], UR5), strict=False)
+    clean = fit_without_contacts(data, strict=False)
     assert clean.remarks == []
     np.testing.assert_allclose(fits[1].fit.values[:2], clean.fits[1].fit.values[:2], rtol=0.03)
 
@@ -110,15 +92,8 @@ def test_what_dry_friction_can_hold_near_standstill_is_no_contact(prepared):
     assert not find_contacts(standing, touched(0.5, 35.0), dry)
     assert find_contacts(standing, touched(0.5, 45.0), dry)  # 45 − 30 = 15 > 10.4
     assert find_contacts(running, touched(0.5, 35.0), dry)
-
-
-def test_samples_that_tell_nothing_are_no_contact(prepared):
-    motion = prepared(
-        T,
-        dq=np.full((len(T), 3), 0.5),
-        weights=np.repeat(np.abs(T - 4.25)[:, None] > 0.3, 3, axis=1) * 1.0,
-    )
-    assert not find_contacts(motion, touched(0.5, 50.0), np.zeros((len(T), 3)))
+    told = np.repeat(np.abs(T - 4.25)[:, None] > 0.3, 3, axis=1) * 1.0
+    assert not find_contacts(replace(running, weights=told), touched(0.5, 50.0), 0.0 * dry)
 
 
 def test_standstill_is_spread_by_a_period_of_the_filter(prepared):
@@ -164,14 +139,14 @@ def test_the_worst_explained_heavy_joint_is_named(data):
     assert not list(model_doubts(data._replace(moves=np.zeros(6, dtype=bool)), fits))
 
 
-def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
+def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, arm, sines):
     _, q, dq, ddq = sines(seconds=12.0, seed=2)
     for mass, doubted in ((0.4, False), (1.5, True)):
         load = Payload(mass=mass, com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
-        heavier = chain_parameters(UR5.with_payload(load).loaded_chain)
-        extra = torque_regressor(UR5.chain, q, dq, ddq) @ (heavier - chain_parameters(UR5.chain))
-        log = replace(recording, current=recording.current + extra / UR5.torque_constant)
-        data = prepare_training([log], UR5)
+        heavier = chain_parameters(arm.with_payload(load).loaded_chain)
+        extra = torque_regressor(arm.chain, q, dq, ddq) @ (heavier - chain_parameters(arm.chain))
+        log = replace(recording, current=recording.current + extra / arm.torque_constant)
+        data = prepare_training([log], arm)
         remarks = list(model_doubts(data, {}))
         assert [r.code for r in remarks] == ["unknown-load"] * doubted
         if doubted:
@@ -180,9 +155,9 @@ def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
             assert 99.5 < remarks[0].values["share_percent"] < 100.0
 
 
-def test_strict_methods_refuse_what_others_remark_on(recording):
+def test_strict_methods_refuse_what_others_remark_on(recording, arm):
     turned = replace(recording, current=-recording.current)
-    data = prepare_training([turned], UR5)
+    data = prepare_training([turned], arm)
     with pytest.raises(IdentificationError, match="Choose another --robot"):
         fit_without_contacts(data, strict=True)
     codes = [r.code for r in fit_without_contacts(data, strict=False).remarks]
@@ -190,7 +165,9 @@ def test_strict_methods_refuse_what_others_remark_on(recording):
 
 
 @pytest.mark.slow
-def test_links_of_another_arm_are_reported_from_an_effort_that_no_links_explain(recording, data):
+def test_links_of_another_arm_are_reported_from_an_effort_that_no_links_explain(
+    recording, arm, data
+):
     """The same effort through a UR10e's links, and its own links under noise of 30 N·m."""
 
     def ratio(training):
@@ -198,13 +175,13 @@ def test_links_of_another_arm_are_reported_from_an_effort_that_no_links_explain(
 
     # 10 cosines of freedom a link against 2300 equations a joint: a few per cent
     assert ratio(data) == pytest.approx(1.0, abs=0.1)
-    ur10 = replace(load_robot("ur10e"), torque_constant=UR5.torque_constant)
+    ur10 = replace(load_robot("ur10e"), torque_constant=arm.torque_constant)
     other = prepare_training([recording], ur10)
     assert ratio(other) > OTHER_LINKS
     rng = np.random.default_rng(4)
-    noise = 30.0 * rng.standard_normal(recording.q.shape) / UR5.torque_constant
+    noise = 30.0 * rng.standard_normal(recording.q.shape) / arm.torque_constant
     noisy = replace(recording, current=recording.current + noise)
-    trained = prepare_training([noisy], UR5)
+    trained = prepare_training([noisy], arm)
     remarks = fit_without_contacts(trained, strict=True).remarks
     (said,) = [r for r in remarks if r.code == "noisy-effort"]
     assert said.values["ratio"] < 1.2
@@ -220,17 +197,17 @@ def test_links_of_another_arm_are_reported_from_an_effort_that_no_links_explain(
         ((0.28, 0.2, 0.1), False),
     ],
 )
-def test_a_joint_that_rubs_less_and_less_is_reported(prepared, thirds, found):
+def test_a_joint_that_rubs_less_and_less_is_reported(prepared, arm, thirds, found):
     """So much more torque along the velocity in each third, of joint 2 alone."""
     dq = np.where(T % 1.0 < 0.5, 0.5, -0.5)[:900, None] * np.ones(6)
     along = np.repeat(thirds, 300)[:, None] * np.sign(dq) * np.eye(6)[1]
     log = prepared(T[:900], dq=dq)
     fits = {
-        j: SimpleNamespace(friction=RUBBING, fit=SimpleNamespace(residual=along[:, j]))
+        j: SimpleNamespace(friction=arm.friction[j], fit=SimpleNamespace(residual=along[:, j]))
         for j in range(6)
     }
     moves = np.ones(6, bool)
-    remarks = list(warm_up_remarks(Training(UR5, (), (log,), moves, moves), fits))
+    remarks = list(warm_up_remarks(Training(arm, (), (log,), moves, moves), fits))
     assert [(r.code, r.where.joints) for r in remarks] == [("warm-up", (2,))] * found
     for remark in remarks:
         # tanh of .5 rad/s over the smoothing is 1

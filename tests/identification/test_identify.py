@@ -8,11 +8,11 @@ import pytest
 
 from vftcli.free_motion.free_motion import PARTLY
 from vftcli.identification import Task, identify
-from vftcli.identification.payload import payload_from_pair, payload_from_poses
 from vftcli.identification.training import prepare
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters, torque_regressor
+from vftcli.robots.profile import robot_toml
 from vftcli.robots.terms import gravity_torque
 from vftcli.signals.errors import (
     IdentificationError,
@@ -132,34 +132,6 @@ def test_links_are_identified_for_another_trajectory():
     assert len(found.base) == 40 + 6 * 3
 
 
-def test_the_payload_comes_back_from_a_pair_in_either_order():
-    true = rubbed(UR5, "coulomb-viscous-offset")
-    load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
-    free, loaded = log(true, 1), log(true.with_payload(load), 1)
-    for pair in ((free, loaded), (loaded, free)):
-        fit = payload_from_pair(*pair, UR5)
-        assert fit.payload.mass == pytest.approx(2.0, rel=0.02)
-        np.testing.assert_allclose(fit.payload.com, load.com, atol=5e-3)
-
-
-def test_the_payload_comes_back_from_poses():
-    rng = np.random.default_rng(3)
-    load = Payload(mass=1.5, com=np.array([0.0, 0.05, 0.1]), inertia=np.zeros((3, 3)))
-    poses = rng.uniform(-1.2, 1.2, (8, 6)) + np.array([0, -1.0, 1.0, 0, 0, 0])
-    q = np.repeat(poses, 250, axis=0)
-    t = 0.008 * np.arange(len(q))
-    step = np.arange(len(q)) % 250 < 20
-    dq = np.where(step[:, None], 0.5, 0.0) * np.ones(6)
-    torque = gravity_torque(UR5.with_payload(load), q) + 0.2 * rng.normal(size=q.shape)
-    recording = Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
-    fit = payload_from_poses([recording], UR5)
-    # 230 samples of 0.2 N·m in each of 8 poses: 0.005 N·m, on arms of 0.3 m and 15 N
-    assert fit.payload.mass == pytest.approx(1.5, rel=0.02)
-    np.testing.assert_allclose(fit.payload.com, load.com, atol=5e-3)
-    with pytest.raises(IdentificationError, match="1 poses at rest"):
-        payload_from_poses([recording.between(0.0, 1.9)], UR5)
-
-
 HAND = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
 
 
@@ -205,11 +177,6 @@ def test_a_motion_of_some_seconds_is_not_weighed():
         identify([short], UR5, Task(method="payload"))
 
 
-def test_different_motions_are_no_pair():
-    with pytest.raises(IdentificationError, match="not the same motion"):
-        payload_from_pair(log(UR5, 1), log(UR5, 2), UR5)
-
-
 def test_a_log_at_rest_identifies_nothing():
     t = np.arange(0, 10, 0.008)
     still = np.zeros((len(t), 6))
@@ -228,6 +195,7 @@ def test_a_joint_that_rests_keeps_its_numbers():
     assert [r.where.joints for r in found.remarks if r.code == "static-joint"] == [(4,)]
     assert found.robot.friction[3] == UR5.friction[3]
     assert found.robot.chain.rotor_inertia[3] == UR5.chain.rotor_inertia[3]
+    assert found.robot.document["joints"][3]["rotor_inertia_source"] == "profile ur5"
 
 
 def test_missing_currents_are_reported():
@@ -247,12 +215,6 @@ def test_missing_targets_are_reported():
 def test_the_wrong_robot_is_refused(name, error):
     with pytest.raises(error, match="another"):
         identify([log(rubbed(UR5))], load_robot(name), Task(method="friction"))
-
-
-def test_turned_currents_are_refused():
-    good = log(rubbed(UR5))
-    with pytest.raises(IdentificationError, match="another sign or unit"):
-        identify([replace(good, current=-good.current)], UR5, Task(method="friction"))
 
 
 @pytest.mark.slow
@@ -275,8 +237,10 @@ def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
     assert found.robot.friction[4].parameters["coulomb"] == pytest.approx(5.0, rel=0.05)
 
 
-def test_turned_velocities_are_refused():
+def test_turned_currents_or_velocities_are_refused():
     good = log(rubbed(UR5))
+    with pytest.raises(IdentificationError, match="another sign or unit"):
+        identify([replace(good, current=-good.current)], UR5, Task(method="friction"))
     with pytest.raises(IdentificationError, match="it would push"):
         identify([replace(good, dq=-good.dq)], UR5, Task(method="friction"))
 
@@ -293,6 +257,8 @@ def test_an_unknown_load_is_suspected():
         ({"method": "magic"}, "friction, base, targets"),
         ({"method": "targets", "friction": False}, "leave model.friction=none away"),
         ({"method": "base", "constants": True}, "--method friction"),
+        ({"cutoff": 0.0}, "it must be positive"),
+        ({"cutoff": 1e4}, "it must be positive"),
     ],
 )
 def test_tasks_that_make_no_sense_are_refused(options, match):
@@ -353,17 +319,33 @@ def test_two_logs_of_one_file_name_stay_two_logs():
 def test_a_pair_of_one_file_name_is_a_pair():
     """The loaded log is known by its content, not by its name."""
     true = rubbed(UR5, "coulomb-viscous-offset")
-    load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
-    logs = log(true, 1), log(true.with_payload(load), 1)
-    named = identify(two_folders(*logs), UR5, Task(method="payload"))
+    logs = log(true, 1), log(true.with_payload(HAND), 1)
+    named = identify(two_folders(*logs), UR5, Task(method="payload", name="mine"))
     plain = identify(logs, UR5, Task(method="payload"))
     assert named.parameters.equals(plain.parameters)
     assert len(named.traces) == 1  # the log without the load
+    assert (named.robot.name, plain.robot.name) == ("mine", "ur5-identified")
+    document = named.robot.document
+    assert document["payload"]["source"].startswith("load from")
+    assert document["identification"]["sha256"] == ["a", "b"]
+    table = document["identification"]["payload"]
+    assert (table["loaded"], len(table["residual_Nm"])) == ("log.csv", 6)
+    assert table["mass_sd"] == named.parameters["sd"][0]
+    source = document["sources"][-1]
+    assert (source["id"], source["ref"]) == ("log-2", "log.csv, 3750 samples, 29.992 s")
+
+
+def test_what_a_paper_printed_of_the_profile_is_not_said_of_another_arm():
+    robot = identify([log(UR5.with_payload(HAND), 1)], UR5, Task(method="payload")).robot
+    assert UR5.published
+    assert "published" in UR5.document
+    assert robot.published == {}
+    assert (robot.path, robot.title) == (None, f"{UR5.title}, identified")
+    assert "[published]" not in robot_toml(robot)
 
 
 def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():
-    load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
-    free, loaded = two_folders(log(UR5, 1), log(UR5.with_payload(load), 1))
+    free, loaded = two_folders(log(UR5, 1), log(UR5.with_payload(HAND), 1))
     with pytest.raises(IdentificationError, match="swap the two logs"):
         identify([free], UR5, Task(method="payload"), free=loaded)
 
@@ -376,7 +358,16 @@ def test_a_simulators_arm_has_no_friction(method):
     profile = UR5.without_friction()
     found = identify([log(true)], profile, Task(method=method, friction=False), [log(true, 7)])
     assert found.robot.friction == ()
-    assert not any("friction" in joint for joint in found.robot.document["joints"])
+    joints, account = (found.robot.document[key] for key in ("joints", "identification"))
+    assert not any("friction" in joint for joint in joints)
+    own = f"identified ({method}) from recording"
+    sources = {"rotor_inertia": own, "torque_constant": "profile ur5"}
+    sources["inertial"] = own if method == "base" else "profile ur5"
+    for key, source in sources.items():
+        assert {joint[f"{key}_source"] for joint in joints} == {source}
+    assert (account["method"], account["profile"]) == (method, "ur5")
+    assert ("base_parameters" in account) is (method == "base")
+    assert [table["role"] for table in account["residuals"]] == ["train", "held-out"]
     assert found.shape_choices.is_empty()
     assert "presliding-length" not in [remark.code for remark in found.remarks]
     # white noise of .2 N·m, 8 of 62.5 Hz of which pass the filter: .07

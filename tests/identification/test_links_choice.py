@@ -32,8 +32,8 @@ def with_other_links(recording, sines, share):
 
 
 @pytest.mark.parametrize(("share", "method"), [(0.0, "friction"), (0.35, "base")])
-def test_wrong_links_are_identified_too(rubbing_log, sines, share, method):
-    log = with_other_links(rubbing_log, sines, share)
+def test_wrong_links_are_identified_too(recording, sines, share, method):
+    log = with_other_links(recording, sines, share)
     result = chosen_method(prepare_training([log], UR5))
     assert result.method == method
     said = "links-identified" in [remark.code for remark in result.remarks]

@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 
-from vftcli.identification import Task
 from vftcli.identification.training import (
-    gravity_torque,
     prepare,
     settings_record,
     stride,
     usable_samples,
 )
 from vftcli.robots import load_robot
-from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 
 PANDA = load_robot("panda")
@@ -38,6 +35,10 @@ def test_a_log_is_cut_to_its_motion_and_decimated_to_six_samples_a_period():
     assert motion.t[0] == pytest.approx(0.502)
     assert motion.t[-1] == pytest.approx(7.498, abs=0.021)
     np.testing.assert_array_equal(motion.t, recording.t[motion.kept])
+    assert [stride(8.0, 1 / rate) for rate in (1000.0, 48.0, 20.0)] == [20, 1, 1]
+    words = settings_record(4.0, 0.002)
+    # 500 Hz over 24 Hz
+    assert (words["cutoff_hz"], words["decimation"], words["kept_rate_hz"]) == (4.0, 20.0, 25.0)
 
 
 def test_signals_of_the_band_pass_and_velocity_becomes_acceleration():
@@ -55,20 +56,6 @@ def test_signals_of_the_band_pass_and_velocity_becomes_acceleration():
     np.testing.assert_allclose(filtered, motion.dq, atol=1e-12)
 
 
-def test_a_log_at_rest_has_no_samples():
-    t = np.arange(0, 4, 0.002)
-    still = np.zeros((len(t), 7))
-    motion = prepare(Recording(t=t, q=still, dq=still, torque=still), PANDA)
-    assert motion.samples == 0
-    assert list(motion.chunks()) == []
-
-
-def test_chunks_cover_every_sample_once():
-    motion = prepare(log()[0], PANDA)
-    rows = np.concatenate([np.arange(motion.samples)[span] for span in motion.chunks()])
-    np.testing.assert_array_equal(rows, np.arange(motion.samples))
-
-
 def test_long_stops_and_gaps_tell_nothing():
     t = np.arange(0, 10, 0.01)
     t[500:] += 0.5  # a gap of half a second, 50 steps
@@ -81,32 +68,3 @@ def test_long_stops_and_gaps_tell_nothing():
     gap = list(range(493, 507))
     assert lost.tolist() == [*range(200, 232), *gap]
     assert np.flatnonzero(~usable[:, 1]).tolist() == gap
-
-
-@pytest.mark.parametrize(("rate", "each"), [(1000.0, 20), (500.0, 10), (48.0, 1), (20.0, 1)])
-def test_the_stride_keeps_six_samples_a_period_of_the_cutoff(rate, each):
-    assert stride(8.0, 1 / rate) == each
-
-
-def test_settings_say_what_was_done():
-    words = settings_record(4.0, 0.002)
-    assert words["cutoff_hz"] == 4.0
-    assert words["decimation"] == 20.0  # 500 Hz over 24 Hz
-    assert words["kept_rate_hz"] == 25.0
-
-
-@pytest.mark.parametrize("cutoff", [0.0, -1.0, 1e4])
-def test_impossible_cutoffs_are_refused(cutoff):
-    with pytest.raises(ParameterError, match="it must be positive"):
-        Task(cutoff=cutoff)
-
-
-def test_gravity_is_pinocchios_chunk_by_chunk():
-    import pinocchio as pin
-
-    q = np.random.default_rng(0).uniform(-2, 2, (5000, 7))
-    torque = gravity_torque(PANDA, q)
-    data = PANDA.model.createData()
-    for k in (0, 1, 2048, 4096, 4999):
-        expected = pin.computeGeneralizedGravity(PANDA.model, data, q[k])
-        np.testing.assert_allclose(torque[k], expected, atol=1e-10)

@@ -1,6 +1,5 @@
 """What a controller believes, read off targets that were made here."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -19,7 +18,6 @@ from vftcli.identification.targets import (
     controller_friction,
     controller_models,
     refuse_guided,
-    resolution,
     rotor_inertia,
     target_remarks,
     targets_method,
@@ -58,9 +56,8 @@ def test_rotor_and_gravity_come_from_moments_beyond_the_rigid_body(targets):
     rotor = rotor_inertia(0, targets)
     assert rotor.value == pytest.approx(J, rel=1e-6)
     assert rotor.known
-
-
-def test_a_shift_in_time_is_no_inertia(targets):
+    assert not rotor_inertia(0, targets._replace(ddq=0.0 * targets.ddq)).known
+    # a shift in time is no inertia
     late = targets._replace(moment=targets.moment + 0.002 * targets.lead)
     # the derivative's column takes it up to second order, numerical differences to 1e-3
     assert rotor_inertia(0, late).value == pytest.approx(J, rel=2e-3)
@@ -106,24 +103,18 @@ def test_a_program_feeds_its_friction_forward(targets, share):
 def test_a_hand_that_leads_the_arm_is_refused(targets):
     with pytest.raises(IdentificationError, match="a hand led the arm"):
         refuse_guided(*guided_log(targets, 0.3))
-    for asked in (0.49, 0.51):  # the share of the motion that a program asked for
-        law = targets.dq * (np.arange(len(targets.dq)) < asked * len(targets.dq))[:, None]
-        with (
-            pytest.raises(IdentificationError, match="a hand led")
-            if asked < 0.5
-            else nullcontext()
-        ):
-            refuse_guided(*guided_log(targets, 1.0, asked=law))
+    # a program asked for this share of the motion
+    below, above = (
+        np.arange(len(targets.dq)) < share * len(targets.dq) for share in (0.49, 0.51)
+    )
+    refuse_guided(*guided_log(targets, 1.0, asked=targets.dq * above[:, None]))
+    with pytest.raises(IdentificationError, match="a hand led"):
+        refuse_guided(*guided_log(targets, 1.0, asked=targets.dq * below[:, None]))
 
 
 def slowed(targets, fastest):
     """The motion at other velocities, `fastest` at most."""
     return targets.dq * fastest / np.max(np.abs(targets.dq))
-
-
-def test_a_joint_that_does_not_accelerate_tells_no_rotor(targets):
-    still = targets._replace(ddq=0.0 * targets.ddq)
-    assert not rotor_inertia(0, still).known
 
 
 def resting(prepared, moments, step=1e-3, wobble=0.0):
@@ -152,11 +143,6 @@ def test_rests_whose_current_wanders_or_is_small_tell_nothing(prepared):
     # below 20 steps of 1 mA
     assert not constant_at_rest(0, resting(prepared, [0.19])).known
     assert constant_at_rest(0, resting(prepared, [0.25])).value == pytest.approx(K, rel=0.03)
-
-
-def test_digits_are_the_smallest_step():
-    assert resolution(np.array([0.1, 0.3, 0.15, 0.3])) == pytest.approx(0.05)
-    assert resolution(np.ones(4)) == 0.0
 
 
 def test_a_robot_without_constants_has_no_targets():
@@ -191,11 +177,11 @@ def test_what_the_targets_leave_open_is_reported(believed, said):
         assert str(remark)  # every code has its words, every template its values
 
 
-def test_numbers_stand_beside_the_profiles(rubbing_data, monkeypatch):
+def test_numbers_stand_beside_the_profiles(data, monkeypatch):
     believed = [model(), model(), model(friction=False), *[model()] * 3]
     door = "vftcli.identification.targets.controller_models"
     monkeypatch.setattr(door, lambda *_: believed)
-    found, arm = targets_method(rubbing_data), rubbing_data.robot
+    found, arm = targets_method(data), data.robot
     own = ["torque_constant", "rotor_inertia"]
     numbers = [n for n in found.numbers if n.joint == 2]
     assert [n.parameter for n in numbers] == [*own, "coulomb", "logarithmic"]

@@ -133,20 +133,6 @@ def test_another_number_of_gains_is_refused() -> None:
         build_observers(["gmo"], setup("ur5", "gmo.gain=1,2,3"))
 
 
-def test_an_unknown_observer_lists_what_there_is() -> None:
-    with pytest.raises(ParameterError, match="there is best, fdo, gmo, kfo-fe, kfo-zoh"):
-        ObserverChoice(names=("kalman",))
-
-
-def test_sections_are_read_as_a_robot_file_s(tmp_path: Path) -> None:
-    path = tmp_path / "gains.toml"
-    path.write_text("[observers.gmo]\ngain = [1.0, 2.0]\n[observers.kfo-rts]\nr_diag = 0.1\n")
-    assert load_gains(path) == {
-        "gmo": {"gain": [1.0, 2.0]},
-        "kfo-rts": {"r_diag": 0.1},
-    }
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

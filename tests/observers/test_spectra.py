@@ -17,13 +17,6 @@ STEP = 0.008
 MakesTerms = Callable[..., DynamicsTerms]
 
 
-def test_the_raw_disturbance_of_a_constant_torque_is_that_torque(terms_of: MakesTerms) -> None:
-    t = STEP * np.arange(100)
-    d = raw_disturbance(terms_of(t, np.full((100, 2), 3.0)))
-    # differences of a sum of a hundred terms: rounding only
-    np.testing.assert_allclose(d, 3.0, rtol=1e-12)
-
-
 def test_spectra_hold_the_mean_square_and_the_mean(terms_of: MakesTerms) -> None:
     """Parseval: the density summed over frequency is the power, a constant's included."""
     t = STEP * np.arange(4000)
@@ -81,16 +74,6 @@ def test_no_segment_reaches_across_a_gap(terms_of: MakesTerms) -> None:
         spectra_of(samples_of(terms, ~few), [samples_of(terms, few)])
 
 
-def test_the_spectra_predict_the_error_of_a_perfect_and_of_a_dead_observer() -> None:
-    spectra = flat_spectra()
-    one, none = np.ones((11, 1), complex), np.zeros((11, 1), complex)
-    assert spectra.missed(one)[0] == 0.0
-    assert spectra.passed(none)[0] == 0.0
-    # 11 bins of .5 Hz, S_τ = 2 and S_n = 1
-    assert spectra.missed(none)[0] == pytest.approx(11.0)
-    assert spectra.passed(one)[0] == pytest.approx(5.5)
-
-
 def flat_spectra(free: float = 1.0, loaded: float = 3.0) -> Spectra:
     """Eleven bins of .5 Hz, of one density each: so slow that nothing is capped."""
     f = np.linspace(0.0, 5.0, 11)
@@ -120,9 +103,7 @@ def test_power_goes_with_the_square_of_the_complex_response(
     spectra, H = flat_spectra(), np.full((11, 1), response, complex)
     assert spectra.missed(H)[0] == pytest.approx(11.0 * missed)
     assert spectra.passed(H)[0] == pytest.approx(5.5 * passed)
-
-
-def test_less_than_the_free_part_is_no_external_torque() -> None:
+    # less than the free part is no external torque
     assert not flat_spectra(free=3.0, loaded=1.0).external.any()
 
 
@@ -141,11 +122,7 @@ def test_above_five_hertz_an_external_torque_s_spectrum_falls() -> None:
     above = f > 5.0
     # the cap lies below the plateau from the first bin on: the mean is below the last bin's value
     np.testing.assert_allclose(spectra.external[above, 0], level / f[above] ** 2.5)
-
-
-def test_what_is_cut_off_the_external_torque_is_noise() -> None:
-    """Nothing is lost, so what an observer that passes everything reads stays the same."""
-    spectra = chattering()
+    # What is cut off is noise: what an observer that passes everything reads stays the same.
     np.testing.assert_allclose(spectra.noise + spectra.external, spectra.loaded)
     assert np.all(spectra.noise >= spectra.free)
     one = np.ones((201, 1), complex)
@@ -163,22 +140,10 @@ def test_a_spectrum_that_falls_by_itself_is_left_as_it_is() -> None:
     np.testing.assert_allclose(spectra.noise, free)
 
 
-def test_the_floor_is_the_quietest_octave_s_level_below_it() -> None:
-    """Friction at low frequencies, noise above: the floor is the noise throughout."""
-    f = np.arange(101) * 0.5
-    free = np.where(f < 5.0, 100.0, 1.0)[:, None]
-    spectra = Spectra(frequency=f, free=free, loaded=free, step=0.01, segments=(1, 1))
-    # averages over a fifth of the frequency reach from 6 Hz down to 4.8
-    np.testing.assert_allclose(spectra.floor[f >= 6.5], 1.0)
-    assert np.all(spectra.floor < 100.0)
-    assert spectra.floor[0, 0] == pytest.approx(1.0)
-
-
 def test_neighbours_are_averaged_over_a_fifth_of_the_frequency() -> None:
     spectrum = np.arange(50.0)[:, None]
-    np.testing.assert_allclose(
-        neighbour_mean(spectrum)[:40], spectrum[:40]
-    )  # a straight line stays
+    # a straight line stays
+    np.testing.assert_allclose(neighbour_mean(spectrum)[:40], spectrum[:40])
     spike = np.zeros((50, 1))
     spike[20] = 9.0
     found = neighbour_mean(spike)[:, 0]
@@ -187,7 +152,7 @@ def test_neighbours_are_averaged_over_a_fifth_of_the_frequency() -> None:
     assert np.flatnonzero(found).tolist() == list(range(17, 26))
 
 
-def test_octaves_are_half_an_octave_apart() -> None:
+def test_the_floor_is_the_quietest_octave_s_level_below_it() -> None:
     """The seventh half octave above the first bin, 5.66 to 11.3 Hz, is the only quiet one."""
     f = np.arange(101) * 0.5
     free = np.where((f >= 5.5) & (f <= 11.5), 1.0, 100.0)[:, None]

@@ -3,6 +3,7 @@
 import json
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,13 +45,10 @@ def spectra(noise: float = 1e-3) -> Spectra:
     return Spectra(frequency=f, free=quiet, loaded=quiet + torque, step=STEP, segments=(4, 10))
 
 
-def test_every_observer_reaches_the_stated_delay() -> None:
+def test_every_observer_reaches_the_stated_delay_or_bandwidth() -> None:
     for line in tune_all(spectra(), parse_goal("delay=0.05")):
         expected = 0.0 if line.observer == "kfo-rts" else 0.05
         np.testing.assert_allclose(line.delay, expected, atol=1e-9)
-
-
-def test_every_observer_reaches_the_stated_bandwidth() -> None:
     lines = {line.observer: line for line in tune_all(spectra(), parse_goal("bandwidth=3"))}
     smoother = kalman_smoother(lines["kfo-rts"].rate)
     np.testing.assert_allclose(smoother.tuning(STEP, 2).bandwidth, 3.0, rtol=1e-12)
@@ -66,17 +64,6 @@ def test_the_smoother_promises_the_smallest_error() -> None:
     assert lines[1].rate[1] < lines[1].rate[0]
 
 
-def test_rices_formula_on_a_narrow_band() -> None:
-    """A 2 Hz narrow-band signal of 1 N·m rms passes ±h at 2·2·e^{−h²/2} times a second."""
-    f = np.linspace(0.0, 10.0, 1001)
-    power = np.exp(-(((f - 2.0) / 0.02) ** 2))[:, None]
-    power /= power.sum()
-    power[0] = 0.0
-    found = crossings(power, f, np.array([2.0]))
-    # both sides, upwards only: 2 · 2 Hz · 3600 s · e^{−2}; the band is 1 % wide
-    assert found[0] == pytest.approx(2 * 2.0 * 3600 * np.exp(-2.0), rel=1e-3)
-
-
 def test_few_false_alarms_cost_bandwidth() -> None:
     many = tune_all(spectra(0.3), parse_goal("false-alarms=1000", "8"))
     few = tune_all(spectra(0.3), parse_goal("false-alarms=0.01", "8"))
@@ -84,9 +71,6 @@ def test_few_false_alarms_cost_bandwidth() -> None:
         assert slow.alarms is not None
         assert np.all(slow.rate <= fast.rate)
         assert np.all(slow.alarms <= 0.01)
-
-
-def test_alarms_that_nothing_can_avoid_are_said() -> None:
     with pytest.raises(ParameterError, match=r"too loud for the threshold on J1"):
         tune_all(spectra(50.0), parse_goal("false-alarms=0.01", "0.5"))
 
@@ -95,11 +79,8 @@ def test_alarms_that_nothing_can_avoid_are_said() -> None:
     ("goal", "threshold"),
     [
         ("fast", None),
-        ("delay", None),
         ("delay=-1", None),
-        ("delay=nan", None),
         ("auto=3", None),
-        ("bandwidth=x", None),
         ("false-alarms=2", None),
         ("false-alarms=2", "0"),
         ("false-alarms=2", "a"),
@@ -113,17 +94,8 @@ def test_goals_that_are_none(goal: str, threshold: str | None) -> None:
 def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
     """identify writes it, --gains takes it: GMO then errs as little as was promised."""
     gains, runner = tmp_path / "gains.toml", CliRunner()
-    asked = [
-        "identify",
-        str(FIXTURE),
-        "--robot",
-        "ur5",
-        "--method",
-        "gains",
-        "-o",
-        str(gains),
-        "--json",
-    ]
+    asked = ["identify", str(FIXTURE), "--robot", "ur5", "--method", "gains", "--json"]
+    asked += ["-o", str(gains)]
     done = runner.invoke(app, asked)
     assert done.exit_code == 0, done.output
     promised = {o["observer"]: o for o in json.loads(done.stdout)["observers"]}
@@ -153,9 +125,7 @@ def test_a_constant_error_brings_one_threshold_nearer(offset: float) -> None:
     sides = np.array([2.0 - offset, 2.0 + offset])
     expected = 7200.0 * np.exp(-(sides**2) / 4.5).sum()
     assert crossings(power, f, np.array([2.0]))[0] == pytest.approx(expected, rel=1e-12)
-
-
-def test_an_offset_at_the_threshold_is_an_alarm_without_end() -> None:
+    # at the threshold it is an alarm without end
     power = np.array([[4.0], [1.0]])
     assert crossings(power, np.array([0.0, 2.0]), np.array([2.0]))[0] == np.inf
 
@@ -177,25 +147,19 @@ def test_a_threshold_is_one_or_one_a_joint() -> None:
         assert line.alarms is not None
 
 
-@pytest.mark.parametrize("name", ["kfo-zoh", "kfo-rts"])
-def test_a_kalman_filters_rate_is_the_fourth_root_of_its_densities(name: str) -> None:
+def test_a_kalman_filters_rate_is_the_fourth_root_of_its_densities() -> None:
     """ω_n⁴ = Q_τ/R under ``density``, whatever R the log's noise asks for."""
-    (line,) = (x for x in tune_all(spectra(0.3), parse_goal("auto")) if x.observer == name)
-    ratio = np.array(line.gains["q_tau_diag"]) / np.array(line.gains["r_diag"])
-    np.testing.assert_allclose(ratio**0.25, line.rate, rtol=1e-12)
+    _, _, *kalman = tune_all(spectra(0.3), parse_goal("auto"))
+    assert [line.observer for line in kalman] == ["kfo-zoh", "kfo-rts"]
+    for line in kalman:
+        ratio = np.array(line.gains["q_tau_diag"]) / np.array(line.gains["r_diag"])
+        np.testing.assert_allclose(ratio**0.25, line.rate, rtol=1e-12)
 
 
 def test_a_gain_at_a_bound_is_said_with_the_numbers() -> None:
     """No torque beyond the noise: every observer runs to the slowest; a stated delay has none."""
-    quiet = spectra()
-    silent = Spectra(
-        frequency=quiet.frequency,
-        free=quiet.free,
-        loaded=quiet.free,
-        step=quiet.step,
-        segments=(8, 8),
-    )
-    goal = parse_goal("auto")
+    quiet, goal = spectra(), parse_goal("auto")
+    silent = replace(quiet, loaded=quiet.free)
     remarks = bounds_reached(tune_all(silent, goal), silent, goal)
     assert {r.where.about for r in remarks} == {"fdo", "gmo", "kfo-zoh", "kfo-rts"}
     for remark in remarks:
@@ -268,14 +232,6 @@ def test_tuning_finds_the_best_of_all_natural_frequencies(pushed: Pushed) -> Non
         assert np.all(expected(found.best * factor) >= found.least)
 
 
-def test_more_noise_calls_for_slower_filters(pushed: Pushed) -> None:
-    best = []
-    for noise in (0.5, 4.0):
-        loaded, free = pushed(noise=noise)
-        best.append(error_curve(kalman_smoother, spectra_of(loaded, [free])).best)
-    assert np.all(best[1] < best[0])
-
-
 def test_the_noise_level_gives_innovations_their_expected_variance(pushed: Pushed) -> None:
     """NIS = 1 on the loaded part, which is what R is scaled for."""
     loaded, free = pushed()
@@ -303,10 +259,9 @@ def test_without_spectra_auto_falls_back_and_says_so(pushed: Pushed) -> None:
     np.testing.assert_array_equal(smoothed.tau, rts.tau)
 
 
-def test_tuned_observers_have_nothing_left_to_tune(pushed: Pushed) -> None:
-    loaded, free = pushed()
+def test_tuned_observers_have_nothing_left_to_tune() -> None:
     setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
-    setup = setup._replace(shown=LogSpectra(plain=spectra_of(loaded, [free])))
+    setup = setup._replace(shown=LogSpectra(plain=spectra()))
     observer, remarks = OBSERVERS["rts-auto"].build(setup, "rts-auto")
     assert remarks == ()
     assert observer.tuning(STEP, 2).parameter_count == 0
@@ -335,13 +290,11 @@ def test_chatter_under_load_does_not_run_the_gains_up() -> None:
 def test_a_bound_is_never_reached_in_silence() -> None:
     grid = np.array([1.0, 10.0, 250.0])
     slow, fast = bound_remarks("kfo-auto", np.array([1.0, 10.0, 250.0, 1.0]), grid)
-    assert [(r.code, r.level) for r in (slow, fast)] == [
-        ("gain-at-slowest", "warning"),
-        ("gain-at-fastest", "warning"),
-    ]
+    assert (slow.code, fast.code) == ("gain-at-slowest", "gain-at-fastest")
+    assert slow.level == fast.level == "warning"
     assert (slow.where.joints, fast.where.joints) == ((1, 4), (3,))
     assert (slow.values["rate_rad_s"], fast.values["rate_rad_s"]) == (1.0, 250.0)
-    assert str(fast).startswith("kfo-auto: J3: noise missing from the free part")
+    assert str(fast).startswith("kfo-auto: J3: ")
 
 
 def test_best_keeps_a_push_where_the_log_shows_none(pushed: Pushed) -> None:

@@ -44,12 +44,6 @@ def test_a_zero_that_is_none(words: list[str], message: str) -> None:
         ZeroChoice.parsed(words)
 
 
-@pytest.mark.parametrize("wrong", [{"frame": "wrist"}, {"solver": "svd"}])
-def test_a_choice_is_checked_where_it_is_made(wrong: dict[str, str]) -> None:
-    with pytest.raises(ParameterError, match="for a wrench; there is"):
-        WrenchChoice(**wrong)  # type: ignore[arg-type]
-
-
 def test_what_is_asked_goes_before_the_robot_file() -> None:
     robot = load_robot("ur5")
     there = WrenchChoice(tool="0,0,0.1", sensor_pose="0,0,0.03").mounting(robot)

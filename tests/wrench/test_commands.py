@@ -25,54 +25,41 @@ def run(monkeypatch, capsys, *words: str) -> tuple[int, str, str]:
     return code, out, err
 
 
+
+
 def test_estimate_writes_the_wrench_and_nulls_what_the_pose_cannot_tell(
     monkeypatch, capsys, tmp_path
 ) -> None:
-    words = ("--wrench", "--frame", "base", "-o", str(tmp_path / "out"))
+    words = ("--wrench", "--frame", "base", "-o", str(tmp_path))
     code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *words)
     assert code == 0, err
-    table = pl.read_parquet(tmp_path / "out" / "estimates.parquet")
-    axes = [f"wrench/gmo/{axis}" for axis in ("fx", "fy", "fz", "mx", "my", "mz")]
-    masked = table.filter(pl.col("sigma_min") < 0.05)
-    clear = table.filter(pl.col("sigma_min") >= 0.05)
-    assert len(clear) > 0
-    for axis in axes:
-        assert masked[axis].null_count() == len(masked)
-        assert clear[axis].null_count() == 0
-    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    table = pl.read_parquet(tmp_path / "estimates.parquet")
+    clear = table["sigma_min"] >= 0.05
+    assert clear.any()
+    for axis in ("fx", "fy", "fz", "mx", "my", "mz"):
+        assert (table[f"wrench/gmo/{axis}"].is_not_null() == clear).all()
+    record = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
     assert record["wrench"]["frame"] == "base"
-    assert "ON the robot" in record["wrench"]["meaning"]
 
 
 @pytest.mark.parametrize(
-    "option", [("--frame", "base"), ("--set", "virtual-sensor.solver=map"), ("--zero", "1:3")]
+    ("option", "asks"),
+    [
+        (("--frame", "base"), True),
+        (("--set", "virtual-sensor.solver=map"), True),
+        (("--zero", "1:3"), True),
+        ((), False),
+    ],
 )
-def test_any_wrench_option_asks_for_the_wrench(monkeypatch, capsys, tmp_path, option) -> None:
+def test_any_wrench_option_asks_for_the_wrench(
+    monkeypatch, capsys, tmp_path, option, asks
+) -> None:
     code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *option, "-o", str(tmp_path))
     assert code == 0, err
-    assert "wrench/gmo/fx" in pl.read_parquet_schema(tmp_path / "estimates.parquet")
+    columns = pl.read_parquet_schema(tmp_path / "estimates.parquet")
+    assert any("wrench" in name for name in columns) is asks
 
 
-def test_without_one_there_is_none(monkeypatch, capsys, tmp_path) -> None:
-    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, "-o", str(tmp_path))
-    assert code == 0, err
-    assert not [
-        n for n in pl.read_parquet_schema(tmp_path / "estimates.parquet") if "wrench" in n
-    ]
-
-
-def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:
-    words = ("compare", *COMMON, "--reference", "zero", "--interval", "1:4", "--wrench", "--json")
-    code, out, err = run(monkeypatch, capsys, *words)
-    assert code == 0, err
-    rows = {row["axis"]: row for row in json.loads(out)["rows"] if row.get("axis")}
-    assert list(rows) == ["fx", "fy", "fz", "mx", "my", "mz"]
-    for axis, row in rows.items():
-        unit, other = ("rmse_N", "rmse_Nm") if axis.startswith("f") else ("rmse_Nm", "rmse_N")
-        assert row[unit] > 0
-        assert row[other] is None
-        assert row["observer"] == "gmo"
-        assert row["samples"] > 0
 
 
 @pytest.mark.parametrize(
@@ -80,7 +67,7 @@ def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:
     [
         (("--frame", "wrist"), "no frame 'wrist' for a wrench; there is flange"),
         (("--frame", "tool"), "the robot has no tool"),
-        (("--set", "virtual-sensor.solver=svd"), "no solver 'svd'"),
+        (("--set", "virtual-sensor.solver=svd"), "no solver 'svd' for a wrench; there is pinv"),
         (("--zero", "500:600"), "is outside the log"),
         (
             ("--frame", "sensor", "--set", "virtual-sensor.sensor=0,0,0,2,0,0,0,1,0,0,0,1"),

@@ -1,5 +1,7 @@
 """Where a UR controller's wrench has its moment: a sensor of its own, or one beside it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,19 +61,9 @@ def test_the_currents_tell_the_point(point: str, seed: int) -> None:
 
 def test_a_log_without_pushes_tells_nothing() -> None:
     log = pushed("tool", force=0.0)
-    quiet = np.random.default_rng(8).normal(0.0, 2.0, log.q.shape)
-    found = logged_wrench(
-        Recording(
-            t=log.t,
-            q=log.q,
-            current=log.target_current + NOISE * quiet,  # type: ignore[operator]
-            target_current=log.target_current,
-            wrench=quiet,
-            wrench_frame=CONTROLLER,
-        ),
-        ROBOT.chain,
-        TOOL,
-    )
+    noise = np.random.default_rng(8).normal(0.0, 2.0, log.q.shape)
+    quiet = replace(log, current=log.target_current + NOISE * noise, wrench=noise)  # type: ignore[operator]
+    found = logged_wrench(quiet, ROBOT.chain, TOOL)
     assert [remark.code for remark in found.remarks] == ["controller-point-open"]
 
 
@@ -79,21 +71,11 @@ def test_without_a_tool_or_target_currents_it_is_the_flange_aloud() -> None:
     log = pushed("flange")
     bare = logged_wrench(log, ROBOT.chain, Mounting())
     assert [remark.code for remark in bare.remarks] == ["controller-point-without-tool"]
-    blind = Recording(t=log.t, q=log.q, wrench=log.wrench, wrench_frame=CONTROLLER)
-    found = logged_wrench(blind, ROBOT.chain, TOOL)
+    found = logged_wrench(replace(log, target_current=None), ROBOT.chain, TOOL)
     assert [remark.code for remark in found.remarks] == ["controller-point-without-currents"]
     np.testing.assert_array_equal(found.values, log.wrench)
 
 
 def test_a_stated_point_is_not_tested() -> None:
-    log = pushed("tool")
-    assert log.wrench is not None
-    stated = Recording(
-        t=log.t,
-        q=log.q,
-        current=log.current,
-        target_current=log.target_current,
-        wrench=log.wrench,
-        wrench_frame=WrenchFrame("base", "tool"),
-    )
+    stated = replace(pushed("tool"), wrench_frame=WrenchFrame("base", "tool"))
     assert logged_wrench(stated, ROBOT.chain, TOOL).remarks == ()

@@ -15,6 +15,7 @@ from vftcli.signals.wrench import Wrench
 from vftcli.wrench.detection import (
     LEAST_TORQUE,
     ContactInterval,
+    ContactScore,
     KnownContacts,
     assignment,
     departure,
@@ -32,31 +33,21 @@ from vftcli.wrench.solvers import VirtualSensor
 T = np.arange(0.0, 20.0, 0.01)
 
 
-def pulses(*spans: tuple[float, float], height: float = 3.0) -> np.ndarray:
-    score = np.zeros(len(T))
-    for start, stop in spans:
-        score[(start <= T) & (stop > T)] = height
-    return score
+def push(height: float, start: float = 5.0, stop: float = 7.0) -> np.ndarray:
+    return np.where((start <= T) & (stop > T), height, 0.0)
 
 
-def test_a_score_that_dips_stays_one_contact_until_it_leaves_the_lower_threshold() -> None:
-    score = np.array([0, 0.5, 1.2, 0.8, 0.7, 1.1, 0.5, 0.0, 0.9, 0.0])
-    (found,) = find_contacts(np.arange(10.0), score)
-    assert (found.start, found.stop) == (2.0, 5.0)
-
-
-def test_short_spikes_are_dropped_and_close_contacts_joined() -> None:
-    score = pulses((2.0, 3.0), (3.1, 4.0), (8.0, 8.01), (12.0, 12.5))
-    found = find_contacts(T, score)
-    assert [(round(c.start, 2), round(c.stop, 2)) for c in found] == [(2.0, 3.99), (12.0, 12.49)]
+def contacts(*spans: tuple[float, float]) -> tuple[ContactInterval, ...]:
+    """The contacts of a score of 3 in these spans; each ends 10 ms early."""
+    return find_contacts(T, np.sum([push(3.0, *span) for span in spans], axis=0))
 
 
 def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
-    true = find_contacts(T, pulses((2, 4), (8, 9), (14, 15)))
-    found = find_contacts(T, pulses((2.2, 4.3), (11, 11.5), (14.1, 15)))
+    true = contacts((2, 4), (8, 9), (14, 15))
+    found = contacts((2.2, 4.3), (11, 11.5), (14.1, 15))
     reported = match_contacts(found, true, 20.0)
     assert (reported.contacts, reported.missed, reported.false_alarms) == (3, 1, 1)
-    # one alarm in the 16 s without contact (each contact's last sample is 10 ms early)
+    # one alarm in the 16 s without contact
     assert reported.false_alarms_per_h == pytest.approx(3600 / 16.03, rel=1e-3)
     np.testing.assert_allclose(reported.delay, [0.2, np.nan, 0.1], atol=1e-9)
     assert reported.mean_delay == pytest.approx(0.15)
@@ -64,9 +55,9 @@ def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
 
 
 def test_a_found_contact_is_credited_to_one_true_one() -> None:
-    true = find_contacts(T, pulses((2, 4), (5, 6), (7, 8), (14, 15)))
+    true = contacts((2, 4), (5, 6), (7, 8), (14, 15))
     # One interval over three contacts, the last of which it has most of; one in two pieces.
-    found = find_contacts(T, pulses((3.9, 8), (14, 14.3), (14.6, 15)))
+    found = contacts((3.9, 8), (14, 14.3), (14.6, 15))
     reported = match_contacts(found, true, 20.0)
     assert (reported.contacts, reported.listed, reported.found, reported.missed) == (4, 3, 2, 2)
     assert reported.false_alarms == 0
@@ -96,7 +87,7 @@ def test_the_free_band_reaches_a_third_beyond_the_free_part() -> None:
 
 def test_contacts_are_reported_from_torques_before_the_first_true_one() -> None:
     truth = np.zeros((len(T), 6))
-    truth[:, 1] = 10 * pulses((5, 6), (10, 11), height=1.0)
+    truth[:, 1] = push(10.0, 5.0, 6.0) + push(10.0, 10.0, 11.0)
     rng = np.random.default_rng(2)
     late = np.roll(truth, 8, axis=0) + 0.1 * rng.standard_normal(truth.shape)
     estimate = ExternalTorque(name="gmo", t=T, tau=late)
@@ -105,10 +96,6 @@ def test_contacts_are_reported_from_torques_before_the_first_true_one() -> None:
     assert reported.signal == "torque"
     assert (reported.detection.contacts, reported.detection.missed) == (2, 0)
     assert reported.detection.mean_delay == pytest.approx(0.08, abs=0.011)  # eight samples late
-
-
-def push(height: float, start: float = 5.0, stop: float = 7.0) -> np.ndarray:
-    return np.where((start <= T) & (stop > T), height, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -170,12 +157,15 @@ def reference(height: float, floor: np.ndarray | None = None) -> ExternalTorque:
     return ExternalTorque(name="truth", t=T, tau=tau, floor=floor)
 
 
+def judged(tau: np.ndarray, floor: np.ndarray | None = None) -> tuple[ContactScore, ...]:
+    """An estimate's torque against a reference of 2 N·m."""
+    return judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0, floor))
+
+
 def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contact() -> None:
-    estimate = ExternalTorque(name="gmo", t=T, tau=reference(2.0).tau)
-    (one,) = judge_contacts([estimate], None, reference(2.0))
-    assert one.detection.contacts == 1
-    (none,) = judge_contacts([estimate], None, reference(2.0, np.array([0.5, np.nan])))
-    assert none.detection.contacts == 0
+    for floor, count in ((None, 1), (np.array([0.5, np.nan]), 0)):
+        (score,) = judged(reference(2.0).tau, floor)
+        assert score.detection.contacts == count
 
 
 def test_stiction_at_rest_deafens_no_reference() -> None:
@@ -193,17 +183,13 @@ def test_stiction_at_rest_deafens_no_reference() -> None:
     np.testing.assert_allclose(floor_in_motion(one), [1.0, 1.0, 5.0])
 
 
-def test_a_free_band_of_torques_is_never_narrower_than_half_a_newton_metre() -> None:
-    estimate = ExternalTorque(name="gmo", t=T, tau=reference(0.9 * LEAST_TORQUE).tau)
-    (score,) = judge_contacts([estimate], None, reference(2.0))
-    assert score.detection.missed == 1
-
-
 def test_settling_is_no_contact() -> None:
-    tau = reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0
-    (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
+    (score,) = judged(reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0)
     assert score.detection.false_alarms == 0
     assert score.detection.delay == (0.0,)
+    # nor is what stays in the narrowest band, half a newton-metre
+    (score,) = judged(reference(0.9 * LEAST_TORQUE).tau)
+    assert score.detection.missed == 1
 
 
 def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
@@ -230,17 +216,16 @@ def test_contacts_are_reported_from_wrenches_where_there_are_some() -> None:
 
 
 def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
-    true = find_contacts(T, push(3.0))
+    true = contacts((5.0, 7.0))
     np.testing.assert_array_equal(learned_free(T, true), (T >= 1.0) & (true[0].start > T))
     assert learned_free(T, ())[-2]
     with pytest.raises(ParameterError, match=r"begins at 1\.05 s.* no free part.*--free A:B"):
-        learned_free(T, find_contacts(T, push(3.0, 1.05)))
+        learned_free(T, contacts((1.05, 7.0)))
 
 
 def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
     """One alarm in 19.99 s, of which the push holds 5 to 6.99 s: one in 18.00 s, 200 an hour."""
-    tau = reference(2.0).tau + np.column_stack([push(2.0, 12.0, 13.0), np.zeros(len(T))])
-    (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
+    (score,) = judged(reference(2.0).tau + np.outer(push(2.0, 12.0, 13.0), [1.0, 0.0]))
     assert score.detection.false_alarms == 1
     assert score.detection.false_alarms_per_h == pytest.approx(200.0)
 
@@ -253,17 +238,14 @@ def test_what_is_listed_is_judged_as_it_stands() -> None:
     )
     best = ExternalTorque(name="best", t=T, tau=np.zeros((len(T), 2)))
     (score,) = judge_contacts([best], None, reference(2.0), reported)
+    detection = score.detection
     assert score.signal == "list"
-    assert (score.detection.found, score.detection.listed, score.detection.false_alarms) == (
-        1,
-        2,
-        0,
-    )
+    assert (detection.found, detection.listed, detection.false_alarms) == (1, 2, 0)
 
 
 def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
     """A bump of 5 N·m at 12 s is a false alarm, unless the free part or a free run shows it."""
-    tau = reference(8.0).tau + np.column_stack([push(5.0, 12.0, 13.0), np.zeros(len(T))])
+    tau = reference(8.0).tau + np.outer(push(5.0, 12.0, 13.0), [1.0, 0.0])
     estimate = [ExternalTorque(name="gmo", t=T, tau=tau)]
 
     def alarms(reported: KnownContacts | None) -> int:

@@ -28,6 +28,12 @@ def test_what_was_drawn_is_learned() -> None:
     np.testing.assert_allclose(found.white, 0.01, rtol=0.15)
     np.testing.assert_allclose(found.time, 0.4, rtol=0.35)
     assert found.seen[0]
+    # an offset is an error too
+    shifted = learn_noise([blocks(d + 3.0, np.full_like(d, 0.5))], np.array([10.0]))
+    assert shifted is not None
+    assert shifted.variance[0] > found.variance[0] + 8.0
+    # ten blocks are no spectrum
+    assert learn_noise([blocks(d[:10], d[:10])], np.array([10.0])) is None
 
 
 def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
@@ -49,28 +55,12 @@ def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
         assert both is not None
         assert (both.white[0], both.time[0], both.free_seconds) == (4.0, found, 4.0)
         assert both.variance[0] == max(variance, alone.variance[0])
-    strong = infer_noise(
-        log, np.array([10.0]), noise()
-    )  # its friction says more than the quietest
+    # its friction says more than the quietest
+    strong = infer_noise(log, np.array([10.0]), noise())
     assert strong is not None
     assert strong.variance[0] == pytest.approx((0.2 * 10.0) ** 2)
     assert (strong.at_rest[0], strong.pushed[0]) == (noise().at_rest[0], noise().pushed[0])
     assert infer_noise(blocks(np.zeros((2, 1)), np.zeros((2, 1))), dry, None) is None
-
-
-def test_an_offset_is_an_error_too() -> None:
-    d = drawn(1000, np.random.default_rng(2))
-    plain, shifted = (
-        learn_noise([blocks(x, np.full_like(d, 0.5))], np.array([10.0])) for x in (d, d + 3.0)
-    )
-    assert plain is not None
-    assert shifted is not None
-    assert shifted.variance[0] > plain.variance[0] + 8.0
-
-
-def test_a_short_free_part_tells_nothing() -> None:
-    d = np.zeros((10, 1))
-    assert learn_noise([blocks(d, d)], np.array([10.0])) is None
 
 
 def test_reversals_are_bridged_in_a_straight_line() -> None:
@@ -121,14 +111,16 @@ def test_a_joint_that_turns_round_may_show_any_friction_for_a_moment() -> None:
     turned = np.isin(np.arange(20), [9, 10])
     np.testing.assert_allclose(course.white[:, 0], 0.01 + turned * (CREEP_SHARE * 10.0) ** 2)
     np.testing.assert_allclose(course.white[:, 1], 0.01)
+    # a gap says nothing
+    known = np.arange(20) != 7
+    gap = error_process(noise(2), blocks(np.zeros((20, 2)), velocity, known))
+    assert gap.white[7].tolist() == [UNKNOWN, UNKNOWN]
 
 
 def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
-    velocity = np.column_stack([np.zeros(20), np.full(20, 0.5)])
-    log = blocks(np.zeros((20, 2)), velocity)
-    both = noise(2)
-    pushed = np.arange(20) >= 10
-    strict, free = error_process(both, log), error_process(both, log, pushed)
+    log = blocks(np.zeros((20, 2)), np.tile([0.0, 0.5], (20, 1)))
+    strict = error_process(noise(2), log)
+    free = error_process(noise(2), log, np.arange(20) >= 10)
     stationary = free.added[15] / (1.0 - free.decay[15] ** 2)
     np.testing.assert_allclose(stationary, [0.25 + (PUSHED_SHARE * 10.0) ** 2, 0.25])
     np.testing.assert_array_equal(free.added[5], strict.added[5])
@@ -139,9 +131,3 @@ def test_a_joint_that_the_free_part_never_moved_errs_by_its_friction() -> None:
     course = error_process(noise(seen=False), log)
     stationary = course.added[10, 0] / (1.0 - course.decay[10, 0] ** 2)
     np.testing.assert_allclose(stationary, 0.25 + 4.0)
-
-
-def test_a_gap_says_nothing() -> None:
-    known = np.arange(20) != 7
-    course = error_process(noise(), blocks(np.zeros((20, 1)), np.full((20, 1), 0.5), known))
-    assert course.white[7, 0] == UNKNOWN

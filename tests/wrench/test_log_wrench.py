@@ -14,6 +14,7 @@ from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
+from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
@@ -63,11 +64,7 @@ def test_axes_and_point_of_the_flange_are_pinocchios_action(frame, pose) -> None
 
 @pytest.mark.parametrize(
     ("point", "lever"),
-    [
-        ("flange", np.zeros(3)),
-        ("tool", TOOL.translation),
-        ("sensor", SENSOR.translation),
-    ],
+    [("flange", np.zeros(3)), ("tool", TOOL.translation), ("sensor", SENSOR.translation)],
 )
 def test_in_base_axes_only_the_moment_moves(point: str, lever: np.ndarray) -> None:
     found = in_base(WrenchFrame("base", point))
@@ -85,6 +82,14 @@ def test_a_moment_about_the_bases_origin_is_pinocchios_action() -> None:
         np.testing.assert_allclose(mine, expected, atol=ROUNDING)
 
 
+def explained(recording: Recording, robot: Robot) -> list[np.ndarray]:
+    """pinv(Jᵀ) of the log's joint torque, sample by sample."""
+    assert recording.tau_ext is not None
+    J = flange_jacobian(robot.chain, recording.q)
+    pairs = zip(J, recording.tau_ext, strict=True)
+    return [np.linalg.lstsq(j.T, tau, rcond=None)[0] for j, tau in pairs]
+
+
 def test_both_wrenches_of_a_real_franka_are_its_joint_torque(logs: Path) -> None:
     """O_F_ext_hat_K about the base's origin, K_F_ext_hat_K about K, K being this log's flange.
 
@@ -93,10 +98,7 @@ def test_both_wrenches_of_a_real_franka_are_its_joint_torque(logs: Path) -> None
     """
     path, robot = logs / "franka_bags" / "calib_0308.bag", load_robot("fr3")
     recording = read(path)
-    assert recording.tau_ext is not None
-    J = flange_jacobian(robot.chain, recording.q)
-    pairs = zip(J, recording.tau_ext, strict=True)
-    expected = [np.linalg.lstsq(j.T, tau, rcond=None)[0] for j, tau in pairs]
+    expected = explained(recording, robot)
     of_base = logged_wrench(recording, robot.chain, Mounting()).values
     np.testing.assert_allclose(of_base, expected, atol=1e-3)
     with AnyReader([path]) as bag:
@@ -117,13 +119,9 @@ def test_both_wrenches_of_a_real_franka_are_its_joint_torque(logs: Path) -> None
 def test_a_simulated_franka_states_its_wrench_as_a_real_one() -> None:
     """panda_bag's O_F_ext_hat_K is its joint torque's wrench about the base's origin."""
     recording, robot = read(FIXTURES / "panda_bag"), load_robot("panda")
-    assert recording.tau_ext is not None
     wrench = logged_wrench(recording, robot.chain, Mounting()).values
-    J = flange_jacobian(robot.chain, recording.q)
-    pairs = zip(J, recording.tau_ext, strict=True)
-    expected = [np.linalg.lstsq(j.T, tau, rcond=None)[0] for j, tau in pairs]
     # Forces of a few N at a metre's lever, in double precision throughout.
-    np.testing.assert_allclose(wrench, expected, atol=1e-9)
+    np.testing.assert_allclose(wrench, explained(recording, robot), atol=1e-9)
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -134,9 +132,8 @@ def test_the_answers_frame_undoes_the_logs(frame: str) -> None:
 
 @pytest.mark.parametrize("axes", ["base", "sensor"])
 def test_a_force_by_the_robot_is_turned(axes: str) -> None:
-    by = in_base(WrenchFrame(axes, axes if axes == "sensor" else "flange", "by-robot"))
-    on = in_base(WrenchFrame(axes, axes if axes == "sensor" else "flange"))
-    np.testing.assert_array_equal(by, -on)
+    by = in_base(WrenchFrame(axes, "sensor", "by-robot"))
+    np.testing.assert_array_equal(by, -in_base(WrenchFrame(axes, "sensor")))
 
 
 def of_sensor(recording: Recording, mounting: Mounting) -> np.ndarray:
@@ -174,17 +171,10 @@ def test_the_flange_stands_for_a_tool_that_is_not_known() -> None:
     np.testing.assert_array_equal(in_base(WrenchFrame("tool", "tool"), Mounting()), flange)
 
 
-@pytest.mark.parametrize(
-    "frame",
-    [
-        WrenchFrame("world", "flange"),
-        WrenchFrame("base", "wrist"),
-        WrenchFrame("base", "stiffness"),
-    ],
-)
+@pytest.mark.parametrize("frame", [WrenchFrame("world", "flange"), WrenchFrame("base", "wrist")])
 def test_a_frame_that_is_not_known_is_refused(frame: WrenchFrame) -> None:
     with pytest.raises(ParameterError, match=r"no frame known here.*flange, base, tool, sensor"):
-        logged_wrench(log(frame), UR5.chain, MOUNTED)
+        in_base(frame)
 
 
 def test_a_wrench_of_zeros_is_no_reference() -> None:

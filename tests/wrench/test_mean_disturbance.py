@@ -45,12 +45,11 @@ def test_noise_of_the_velocity_is_averaged_out() -> None:
     assert np.std(found.tau) == pytest.approx(np.sqrt(2) * 3e-3 / (2 * HALF), rel=0.2)
 
 
-def test_two_samples_tell_the_mean_between_them() -> None:
+def test_two_samples_tell_the_mean_between_them_and_one_nothing() -> None:
     t = np.array([0.0, 0.02])
     found = mean_disturbance(terms_of(t, np.array([[1.0], [3.0]]), np.array([[5.0], [-2.0]])))
     np.testing.assert_allclose(found.tau, 2.0, rtol=1e-12)
-
-
-def test_one_sample_tells_nothing() -> None:
     one = DynamicsTerms(t=np.zeros(1), p=np.ones((1, 6)), mu=np.ones((1, 6)))
     np.testing.assert_array_equal(mean_disturbance(one).tau, np.zeros((1, 6)))
+
+

@@ -43,7 +43,7 @@ def cost(logs: np.ndarray, f: np.ndarray, P: np.ndarray) -> float:
     return float(np.sum(np.log(S) + P / S) + 0.5 * ((logs[2] - np.log(0.5)) / 1.5) ** 2)
 
 
-@pytest.mark.parametrize(("sd", "time"), [(2.0, 0.5), (3.0, 4.0), (0.4, 1.0)])
+@pytest.mark.parametrize(("sd", "time"), [(2.0, 0.5), (3.0, 4.0)])
 def test_a_drawn_process_is_found_again(sd: float, time: float) -> None:
     """20 000 blocks: 2000 s of T ≤ 4 s fix s² to √(2·4/2000) = 6 % and T to about twice that."""
     d = wandering(20_000, sd, time, 1) + 0.3 * np.random.default_rng(2).standard_normal(20_000)
@@ -154,8 +154,3 @@ def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
         assert np.flatnonzero(variance > variance[0]).tolist() == list(expected)
 
 
-def test_a_sigmoids_dry_torque_is_its_amplitude() -> None:
-    panda = load_robot("panda")
-    amplitudes = [joint.parameters["amplitude"] for joint in panda.friction]
-    np.testing.assert_allclose(dry_torques(panda), np.abs(amplitudes))
-    assert not dry_torques(replace(UR5, friction=())).any()

@@ -16,7 +16,6 @@ from vftcli.wrench.sensor import find_mounting, fit_pose
 POSE = Pose(rpy_matrix((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
 UR5 = load_robot("ur5")
 T = np.arange(0.0, 20.0, 0.05)
-rng = np.random.default_rng(7)
 Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.5 * np.sin(
     np.outer(T, [0.3, 0.5, 0.7, 0.9, 1.1, 0.4])
 )
@@ -25,29 +24,19 @@ PUSH = np.sin(np.outer(T, [0.7, 1.1, 1.3, 0.9, 1.7, 2.1])) * [20, 15, 25, 2, 2, 
 """A contact at the flange, in flange axes. (T, 6) [N, N·m]"""
 
 
-def pushes(samples: int = 400, seed: int = 1) -> np.ndarray:
-    """Smooth wrenches in all directions, flange axes. (T, 6)"""
-    t = np.linspace(0, 10, samples)[:, None]
-    rng = np.random.default_rng(seed)
-    phase, speed = rng.uniform(0, 6, 6), rng.uniform(0.5, 3, 6)
-    return np.sin(speed * t + phase) * np.array([20, 15, 25, 2, 2, 1.5])
-
-
 def test_a_sensors_pose_is_found_again_whatever_its_zero() -> None:
-    flange = pushes()
-    reading = flange @ adjoint(inverse(POSE)).T + np.array([1.0, -2.0, 3.0, 0.1, 0.0, -0.2])
-    fit = fit_pose(flange, reading)
+    reading = PUSH @ adjoint(inverse(POSE)).T + np.array([1.0, -2.0, 3.0, 0.1, 0.0, -0.2])
+    fit = fit_pose(PUSH, reading)
     np.testing.assert_allclose(fit.pose.rotation, POSE.rotation, atol=1e-9)
     np.testing.assert_allclose(fit.pose.translation, POSE.translation, atol=1e-9)
 
 
 def test_under_noise_the_pose_is_found_within_its_own_deviation() -> None:
     """Of 50 noises a deviation is known to 10 %; .05 N·m over √400 samples of 20 N are < 1 mm."""
-    flange = pushes()
     rng = np.random.default_rng(2)
-    reading = flange @ adjoint(inverse(POSE)).T
-    noises = rng.standard_normal((50, *flange.shape)) * np.repeat([0.5, 0.05], 3)
-    fits = [fit_pose(flange + noise, reading) for noise in noises]
+    reading = PUSH @ adjoint(inverse(POSE)).T
+    noises = rng.standard_normal((50, *PUSH.shape)) * np.repeat([0.5, 0.05], 3)
+    fits = [fit_pose(PUSH + noise, reading) for noise in noises]
     error = np.array([fit.pose.translation - POSE.translation for fit in fits])
     sd = np.mean([fit.position_sd for fit in fits], axis=0)
     np.testing.assert_allclose(sd, np.sqrt(np.mean(error**2, axis=0)), rtol=0.4)
@@ -74,12 +63,7 @@ def disturbance() -> ExternalTorque:
 
 
 @pytest.mark.parametrize(
-    ("sign", "frame"),
-    [
-        (1.0, None),
-        (1.0, WrenchFrame("sensor", "sensor", "on-robot")),
-        (-1.0, WrenchFrame("sensor", "sensor", "by-robot")),
-    ],
+    ("sign", "frame"), [(1.0, None), (-1.0, WrenchFrame("sensor", "sensor", "by-robot"))]
 )
 def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(
     sign: float, frame: WrenchFrame | None
@@ -93,18 +77,15 @@ def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(
     np.testing.assert_allclose(mounting.sensor.translation, POSE.translation, atol=1e-9)
     (remark,) = remarks
     np.testing.assert_allclose(remark.values["position_mm"], [10, -20, 40], atol=1e-6)
-    assert str(remark).startswith("sensor pose found from the log: 10.0 -20.0 40.0 mm")
+    assert "10.0 -20.0 40.0 mm" in str(remark)
 
 
-def test_a_pose_that_is_given_is_not_looked_for() -> None:
-    choice = WrenchChoice(sensor_pose="0,0,0.05")
-    mounting, remarks = find_mounting(log(None), UR5, disturbance(), choice)
+def test_a_pose_that_is_given_is_not_looked_for_nor_one_without_a_sensors_wrench() -> None:
+    given = WrenchChoice(sensor_pose="0,0,0.05")
+    mounting, remarks = find_mounting(log(None), UR5, disturbance(), given)
     assert mounting.sensor is not None
     np.testing.assert_array_equal(mounting.sensor.translation, [0, 0, 0.05])
     assert remarks == ()
-
-
-def test_a_pose_is_not_found_without_a_sensors_wrench() -> None:
     fit = WrenchChoice(sensor_pose=FIT)
     with pytest.raises(MissingSignalError, match="no wrenches"):
         find_mounting(log(None), UR5, disturbance(), fit)

@@ -46,19 +46,21 @@ def test_a_sensors_own_zero_goes_where_the_readings_went() -> None:
     assert lag.values["lag_ms"] == pytest.approx(80.0, abs=5.0)  # half a sample
 
 
-@pytest.mark.parametrize("flags", [(), (False,)])
-def test_without_a_zero_of_the_reading_the_sensor_keeps_its_own(flags: tuple[bool, ...]) -> None:
+@pytest.mark.parametrize(
+    ("flags", "of_sensor", "codes"),
+    [
+        ((), True, ["lag-behind-sensor"]),
+        ((False,), True, ["lag-behind-sensor"]),
+        ((True,), False, []),  # another reference has no zero and no lag of its own
+    ],
+)
+def test_without_a_zero_of_the_reading_the_sensor_keeps_its_own(
+    flags: tuple[bool, ...], of_sensor: bool, codes: list[str]
+) -> None:
     theirs = Wrench(name="sensor", t=T, values=force(offset=1.5), frame="base")
-    found = with_reference(reading(*flags), theirs, of_sensor=True)
+    found = with_reference(reading(*flags), theirs, of_sensor=of_sensor)
     assert found.reference is theirs
-    assert [remark.code for remark in found.remarks] == ["lag-behind-sensor"]
-
-
-def test_another_reference_has_no_zero_and_no_lag_of_its_own() -> None:
-    theirs = Wrench(name="two-cycle", t=T, values=force(offset=1.5), frame="base")
-    found = with_reference(reading(True), theirs)
-    assert found.reference is theirs
-    assert found.remarks == ()
+    assert [remark.code for remark in found.remarks] == codes
 
 
 def test_what_is_masked_and_zeroed_can_be_asked() -> None:

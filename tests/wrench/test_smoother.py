@@ -65,13 +65,18 @@ def load(t: Array) -> Array:
     return np.tile([0.0, 0, -25, 0, 0, 0], (len(t), 1))
 
 
+def untouched(robot: Robot, q: Array, t: Array) -> RunSamples:
+    """All of another log of this motion, with another error."""
+    free = simulated(robot, q, np.zeros((len(t), 6)), t, seed=2)
+    return RunSamples(free, np.ones(len(t), dtype=bool))
+
+
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
     """25 N for 30 s of motion against .3 N·m of error; the band says what is left."""
     robot, t = load_robot(name), np.arange(0.0, 30.0, STEP)
     q = swing(robot, t)
-    free = RunSamples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
-    found = smooth_wrench(simulated(robot, q, load(t), t), [free])
+    found = smooth_wrench(simulated(robot, q, load(t), t), [untouched(robot, q, t)])
     assert found.prior.is_steady
     assert found.seconds == pytest.approx(0.1)
     error = found.values - load(found.t)
@@ -83,8 +88,7 @@ def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
 def test_pushes_are_followed_in_short_blocks() -> None:
     robot, t = load_robot("ur5"), np.arange(0.0, 30.0, STEP)
     q, push = swing(robot, t), load(t) * (np.sin(2.0 * t) > 0.6)[:, None]
-    free = RunSamples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
-    found = smooth_wrench(simulated(robot, q, push, t), [free])
+    found = smooth_wrench(simulated(robot, q, push, t), [untouched(robot, q, t)])
     assert not found.prior.is_steady
     assert found.seconds == pytest.approx(0.024)
     moved, covariance = found.at(t)
@@ -121,9 +125,8 @@ def test_the_band_where_nothing_is_listed_is_that_of_a_contact_there(at: float) 
     It takes every block for itself, the band their mean weight: the two agree within a quarter
     (measured .90 to .99), near the reversal of a joint at 4.1 s too.
     """
-    robot, t = load_robot("ur5"), np.arange(0.0, 12.0, STEP)
-    q, prior = swing(robot, t), WrenchPrior(1.0, 30.0)
-    run = simulated(robot, q, 0 * load(t), t)
+    robot, t, prior = load_robot("ur5"), np.arange(0.0, 12.0, STEP), WrenchPrior(1.0, 30.0)
+    run = simulated(robot, swing(robot, t), 0 * load(t), t)
     free, half = RunSamples(run, np.ones(len(t), dtype=bool)), 0.5 * UNLISTED
     never = smooth_wrench(run, [free], [], prior)
     # A block on either side is inside of the gate, too.
@@ -140,12 +143,7 @@ def test_the_band_where_nothing_is_listed_grows_with_the_blindness_of_the_pose()
     q, prior = swing(robot, t), WrenchPrior(3.0, 30.0)
     q[:, 4] *= np.clip(5.0 - t, 0.0, 1.0)
     run = simulated(robot, q, 0 * load(t), t)
-    found = smooth_wrench(
-        run,
-        [RunSamples(run, np.ones(len(t), dtype=bool))],
-        [],
-        prior,
-    )
+    found = smooth_wrench(run, [RunSamples(run, np.ones(len(t), dtype=bool))], [], prior)
     blind, clear = (found.sd[span].max(axis=0) for span in (found.t > 6.0, found.t < 3.0))
     assert np.max(blind / clear) > 2.0
     # 1.5 and 2 widen every band, and so the prior's 30 N and 3 N·m.
@@ -161,7 +159,7 @@ def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing() -> None
     sigma = decompose(flange_jacobian(robot.chain, q)).sigma_min
     assert np.all(sigma[blind] < LEAST_SIGMA)
     push = load(t) * (np.sin(1.3 * t) > 0.3)[:, None]
-    free = RunSamples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
+    free = untouched(robot, q, t)
     found = smooth_wrench(simulated(robot, q, push, t), [free], prior=WrenchPrior(1, 30))
     moved, covariance = found.at(t)
     sd = deviations(covariance)
@@ -179,13 +177,9 @@ def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows() -> None:
     q, prior = swing(robot, t), WrenchPrior(3.0, 30.0)
     whole = simulated(robot, q, load(t), t).terms
     # μ says nothing of the gap: what p gained in it is not the mean of two samples' torque
-    cut = DynamicsTerms(
-        t=t[there],
-        p=whole.p[there] + 50.0 * (t[there] > 12)[:, None],
-        mu=whole.mu[there],
-    )
-    quiet = RunSamples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
-    found = smooth_wrench(run_of(cut, q[there]), [quiet], prior=prior)
+    p = whole.p[there] + 50.0 * (t[there] > 12)[:, None]
+    cut = DynamicsTerms(t=t[there], p=p, mu=whole.mu[there])
+    found = smooth_wrench(run_of(cut, q[there]), [untouched(robot, q, t)], prior=prior)
     values, covariance = found.at(np.array([5.0, 10.0, 15.0]))
     sd = deviations(covariance)
     assert np.isfinite(values).all()
@@ -194,12 +188,13 @@ def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows() -> None:
 
 
 def test_a_log_of_one_sample_leaves_the_prior() -> None:
-    robot = load_robot("ur5")
     nothing = np.zeros((1, 6))
-    terms = DynamicsTerms(t=np.zeros(1), p=nothing, mu=nothing)
-    found = smooth_wrench(run_of(terms, nothing, robot))
+    run = run_of(DynamicsTerms(t=np.zeros(1), p=nothing, mu=nothing), nothing)
+    found = smooth_wrench(run)
     assert not found.values.any()
     np.testing.assert_allclose(found.sd[0, :3], 1.5 * found.prior.force)
+    unlisted_there = smooth_wrench(run, gate=[], prior=WrenchPrior(1.0, 30.0))
+    np.testing.assert_allclose(unlisted_there.sd[0], np.repeat([45.0, 6.0], 3))
 
 
 def test_fewer_than_six_joints_tell_no_wrench() -> None:
@@ -211,13 +206,7 @@ def test_fewer_than_six_joints_tell_no_wrench() -> None:
 
 @pytest.mark.parametrize(
     ("step", "jitter", "seconds"),
-    [
-        (0.002, 0.0, 0.024),
-        (0.008, 0.002, 0.04),
-        (0.01, 0.003, 0.05),
-        (0.03, 0.01, 0.1),
-        (0.2, 0, 0.1),
-    ],
+    [(0.002, 0.0, 0.024), (0.008, 0.002, 0.04), (0.03, 0.01, 0.1), (0.2, 0, 0.1)],
 )
 def test_short_blocks_hold_five_samples_of_an_uneven_clock(
     step: float, jitter: float, seconds: float
@@ -234,9 +223,7 @@ def test_a_clock_is_uneven_by_more_than_a_tenth_of_its_steps() -> None:
     # A third of the steps 2 ms off, as on the UR10e logs.
     rough = even + np.where(np.arange(500) % 3 == 0, 0.002, 0.0)
     assert contact_block(rough) == pytest.approx(0.05, rel=0.21)
-
-
-def test_blocks_of_a_very_long_log_are_longer() -> None:
+    # blocks of a very long log are longer
     t = np.linspace(0.0, 7200.0, 1000)
     assert block_length(t, fine=False) == pytest.approx(7200.0 / MOST_BLOCKS)
     assert block_length(t[:1], fine=True) == pytest.approx(0.1)
@@ -321,11 +308,3 @@ def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near: float) 
     assert np.all(variance <= 0.1 + 1.44 * 10.0 + 1e-2)
     away = (t < 1.0) | (t > 3.5)
     np.testing.assert_allclose(variance[away], 0.1 + 1e-2 * 0.024 / 0.6, rtol=0.01)
-
-
-def test_a_log_of_one_sample_has_a_band_where_nothing_is_listed() -> None:
-    robot, nothing = load_robot("ur5"), np.zeros((1, 6))
-    terms = DynamicsTerms(t=np.zeros(1), p=nothing, mu=nothing)
-    prior = WrenchPrior(1.0, 30.0)
-    found = smooth_wrench(run_of(terms, nothing, robot), gate=[], prior=prior)
-    np.testing.assert_allclose(found.sd[0], np.repeat([45.0, 6.0], 3))  # nothing but the prior

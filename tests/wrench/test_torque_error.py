@@ -23,7 +23,6 @@ from vftcli.wrench.sensing import (
     missed_torque,
     torque_error,
 )
-from vftcli.wrench.sensor_reading import SensorReading
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 T = np.arange(0.0, 40.0, 0.01)
@@ -53,20 +52,11 @@ def test_what_is_no_error(text: str) -> None:
 
 
 def test_a_measured_band_is_taken_as_it_is() -> None:
+    run = log_run(np.zeros((len(T), 6)))
     varying = torque(error_sd=np.linspace(0.1, 0.2, 2 * len(T)).reshape(-1, 2))
-    deviations, remarks = torque_error(
-        None, log_run(np.zeros((len(T), 6))), (), [varying], T < 0.0
-    )
+    deviations, remarks = torque_error(None, run, (), [varying], T < 0.0)
     np.testing.assert_array_equal(deviations["gmo"], varying.error_sd)
     assert [r.code for r in remarks] == ["band-from-torques"]
-
-
-def test_where_nothing_is_known_there_is_no_band() -> None:
-    deviations, remarks = torque_error(
-        None, log_run(np.zeros((len(T), 6))), (), [torque()], T < 0.0
-    )
-    assert deviations == {}
-    assert [r.code for r in remarks] == ["no-wrench-band"]
 
 
 def log_run(dq: np.ndarray) -> Run:
@@ -100,21 +90,15 @@ def test_a_free_part_measures_the_spread_about_its_mean(moves: bool) -> None:
 @pytest.mark.slow
 def test_two_observers_of_one_response_have_one_band() -> None:
     """FE and ZOH read nearly the same and get nearly the same error, whatever P₂₂ each has."""
-    found = reading_of("kfo-fe", "kfo-zoh")
-    one, other = (wrench.sd[~wrench.hidden] for wrench in found.wrenches)
-    np.testing.assert_allclose(one, other, rtol=0.02)
-
-
-def reading_of(*names: str) -> SensorReading:
-    """The reference fixture's wrenches, its zero the unloaded start."""
     choice = AnalysisChoice(
         robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=names),
+        observers=ObserverChoice(names=("kfo-fe", "kfo-zoh")),
         wrench=WrenchChoice(zero=ZeroChoice(start=True)),
     )
     found = analyse_log(FIXTURE, choice).virtual_sensor
     assert found is not None
-    return found
+    one, other = (wrench.sd[~wrench.hidden] for wrench in found.wrenches)
+    np.testing.assert_allclose(one, other, rtol=0.02)
 
 
 def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:

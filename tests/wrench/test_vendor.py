@@ -6,8 +6,11 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import Wrench, WrenchFrame
-from vftcli.wrench.sensor import AxesFit, fit_axes, vendor_remarks
+from vftcli.wrench.sensor import fit_axes, vendor_remarks
+
+UR5 = load_robot("ur5").chain
 
 
 def pushes(samples: int = 400, seed: int = 1) -> np.ndarray:
@@ -31,14 +34,11 @@ def test_any_order_and_sign_of_axes_is_recognised(seed: int) -> None:
     assert fit_axes(ours, 2.0 * ours @ P.T).derived
 
 
-def test_axes_in_words() -> None:
-    matrix = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-    fit = AxesFit(matrix=matrix, gain=1.0, correlation=1.0)
-    assert fit.words == "+x +z −y"
+FLANGE = pushes()
 
 
-def log(wrench: np.ndarray, frame: WrenchFrame | None, samples: int = 400) -> Recording:
-    t = np.linspace(0, 10, samples)
+def log(wrench: np.ndarray | None, frame: WrenchFrame | None = None) -> Recording:
+    t = np.linspace(0, 10, len(FLANGE))
     rng = np.random.default_rng(5)
     q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.3 * np.sin(
         np.outer(t, rng.uniform(0.3, 1, 6))
@@ -46,95 +46,76 @@ def log(wrench: np.ndarray, frame: WrenchFrame | None, samples: int = 400) -> Re
     return Recording(t=t, q=q, wrench=wrench, wrench_frame=frame)
 
 
-def ours_in_base(recording: Recording, flange: np.ndarray) -> Wrench:
-    R = link_poses(load_robot("ur5").chain, recording.q).rotation[:, -1]
-    parts = [np.einsum("tij,tj->ti", R, part) for part in (flange[:, :3], flange[:, 3:])]
+def ours_in_base() -> Wrench:
+    """What the virtual sensor reads of those pushes."""
+    recording = log(None)
+    R = link_poses(UR5, recording.q).rotation[:, -1]
+    parts = [np.einsum("tij,tj->ti", R, part) for part in (FLANGE[:, :3], FLANGE[:, 3:])]
     values = np.concatenate(parts, axis=1)
     return Wrench(name="x", t=recording.t, values=values, frame="base")
 
 
+OURS = ours_in_base()
+
+
+def remarks(wrench: np.ndarray | None, frame: WrenchFrame | None = None) -> list[Remark]:
+    """What is said of a log's own wrench."""
+    return vendor_remarks(log(wrench, frame), OURS, UR5)
+
+
+def noisy(values: np.ndarray, seed: int) -> np.ndarray:
+    """With noise of .5 N."""
+    return values + 0.5 * np.random.default_rng(seed).standard_normal(values.shape)
+
+
 @pytest.mark.parametrize(
-    ("axes", "sign", "words"),
+    ("theirs", "words"),
     [
-        ("base", 1.0, "fits base axes, force on the robot"),
-        ("base", -1.0, "fits base axes with turned sign"),
-        ("flange", -1.0, "fits flange axes with turned sign"),
+        (OURS.values, "fits base axes, force on the robot"),
+        (-OURS.values, "fits base axes with turned sign"),
+        (-FLANGE, "fits flange axes with turned sign"),
     ],
 )
-def test_a_vendors_frame_and_sign_are_reported(axes: str, sign: float, words: str) -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    rng = np.random.default_rng(0)
-    theirs = sign * (flange if axes == "flange" else ours.values)
-    theirs = theirs + 0.5 * rng.standard_normal(theirs.shape)
-    remarks = vendor_remarks(
-        log(theirs, WrenchFrame("vendor", "vendor")), ours, load_robot("ur5").chain
-    )
-    assert words in str(remarks[-1])
+def test_a_vendors_frame_and_sign_are_reported(theirs: np.ndarray, words: str) -> None:
+    assert words in str(remarks(noisy(theirs, 0), WrenchFrame("vendor", "vendor"))[-1])
 
 
-def test_a_vendors_zeros_are_called_that() -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    remarks = vendor_remarks(log(np.zeros_like(flange), None), ours, load_robot("ur5").chain)
-    assert [remark.code for remark in remarks] == ["log-wrench-all-zero"]
+def test_a_log_without_a_wrench_or_of_zeros_has_no_convention() -> None:
+    """Some controllers log zeros where no sensor is fitted: their gain is 0, 0/0 correlates not."""
+    assert remarks(None) == []
+    assert [remark.code for remark in remarks(0.0 * FLANGE)] == ["log-wrench-all-zero"]
+    fit = fit_axes(FLANGE[:, :3], np.zeros((len(FLANGE), 3)))
+    assert fit.gain == 0.0
+    assert np.isnan(fit.correlation)
 
 
 def test_a_fit_that_is_the_same_signal_is_reported_to_be_derived() -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    remarks = vendor_remarks(log(2.0 * ours.values, None), ours, load_robot("ur5").chain)
-    codes = [remark.code for remark in remarks]
-    assert codes == ["log-wrench-fits", "log-wrench-derived"]
-    assert remarks[0].values["gain"] == pytest.approx(2.0)
-    assert remarks[0].values["stated"] == "frame not stated"
+    fits, derived = remarks(2.0 * OURS.values)
+    assert (fits.code, derived.code) == ("log-wrench-fits", "log-wrench-derived")
+    assert fits.values["gain"] == pytest.approx(2.0)
+    assert fits.values["stated"] == "frame not stated"
 
 
 def test_swapped_axes_are_named() -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    rng = np.random.default_rng(3)
-    theirs = ours.values[:, [0, 2, 1, 3, 5, 4]] * [1, 1, -1, 1, 1, -1]
-    theirs = theirs + 0.5 * rng.standard_normal(theirs.shape)
-    remarks = vendor_remarks(log(theirs, None), ours, load_robot("ur5").chain)
-    (remark,) = remarks
+    swapped = OURS.values[:, [0, 2, 1, 3, 5, 4]] * [1, 1, -1, 1, 1, -1]
+    (remark,) = remarks(noisy(swapped, 3))
     assert remark.code == "log-wrench-fits-other-axes"
     assert remark.values["axes"] == "+x +z −y"
 
 
 def test_what_resembles_nothing_is_reported_and_zeros_in_part() -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    noise = np.random.default_rng(1).standard_normal(flange.shape)
+    noise = np.random.default_rng(1).standard_normal(FLANGE.shape)
     noise[:100] = 0.0
-    remarks = vendor_remarks(log(noise, None), ours, load_robot("ur5").chain)
-    assert [remark.code for remark in remarks] == ["log-wrench-zero", "log-wrench-unlike"]
-    assert remarks[0].values["share"] == pytest.approx(0.25)
+    zero, unlike = remarks(noise)
+    assert (zero.code, unlike.code) == ("log-wrench-zero", "log-wrench-unlike")
+    assert zero.values["share"] == pytest.approx(0.25)
     # the rms of the norm where theirs is zero
-    rms = np.sqrt(np.mean(np.sum(ours.force[:100] ** 2, axis=1)))
-    assert remarks[0].values["force_N"] == pytest.approx(rms)
+    rms = np.sqrt(np.mean(np.sum(OURS.force[:100] ** 2, axis=1)))
+    assert zero.values["force_N"] == pytest.approx(rms)
 
 
 def test_a_late_field_is_reported_by_how_much() -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    late = np.roll(ours.values, 4, axis=0)
-    remarks = vendor_remarks(log(late, None), ours, load_robot("ur5").chain)
+    late, *_ = remarks(np.roll(OURS.values, 4, axis=0))
     step = 10.0 / 399
     # four of 400 samples are wrapped round, and a parabola stands for the peak
-    assert remarks[0].values["lag_ms"] == pytest.approx(4e3 * step, abs=250.0 * step)
-
-
-def test_a_log_without_a_wrench_has_no_convention() -> None:
-    flange = pushes()
-    recording = log(flange, None)
-    without = Recording(t=recording.t, q=recording.q)
-    assert vendor_remarks(without, ours_in_base(recording, flange), load_robot("ur5").chain) == []
-
-
-def test_a_field_of_zeros_fits_no_axes_and_has_no_correlation() -> None:
-    """Some controllers log zeros where no sensor is fitted: their gain is 0, 0/0 correlates not."""
-    ours = pushes()[:, :3]
-    fit = fit_axes(ours, np.zeros_like(ours))
-    assert fit.gain == 0.0
-    assert np.isnan(fit.correlation)
+    assert late.values["lag_ms"] == pytest.approx(4e3 * step, abs=250.0 * step)

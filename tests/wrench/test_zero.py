@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.free_motion.free_motion import within
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench.choice import ZeroChoice
@@ -51,12 +50,6 @@ def test_the_change_between_two_spans_is_reported() -> None:
     assert moved.where.span == (6, 7)
 
 
-def test_the_unloaded_start_ends_where_the_load_begins() -> None:
-    span = unloaded_start(hung())
-    # the load begins at 5 s; 0.3 s are left out before it
-    assert span == pytest.approx((1.0, 4.7))
-
-
 @pytest.mark.parametrize(
     ("lasts", "size", "stop"),
     [(0, 0.0, 12.99), (0.09, 9, 12.99), (0.11, 9, 7.7), (2, 2.8, 12.99), (2, 3.2, 7.7)],
@@ -98,34 +91,27 @@ def test_a_zero_across_the_begin_of_a_contact_swings() -> None:
     assert zero_warning(no_start, zero_drift(no_start, (4.0, 6.0))) == ()
 
 
-def test_a_zero_outside_the_log_is_refused() -> None:
-    with pytest.raises(ParameterError, match="zero interval 20:30 is outside the log"):
-        zero_drift(hung(), (20.0, 30.0))
-    with pytest.raises(ParameterError, match="zero interval :-3 is outside the log"):
-        zero_drift(hung(), (-np.inf, -3.0))
+@pytest.mark.parametrize(
+    ("span", "masked", "words"),
+    [
+        ((20.0, 30.0), False, "zero interval 20:30 is outside the log"),
+        ((-np.inf, -3.0), False, "zero interval :-3 is outside the log"),
+        ((1.0, 4.0), True, "no two of its samples have a known wrench"),
+    ],
+)
+def test_a_zero_outside_the_log_or_in_a_masked_span_is_refused(
+    span: tuple[float, float], masked: bool, words: str
+) -> None:
+    with pytest.raises(ParameterError, match=words):
+        zero_drift(hung(masked), span)
 
 
-def test_a_zero_in_a_masked_span_is_refused() -> None:
-    with pytest.raises(ParameterError, match="no two of its samples have a known wrench"):
-        zero_drift(hung(masked=True), (1.0, 4.0))
-
-
-def test_a_choice_of_spans_is_the_zero_and_the_unloaded_part() -> None:
-    wrench = hung()
-    spans = ((1.0, 2.0), (8.0, 9.0))
-    assert zero_spans(ZeroChoice(spans=spans), wrench) == (spans, spans)
-    inside = ((wrench.t >= 1) & (wrench.t <= 2)) | ((wrench.t >= 8) & (wrench.t <= 9))
-    np.testing.assert_array_equal(within(wrench.t, spans), inside)
-
-
-def test_the_start_is_the_zero_only_where_it_is_chosen() -> None:
-    wrench = hung()
+def test_the_zero_is_the_chosen_spans_or_the_start_where_it_is_chosen() -> None:
+    wrench, spans = hung(), ((1.0, 2.0), (8.0, 9.0))
     start = (unloaded_start(wrench),)
+    assert zero_spans(ZeroChoice(spans=spans), wrench) == (spans, spans)
     assert zero_spans(ZeroChoice(start=True), wrench) == (start, start)
     assert zero_spans(ZeroChoice(), wrench) == ((), start)
-
-
-def test_a_start_that_is_not_there_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"--zero start: .*--zero A:B"):
         zero_spans(ZeroChoice(start=True), hung(masked=True))
 
