@@ -14,6 +14,7 @@ from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.robots.profile import robot_toml
 from vftcli.robots.terms import gravity_torque
+from vftcli.signals.arrays import root_mean_squares
 from vftcli.signals.errors import (
     IdentificationError,
     MissingSignalError,
@@ -23,10 +24,10 @@ from vftcli.signals.errors import (
 from vftcli.signals.recording import Recording
 
 
-def motion(seed, duration=30.0, rate=125.0, joints=6):
-    """Sums of three sines a joint, 0.1 to 0.3 Hz, some rad/s fast."""
+def motion(seed, duration=30.0, joints=6):
+    """Sums of three sines a joint, 0.1 to 0.3 Hz, some rad/s fast; 125 Hz."""
     rng = np.random.default_rng(seed)
-    t = np.arange(0, duration, 1 / rate)
+    t = np.arange(0, duration, 1 / 125.0)
     q, dq, ddq = (np.zeros((len(t), joints)) for _ in range(3))
     for k in (1, 2, 3):
         w = 2 * np.pi * 0.1 * k
@@ -46,10 +47,10 @@ def drive(robot, q, dq, ddq):
     return torque + friction_torque(robot.friction, dq, gravity_torque(robot, q))
 
 
-def log(robot, seed=0, noise=0.2, duration=30.0, extra=0.0):
-    t, q, dq, ddq = motion(seed, duration, joints=robot.joints)
+def log(robot, seed=0, noise=0.2):
+    t, q, dq, ddq = motion(seed, joints=robot.joints)
     rng = np.random.default_rng(seed + 100)
-    torque = drive(robot, q, dq, ddq) + extra + noise * rng.normal(size=q.shape)
+    torque = drive(robot, q, dq, ddq) + noise * rng.normal(size=q.shape)
     if robot.torque_constant is None:
         return Recording(t=t, q=q, dq=dq, torque=torque)
     return Recording(t=t, q=q, dq=dq, current=torque / robot.torque_constant)
@@ -114,20 +115,15 @@ def test_a_stribeck_effect_is_seen():
 @pytest.mark.slow
 def test_links_are_identified_for_another_trajectory():
     scale = np.linspace(0.85, 1.2, 6)
-    chain = replace(
-        UR5.chain, mass=UR5.chain.mass * scale, inertia=UR5.chain.inertia * scale[:, None, None]
-    )
+    inertia = UR5.chain.inertia * scale[:, None, None]
+    chain = replace(UR5.chain, mass=UR5.chain.mass * scale, inertia=inertia)
     true = replace(rubbed(UR5, "coulomb-viscous-offset"), chain=chain)
     found = identify([log(true, 0)], UR5, Task(method="base"), [log(true, 7)])
-    test = found.residuals.filter(
-        (found.residuals["role"] == "held-out") & (found.residuals["model"] == "identified")
-    )
-    noise = prepare(log(true, 7), true)
-    floor = np.sqrt(
-        np.mean((noise.tau - prepare(log(true, 7, noise=0.0), true).tau) ** 2, axis=0)
-    )
+    test = found.residuals.filter(role="held-out", model="identified")
+    noisy, exact = (prepare(log(true, 7, noise), true).tau for noise in (0.2, 0.0))
+    floor = root_mean_squares(noisy - exact)
     # the filter's rounding of reversals is in both; 1.3 covers the 46 numbers of 1400 samples
-    assert np.mean(test["rms_Nm"].to_numpy()) < 1.3 * np.mean(floor)
+    assert test["rms_Nm"].mean() < 1.3 * floor.mean()
     assert found.base is not None
     assert len(found.base) == 40 + 6 * 3
 
@@ -138,10 +134,8 @@ HAND = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3,
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_payload_comes_back_from_one_motion(seed):
     """In every joint another friction than the profile's; the load's inertia counts too."""
-    asked = Task(method="payload")
-    found = identify(
-        [log(rubbed(UR5, "coulomb-viscous-offset").with_payload(HAND), seed)], UR5, asked
-    )
+    carried = log(rubbed(UR5, "coulomb-viscous-offset").with_payload(HAND), seed)
+    found = identify([carried], UR5, Task(method="payload"))
     origin = found.remarks[-1]
     assert origin.code == "load-from-motion"
     assert 0.0 < origin.values["left_percent"] < 100.0 * PARTLY
@@ -153,36 +147,6 @@ def test_the_payload_comes_back_from_one_motion(seed):
         assert abs(value - true) < 3.0 * sd[f"com_{name}"] < 0.05
     # its drives carry 18 kg of arm: 3 % of that weigh more than 3 % of the load
     assert 0.06 < sd["mass"] < 0.4
-
-
-@pytest.mark.parametrize("mass", [0.0, 0.15])
-def test_a_motion_in_which_no_load_shows_says_so(mass):
-    true = rubbed(UR5, "coulomb-viscous-offset", coulomb=2.0)
-    light = replace(HAND, mass=mass) if mass else None
-    asked = Task(method="payload")
-    with pytest.raises(IdentificationError, match="no load shows; in this motion one from"):
-        identify([log(true.with_payload(light), 1)], UR5, asked)
-
-
-def test_an_arm_that_hardly_moves_is_not_weighed():
-    held = log(UR5.with_payload(HAND), 1)
-    still = replace(held, q=held.q[0] + 0.01 * (held.q - held.q[0]), dq=0.01 * held.dq)
-    with pytest.raises(IdentificationError, match="the arm passes 1 different poses"):
-        identify([still], UR5, Task(method="payload"))
-
-
-def test_a_motion_of_some_seconds_is_not_weighed():
-    short = log(UR5.with_payload(HAND), 1).between(5.0, 14.0)
-    with pytest.raises(IdentificationError, match=r"9 s of motion are too short .* record 10 s"):
-        identify([short], UR5, Task(method="payload"))
-
-
-def test_a_log_at_rest_identifies_nothing():
-    t = np.arange(0, 10, 0.008)
-    still = np.zeros((len(t), 6))
-    recording = Recording(t=t, q=still, dq=still, current=still + 1.0)
-    with pytest.raises(IdentificationError, match="a log at rest identifies no friction"):
-        identify([recording], UR5, Task(method="friction"))
 
 
 @pytest.mark.slow
@@ -198,15 +162,66 @@ def test_a_joint_that_rests_keeps_its_numbers():
     assert found.robot.document["joints"][3]["rotor_inertia_source"] == "profile ur5"
 
 
-def test_missing_currents_are_reported():
-    t, q, dq, _ = motion(0)
-    with pytest.raises(MissingSignalError, match="no motor currents"):
-        identify([Recording(t=t, q=q, dq=dq)], UR5, Task(method="friction"))
+@pytest.mark.slow
+@pytest.mark.parametrize(("push", "terms"), [(-0.1, "coulomb and viscous"), (0.1, None)])
+def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
+    """Of joint 6 noise of .2 N·m and a model that is .1 N·m wrong are all there is to fit."""
+    recording = log(rubbed(UR5, "coulomb-viscous-offset"), 3)
+    current = recording.current.copy()
+    dq = recording.dq[:, 5]
+    more = (push - 5.0) * np.tanh(dq / 0.01) + (push - 8.0) * dq
+    current[:, 5] += more / UR5.torque_constant[5]
+    found = identify([replace(recording, current=current)], UR5, Task(method="friction"))
+    friction = found.robot.friction[5].parameters
+    assert friction.get("coulomb", 0.0) >= 0.0
+    assert friction.get("viscous", 0.0) >= 0.0
+    bounded = [r for r in found.remarks if r.code == "friction-at-bound"]
+    said = [((6,), terms)] if terms else []
+    assert [(r.where.joints, r.values["terms"]) for r in bounded] == said
+    # the other joints are none the worse: 5 N·m on 3000 samples of .2 N·m
+    assert found.robot.friction[4].parameters["coulomb"] == pytest.approx(5.0, rel=0.05)
 
 
-def test_missing_targets_are_reported():
-    with pytest.raises(MissingSignalError, match="no target currents"):
-        identify([log(UR5)], UR5, Task(method="targets"))
+def good():
+    return log(rubbed(UR5))
+
+
+def weighed(mass):
+    """A log of an arm that rubs little, with so much of a hand on its flange."""
+    light = replace(HAND, mass=mass) if mass else None
+    rubbing = rubbed(UR5, "coulomb-viscous-offset", coulomb=2.0)
+    return log(rubbing.with_payload(light), 1)
+
+
+def hardly(share):
+    """So much of the motion is left."""
+    moved = weighed(2.0)
+    return replace(moved, q=moved.q[0] + share * (moved.q - moved.q[0]), dq=share * moved.dq)
+
+
+LITTLE, MISSING = IdentificationError, MissingSignalError
+
+
+@pytest.mark.parametrize(
+    ("made", "method", "error", "words"),
+    [
+        (lambda: hardly(0.0), "friction", LITTLE, "a log at rest identifies no friction"),
+        (lambda: hardly(0.01), "payload", LITTLE, "the arm passes 1 different poses"),
+        (lambda: weighed(2.0).between(5.0, 14.0), "payload", LITTLE, "too short .* record 10 s"),
+        (lambda: weighed(0.0), "payload", LITTLE, "no load shows; in this motion one from"),
+        (lambda: weighed(0.15), "payload", LITTLE, "no load shows"),
+        (lambda: replace(good(), current=None), "friction", MISSING, "no motor currents"),
+        (good, "targets", MISSING, "no target currents"),
+        (lambda: replace(good(), current=-good().current), "friction", LITTLE, "another sign or"),
+        (lambda: replace(good(), dq=-good().dq), "friction", LITTLE, "it would push"),
+        (lambda: weighed(2.5), "friction", LITTLE, "kg on the flange .* --method payload"),
+    ],
+)
+def test_a_log_that_tells_too_little_or_contradicts_the_robot_is_refused(
+    made, method, error, words
+):
+    with pytest.raises(error, match=words):
+        identify([made()], UR5, Task(method=method))
 
 
 @pytest.mark.parametrize(
@@ -214,41 +229,7 @@ def test_missing_targets_are_reported():
 )
 def test_the_wrong_robot_is_refused(name, error):
     with pytest.raises(error, match="another"):
-        identify([log(rubbed(UR5))], load_robot(name), Task(method="friction"))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("push", "terms"), [(-0.1, "coulomb and viscous"), (0.1, None)])
-def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
-    """Of joint 6 noise of .2 N·m and a model that is .1 N·m wrong are all there is to fit."""
-    recording = log(rubbed(UR5, "coulomb-viscous-offset"), 3)
-    current = recording.current.copy()
-    current[:, 5] += (push - 5.0) * np.tanh(recording.dq[:, 5] / 0.01) / UR5.torque_constant[5]
-    current[:, 5] += (push - 8.0) * recording.dq[:, 5] / UR5.torque_constant[5]
-    found = identify([replace(recording, current=current)], UR5, Task(method="friction"))
-    friction = found.robot.friction[5].parameters
-    assert friction.get("coulomb", 0.0) >= 0.0
-    assert friction.get("viscous", 0.0) >= 0.0
-    bounded = [r for r in found.remarks if r.code == "friction-at-bound"]
-    assert [(r.where.joints, r.values["terms"]) for r in bounded] == (
-        [((6,), terms)] if terms else []
-    )
-    # the other joints are none the worse: 5 N·m on 3000 samples of .2 N·m
-    assert found.robot.friction[4].parameters["coulomb"] == pytest.approx(5.0, rel=0.05)
-
-
-def test_turned_currents_or_velocities_are_refused():
-    good = log(rubbed(UR5))
-    with pytest.raises(IdentificationError, match="another sign or unit"):
-        identify([replace(good, current=-good.current)], UR5, Task(method="friction"))
-    with pytest.raises(IdentificationError, match="it would push"):
-        identify([replace(good, dq=-good.dq)], UR5, Task(method="friction"))
-
-
-def test_an_unknown_load_is_suspected():
-    load = Payload(mass=2.5, com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
-    with pytest.raises(IdentificationError, match=r"kg on the flange .* --method payload"):
-        identify([log(UR5.with_payload(load))], UR5, Task(method="friction"))
+        identify([good()], load_robot(name), Task(method="friction"))
 
 
 @pytest.mark.parametrize(
@@ -276,16 +257,10 @@ def test_the_controllers_own_model_is_read_off():
     asked = drive(replace(true, friction=()), q, dq, ddq)
     wanted = (asked + friction_torque(true.friction, dq)) / K
     hand = 20.0 * np.sin(t)[:, None]
-    recording = Recording(
-        t=t,
-        q=q,
-        dq=dq,
-        current=wanted + hand / K,
-        target_current=np.round(wanted, 4),
-        target_torque=np.round(asked, 4),
-    )
+    targets = {"target_current": np.round(wanted, 4), "target_torque": np.round(asked, 4)}
+    recording = Recording(t=t, q=q, dq=dq, current=wanted + hand / K, **targets)
     found = identify([recording], UR5, Task(method="targets"))
-    known = found.parameters.filter(found.parameters["parameter"] == "torque_constant")
+    known = found.parameters.filter(parameter="torque_constant")
     for row in known.filter(known["determined"]).iter_rows(named=True):
         # rounded to 1e-4 A and filtered alike on both sides
         assert row["value"] == pytest.approx(K[row["joint"] - 1], rel=5e-3)

@@ -1,18 +1,18 @@
 """On simulated logs with seeded mismatch: the numbers the issue requires."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vftcli.identification import Task, identify
 from vftcli.identification.links import is_physical
-from vftcli.identification.training import (
-    gravity_torque,
-    prepare,
-)
+from vftcli.identification.training import prepare
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import root_mean_squares
 from vftcli.simulation import load_scenario, simulate
 from vftcli.simulation import prepare as build
@@ -47,8 +47,6 @@ def other():
 @pytest.fixture(scope="module")
 def truth() -> Robot:
     """The simulated arm as a robot."""
-    from dataclasses import replace
-
     arm, _ = build(load_scenario("free-excitation", [STICKS]), SEED)
     profile, true = load_robot("ur5"), arm.true
     friction = []

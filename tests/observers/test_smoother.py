@@ -149,14 +149,6 @@ def test_the_bandwidth_is_that_of_the_formula() -> None:
     assert not np.any(tuning.delay)
 
 
-def test_it_knows_more_than_the_filter(wandering: MakesTerms) -> None:
-    log = wandering(500, 0.1, joints=2)
-    smooth = smoother()
-    before, after = smooth.filter.estimate(log).sd, smooth.estimate(log).sd
-    assert before is not None
-    assert after is not None
-    assert np.all(after[:-1] < before[:-1])
-    np.testing.assert_allclose(after[-1], before[-1], rtol=1e-12)
 
 
 def test_a_gap_of_days_parts_a_log_into_two() -> None:

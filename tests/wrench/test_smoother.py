@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from drawn_blocks import blocks, noise
 from made_runs import run_of
 
 from vftcli.readers.library import Library
@@ -13,12 +14,10 @@ from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.model_error import TorqueNoise
 from vftcli.wrench.smoother import (
     BLOCK,
     MOST_BLOCKS,
@@ -288,21 +287,12 @@ def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near: float) 
     rest under a contact gives, .1 + (.6/.5)² 10 and the white noise. Far from the rest it is what
     motion gives, which within .3 s forgets what quiet blocks show.
     """
-    count, n = 200, 6
-    t = 0.024 * np.arange(count)
-    velocity = np.where((t > 2.0) & (t < 2.4), 0.0, 1.0)[:, None] * np.ones(n)
-    blocks = Blocks(
-        t, np.full(count, 0.024), np.zeros((count, n)), np.zeros((count, n)), velocity,
-        np.ones(count, dtype=bool),
-    )  # fmt: skip
-    noise = TorqueNoise(
-        white=np.full(n, 1e-2), variance=np.full(n, 0.1), time=np.full(n, 0.05), dry=np.zeros(n),
-        seen=np.ones(n, dtype=bool), at_rest=np.full(n, 9.9), pushed=np.full(n, 14.4), near=near,
-    )  # fmt: skip
-    J = np.broadcast_to(np.eye(6), (count, 6, n))
-    found = unlisted(
-        BlockModel(blocks, J, noise, np.zeros(count, dtype=bool)), WrenchPrior(1.0, 1e3)
-    )
+    t, nothing = 0.024 * (np.arange(200) + 0.5), np.zeros((200, 6))
+    log = blocks(nothing, nothing + ((t < 2.0) | (t > 2.4))[:, None])
+    numbers = {"white": 1e-2, "variance": 0.1, "time": 0.05, "at_rest": 9.9, "pushed": 14.4}
+    each = {name: np.full(6, value) for name, value in numbers.items()}
+    J, error = np.array([np.eye(6)] * 200), noise(6)._replace(**each, near=near)
+    found = unlisted(BlockModel(log, J, error, t < 0.0), WrenchPrior(1.0, 1e3))
     variance = np.diagonal(found, axis1=1, axis2=2)[:, :3]
     assert np.all(variance > 0.0)
     assert np.all(variance <= 0.1 + 1.44 * 10.0 + 1e-2)
