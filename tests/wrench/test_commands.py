@@ -25,8 +25,6 @@ def run(monkeypatch, capsys, *words: str) -> tuple[int, str, str]:
     return code, out, err
 
 
-
-
 def test_estimate_writes_the_wrench_and_nulls_what_the_pose_cannot_tell(
     monkeypatch, capsys, tmp_path
 ) -> None:
@@ -60,14 +58,15 @@ def test_any_wrench_option_asks_for_the_wrench(
     assert any("wrench" in name for name in columns) is asks
 
 
-
-
 @pytest.mark.parametrize(
     ("option", "words"),
     [
         (("--frame", "wrist"), "no frame 'wrist' for a wrench; there is flange"),
         (("--frame", "tool"), "the robot has no tool"),
-        (("--set", "virtual-sensor.solver=svd"), "no solver 'svd' for a wrench; there is pinv"),
+        (
+            ("--set", "virtual-sensor.solver=svd"),
+            "no solver 'svd' for a wrench; there is smoother, pinv",
+        ),
         (("--zero", "500:600"), "is outside the log"),
         (
             ("--frame", "sensor", "--set", "virtual-sensor.sensor=0,0,0,2,0,0,0,1,0,0,0,1"),

@@ -77,7 +77,7 @@ def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(
     np.testing.assert_allclose(mounting.sensor.translation, POSE.translation, atol=1e-9)
     (remark,) = remarks
     np.testing.assert_allclose(remark.values["position_mm"], [10, -20, 40], atol=1e-6)
-    assert "10.0 -20.0 40.0 mm" in str(remark)
+    assert "10.0 −20.0 40.0 mm" in str(remark)
 
 
 def test_a_pose_that_is_given_is_not_looked_for_nor_one_without_a_sensors_wrench() -> None:
