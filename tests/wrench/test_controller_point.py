@@ -32,7 +32,6 @@ def pushed(point: str, force: float = 25.0, seed: int = 3) -> Recording:
         shape = np.sin(np.pi * (t[inside] - start) / 1.5)[:, None]
         about_flange[inside] = shape * rng.normal(0.0, 1.0, 6) * np.repeat([force, 1.0], 3)
     J = flange_jacobian(ROBOT.chain, q)
-    assert ROBOT.torque_constant is not None
     torque = np.einsum("tij,ti->tj", J, about_flange)
     target = rng.normal(0.0, 1.0, 6) * np.sin(t)[:, None]
     current = target - torque / ROBOT.torque_constant + rng.normal(0.0, NOISE, q.shape)

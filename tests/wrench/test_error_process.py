@@ -22,7 +22,6 @@ from vftcli.wrench.model_error import (
 def test_what_was_drawn_is_learned() -> None:
     d = drawn(4000, np.random.default_rng(1))
     found = learn_noise([blocks(d, np.full_like(d, 0.5))], np.array([10.0]))
-    assert found is not None
     # 96 s hold 120 correlation times: the variance is known to some 13 %, two of its deviations.
     np.testing.assert_allclose(found.variance, 0.25, rtol=0.3)
     np.testing.assert_allclose(found.white, 0.01, rtol=0.15)
@@ -30,7 +29,6 @@ def test_what_was_drawn_is_learned() -> None:
     assert found.seen[0]
     # an offset is an error too
     shifted = learn_noise([blocks(d + 3.0, np.full_like(d, 0.5))], np.array([10.0]))
-    assert shifted is not None
     assert shifted.variance[0] > found.variance[0] + 8.0
     # ten blocks are no spectrum
     assert learn_noise([blocks(d[:10], d[:10])], np.array([10.0])) is None
@@ -41,7 +39,6 @@ def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
     log = blocks(drawn(8000, np.random.default_rng(7)), np.full((8000, 1), 0.5))
     dry = np.array([0.1])
     alone = infer_noise(log, dry, None)
-    assert alone is not None
     # Second differences of b are noise too, γ₀(6 − 8f + 2f²); robust, of 8000: 1.5 %.
     f = np.exp(-B / 0.4)
     np.testing.assert_allclose(alone.white, 0.01 + 0.25 * (1 - 4 * f / 3 + f * f / 3), rtol=0.05)
@@ -52,12 +49,10 @@ def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
         fitted = {"white": [4.0], "variance": [variance], "time": [time]}
         learned = noise()._replace(**{name: np.array(x) for name, x in fitted.items()})
         both = infer_noise(log, dry, learned)
-        assert both is not None
         assert (both.white[0], both.time[0], both.free_seconds) == (4.0, found, 4.0)
         assert both.variance[0] == max(variance, alone.variance[0])
     # its friction says more than the quietest
     strong = infer_noise(log, np.array([10.0]), noise())
-    assert strong is not None
     assert strong.variance[0] == pytest.approx((0.2 * 10.0) ** 2)
     assert (strong.at_rest[0], strong.pushed[0]) == (noise().at_rest[0], noise().pushed[0])
     assert infer_noise(blocks(np.zeros((2, 1)), np.zeros((2, 1))), dry, None) is None

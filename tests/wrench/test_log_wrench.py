@@ -84,7 +84,6 @@ def test_a_moment_about_the_bases_origin_is_pinocchios_action() -> None:
 
 def explained(recording: Recording, robot: Robot) -> list[np.ndarray]:
     """pinv(Jᵀ) of the log's joint torque, sample by sample."""
-    assert recording.tau_ext is not None
     J = flange_jacobian(robot.chain, recording.q)
     pairs = zip(J, recording.tau_ext, strict=True)
     return [np.linalg.lstsq(j.T, tau, rcond=None)[0] for j, tau in pairs]

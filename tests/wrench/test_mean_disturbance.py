@@ -51,5 +51,3 @@ def test_two_samples_tell_the_mean_between_them_and_one_nothing() -> None:
     np.testing.assert_allclose(found.tau, 2.0, rtol=1e-12)
     one = DynamicsTerms(t=np.zeros(1), p=np.ones((1, 6)), mu=np.ones((1, 6)))
     np.testing.assert_array_equal(mean_disturbance(one).tau, np.zeros((1, 6)))
-
-

@@ -1,7 +1,5 @@
 """White noise and model error from the free part: against drawn processes and another optimiser."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from made_runs import samples_of
@@ -152,5 +150,3 @@ def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
     for near, expected in ((2.5 * SECONDS, range(18, 27)), (0.0, range(20, 25))):
         variance = assumed._replace(near=near).stationary(log)[0][:, 2]
         assert np.flatnonzero(variance > variance[0]).tolist() == list(expected)
-
-

@@ -51,7 +51,6 @@ def motion() -> FreeMotion:
 
 def reading(*names: str, **wrench: object) -> SensorReading:
     sensed = analyse_log(CIRCLE, choice(*names, **wrench)).virtual_sensor  # type: ignore[arg-type]
-    assert sensed is not None
     assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
     return sensed
 
@@ -124,7 +123,6 @@ def test_a_list_of_contacts_is_its_gate(motion: FreeMotion) -> None:
     t = log.recording.t
     away = (t < 4.4) | (t > 5.1)
     assert not wrench.values[away].any()
-    assert wrench.sd is not None
     assert wrench.sd.min() > 0.0
     assert wrench.values[(t > 4.5) & (t < 5.0)].any()
 

@@ -33,7 +33,6 @@ def analysed(log: str, names: tuple[str, ...], wrench: WrenchChoice, **read: obj
 
 def reading(log: str, *names: str, **choice: object) -> SensorReading:
     sensed = analysed(log, names, WrenchChoice(**choice)).virtual_sensor  # type: ignore[arg-type]
-    assert sensed is not None
     assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
     return sensed
 
@@ -114,7 +113,6 @@ def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed() -> None:
         "ur5_circle.csv", ("best", "gmo", "fdo"), WrenchChoice(), interval=(0.0, 2.0)
     )
     found = short.virtual_sensor
-    assert found is not None
     (unknown,) = [remark for remark in found.remarks if remark.code == "no-wrench-band"]
     assert unknown.where.about == "gmo, fdo"
     assert found.wrenches[0].sd is not None

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.sensor_reading import Drift, SensorReading, with_reference, zero_drift
+from vftcli.wrench.sensor_reading import (
+    MARGIN,
+    Drift,
+    SensorReading,
+    contact_elsewhere,
+    with_reference,
+    zero_drift,
+)
 from vftcli.wrench.solvers import VirtualSensor
 
 T = np.arange(0.0, 20.0, 0.01)
@@ -37,7 +44,6 @@ def reading(*removed: bool) -> SensorReading:
 def test_a_sensors_own_zero_goes_where_the_readings_went() -> None:
     theirs = Wrench(name="sensor", t=T, values=force(offset=1.5), frame="base")
     found = with_reference(reading(True), theirs, of_sensor=True)
-    assert found.reference is not None
     np.testing.assert_allclose(found.reference.values, force(), atol=1e-12)
     zero, lag = found.remarks
     assert (zero.code, zero.where.about) == ("zero-removed", "sensor")
@@ -79,3 +85,32 @@ def test_which_solver_made_which_wrench() -> None:
     assert (both.solver, both.hides) == ("smoother for best, pinv for the others", True)
     alone = replace(both, wrenches=(best,))
     assert (alone.solver, alone.hides) == ("smoother", False)
+
+
+def wrench(null_space: np.ndarray | None) -> Wrench:
+    t = np.arange(1000.0)
+    return Wrench(
+        name="gmo", t=t, values=np.zeros((1000, 6)), frame="base", null_space=null_space
+    )
+
+
+FREE = np.arange(1000) < 500
+
+
+def test_a_contact_elsewhere_is_what_exceeds_the_free_part() -> None:
+    residual = np.full(1000, 0.8)
+    residual[100], residual[600:650], residual[700:800], residual[10] = 1.0, 2.0, MARGIN, np.nan
+    (remark,) = contact_elsewhere(wrench(residual), FREE)
+    assert (remark.code, remark.where.about) == ("contact-elsewhere", "gmo")
+    assert remark.values == {"share": pytest.approx(0.05), "threshold_Nm": pytest.approx(MARGIN)}
+    # a stray sample is none
+    stray = np.where(np.arange(1000) == 999, 5.0, 1.0)
+    assert contact_elsewhere(wrench(stray), FREE) == ()
+    assert contact_elsewhere(wrench(np.where(np.arange(1000) >= 998, 5.0, 1.0)), FREE)
+
+
+def test_nothing_is_said_without_a_channel_or_a_free_part() -> None:
+    residual = np.where(FREE, 1.0, 2.0)
+    assert contact_elsewhere(wrench(None), FREE) == ()
+    assert contact_elsewhere(wrench(residual), np.zeros(1000, dtype=bool)) == ()
+    assert contact_elsewhere(wrench(np.where(FREE, np.nan, 2.0)), FREE) == ()

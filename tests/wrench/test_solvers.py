@@ -98,7 +98,6 @@ def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver: str) ->
     if solver == "map":
         covariance = np.linalg.inv(information)
     np.testing.assert_allclose(found.values[0], gain @ tau[0], rtol=1e-9)
-    assert found.sd is not None
     np.testing.assert_allclose(found.sd[0], np.sqrt(np.diag(covariance)), rtol=1e-9)
 
 
@@ -126,9 +125,7 @@ def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> 
     blown, held = reported("ur5", q, tau, sd=sd), reported("ur5", q, tau, solver="map", sd=sd)
     assert blown.hidden.all()
     assert np.isnan(blown.known).all()
-    assert blown.sigma_min is not None
     assert blown.sigma_min.max() < LEAST_SIGMA
-    assert held.sd is not None
     assert np.max(np.abs(held.values[:, :3])) < 4.0 * PRIOR[0]
     assert np.all(held.sd[:, :3] <= PRIOR[0] * (1 + 1e-9))
     assert np.sqrt(np.mean(blown.values[:, :3] ** 2)) > 3 * np.sqrt(
@@ -140,7 +137,6 @@ def test_joint_noise_is_newtons_in_a_regular_pose_and_tens_at_the_wrist() -> Non
     """Science §4: 0.3 N·m is 1.2 N in a regular UR5 pose and 38 N at q5 = 0.02."""
     q = np.array([REGULAR, NEAR_WRIST])
     found = reported("ur5", q, np.zeros_like(q), sd=np.full(6, 0.3))
-    assert found.sd is not None
     rms = np.sqrt(np.mean(found.sd[:, :3] ** 2, axis=1))
     assert 0.5 < rms[0] < 2.5
     assert 15.0 < rms[1] < 80.0
@@ -181,10 +177,6 @@ def test_directions_that_are_left_out_read_nothing_and_the_others_stay() -> None
     expected = SCALE * np.einsum("kij,kj->ki", U, cut * np.einsum("kij,kj->ki", Vt, tau))
     assert np.any(cut == 0.0)
     np.testing.assert_allclose(found, expected, atol=1e-10)
-
-
-
-
 
 
 def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:

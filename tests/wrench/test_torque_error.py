@@ -96,7 +96,6 @@ def test_two_observers_of_one_response_have_one_band() -> None:
         wrench=WrenchChoice(zero=ZeroChoice(start=True)),
     )
     found = analyse_log(FIXTURE, choice).virtual_sensor
-    assert found is not None
     one, other = (wrench.sd[~wrench.hidden] for wrench in found.wrenches)
     np.testing.assert_allclose(one, other, rtol=0.02)
 
