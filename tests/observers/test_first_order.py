@@ -175,27 +175,6 @@ def test_as_printed_gmo_agrees_with_its_formula_as_a_loop(wandering: MakesTerms)
     np.testing.assert_allclose(printed, r[:400], atol=1e-11)
 
 
-def test_frequency_response_is_that_of_the_filter() -> None:
-    """Amplitude and lag of the answer to a sine, after the transient, against the formula."""
-    observer, f = MomentumObserver(gain=10.0), 2.0
-    t = clock(5000)
-    w = 2 * np.pi * f
-    terms = DynamicsTerms(t=t, p=-np.cos(w * t)[:, None] / w, mu=np.zeros((5000, 1)))
-    answer = observer.estimate(terms).tau[2500:, 0]
-    basis = np.column_stack([np.sin(w * t[2500:]), np.cos(w * t[2500:])])
-    sine, cosine = np.linalg.lstsq(basis, answer, rcond=None)[0]
-    response = observer.frequency_response(np.array([f]), 1 / RATE, 1)[0, 0]
-    np.testing.assert_allclose(sine + 1j * cosine, response, atol=1e-10)  # transient e^-200
-
-
-def test_delay_to_a_ramp_is_one_over_the_gain() -> None:
-    t = clock(4000)
-    terms = DynamicsTerms(t=t, p=0.5 * t[:, None] ** 2, mu=np.zeros((4000, 1)))
-    lag = t[-1] - MomentumObserver(gain=10.0).estimate(terms).tau[-1, 0]
-    delay = MomentumObserver(gain=10.0).tuning(1 / RATE, 1).delay[0]
-    np.testing.assert_allclose(lag, delay, rtol=1e-9)
-
-
 @pytest.mark.parametrize("gain", [0.0, -1.0, np.nan, np.inf])
 def test_a_gain_that_is_not_positive_is_refused(gain: float) -> None:
     with pytest.raises(ParameterError, match="must be positive"):

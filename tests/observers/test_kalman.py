@@ -226,16 +226,6 @@ def test_what_the_papers_parameters_mean(
     np.testing.assert_allclose(1e3 * tuning.delay[[0, 3]], delay, atol=0.051)
 
 
-@pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_delay_to_a_ramp_is_exact(scheme: str) -> None:
-    t = np.arange(4000) * STEP
-    p = 0.5 * t[:, None] ** 2 * np.ones(6)
-    log = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
-    observer = paper(scheme)
-    lag = t[-1] - observer.estimate(log).tau[-1]
-    np.testing.assert_allclose(lag, observer.tuning(STEP, 6).delay, rtol=1e-6)  # 32 s of ramp
-
-
 @pytest.mark.parametrize(("decay", "gain"), [(1.0, 0.872), (10.0, 0.278)])
 def test_a_decaying_model_loses_gain_at_rest(decay: float, gain: float) -> None:
     """DC gain of kfo-zoh with A_τ = −a, UR5 J1, as worked out and as the filter really answers."""
@@ -253,18 +243,6 @@ def test_the_density_convention_does_not_change_with_the_rate() -> None:
     np.testing.assert_allclose(slow.omega_n, fast.omega_n, rtol=1e-12)
     # what is left is the half sample by which a coarser clock sees the momentum earlier
     np.testing.assert_allclose(slow.delay, fast.delay, atol=(0.008 - 0.001) / 2)
-
-
-def test_frequency_response_is_that_of_the_filter() -> None:
-    observer, f = paper("fe", "discrete"), 2.0
-    t = np.arange(5000) * STEP
-    w = 2 * np.pi * f
-    p = -np.cos(w * t)[:, None] / w * np.ones(6)
-    answer = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau[2500:]
-    basis = np.column_stack([np.sin(w * t[2500:]), np.cos(w * t[2500:])])
-    sine, cosine = np.linalg.lstsq(basis, answer, rcond=None)[0]
-    response = observer.frequency_response(np.array([f]), STEP, 6)[0]
-    np.testing.assert_allclose(sine + 1j * cosine, response, atol=1e-9)  # transient long gone
 
 
 def test_forward_euler_refuses_a_decay_it_cannot_hold(wandering: MakesTerms) -> None:

@@ -149,8 +149,6 @@ def test_the_bandwidth_is_that_of_the_formula() -> None:
     assert not np.any(tuning.delay)
 
 
-
-
 def test_a_gap_of_days_parts_a_log_into_two() -> None:
     """Nothing is known across it: each part is what a log of its own gives, but near the gap."""
     rng = np.random.default_rng(3)
