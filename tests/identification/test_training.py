@@ -8,11 +8,7 @@ import pytest
 
 from vftcli.identification import friction_fit
 from vftcli.identification.clean_fit import CleanFit
-from vftcli.identification.friction_fit import (
-    PreslidingScore,
-    all_residuals,
-    fit_frictions,
-)
+from vftcli.identification.friction_fit import PreslidingScore, all_residuals, fit_frictions
 from vftcli.identification.links import stack
 from vftcli.identification.methods import (
     by_constant,
@@ -63,9 +59,7 @@ def test_residuals_are_cut_apart_log_by_log(recording, arm):
 
 def test_drive_constants_need_currents(recording, arm):
     torque = replace(recording, current=None, torque=recording.q)
-    with pytest.raises(
-        IdentificationError, match=r"--set identify\.constants=yes needs motor currents"
-    ):
+    with pytest.raises(IdentificationError, match=r"constants=yes needs motor currents"):
         prepare_training([torque], arm, fit_constants=True)
 
 
@@ -182,11 +176,8 @@ def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, arm):
     assert layout.shapes[0].terms == ("coulomb", "viscous", "offset")
     np.testing.assert_array_equal(start[layout.frictions[0]], [4.0, 6.0, 0.5])
     np.testing.assert_allclose(start[60], arm.chain.rotor_inertia[0])
-
-
-def test_a_vector_becomes_a_robot_without_its_payload(data, arm):
+    # a vector becomes a robot without its payload
     load = Payload(mass=1.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
-    layout, start = initial_columns(data, fit_frictions(data))
     start[10], start[60:66] = 9.5, 2.5
     robot = with_vector(arm.with_payload(load), layout, start, arm.friction)
     assert robot.payload is None
