@@ -1,11 +1,12 @@
 """What tests of observers and spectra share."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
-from vftcli.observers import MomentumObserver
+from vftcli.observers import KalmanObserver, MomentumObserver
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import Remark
 
@@ -43,6 +44,40 @@ def random_walk(
     t = np.concatenate([[0.0], np.cumsum(steps)])
     p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, joints)), axis=0)
     return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, joints)))
+
+
+@pytest.fixture
+def dense() -> Callable[..., list[Any]]:
+    """Runs the 2n-state textbook filter with full matrices over a log."""
+    return dense_filter
+
+
+def dense_filter(observer: KalmanObserver, log: DynamicsTerms, wide: float = 0.0) -> list[Any]:
+    """Of each sample the state, its covariance and A before the update, and the first two after.
+
+    `wide` is added to the variances of the first state.
+    """
+    n, clock = log.joints, log.clock
+    eye, zero = np.eye(n), np.zeros((n, n))
+    C, whole = np.hstack([eye, zero]), np.eye(2 * n)
+    p11, p12, p22 = map(np.diag, observer.first_prior(clock.step, n))
+    x, P = np.append(log.p[0], np.zeros(n)), np.block([[p11, p12], [p12, p22]]) + wide * whole
+    steps = []
+    for k in range(log.samples):
+        step = clock.step if clock.uniform else log.dt[k, 0]
+        m = observer.model(step, n)
+        A = np.block([[eye, np.diag(m.a12)], [zero, np.diag(m.a22)]])
+        if k:
+            B = np.vstack([step * eye, zero])
+            Q = np.block([[np.diag(m.q11), np.diag(m.q12)], [np.diag(m.q12), np.diag(m.q22)]])
+            u = log.mu[k] if observer.as_printed else 0.5 * (log.mu[k] + log.mu[k - 1])
+            x, P = A @ x + B @ u, A @ P @ A.T + Q
+        before = x, P, A
+        L = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(m.r))
+        x = x + L @ (log.p[k] - C @ x)
+        P = (whole - L @ C) @ P @ (whole - L @ C).T + L @ np.diag(m.r) @ L.T
+        steps.append((before, (x, P)))
+    return steps
 
 
 @pytest.fixture

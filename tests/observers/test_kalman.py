@@ -26,6 +26,14 @@ Q_TAU = np.full(6, 5000.0)
 STEP = 0.008
 
 MakesTerms = Callable[..., DynamicsTerms]
+DenseFilter = Callable[..., list[Any]]
+
+
+def dense_torque(steps: list[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """τ̂ and its standard deviation of a dense filter. (T, n) each"""
+    tau = [x[len(x) // 2 :] for _, (x, _) in steps]
+    sd = [np.sqrt(np.diag(P)[len(x) // 2 :]) for _, (x, P) in steps]
+    return np.array(tau), np.array(sd)
 
 
 def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObserver:
@@ -39,42 +47,15 @@ def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObs
     )
 
 
-def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
-    """The 2n-state textbook filter with full matrices; returns τ̂ and its standard deviation."""
-    n, clock = log.joints, log.clock
-    eye, zero = np.eye(n), np.zeros((n, n))
-    C, whole = np.hstack([eye, zero]), np.eye(2 * n)
-    prior = observer.first_prior(clock.step, n)
-    P = np.block(
-        [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
-    )
-    x = np.concatenate([log.p[0], np.zeros(n)])
-    tau, sd = np.empty_like(log.p), np.empty_like(log.p)
-    for k in range(log.samples):
-        step = clock.step if clock.uniform else log.dt[k, 0]
-        m = observer.model(step, n)
-        if k:
-            A = np.block([[eye, np.diag(m.a12)], [zero, np.diag(m.a22)]])
-            B = np.vstack([step * eye, zero])
-            Q = np.block([[np.diag(m.q11), np.diag(m.q12)], [np.diag(m.q12), np.diag(m.q22)]])
-            u = log.mu[k] if observer.as_printed else 0.5 * (log.mu[k] + log.mu[k - 1])
-            x, P = A @ x + B @ u, A @ P @ A.T + Q
-        L = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(m.r))
-        x = x + L @ (log.p[k] - C @ x)
-        P = (whole - L @ C) @ P @ (whole - L @ C).T + L @ np.diag(m.r) @ L.T
-        tau[k], sd[k] = x[n:], np.sqrt(np.diag(P)[n:])
-    return tau, sd
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 def test_agrees_with_the_dense_textbook_filter(
-    scheme: str, convention: str, jitter: float, wandering: MakesTerms
+    scheme: str, convention: str, jitter: float, wandering: MakesTerms, dense: DenseFilter
 ) -> None:
     observer, log = paper(scheme, convention), wandering(jitter=jitter)
-    tau, sd = dense(observer, log)
+    tau, sd = dense_torque(dense(observer, log))
     estimate = observer.estimate(log)
     # the decoupled filter is the same filter; 1500 steps of rounding at values of 100 N·m
     np.testing.assert_allclose(estimate.tau, tau, atol=1e-10, rtol=0)
@@ -86,11 +67,11 @@ def test_agrees_with_the_dense_textbook_filter(
     [("fe", {"decay": 3.0}), ("zoh", {"decay": 3.0}), ("fe", {"as_printed": True})],
 )
 def test_decay_and_printed_euler_agree_with_the_dense_textbook_filter(
-    scheme: str, more: dict[str, Any], wandering: MakesTerms
+    scheme: str, more: dict[str, Any], wandering: MakesTerms, dense: DenseFilter
 ) -> None:
     """The print is on μ alone, of the literal noise."""
     observer, log = paper(scheme, **more), wandering(samples=600)
-    tau, _ = dense(observer, log)
+    tau, _ = dense_torque(dense(observer, log))
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-10)
     printed, named = (one.model(STEP, 6) for one in (observer, paper("fe", "literal")))
     assert observer.as_printed is np.array_equal(printed.q22, named.q22)

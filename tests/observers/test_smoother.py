@@ -1,6 +1,7 @@
 """The smoother against a dense Rauch–Tung–Striebel textbook implementation, and its symmetries."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ STEP = 0.008
 WIDE = 1e9  # [(N·m·s)², (N·m)²]
 
 MakesTerms = Callable[..., DynamicsTerms]
+DenseFilter = Callable[..., list[Any]]
 
 
 def smoother(scheme: str = "fe", convention: str = "density", **more: object) -> KalmanSmoother:
@@ -21,39 +23,13 @@ def smoother(scheme: str = "fe", convention: str = "density", **more: object) ->
     return KalmanSmoother(filter=KalmanObserver(discretisation=scheme, **own, **more))
 
 
-def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
-    """Forward filter and backward smoother with full 2n-state matrices, as in any textbook.
-
-    The first state may be anything: `WIDE` is its variance.
-    """
-    f, n, clock = smooth.filter, log.joints, log.clock
-    eye, zero = np.eye(n), np.zeros((n, n))
-    C, whole = np.hstack([eye, zero]), np.eye(2 * n)
-    prior = f.first_prior(clock.step, n)
-    prior = prior._replace(p11=prior.p11 + WIDE, p22=prior.p22 + WIDE)
-    P = np.block(
-        [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
-    )
-    x = np.concatenate([log.p[0], np.zeros(n)])
-    filtered, predicted = [], []
-    for k in range(log.samples):
-        step = clock.step if clock.uniform else log.dt[k, 0]
-        m = f.model(step, n)
-        A = np.block([[eye, np.diag(m.a12)], [zero, np.diag(m.a22)]])
-        if k:
-            B = np.vstack([step * eye, zero])
-            Q = np.block([[np.diag(m.q11), np.diag(m.q12)], [np.diag(m.q12), np.diag(m.q22)]])
-            x, P = A @ x + B @ (0.5 * (log.mu[k] + log.mu[k - 1])), A @ P @ A.T + Q
-        predicted.append((x, P, A))
-        L = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(m.r))
-        x = x + L @ (log.p[k] - C @ x)
-        P = (whole - L @ C) @ P @ (whole - L @ C).T + L @ np.diag(m.r) @ L.T
-        filtered.append((x, P))
-    xs, Ps = filtered[-1]
+def dense_rts(steps: list[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Backward smoother with full 2n-state matrices, as in any textbook, on a dense filter."""
+    xs, Ps = steps[-1][1]
+    n = len(xs) // 2
     tau, sd = [xs[n:]], [np.sqrt(np.diag(Ps)[n:])]
-    for k in range(log.samples - 2, -1, -1):
-        x, P = filtered[k]
-        x_next, P_next, A = predicted[k + 1]
+    for k in range(len(steps) - 2, -1, -1):
+        (x, P), (x_next, P_next, A) = steps[k][1], steps[k + 1][0]
         G = P @ A.T @ np.linalg.inv(P_next)
         xs, Ps = x + G @ (xs - x_next), P + G @ (Ps - P_next) @ G.T
         tau.append(xs[n:])
@@ -65,11 +41,12 @@ def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, n
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
 def test_agrees_with_a_dense_textbook_smoother(
-    scheme: str, convention: str, jitter: float, wandering: MakesTerms
+    scheme: str, convention: str, jitter: float, wandering: MakesTerms, dense: DenseFilter
 ) -> None:
     log = wandering(700, jitter, joints=2)
     smooth = smoother(scheme, convention)
-    estimate, (tau, sd) = smooth.estimate(log), dense_rts(smooth, log)
+    # The first state may be anything: `WIDE` is its variance.
+    estimate, (tau, sd) = smooth.estimate(log), dense_rts(dense(smooth.filter, log, WIDE))
     # the dense one rounds at `WIDE`, 1e-7 (N·m)² beside variances of .001 to 1000
     np.testing.assert_allclose(estimate.tau, tau, atol=2e-6, rtol=0)
     np.testing.assert_allclose(estimate.sd, sd, rtol=5e-4)

@@ -1,5 +1,6 @@
 """Contacts against the true ones: hysteresis, matching, limits, free part, settling."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,22 @@ def push(height: float, start: float = 5.0, stop: float = 7.0) -> np.ndarray:
 def contacts(*spans: tuple[float, float]) -> tuple[ContactInterval, ...]:
     """The contacts of a score of 3 in these spans; each ends 10 ms early."""
     return find_contacts(T, np.sum([push(3.0, *span) for span in spans], axis=0))
+
+
+def reference(height: float, floor: float | None = None) -> ExternalTorque:
+    """So much on the first of two joints from 5 to 7 s, known to a floor."""
+    tau = np.outer(push(height), [1.0, 0.0])
+    floors = None if floor is None else np.array([floor, np.nan])
+    return ExternalTorque(name="truth", t=T, tau=tau, floor=floors)
+
+
+def judged(
+    tau: np.ndarray, truth: ExternalTorque | None = None, known: KnownContacts | None = None
+) -> ContactScore:
+    """An estimate's torque against the true one, else 2 N·m."""
+    estimate = ExternalTorque(name="gmo", t=T, tau=tau)
+    (score,) = judge_contacts([estimate], None, truth or reference(2.0), known)
+    return score
 
 
 def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
@@ -90,9 +107,7 @@ def test_contacts_are_reported_from_torques_before_the_first_true_one() -> None:
     truth[:, 1] = push(10.0, 5.0, 6.0) + push(10.0, 10.0, 11.0)
     rng = np.random.default_rng(2)
     late = np.roll(truth, 8, axis=0) + 0.1 * rng.standard_normal(truth.shape)
-    estimate = ExternalTorque(name="gmo", t=T, tau=late)
-    reference = ExternalTorque(name="file:truth", t=T, tau=truth)
-    (reported,) = judge_contacts([estimate], None, reference)
+    reported = judged(late, ExternalTorque(name="file:truth", t=T, tau=truth))
     assert reported.signal == "torque"
     assert (reported.detection.contacts, reported.detection.missed) == (2, 0)
     assert reported.detection.mean_delay == pytest.approx(0.08, abs=0.011)  # eight samples late
@@ -136,11 +151,9 @@ def test_what_begins_too_early_or_late_is_false(start: float, false: int) -> Non
 def test_contacts_of_an_exact_reference_are_parted_by_a_shorter_pause(
     pause: float, floor: float | None, count: int
 ) -> None:
-    tau = np.column_stack([push(2.0, 5.0, 6.0) + push(2.0, 6.0 + pause, 7.0), np.zeros(len(T))])
-    floors = None if floor is None else np.full(2, floor)
-    known = ExternalTorque(name="truth", t=T, tau=tau, floor=floors)
-    (one,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, known)
-    assert one.detection.contacts == count
+    tau = np.outer(push(2.0, 5.0, 6.0) + push(2.0, 6.0 + pause, 7.0), [1.0, 0.0])
+    known = replace(reference(2.0, floor), tau=tau)
+    assert judged(tau, known).detection.contacts == count
 
 
 def test_true_contacts_exceed_half_a_newton_metre_on_any_joint() -> None:
@@ -151,20 +164,9 @@ def test_true_contacts_exceed_half_a_newton_metre_on_any_joint() -> None:
     assert [(round(c.start, 1), round(c.stop, 1)) for c in found] == [(5.0, 7.0), (10.0, 11.0)]
 
 
-def reference(height: float, floor: np.ndarray | None = None) -> ExternalTorque:
-    tau = np.zeros((len(T), 2))
-    tau[:, 0] = push(height)
-    return ExternalTorque(name="truth", t=T, tau=tau, floor=floor)
-
-
-def judged(tau: np.ndarray, floor: np.ndarray | None = None) -> tuple[ContactScore, ...]:
-    """An estimate's torque against a reference of 2 N·m."""
-    return judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0, floor))
-
-
 def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contact() -> None:
-    for floor, count in ((None, 1), (np.array([0.5, np.nan]), 0)):
-        (score,) = judged(reference(2.0).tau, floor)
+    for floor, count in ((None, 1), (0.5, 0)):
+        score = judged(reference(2.0).tau, reference(2.0, floor))
         assert score.detection.contacts == count
 
 
@@ -184,12 +186,11 @@ def test_stiction_at_rest_deafens_no_reference() -> None:
 
 
 def test_settling_is_no_contact() -> None:
-    (score,) = judged(reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0)
+    score = judged(reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0)
     assert score.detection.false_alarms == 0
     assert score.detection.delay == (0.0,)
     # nor is what stays in the narrowest band, half a newton-metre
-    (score,) = judged(reference(0.9 * LEAST_TORQUE).tau)
-    assert score.detection.missed == 1
+    assert judged(reference(0.9 * LEAST_TORQUE).tau).detection.missed == 1
 
 
 def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
@@ -225,7 +226,7 @@ def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
 
 def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
     """One alarm in 19.99 s, of which the push holds 5 to 6.99 s: one in 18.00 s, 200 an hour."""
-    (score,) = judged(reference(2.0).tau + np.outer(push(2.0, 12.0, 13.0), [1.0, 0.0]))
+    score = judged(reference(2.0).tau + np.outer(push(2.0, 12.0, 13.0), [1.0, 0.0]))
     assert score.detection.false_alarms == 1
     assert score.detection.false_alarms_per_h == pytest.approx(200.0)
 
@@ -234,10 +235,9 @@ def test_what_is_listed_is_judged_as_it_stands() -> None:
     """Two rows for one push: one is credited, the other a piece."""
     reported = KnownContacts(
         untouched=np.zeros(len(T), dtype=bool),
-        listed={"best": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
+        listed={"gmo": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
     )
-    best = ExternalTorque(name="best", t=T, tau=np.zeros((len(T), 2)))
-    (score,) = judge_contacts([best], None, reference(2.0), reported)
+    score = judged(np.zeros((len(T), 2)), known=reported)
     detection = score.detection
     assert score.signal == "list"
     assert (detection.found, detection.listed, detection.false_alarms) == (1, 2, 0)
@@ -246,10 +246,9 @@ def test_what_is_listed_is_judged_as_it_stands() -> None:
 def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
     """A bump of 5 N·m at 12 s is a false alarm, unless the free part or a free run shows it."""
     tau = reference(8.0).tau + np.outer(push(5.0, 12.0, 13.0), [1.0, 0.0])
-    estimate = [ExternalTorque(name="gmo", t=T, tau=tau)]
 
     def alarms(reported: KnownContacts | None) -> int:
-        (score,) = judge_contacts(estimate, None, reference(8.0), reported)
+        score = judged(tau, reference(8.0), reported)
         assert score.detection.missed == 0
         return score.detection.false_alarms
 
