@@ -198,6 +198,7 @@ def hardly(share):
     return replace(moved, q=moved.q[0] + share * (moved.q - moved.q[0]), dq=share * moved.dq)
 
 
+HEAVY = replace(HAND, mass=2.5, com=np.array([0.0, 0.0, 0.05]))
 LITTLE, MISSING = IdentificationError, MissingSignalError
 
 
@@ -213,7 +214,7 @@ LITTLE, MISSING = IdentificationError, MissingSignalError
         (good, "targets", MISSING, "no target currents"),
         (lambda: replace(good(), current=-good().current), "friction", LITTLE, "another sign or"),
         (lambda: replace(good(), dq=-good().dq), "friction", LITTLE, "it would push"),
-        (lambda: weighed(2.5), "friction", LITTLE, "kg on the flange .* --method payload"),
+        (lambda: log(UR5.with_payload(HEAVY)), "friction", LITTLE, "kg on the flange .* payload"),
     ],
 )
 def test_a_log_that_tells_too_little_or_contradicts_the_robot_is_refused(
