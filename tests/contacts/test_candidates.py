@@ -9,17 +9,13 @@ from vftcli.contacts.search import (
     BETWEEN,
     PUSH,
     SEARCHES,
-    STRETCH,
-    WARM_UP,
     filtered_contacts,
-    stretches_of,
     turned_round,
     two_state_odds,
 )
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
-from vftcli.signals.series import runs_of
 from vftcli.wrench.model_error import ErrorProcess, error_process
 
 
@@ -41,31 +37,6 @@ def pushed(count: int, seed: int) -> Array:
     d = drawn(count, np.random.default_rng(seed))
     d[100:120] += 8.0
     return d
-
-
-def test_a_push_is_found_to_a_block_or_two() -> None:
-    runs = runs_of(touched_blocks(*joints_of(pushed(300, 1))))
-    assert len(runs) == 1
-    assert abs(runs[0][0] - 100) <= 2
-    assert abs(runs[0][1] - 120) <= 2
-
-
-def test_nothing_is_found_in_what_was_drawn_free() -> None:
-    assert not touched_blocks(*joints_of(drawn(1000, np.random.default_rng(2)))).any()
-
-
-def test_the_list_of_a_log_turned_round_is_the_list_turned_round() -> None:
-    log, jacobian = joints_of(pushed(300, 3))
-    np.testing.assert_array_equal(
-        touched_blocks(turned_round(log), jacobian), touched_blocks(log, jacobian)[::-1]
-    )
-
-
-def test_one_bad_block_is_no_contact() -> None:
-    d = drawn(300, np.random.default_rng(4))
-    # Six standard deviations of the innovation.
-    d[150] += 1.0
-    assert not touched_blocks(*joints_of(d)).any()
 
 
 @pytest.mark.parametrize("push", [3.4, 3.5])
@@ -163,16 +134,6 @@ def test_a_long_log_is_searched_in_stretches_as_if_in_one(
         for a, b in zip(one, other, strict=True):
             # After 5 s, a dozen correlation times, nothing is left of how a stretch began.
             assert np.mean(np.sign(a) != np.sign(b)) < 0.002
-
-
-def test_stretches_cover_the_log() -> None:
-    begins, warm, length = stretches_of(5000, B)
-    own = length - warm
-    assert warm == round(WARM_UP / B)
-    assert own == round(STRETCH / B)
-    assert begins[0] == 0
-    assert begins[-1] + length >= 5000
-    assert stretches_of(100, B) == ([0], 0, 100)
 
 
 def test_behind_a_gap_of_an_hour_the_odds_are_those_of_a_log_that_begins() -> None:

@@ -63,17 +63,13 @@ def test_beside_a_joint_without_effort_every_row_is_a_candidate() -> None:
     assert not found.tells_untouched
 
 
-def test_the_hardest_is_the_one_with_the_largest_force() -> None:
+def test_the_hardest_has_the_largest_force_of_those_beyond_their_band() -> None:
     soft, hard = contact(peak_force=10.0), contact(number=2, peak_force=80.0)
-    assert contact_list(soft, hard).hardest is hard
-    assert contact_list().hardest is None
-
-
-def test_a_force_within_its_band_is_the_hardest_only_among_its_like() -> None:
-    wide, sized = contact(peak_force=88.0, peak_band=170.0), contact(peak_force=10.0)
-    assert contact_list(wide, sized).hardest is sized
+    wide = contact(peak_force=88.0, peak_band=170.0)
+    assert contact_list(soft, hard, wide).hardest is hard
     assert contact_list(wide).hardest is wide
-    assert (wide.size_known, sized.size_known) == (False, True)
+    assert contact_list().hardest is None
+    assert (wide.size_known, hard.size_known) == (False, True)
 
 
 def test_a_size_that_depends_on_an_unknown_place_is_unknown() -> None:

@@ -12,35 +12,20 @@ import vftcli as vft
 from vftcli.bias.whole_log import whole_log_bias
 from vftcli.contacts import free_statistics as free_statistics_room
 from vftcli.contacts.free_statistics import (
-    DRY_SHARE,
-    beyond_threshold,
-    blocks_of,
-    expected_torque,
     free_part,
     free_statistics,
-    is_touched,
     observer_noise,
-    pseudo_contacts,
-    self_test,
-    torque_level,
 )
-from vftcli.contacts.windows import START
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.readers.reading import read
-from vftcli.robots import load_robot
-from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
-from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import Blocks
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import runs_of
-from vftcli.wrench.smoother import BLOCK
 
 LOG = read(FIXTURES / "ur5_circle.csv")
 
 
-def test_a_named_span_is_the_free_part() -> None:
+def test_a_named_span_or_another_log_is_the_free_part() -> None:
     part = free_part(motion(LOG, "ur5", "0.3:4"))
     assert part is not None
     (piece,) = part.pieces
@@ -48,11 +33,7 @@ def test_a_named_span_is_the_free_part() -> None:
     assert (t[0], t[-1]) == (pytest.approx(0.304), pytest.approx(4.0))
     assert not part.doubted
     assert part.remarks[0].code == "free-span"
-
-
-def test_another_log_is_a_free_part_whatever_its_motion() -> None:
-    other = read(FIXTURES / "ur5_table1.csv")
-    part = free_part(motion(LOG, "ur5", run=other))
+    part = free_part(motion(LOG, "ur5", run=read(FIXTURES / "ur5_table1.csv")))
     assert part is not None
     (piece,) = part.pieces
     assert piece.inside.all()
@@ -66,6 +47,9 @@ def test_what_repeats_nothing_has_no_free_part() -> None:
     assert free_statistics(bare, whole_log_bias(bare.log)) is None
     with pytest.raises(ParameterError, match="free part"):
         free_part(motion(short, "ur5", "90:95"))
+    cycles = FreeChoice.parsed(settings={"two-cycle.free-cycles": "9"})
+    with pytest.raises(ReferenceTorqueError):
+        free_part(replace(bare, choice=cycles))
 
 
 def test_cycles_of_which_none_was_recorded_are_no_free_part() -> None:
@@ -74,68 +58,6 @@ def test_cycles_of_which_none_was_recorded_are_no_free_part() -> None:
     keep = (t < 4.79) | (t > 8.79)
     kept = Recording(t=LOG.t[keep], **{k: LOG.require(k)[keep] for k in ("q", "dq", "current")})
     assert free_part(motion(kept, "ur5")) is None
-
-
-def test_cycles_that_do_not_exist_are_refused() -> None:
-    from dataclasses import replace
-
-    from vftcli.free_motion.choice import FreeChoice
-
-    short = motion(read(FIXTURES / "ur5_taps_ur_rtde.csv"), "ur5")
-    with pytest.raises(ReferenceTorqueError):
-        free_part(
-            replace(short, choice=FreeChoice.parsed(settings={"two-cycle.free-cycles": "9"}))
-        )
-
-
-def test_the_level_is_that_of_the_free_samples_that_move() -> None:
-    """2 N·m while J1 moves, 9 at rest, 20 in the first .1 s, in which the observer settles.
-
-    Its gain of 30 1/s leaves 18 e^(−30 · .2) N·m of that after .3 s, .05.
-    """
-    t = 0.005 * np.arange(600)
-    moves = (t < 2.0)[:, None] * (np.arange(6) == 0)
-    torque = np.where(t[:, None] < 0.1, 20.0, np.where(moves, 2.0, 9.0))
-    log = Recording(t=t, q=np.zeros((600, 6)), dq=0.5 * moves, torque=0.0 * torque)
-    p = np.cumsum(0.005 * torque, axis=0)
-    run = Run(recording=log, robot=load_robot("ur5"))
-    run = run.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
-    level = torque_level([RunSamples(run, t < 2.8)])
-    np.testing.assert_allclose(level, np.array([2.0, 9.0, 9.0, 9.0, 9.0, 9.0]) / 1.96, rtol=0.02)
-
-
-def test_resting_joints_are_given_their_stiction() -> None:
-    log = motion(LOG, "ur5").log
-    sd, dry = expected_torque(log, None), dry_torques(log.robot)
-    speed = np.abs(LOG.require("dq"))
-    far = np.convolve(speed[:, 0] < 0.01, np.ones(101), "same") == 0
-    np.testing.assert_allclose(sd[far, 0], DRY_SHARE * dry[0])
-    assert np.all(
-        sd[speed < 0.01] >= np.tile(NEAR_REST_SHARE * dry, (len(speed), 1))[speed < 0.01]
-    )
-
-
-def test_contacts_that_are_none_read_little() -> None:
-    named = motion(LOG, "ur5", "0.3:4")
-    free = free_statistics(named, whole_log_bias(named.log))
-    assert free is not None
-    found = self_test(free, START)
-    assert np.all(found.widening >= 1.0)
-    # Simulations gave 4 to 9 N.
-    assert 1.0 < found.smallest_force < 15.0
-    assert len(pseudo_contacts(blocks_of(free.free, BLOCK)[0], 3)) == 3
-
-
-@pytest.mark.parametrize(
-    ("known", "runs"), [(23, []), (24, [(6, 18)]), (36, [(6, 18), (18, 30)])]
-)
-def test_a_contact_that_is_made_up_has_free_blocks_on_either_side(
-    known: int, runs: list[tuple[int, int]]
-) -> None:
-    """.6 s in blocks of .05 s, with .3 s before and after it."""
-    there, nothing = np.arange(40) < known, np.zeros((40, 6))
-    blocks = Blocks(0.05 * np.arange(40), np.full(40, 0.05), nothing, nothing, nothing, there)
-    assert pseudo_contacts(blocks, 5) == runs
 
 
 def test_a_load_in_the_free_part_is_no_noise() -> None:
@@ -156,40 +78,6 @@ def test_a_load_in_the_free_part_is_no_noise() -> None:
     assert np.all(heavy.noise.variance < 4.0 * light.noise.variance + 0.3)
     left = heavy.log.terms.mu - known
     assert np.abs(left).mean() < 0.2 * np.abs(load.torque(plain.log)).mean()
-
-
-def test_free_cycles_with_a_contact_in_every_one_are_not_believed() -> None:
-    """A push in each of ten cycles: the quietest is no quieter, and beyond friction."""
-    robot, t = load_robot("ur5"), 0.008 * np.arange(5000)
-    phase = 2.0 * np.pi * t / 4.0
-    rest = np.array([0.0, -1.35, 1.9, -2.1, -1.57, 0.0])
-    q = rest + 0.2 * np.column_stack([np.sin(phase + k) for k in range(6)])
-    dq = 0.2 * (2.0 * np.pi / 4.0) * np.column_stack([np.cos(phase + k) for k in range(6)])
-    still = Run(recording=Recording(t=t, q=q, dq=dq, torque=np.zeros_like(q)), robot=robot)
-    rng = np.random.default_rng(5)
-    torque = 0.2 * rng.standard_normal(q.shape)
-    torque[(t % 4.0) > 2.0] += 20.0
-    # d = torque exactly, less friction: the terms alone describe the log.
-    p = np.cumsum(0.008 * torque, axis=0)
-    log = still.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
-    own = (t >= 4.5) & (t < 8.0)
-    assert is_touched(log, own)
-    quiet = torque * ~((t % 4.0 > 2.0) & own)[:, None]
-    p = np.cumsum(0.008 * quiet, axis=0)
-    assert not is_touched(still.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))), own)
-
-
-def test_a_threshold_takes_what_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
-    torque = np.zeros((300, 2))
-    torque[10:20, 0] = 9.0  # while the observer settles
-    torque[50, 0] = 9.0  # one sample
-    torque[100:110, 1] = 9.0  # .1 s
-    torque[120:130, 1] = -9.0  # closer than .2 s: the same
-    room = "vftcli.contacts.free_statistics"
-    monkeypatch.setattr(f"{room}.observed", lambda _: torque)
-    monkeypatch.setattr(f"{room}.expected_torque", lambda *_: np.full((300, 2), 2.0))
-    found = beyond_threshold(SimpleNamespace(t=0.01 * np.arange(300)), None)  # type: ignore[arg-type]
-    assert runs_of(found) == [(100, 130)]
 
 
 def test_the_noise_is_that_of_the_observer_whatever_touches(

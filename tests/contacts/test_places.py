@@ -5,19 +5,12 @@ import pytest
 
 from vftcli.contacts.windows import (
     arm_parts,
-    places,
     point_fits,
 )
 from vftcli.robots import load_robot
-from vftcli.robots.chain import flange_jacobian, link_jacobian, link_poses
+from vftcli.robots.chain import link_jacobian, link_poses
 
 Q = np.array([0.3, -1.2, 1.6, -1.9, -1.4, 0.5])
-
-
-def test_the_first_place_is_the_flange() -> None:
-    chain = load_robot("ur5").chain
-    flange = flange_jacobian(chain, Q[None])
-    np.testing.assert_array_equal(places(chain, Q[None])[0].jacobian, flange)
 
 
 @pytest.mark.parametrize("link", [2, 3, 4])
@@ -36,11 +29,6 @@ def test_a_points_jacobian_is_how_it_moves(link: int) -> None:
     np.testing.assert_allclose(
         link_jacobian(link_poses(robot.chain, Q[None]), link, 0.5)[0], exact, atol=1e-12
     )
-
-
-def test_joints_behind_a_place_do_not_feel_it() -> None:
-    for place in places(load_robot("panda").chain, np.full((1, 7), 0.4))[1:]:
-        assert not place.jacobian[:, :, place.link :].any()
 
 
 def test_every_link_belongs_to_a_part() -> None:
@@ -79,15 +67,3 @@ def test_a_force_and_its_band_are_drawn_to_zero_by_the_prior_of_100_N() -> None:
         # The size's variance is |rows⁺ᵀ u|², u the force's direction.
         along = np.linalg.pinv(rows).T @ (fit.force / fit.size)
         assert fit.band == pytest.approx(1.96 * np.linalg.norm(along), rel=1e-9)
-
-
-def test_what_loads_the_first_joints_alone_can_be_anywhere() -> None:
-    """Little is known of a torque on J1 and J2 with stiction on all: many places fit."""
-    torque, sd = (
-        np.array([17.0, -42.0, 0.0, 0.0, 0.0, 0.0]),
-        np.array([9.0, 9.0, 4.0, 2.0, 2.0, 2.0]),
-    )
-    fits = point_fits(load_robot("ur10e").chain, Q, torque, sd)
-    parts = {arm_parts(6)[fit.link] for fit in fits}
-    assert "upper arm" in parts
-    assert fits == sorted(fits, key=lambda fit: fit.score)

@@ -7,6 +7,7 @@ from contact_logs import FIXTURES, motion
 from contact_rows import contact
 from drawn_blocks import blocks, drawn, noise
 
+from vftcli.contacts.listing import list_contacts
 from vftcli.contacts.rows import (
     ContactLocation,
     force_course,
@@ -67,28 +68,21 @@ def still(**signals: object) -> Run:
     return Run(recording=recording, robot=load_robot("ur5"))
 
 
-def test_the_vendors_torque_is_a_force_at_the_flange() -> None:
+def test_the_logs_own_torque_and_wrench_are_forces_beside_a_row() -> None:
     plain = still()
     J = flange_jacobian(plain.robot.chain, plain.recording.q)[0]
     torque = np.tile(J.T @ [3.0, 4.0, 12.0, 0.0, 0.0, 0.0], (100, 1))
-    reported = still(tau_ext=torque)
-    assert vendor_force(reported, J, 0.5) == pytest.approx(13.0)
-    assert vendor_force(plain, J, 0.5) is None
-
-
-def test_a_sensors_force_needs_no_frame() -> None:
+    assert vendor_force(still(tau_ext=torque), J, 0.5) == pytest.approx(13.0)
     wrench = np.tile([3.0, 4.0, 12.0, 1.0, 1.0, 1.0], (100, 1))
     reported = still(wrench=wrench, wrench_frame=WrenchFrame("sensor", "sensor"))
     assert sensor_force(reported, 0.5) == pytest.approx(13.0)
-    assert sensor_force(still(), 0.5) is None
+    assert vendor_force(plain, J, 0.5) is sensor_force(plain, 0.5) is None
     # A field that the log's writer left at zero measures nothing.
     assert sensor_force(still(wrench=0.0 * wrench), 0.5) is None
 
 
 def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
     """A fixture's rows: what joints 1 to 6 feel is Jᵀ of the wrench at the flange."""
-    from vftcli.contacts.listing import list_contacts
-
     recording = read(FIXTURES / "ur5_taps_ur_rtde.csv")
     truth = pl.read_parquet(FIXTURES / "ur5_taps_ur_rtde.csv.truth.parquet")
     t = truth["t"].to_numpy() - recording.source.t0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from drawn_blocks import B
 
-from vftcli.contacts.search import quiet_pauses, split_at_turns, split_run
+from vftcli.contacts.search import split_at_turns, split_run
 from vftcli.contacts.windows import (
     START,
     WindowWrench,
@@ -17,43 +17,26 @@ from vftcli.wrench.model_error import TorqueNoise, error_process
 from vftcli.wrench.smoother import BlockLog
 
 
-def wrench(size: list[float], sd: float) -> WindowWrench:
-    """A window of which each block reads so much along x."""
-    values = np.zeros((len(size), 6))
+@pytest.mark.parametrize(
+    ("pause", "force", "sd", "felt", "pieces"),
+    [
+        (6, 0.5, 2.0, 0.0, [(0, 10), (16, 26)]),
+        (2, 0.5, 2.0, 0.0, [(0, 22)]),  # a hand that slips for a moment has not let go
+        (6, 0.5, 2.0, 20.0, [(0, 26)]),  # the force turns while the joints feel it
+        (6, 10.0, 20.0, 0.0, [(0, 26)]),  # noise hides the force
+    ],
+)
+def test_two_pushes_are_split_where_force_and_torque_pause(
+    pause: int, force: float, sd: float, felt: float, pieces: list[tuple[int, int]]
+) -> None:
+    """Ten blocks of 30 N and ten of 40 N along x; joint 1 feels the force, joint 4 so much more."""
+    size = [30.0] * 10 + [force] * pause + [40.0] * 10
+    count = len(size)
+    values = np.tile([0.0, 0.0, 0.0, felt, 0.0, 0.0], (count, 1))
     values[:, 0] = size
-    return WindowWrench(0, values, np.tile(np.eye(6) * sd**2 / 3.0, (len(size), 1, 1)))
-
-
-T = B * np.arange(40)
-
-FELT = np.tile(np.eye(6), (40, 1, 1))
-"""A Jacobian by which joint 1 feels the force along x, and so on."""
-
-
-def test_two_pushes_in_one_candidate_are_split() -> None:
-    size = [30.0] * 10 + [0.5] * 6 + [40.0] * 10
-    assert split_run(T, wrench(size, 2.0), (0, 26), FELT) == [(0, 10), (16, 26)]
-
-
-def test_a_hand_that_slips_for_a_moment_has_not_let_go() -> None:
-    size = [30.0] * 10 + [0.5] * 2 + [40.0] * 10
-    assert split_run(T, wrench(size, 2.0), (0, 22), FELT) == [(0, 22)]
-
-
-def test_a_force_that_turns_while_the_joints_feel_it_is_one_contact() -> None:
-    made = wrench([30.0] * 10 + [0.5] * 6 + [40.0] * 10, 2.0)
-    made.values[:, 3] = 20.0
-    assert split_run(T, made, (0, 26), FELT) == [(0, 26)]
-
-
-def test_noise_that_hides_the_force_splits_nothing() -> None:
-    size = [30.0] * 10 + [10.0] * 6 + [40.0] * 10
-    assert split_run(T, wrench(size, 20.0), (0, 26), FELT) == [(0, 26)]
-
-
-def test_pauses_lie_between_loaded_blocks() -> None:
-    low = np.array([1, 1, 1, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1, 1, 1], dtype=bool)
-    assert quiet_pauses(low, T[:15]) == [(6, 10)]
+    wrench = WindowWrench(0, values, np.tile(np.eye(6) * sd**2 / 3.0, (count, 1, 1)))
+    found = split_run(B * np.arange(count), wrench, (0, count), np.tile(np.eye(6), (count, 1, 1)))
+    assert found == pieces
 
 
 def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
