@@ -4,13 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.bias.model_error import ModelError, expected_error
+from vftcli.bias.model_error import (
+    ModelError,
+    column_numbers,
+    error_columns,
+    expected_error,
+    smooth_motion,
+)
+from vftcli.bias.robust_fit import Rows, slow_loads
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.robots.robot import Limits, SensorNoise
 from vftcli.robots.run import Run
 from vftcli.robots.running_friction import play
+from vftcli.signals.filters import zero_phase
 from vftcli.signals.recording import Recording
 
 STEP = 0.01
@@ -31,18 +39,8 @@ def motion(t, joints, seed=1):
 def shortened(robot, joints):
     """The robot's first joints as an arm of its own."""
     chain, n = robot.chain, joints
-    each = {
-        name: getattr(chain, name)[:n]
-        for name in (
-            "names",
-            "rotation",
-            "translation",
-            "mass",
-            "com",
-            "inertia",
-            "rotor_inertia",
-        )
-    }
+    names = ("names", "rotation", "translation", "mass", "com", "inertia", "rotor_inertia")
+    each = {name: getattr(chain, name)[:n] for name in names}
     limits = Limits(**{key: value[:n] for key, value in vars(robot.limits).items()})
     noise = SensorNoise(**{key: value[:n] for key, value in vars(robot.noise).items()})
     return replace(
@@ -88,6 +86,46 @@ def drawn_error(robot, seed=2, size=1.0):
         for name, value in expected_error(robot)._asdict().items()
     }
     return ModelError(**values)
+
+
+def fit_rows(run, stride, cutoff=None):
+    """What the whole log's fit is given of a run, every so many samples. [Hz]"""
+    motion = smooth_motion(run)
+    d = np.gradient(run.terms.p, motion.t, axis=0) - run.terms.mu
+    return Rows(
+        columns=error_columns(run, motion, expected_error(run.robot), stride),
+        loads=slow_loads(run.robot.chain, motion.t[::stride], motion.q[::stride]),
+        d=(d if cutoff is None else zero_phase(motion.t, d, cutoff))[::stride],
+    )
+
+
+def dense(rows):
+    """All columns as one matrix a joint: the model's, then each knot's and component's load."""
+    P, loads = rows.unknowns, rows.loads
+    A = np.zeros((len(rows.d), rows.joints, P + loads.sizes[-1]))
+    for j, column in enumerate(rows.columns):
+        A[:, j, column_numbers(j, rows.joints)] = column
+    for size in range(loads.sizes[-1]):
+        A[:, :, P + size] = loads.torque_of(np.eye(loads.sizes[-1])[size])
+    return A
+
+
+def by_hand(A, d, weight, sd):
+    """u and its objective for some columns: (AᵀWA + diag(sd⁻²))⁻¹ AᵀWd with its sign turned."""
+    A = A.reshape(-1, A.shape[-1])
+    w, d = weight.ravel(), d.ravel()
+    u = -np.linalg.solve(A.T @ (A * w[:, None]) + np.diag(sd**-2.0), A.T @ (w * d))
+    return u, np.sum(w * (d + A @ u) ** 2) + np.sum((u / sd) ** 2)
+
+
+def best_by_hand(A, d, weight, scale, rows):
+    """u with the group of loads of the least objective and twice its columns."""
+    P, tried = rows.unknowns, []
+    for size in rows.loads.sizes:
+        sd = np.concatenate([np.full(P, scale), np.ones(size)])
+        u, objective = by_hand(A[..., : P + size], d, weight, sd)
+        tried.append((objective + 2.0 * size, u))
+    return min(tried, key=lambda pair: pair[0])[1]
 
 
 def ur10e():

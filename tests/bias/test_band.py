@@ -68,13 +68,6 @@ def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
     assert [r.code for r in said] == ["no-band"]
 
 
-def test_the_resting_joint_is_named(found: Baseline) -> None:
-    (band, rest) = band_remarks(found)
-    assert (band.code, rest.code) == ("band", "band-of-a-standing-joint")
-    assert rest.where.joints == (5,)
-    assert all(str(remark) for remark in (band, rest))
-
-
 def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Baseline) -> None:
     reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
     quiet = np.arange(found.log.terms.samples) % 7 == 0

@@ -9,7 +9,6 @@ import pytest
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.bias.choice import RefinementChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
@@ -17,11 +16,9 @@ from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.friction import dry_friction
-from vftcli.signals.errors import ParameterError, VftError
 from vftcli.signals.remarks import Remark
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
-WHOLE_LOG = RefinementChoice(bias="whole-log")
 DENSITIES = ObserverChoice.parsed(
     observer=["rts-auto", "kfo-rts"], settings={"kfo.noise_convention": "density"}
 )
@@ -39,19 +36,6 @@ def mean_rmse(analysis: Analysis, observer: str) -> float:
     rows = analysis.errors.filter(pl.col("observer") == observer)
     rows = rows.filter(pl.col("joint").is_in(MOVING.tolist()))
     return float(rows["rmse_Nm"].mean())
-
-
-@pytest.mark.slow
-def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis) -> None:
-    found = worked_up.refinement
-    assert found is not None
-    assert found.remarks[0].code == "free-cycles-found"
-    assert (found.remarks[0].values["cycles"], found.remarks[0].values["whole"]) == ([1], 5)
-    inside = worked_up.t[found.baselines.plain.part.own]
-    assert inside[0] == pytest.approx(0.0, abs=0.05)
-    assert inside[-1] == pytest.approx(4.0, abs=0.05)
-    band = next(r for r in found.remarks if r.code == "band-of-a-standing-joint")
-    assert band.where.joints == (5,)
 
 
 @pytest.mark.slow
@@ -128,20 +112,6 @@ def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None
     np.testing.assert_allclose(parts, read, rtol=1e-9)
 
 
-def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
-    request = AnalysisChoice(
-        read=ReadChoice(interval=(4.5, 6.0)),
-        robot=RobotChoice(name="ur5"),
-        observers=DENSITIES,
-    )
-    analysis = analyse_log(FIXTURE, request)
-    assert any("rts-auto: no free part to tune on" in str(note) for note in analysis.remarks)
-    assert "no-free-part" in codes(analysis)
-    auto, by_hand = analysis.estimates
-    np.testing.assert_array_equal(auto.tau, by_hand.tau)
-    assert auto.error_sd is None
-
-
 @pytest.mark.slow
 def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
     request = AnalysisChoice(
@@ -192,73 +162,3 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Analys
     # what the user states is not doubted
     stated = analyse_log(FIXTURE, replace(always, free=FreeChoice(cycles=(1,))))
     assert stated.estimates[0].error_sd is not None
-
-
-@pytest.mark.slow
-def test_a_gap_in_the_log_is_survived() -> None:
-    """Half a second is missing amid a push: everything stays finite."""
-    request = AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("kfo-auto", "rts-auto")),
-        refinement=WHOLE_LOG,
-    )
-    whole = request.library.open(FIXTURE, request.read)
-    keep = (whole.t < 9.0) | (whole.t > 9.5)
-    names = ("t", "q", "dq", "current")
-    cut = replace(
-        whole,
-        **{name: getattr(whole, name)[keep] for name in names},
-        **dict.fromkeys(
-            ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
-        ),
-    )
-    analysis = analyse(run_of(cut, request.robot.load(cut), request), request)
-    for estimate in analysis.estimates:
-        assert np.all(np.isfinite(estimate.tau))
-        assert estimate.error_sd is not None
-        assert np.all(np.isfinite(estimate.error_sd))
-
-
-def test_what_cannot_be_done_is_one_line() -> None:
-    request = AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("kfo-zoh",)),
-        free=FreeChoice(spans=((40.0, 50.0),)),
-    )
-    with pytest.raises(VftError, match="it must be a part of the log") as caught:
-        analyse_log(FIXTURE, request)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.slow
-def test_bias_removal_needs_no_tuned_observer() -> None:
-    request = AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("gmo",)),
-        refinement=WHOLE_LOG,
-    )
-    estimate = analyse_log(FIXTURE, request).estimates[0]
-    plain = analyse_log(
-        FIXTURE,
-        AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("gmo",))),
-    ).estimates[0]
-    assert estimate.error_sd is not None
-    assert plain.error_sd is None
-    assert np.max(np.abs(estimate.tau - plain.tau)) > 0.5
-
-
-@pytest.mark.slow
-def test_an_unknown_gains_file_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "gains.toml"
-    file.write_text("[observers.gmo]\ngian = 3.0\n", encoding="utf-8")
-    with pytest.raises(ParameterError, match="Did you mean gain"):
-        analyse_log(
-            FIXTURE,
-            AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains=file)),
-        )
-    file.write_text("gain = 3.0\n", encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"no \[observers"):
-        analyse_log(
-            FIXTURE,
-            AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains=file)),
-        )

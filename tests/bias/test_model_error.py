@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from known_errors import drawn_error, shortened, ur10e, wrong_run
 
-from vftcli.bias import model_error
 from vftcli.bias.model_error import (
     column_numbers,
     error_columns,
-    error_of,
     expected_error,
     smooth_motion,
     usual_friction,
@@ -18,27 +16,6 @@ from vftcli.bias.model_error import (
 from vftcli.robots import load_robot
 from vftcli.robots.robot import JointFriction
 from vftcli.robots.terms import raw_disturbance
-
-
-def test_the_expected_errors_are_shares_of_the_robot_s_own_numbers():
-    """Joint 2 of the UR10e by hand, from the specified shares."""
-    robot = ur10e()
-    found, chain = expected_error(robot), robot.chain
-    m, c = chain.mass[1], chain.com[1]
-    size = np.trace(chain.inertia[1]) + m * c @ c
-    np.testing.assert_allclose(found.inertial[10], 0.05 * m)
-    np.testing.assert_allclose(found.inertial[11:14], 0.01 * m + 0.05 * m * np.abs(c))
-    tensor = 0.2 * size + 0.02 * m * np.linalg.norm(c) + 1e-4
-    np.testing.assert_allclose(found.inertial[14:20], tensor)
-    np.testing.assert_allclose(found.rotor, 0.2 * chain.rotor_inertia)
-    np.testing.assert_allclose(found.drive, 0.02)
-    friction = usual_friction(robot)
-    np.testing.assert_allclose(found.friction[0], 0.2 * friction[0] + 0.05)
-    np.testing.assert_allclose(found.friction[1], 0.7 * friction[0] + 0.05)
-    np.testing.assert_allclose(found.friction[2], 0.03)
-    np.testing.assert_allclose(found.friction[3], 0.4 * friction[1] + 0.1)
-    np.testing.assert_allclose(found.friction[4], 0.4 * np.abs(friction[2]) + 0.05)
-    np.testing.assert_allclose(found.offset, 0.15 * friction[0] + 0.02)
 
 
 def test_an_arm_that_measures_behind_its_gears_has_no_rotors():
@@ -77,17 +54,6 @@ def test_a_logarithm_s_slope_is_that_of_a_curve_through_it():
     np.testing.assert_allclose([found[1][0], found[2][0]], fit[1::-1], rtol=1e-6)
 
 
-def test_values_and_columns_are_in_one_order():
-    robot = shortened(ur10e(), 3)
-    error = drawn_error(robot)
-    again = error_of(error.values, 3)
-    for one, other in zip(again, error, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert sorted(set(np.concatenate([column_numbers(j, 3) for j in range(3)]))) == list(
-        range(54)
-    )
-
-
 @pytest.mark.parametrize("name", ["ur10e", "panda"])
 def test_the_columns_times_an_error_are_the_torque_of_it(name):
     """The rigid body's part two ways: by the regressor, and as inverse dynamics' difference."""
@@ -103,17 +69,6 @@ def test_the_columns_times_an_error_are_the_torque_of_it(name):
     dense = np.column_stack([c @ share[k] for c, k in zip(columns, numbers, strict=True)])
     # ṗ by central differences: ω²Ts²/6 of products of up to 1.8 Hz, .2 %, of 30 N·m at most
     np.testing.assert_allclose(error.torque(run, smooth_motion(run)), dense, atol=0.06)
-
-
-def test_chunks_make_no_difference(monkeypatch):
-    robot = shortened(ur10e(), 3)
-    run = wrong_run(robot, seconds=12.0)
-    motion, expected = smooth_motion(run), expected_error(robot)
-    whole = error_columns(run, motion, expected, 2)
-    monkeypatch.setattr(model_error, "CHUNK", 37)
-    for one, other in zip(error_columns(run, motion, expected, 2), whole, strict=True):
-        # blocked sums of the same products: rounding alone
-        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
 
 
 def test_an_error_is_the_raw_disturbance_with_its_sign_turned():

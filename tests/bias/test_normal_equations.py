@@ -4,15 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from known_errors import drawn_error, shortened, ur10e, wrong_run
-
-from vftcli.bias.model_error import (
-    column_numbers,
-    error_columns,
-    expected_error,
-    smooth_motion,
+from known_errors import (
+    best_by_hand,
+    by_hand,
+    dense,
+    drawn_error,
+    fit_rows,
+    shortened,
+    ur10e,
+    wrong_run,
 )
-from vftcli.bias.robust_fit import Rows, slow_loads
 
 JOINTS, STRIDE = 4, 10
 
@@ -25,14 +26,7 @@ def push(t, _q):
 @pytest.fixture(scope="module")
 def rows():
     robot = shortened(ur10e(), JOINTS)
-    run = wrong_run(robot, drawn_error(robot), push, seconds=26.0, noise=0.5)
-    motion = smooth_motion(run)
-    d = np.gradient(run.terms.p, motion.t, axis=0) - run.terms.mu
-    return Rows(
-        columns=error_columns(run, motion, expected_error(robot), STRIDE),
-        loads=slow_loads(robot.chain, motion.t[::STRIDE], motion.q[::STRIDE]),
-        d=d[::STRIDE],
-    )
+    return fit_rows(wrong_run(robot, drawn_error(robot), push, seconds=26.0, noise=0.5), STRIDE)
 
 
 @pytest.fixture(scope="module")
@@ -41,42 +35,15 @@ def weight(rows):
     return np.random.default_rng(4).uniform(0.01, 2.0, rows.d.shape)
 
 
-def dense(rows):
-    """All columns as one matrix a joint: the model's, then each knot's and component's load."""
-    samples, P = len(rows.d), rows.unknowns
-    loads = rows.loads
-    A = np.zeros((samples, rows.joints, P + loads.sizes[-1]))
-    for j, column in enumerate(rows.columns):
-        A[:, j, column_numbers(j, rows.joints)] = column
-    for size in range(loads.sizes[-1]):
-        A[:, :, P + size] = loads.torque_of(np.eye(loads.sizes[-1])[size])
-    return A
-
-
-def by_hand(A, d, weight, sd):
-    """u and its objective for some columns: (AᵀWA + diag(sd⁻²))⁻¹ AᵀWd with its sign turned."""
-    A = A.reshape(-1, A.shape[-1])
-    w, d = weight.ravel(), d.ravel()
-    u = -np.linalg.solve(A.T @ (A * w[:, None]) + np.diag(sd**-2.0), A.T @ (w * d))
-    return u, np.sum(w * (d + A @ u) ** 2) + np.sum((u / sd) ** 2)
-
-
 @pytest.mark.parametrize("scale", [0.1, 1.0])
 def test_the_solution_is_that_of_the_dense_matrix(rows, weight, scale):
     """The group of loads is the one with the least objective and twice its columns."""
-    A, P, sizes = dense(rows), rows.unknowns, rows.loads.sizes
-    found = rows.solution(rows.sums(weight)[0], scale)
-    costs, solutions = [], []
-    for size in sizes:
-        sd = np.concatenate([np.full(P, scale), np.ones(size)])
-        u, objective = by_hand(A[:, :, : P + size], rows.d, weight, sd)
-        costs.append(objective + 2.0 * size)
-        solutions.append(u)
-    best = int(np.argmin(costs))
-    assert len(found.loads) == sizes[best]
+    found, P = rows.solution(rows.sums(weight)[0], scale), rows.unknowns
+    expected = best_by_hand(dense(rows), rows.d, weight, scale, rows)
+    assert P + len(found.loads) == len(expected)
     # condition numbers of up to 1e8 leave seven digits
-    np.testing.assert_allclose(found.model, solutions[best][:P], atol=1e-6)
-    np.testing.assert_allclose(found.loads, solutions[best][P:], atol=1e-6)
+    np.testing.assert_allclose(found.model, expected[:P], atol=1e-6)
+    np.testing.assert_allclose(found.loads, expected[P:], atol=1e-6)
 
 
 def test_the_model_alone_is_solved_alike(rows, weight):
@@ -127,6 +94,5 @@ def test_sums_over_parts_are_sums_over_their_samples(rows, weight):
 
 def test_no_load_is_believed_where_there_is_none(rows):
     """Noise of a tenth of the scale gains less than two a column."""
-    quiet = Rows(columns=rows.columns, loads=rows.loads,
-                 d=np.random.default_rng(8).normal(0.0, 0.1, rows.d.shape))  # fmt: skip
+    quiet = replace(rows, d=np.random.default_rng(8).normal(0.0, 0.1, rows.d.shape))
     assert len(quiet.solution(quiet.sums(np.ones(rows.d.shape))[0]).loads) == 0
