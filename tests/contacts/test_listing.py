@@ -21,6 +21,7 @@ from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
+from vftcli.simulation import load_scenario, simulate
 
 Lister = Callable[..., ContactList]
 
@@ -277,6 +278,23 @@ def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
     assert row.wrench is None
     assert found.smallest_force is None
     assert [remark.code for remark in found.remarks] == ["no-wrench-of-few-joints"]
+
+
+@pytest.mark.slow
+def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
+    """The bearing of 9.2 N hangs from 4 s on; its mean is within its band.
+
+    A wrench that wanders within a second pays for every block of a load that lasts 5 s.
+    """
+    scenario = replace(load_scenario("panda-bearing", ["sensing.rate=250"]), duration=9.0)
+    made = simulate(scenario)
+    log = Run(recording=made.recording, robot=load_robot("panda"))
+    motion = FreeMotion(log=log, choice=FreeChoice.parsed(free=["0.3:3.9"]))
+    (row,) = list_contacts(motion).contacts
+    assert row.start == pytest.approx(4.2, abs=0.3)
+    assert row.stop == pytest.approx(9.0, abs=0.1)
+    assert row.wrench is not None
+    assert row.wrench[2] < 0.0
 
 
 def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
