@@ -45,6 +45,14 @@ def wrong():
     return fit_of(1.0)
 
 
+def test_noise_is_left_alone():
+    """White noise of .3 N·m and no error: nothing is predicted."""
+    found = guarded(*fit_of(0.0))
+    assert found.solution is None
+    assert not found.weight.any()
+    assert np.all(found.share > 0.9)
+
+
 def test_the_unseen_share_is_that_of_dense_fits(wrong):
     """Every fold, scale and choice of loads by dense matrices; the guard's own words by hand."""
     wrong, dq = wrong
