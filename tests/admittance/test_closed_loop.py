@@ -179,11 +179,6 @@ def test_a_step_that_divides_the_period_stays(loop: ClosedLoop) -> None:
         steps_in(0.008, 0.003, "control period")
 
 
-def test_wrong_torque_is_refused() -> None:
-    with pytest.raises(ParameterError, match="average or instant"):
-        run("ur5-drag", "density", duration=0.1, torque="guessed")
-
-
 @pytest.mark.statistical
 @pytest.mark.parametrize("convention", WINDOWS)
 @pytest.mark.parametrize("seed", range(1, 6))

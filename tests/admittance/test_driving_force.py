@@ -18,7 +18,6 @@ UR5 = load_robot("ur5")
 T = np.arange(0.0, 4.0, 0.01)
 Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(np.outer(T, np.arange(1, 7) / 3))
 WRENCH = np.where(T[:, None] > 2.0, 10.0, 0.0) + np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
-BASE = WrenchFrame("base", "flange")
 
 
 def choice(**zero: object) -> WrenchChoice:
@@ -53,22 +52,14 @@ def test_the_logs_sensor_drives_as_the_log_states_it() -> None:
     assert codes == ["wrench-frame-unstated", "sensor-pose-unstated"]
 
 
-def truth(path: Path, **columns: np.ndarray) -> Path:
-    pl.DataFrame({"t": T, **columns}).write_parquet(path)
-    return path
-
-
-def test_a_truth_file_s_wrench_is_the_force(tmp_path: Path) -> None:
-    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+def test_a_truth_file_s_wrench_is_the_force_and_torques_alone_are_none(tmp_path: Path) -> None:
+    file, axes = tmp_path / "truth.parquet", ("fx", "fy", "fz", "mx", "my", "mz")
     columns = {f"wrench/{axis}": WRENCH[:, k] for k, axis in enumerate(axes)}
-    file = truth(tmp_path / "truth.parquet", **columns)
+    pl.DataFrame({"t": T, **columns}).write_parquet(file)
     force = truth_force(Recording(t=T, q=Q), UR5, choice(), file)
     np.testing.assert_allclose(force.wrench.known, WRENCH, atol=1e-12)
     assert force.source.values == {"file": "truth.parquet"}
-
-
-def test_a_truth_file_of_torques_alone_is_no_force(tmp_path: Path) -> None:
     columns = {f"tau_ext/{j}": np.zeros(len(T)) for j in range(1, 7)}
-    file = truth(tmp_path / "truth.parquet", **columns)
+    pl.DataFrame({"t": T, **columns}).write_parquet(file)
     with pytest.raises(ReferenceTorqueError, match="it has no wrench"):
         truth_force(Recording(t=T, q=Q), UR5, choice(), file)

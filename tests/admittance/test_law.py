@@ -63,15 +63,6 @@ def test_constant_force_settles_at_force_over_stiffness() -> None:
     np.testing.assert_array_equal(motion.x[:, 0], motion.x[:, 1])  # the drag phase is the same
 
 
-def test_recovery_damping_is_constant() -> None:
-    p = parameters()
-    for speed in (0.0, 0.3, 0.9):
-        swell = p.alpha * np.exp(speed)
-        B = 2.0 * p.xi * np.sqrt((p.mass / swell) * (p.stiffness * swell))
-        np.testing.assert_allclose(B, variable(p).damping, rtol=1e-14)
-    np.testing.assert_allclose(variable(p).damping, p.damping, rtol=1e-14)  # ξ from B_d
-
-
 # science of the issue: 2 % return from 0.3 m at rest, the UR5's parameters
 EXPECTED = [
     (np.nan, ((4.84, 0.15), (4.66, 0.19), (3.53, 0.205), (2.80, 0.23), (2.31, 0.22))),
@@ -87,13 +78,6 @@ def test_release_figures_of_the_ur5(xi: float, figures: tuple[tuple[float, float
         assert returned(motion, n, 0.02) == pytest.approx(time, rel=0.03)  # the issue's tolerance
         overshoot = max(-motion.x[:, n, 0].min() / 0.3, 0.0)
         assert overshoot == pytest.approx(over, abs=0.006)  # printed to per cents
-
-
-def test_traditional_at_xi_one_is_the_other_figure_of_the_science() -> None:
-    """B = 2√(MK): 3.59 s."""
-    p = parameters(damping=2.0 * np.sqrt(parameters().mass * parameters().stiffness))
-    motion = release([traditional(p)], start(0.3), 12.0)
-    assert returned(motion, 0, 0.02) == pytest.approx(3.59, rel=0.01)  # printed to three digits
 
 
 def test_release_figures_of_the_panda() -> None:

@@ -21,10 +21,7 @@ def test_a_drag_lasts_to_the_next_one_or_the_end() -> None:
     first, second = drags_of(phases((10, 30), (60, 70)), PERIOD)
     assert first == Drag(axis=1, number=1, begin=10, release=30, end=61)
     assert second == Drag(axis=1, number=2, begin=60, release=70, end=101)
-
-
-def test_drags_that_follow_each_other_soon_are_one() -> None:
-    (drag,) = drags_of(phases((10, 30), (39, 50)), PERIOD)  # .9 s apart
+    (drag,) = drags_of(phases((10, 30), (39, 50)), PERIOD)  # .9 s apart: one
     assert (drag.begin, drag.release) == (10, 50)
     assert len(drags_of(phases((10, 30), (40, 50)), PERIOD)) == 2  # 1 s apart
 
@@ -46,9 +43,7 @@ def test_the_return_is_when_the_axis_stays_within_its_share() -> None:
     assert return_time(T, x, RELEASE, 0.1) == pytest.approx(2.3)
     x[50] = 0.2  # and once more outside, 3 s after the release
     assert return_time(T, x, RELEASE, 0.1) == pytest.approx(3.0)
-
-
-def test_what_never_returns_has_no_return() -> None:
+    # What never returns has no return.
     assert return_time(T, np.ones(101), RELEASE, 0.1) is None
     assert return_time(T, np.zeros(101), RELEASE, 0.1) is None
     assert return_time(T, np.where(T > 5, np.inf, 1.0), RELEASE, 0.1) is None

@@ -32,7 +32,7 @@ def test_table_iii_and_iv() -> None:
     np.testing.assert_array_equal(panda.stiffness, [12, 12, 12, 2, 2, 2])
     np.testing.assert_array_equal(panda.alpha, [6, 6, 6, 3, 3, 3])
     np.testing.assert_array_equal(panda.threshold, [4, 4, 15, 2, 2, 2])
-    assert (ur.period, panda.period) == (0.008, 0.0025)
+    assert (ur.period, panda.period, ur.alpha[0]) == (0.008, 0.0025, 1.6)
     # B_d/(2√(M_d K_d)) as the science prints it
     np.testing.assert_allclose(ur.xi[[0, 3]], [0.510, 0.671], atol=5e-4)
     np.testing.assert_allclose(panda.xi[[0, 3]], [2.74, 1.06], atol=5e-3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.joints import follow
-from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings, variable
+from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
@@ -137,7 +137,7 @@ def test_redundant_arm_stays_inside_its_limits() -> None:
     np.testing.assert_array_equal(path.q[lost:, 0], np.tile(path.q[lost - 1, 0], (400 - lost, 1)))
 
 
-def test_start_outside_the_limits_is_refused() -> None:
+def test_a_start_outside_the_limits_and_no_deviation_are_refused() -> None:
     record, q = push()
     q[:, 5] = 7.0
     with pytest.raises(ParameterError, match=r"joint 6 is at 7 rad and may be -6\.283 to 6\.283"):
@@ -145,6 +145,8 @@ def test_start_outside_the_limits_is_refused() -> None:
     p = parameters()
     with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
         replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, controllers(p), start=np.zeros(5))
+    with pytest.raises(ParameterError, match=r"--release x=0\.3"):
+        replay_release(np.zeros(6), UR5, controllers(p), start=START)
 
 
 def test_a_log_that_is_nearly_all_gap_is_refused() -> None:
@@ -192,12 +194,6 @@ def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
     assert {"motion-escaped", "law-escapes"} <= codes(studied)
 
 
-def test_release_needs_a_deviation() -> None:
-    p = parameters()
-    with pytest.raises(ParameterError, match=r"--release x=0\.3"):
-        replay_release(np.zeros(6), UR5, controllers(p), start=START)
-
-
 def test_a_force_that_is_not_known_counts_as_none_and_is_reported() -> None:
     wrench, q = push()
     hidden = (wrench.t > 1.5) & (wrench.t < 1.7)
@@ -215,7 +211,3 @@ def test_control_clock_takes_the_newest_sample() -> None:
     printed = np.round(100.0 + np.arange(500) * 0.008, 6)  # a log's stamps, in step with control
     _, kept = on_control_clock(printed - printed[0], 0.008)
     np.testing.assert_array_equal(kept, np.arange(500))
-
-
-def test_variable_controller_of_the_profile() -> None:
-    assert variable(parameters()).alpha[0] == 1.6

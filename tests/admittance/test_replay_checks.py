@@ -8,10 +8,8 @@ import pytest
 from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import Admittance, controllers, from_table
 from vftcli.admittance.motion import AxisMotion, Drag
-from vftcli.admittance.replay import Replay, drag_remarks, replay, trouble
+from vftcli.admittance.replay import Replay, drag_remarks, trouble
 from vftcli.robots import load_robot
-from vftcli.signals.remarks import fact
-from vftcli.signals.wrench import Wrench
 
 PARAMETERS = from_table(load_robot("ur5").admittance, "ur5", {})
 TWO = controllers(PARAMETERS)
@@ -106,21 +104,6 @@ def test_the_axis_nearest_to_its_threshold_is_named() -> None:
 
 def drag(begin: int, release: int, axis: int = 2) -> Drag:
     return Drag(axis=axis, number=1, begin=begin, release=release, end=release)
-
-
-def test_unknown_samples_are_counted() -> None:
-    masked = np.arange(10) < 3
-    wrench = Wrench(
-        name="x", t=0.01 * np.arange(10.0), values=np.zeros((10, 6)), frame="base", masked=masked
-    )
-    q = np.tile(load_robot("ur5").admittance["start"], (10, 1))
-
-    def counted(record: Wrench) -> list[object]:
-        found = replay(record, q, load_robot("ur5"), TWO, source=fact("force-of-release"))
-        return [r.values["samples"] for r in found.remarks if r.code == "force-unknown"]
-
-    assert counted(wrench) == [3]
-    assert counted(replace(wrench, masked=np.zeros(10, dtype=bool))) == []
 
 
 def test_the_travel_of_a_log_that_moves_is_reported() -> None:

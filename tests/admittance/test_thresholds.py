@@ -30,39 +30,16 @@ def column(*values: float) -> np.ndarray:
     return force
 
 
-def test_hard_passes_the_whole_force_and_soft_the_excess() -> None:
-    force = column(3.0, 4.0, 5.0, -9.0, 1.0)
-    hard, soft = phases(force, parameters()), phases(force, parameters("soft"))
+def test_hard_passes_the_whole_force_soft_the_excess_and_literal_every_force() -> None:
+    """As printed the threshold chooses the parameters alone; an unknown force is none."""
+    force = column(3.0, 4.0, 5.0, -9.0, np.nan)
+    hard, soft, literal = (phases(force, parameters(m)) for m in ("hard", "soft", "literal"))
     np.testing.assert_array_equal(hard.dragged[:, 0], [False, False, True, True, False])
     np.testing.assert_array_equal(hard.force[:, 0], [0, 0, 5, -9, 0])
     np.testing.assert_array_equal(soft.dragged, hard.dragged)
     np.testing.assert_array_equal(soft.force[:, 0], [0, 0, 1, -5, 0])
-
-
-def test_as_printed_the_threshold_chooses_the_parameters_and_the_whole_force_enters() -> None:
-    force = column(3.0, 4.0, 5.0, -9.0, 1.0)
-    literal = phases(force, parameters("literal"))
-    np.testing.assert_array_equal(literal.dragged, phases(force, parameters()).dragged)
-    np.testing.assert_array_equal(literal.force, force)
-
-
-def test_hysteresis_holds_on() -> None:
-    force = column(3.5, 4.5, 3.5, 2.5, 1.9, 3.5, 4.5)
-    held = phases(force, parameters(hysteresis=0.5)).dragged[:, 0]
-    np.testing.assert_array_equal(held, [False, True, True, True, False, False, True])
-
-
-def test_axes_are_apart() -> None:
-    force = np.array([[5.0, 0.0, 14.0, 0.0, 2.5, 0.0]])
-    np.testing.assert_array_equal(
-        phases(force, parameters()).dragged, [[True, False, False, False, True, False]]
-    )
-
-
-def test_unknown_force_is_none() -> None:
-    found = phases(column(np.nan, 5.0), parameters())
-    np.testing.assert_array_equal(found.dragged[:, 0], [False, True])
-    assert np.all(np.isfinite(found.force))
+    np.testing.assert_array_equal(literal.dragged, hard.dragged)
+    np.testing.assert_array_equal(literal.force, np.nan_to_num(force))
 
 
 @given(arrays(float, (30, 6), elements=st.floats(-30, 30)), st.floats(0.0, 0.9))
