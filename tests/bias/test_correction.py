@@ -44,7 +44,6 @@ def automatic(request_: AnalysisChoice) -> Analysis:
 
 def rmse(analysis: Analysis, name: str) -> float:
     """Of the joints that move, against the truth. [N·m]"""
-    assert analysis.reference is not None
     (estimate,) = (e for e in analysis.estimates if e.name == name)
     error = (estimate.tau - analysis.reference.tau)[:, MOVING]
     return float(np.sqrt(np.mean(error**2, axis=0)).mean())
@@ -57,10 +56,8 @@ def codes(analysis: Analysis) -> list[str]:
 @pytest.mark.slow
 def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
     """Measured .27 and .60 N·m, seed 1: .46; a prototype had .37 of it in the mean of four."""
-    assert automatic.refinement is not None
     found = automatic.refinement.baselines
     best = found.of("best")
-    assert best.correction is not None
     assert found.of("gmo").correction is None
     assert not best.by_fit  # the free cycles are known
     plain, off = automatic.motion.log.terms, best.log.terms
@@ -69,7 +66,6 @@ def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
     np.testing.assert_array_equal(plain.p, off.p)
     assert rmse(automatic, "best") < 0.6 * rmse(automatic, "rts-auto")
     band = automatic.estimates[0].error_sd
-    assert band is not None
     assert np.all(band >= np.where(best.correction.applied, best.correction.sd, 0.0))
     # Each is what its own observer makes of its own terms.
     for observer, estimate in zip(automatic.observers, automatic.estimates, strict=True):
@@ -105,7 +101,6 @@ def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
     analysis = analyse_log(FIXTURE, pushed)
     assert "free-by-the-fit" in codes(analysis)
     assert "free-part-not-quiet" not in codes(analysis)
-    assert analysis.refinement is not None
     assert analysis.refinement.baselines.plain.by_fit
     assert analysis.refinement.baselines.plain.untouched == ()
     assert all(estimate.error_sd is not None for estimate in analysis.estimates)
@@ -120,7 +115,6 @@ def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(request_: Analysi
     given = replace(request_, free=FreeChoice(spans=((0.0, 0.1),)))
     analysis = analyse_log(FIXTURE, given)
     assert "free-by-the-fit" not in codes(analysis)
-    assert analysis.refinement is not None
     (said,) = (r for r in analysis.refinement.remarks if r.code == "free-by-the-fit-instead")
     assert "a spectrum needs 32 samples" in str(said)
 
@@ -148,7 +142,6 @@ def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
     np.testing.assert_array_equal(tiny.estimates[0].tau, tiny.estimates[1].tau)
     assert {"no-free-part", "tuning-without-free-part", "no-band"} <= set(codes(tiny))
     band, log = tiny.estimates[0].error_sd, tiny.motion.log
-    assert band is not None
     assert tiny.estimates[1].error_sd is None
     dry = dry_friction(log.robot.friction, 6)
     # a fifth of the dry friction and .05 N·m is what is expected of its sign alone

@@ -32,7 +32,6 @@ def codes(analysis: Analysis) -> set[str]:
 
 
 def mean_rmse(analysis: Analysis, observer: str) -> float:
-    assert analysis.errors is not None
     rows = analysis.errors.filter(pl.col("observer") == observer)
     rows = rows.filter(pl.col("joint").is_in(MOVING.tolist()))
     return float(rows["rmse_Nm"].mean())
@@ -60,7 +59,6 @@ def test_ratios_to_the_hand_set_filter(worked_up: Analysis, request_: AnalysisCh
 
 @pytest.mark.slow
 def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None:
-    assert worked_up.errors is not None
     rows = worked_up.errors.filter(pl.col("joint").is_in(MOVING.tolist()))
     for observer in ("kfo-auto", "rts-auto"):
         share = rows.filter(pl.col("observer") == observer)["coverage_95"].mean()
@@ -72,9 +70,7 @@ def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None
 @pytest.mark.slow
 def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
     found = worked_up.refinement
-    assert found is not None
     spectra = found.baselines.plain.spectra
-    assert spectra is not None
     for observer, estimate in zip(worked_up.observers, worked_up.estimates, strict=True):
         response = observer.frequency_response(spectra.frequency, spectra.step, 6)
         lag = np.sum(np.abs(1 - response) ** 2 * spectra.external, axis=0) * spectra.width
@@ -94,7 +90,6 @@ def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
 
 def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None:
     found = worked_up.refinement
-    assert found is not None
     budget = found.budgets[-1]
     limits = found.remarks[-1]
     assert (limits.code, limits.where.about) == ("limits", "rts-auto")

@@ -17,13 +17,10 @@ def test_ribbons_curve_and_spectra_are_charts(worked_up: Analysis) -> None:
     halves = {s.name: s.half for s in torque_chart(worked_up).series if s.half is not None}
     assert set(halves) == {e.name for e in worked_up.estimates}
     band = worked_up.estimates[-1].error_sd
-    assert band is not None
     np.testing.assert_array_equal(halves["rts-auto"], 1.96 * band)
     found = worked_up.refinement
-    assert found is not None
     curve = tuning_chart(found.curves, observer_styles(worked_up))
     assert [s.name for s in curve.series] == ["kfo-auto", "rts-auto"]
-    assert found.baselines.plain.spectra is not None
     assert len(spectra_chart(found.baselines.plain.spectra).series) == 2
     assert "Error budget in N·m rms" in render(worked_up)
 
@@ -33,7 +30,6 @@ def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) ->
     lines = {line.name: line.values[:, 0] for line in plot.series}
     upper, lower = (lines[f"rts-auto 95 % {edge}"] for edge in ("upper", "lower"))
     estimate = worked_up.estimates[-1]
-    assert estimate.error_sd is not None
     np.testing.assert_allclose(0.5 * (upper + lower), estimate.tau[:, 0], atol=1e-9)
     np.testing.assert_allclose(upper - lower, 2 * 1.96 * estimate.error_sd[:, 0], rtol=1e-9)
     assert not any("kfo-auto 95 %" in name for name in lines)

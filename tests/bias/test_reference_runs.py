@@ -25,7 +25,6 @@ UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
 def mean_rmse(analysis: Analysis, observer: str) -> float:
-    assert analysis.errors is not None
     return float(analysis.errors.filter(pl.col("observer") == observer)["rmse_Nm"].mean())
 
 
@@ -42,7 +41,6 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     )
     motion = read(run_of(log, robot, asked), asked)
     terms, found = motion.log.terms, model(motion, asked)
-    assert found is not None
     observers, _ = asked.observers.build(robot, log.median_step, found.spectra(gains=False))
     estimates = [observer.estimate(terms) for observer in observers]
     discrete = replace(asked.observers, settings={"kfo": {"noise_convention": "discrete"}})

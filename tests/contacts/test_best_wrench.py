@@ -38,9 +38,7 @@ def analysed(name: str) -> Analysis:
 
 def best_of(analysis: Analysis) -> Wrench:
     """The wrench of `best`, with a band."""
-    assert analysis.virtual_sensor is not None
     (best,) = analysis.virtual_sensor.wrenches
-    assert best.sd is not None
     return best
 
 
@@ -53,7 +51,6 @@ def test_the_wrench_of_best_is_that_of_the_rows_and_holds_the_truth(name: str) -
     the samples an axis; with no band outside of the rows it was .93 to .98.
     """
     analysis = analysed(name)
-    assert analysis.contacts is not None
     best = best_of(analysis)
     away, near = 0, np.zeros(len(best.t), dtype=bool)
     for row in analysis.contacts.contacts:
@@ -77,8 +74,6 @@ def test_a_wrench_that_comes_after_the_answer_is_that_of_one_go() -> None:
     whole, answer = (analyse_log(FIXTURES / NAMES[0], each) for each in (choice, first))
     assert answer.virtual_sensor is None
     made = sense(answer, first).wrench
-    assert whole.wrench is not None
-    assert made is not None
     np.testing.assert_array_equal(made.values, whole.wrench.values)
     np.testing.assert_array_equal(made.sd, whole.wrench.sd)
     asked = analyse_log(FIXTURES / NAMES[0], replace(first, wrench=WrenchChoice()))

@@ -27,14 +27,12 @@ LOG = read(FIXTURES / "ur5_circle.csv")
 
 def test_a_named_span_or_another_log_is_the_free_part() -> None:
     part = free_part(motion(LOG, "ur5", "0.3:4"))
-    assert part is not None
     (piece,) = part.pieces
     t = LOG.t[piece.inside]
     assert (t[0], t[-1]) == (pytest.approx(0.304), pytest.approx(4.0))
     assert not part.doubted
     assert part.remarks[0].code == "free-span"
     part = free_part(motion(LOG, "ur5", run=read(FIXTURES / "ur5_table1.csv")))
-    assert part is not None
     (piece,) = part.pieces
     assert piece.inside.all()
     assert not part.own.any()
@@ -68,8 +66,6 @@ def test_a_load_in_the_free_part_is_no_noise() -> None:
     bias = whole_log_bias(plain.log)
     heavy = free_statistics(replace(plain, log=run), bias)
     light = free_statistics(plain, bias)
-    assert heavy is not None
-    assert light is not None
     assert [remark.code for remark in heavy.remarks] == ["free-span", "free-part-loaded"]
     assert [remark.code for remark in light.remarks] == ["free-span"]
     known = bias.corrected(plain.log).terms.mu

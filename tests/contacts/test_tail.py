@@ -28,7 +28,6 @@ def level_at(rate: float) -> float:
 def test_the_level_of_exponential_noise_is_the_analytic_one(rate: float) -> None:
     """Two hours, k = 120: e is known to 1/√120 = 9 %, and 3 sd of it are allowed."""
     tail = tail_of(maxima_of(np.random.default_rng(1), 7200))
-    assert tail is not None
     assert (tail.size, tail.hours, tail.rate) == (120, 2.0, 60.0)
     allowed = 3.0 / np.sqrt(tail.size) * np.log(tail.rate / rate)
     assert abs(tail.threshold(rate)[0] - level_at(rate)) < allowed
@@ -39,7 +38,6 @@ def test_the_interval_holds_the_analytic_level_as_often_as_it_says() -> None:
     rng, held = np.random.default_rng(2), 0
     for _ in range(300):
         tail = tail_of(maxima_of(rng, 900))
-        assert tail is not None
         _, (low, high) = tail.threshold(1.0)
         held += low <= level_at(1.0) <= high
     assert 0.88 <= held / 300 <= 0.99
@@ -48,14 +46,12 @@ def test_the_interval_holds_the_analytic_level_as_often_as_it_says() -> None:
 def test_few_maxima_tell_a_fifth_of_them_and_four_tell_nothing() -> None:
     assert tail_of(np.arange(4.0)) is None
     tail = tail_of(np.arange(60.0))
-    assert tail is not None
     # The twelve largest of 0 … 59 lie 1 … 12 beyond the next, 47.
     assert (tail.size, tail.start, tail.excess) == (12, 47.0, 6.5)
 
 
 def test_the_lower_end_of_one_maximum_is_the_level_it_lies_beyond() -> None:
     tail = tail_of(np.array([1.0, 1.0, 2.0, 3.0, 5.0]))
-    assert tail is not None
     assert tail.size == 1
     value, (low, high) = tail.threshold(tail.rate / np.e)
     # One e-fold beyond u = 3 with e = 2, and 1.96 times that as half the interval.
@@ -66,7 +62,6 @@ def test_the_lower_end_of_one_maximum_is_the_level_it_lies_beyond() -> None:
 def test_what_happens_more_often_than_the_tail_is_read_off_the_maxima() -> None:
     """Of 3600 maxima 0 … 3599 the level 100 an hour is the hundredth largest, 3500."""
     tail = tail_of(np.arange(3600.0))
-    assert tail is not None
     with pytest.raises(ParameterError, match="at most 1800"):
         tail.threshold(2000.0)
     value, (low, high) = tail.threshold(100.0)
@@ -74,7 +69,6 @@ def test_what_happens_more_often_than_the_tail_is_read_off_the_maxima() -> None:
     # 100 ± 1.96 √100 = 119.6 and 80.4 of them lie above the ends.
     assert (low, high) == (3480.0, 3520.0)
     few = tail_of(np.array([1.0, 1.0, 2.0, 3.0, 5.0]))
-    assert few is not None
     # Of 2 the ends are 2 + 1.96 √2 = 4.8, hence 5, and the largest at the most.
     assert few.threshold(2.0 / few.hours) == (3.0, (1.0, 5.0))
 

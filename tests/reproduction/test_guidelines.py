@@ -27,18 +27,12 @@ def numbers(
     return list(guideline_numbers(made).values())  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("gain", [5.0, 20.0])
-def test_a_first_order_filter_reaches_nine_tenths_at_its_time(gain: float) -> None:
-    """ln(10)/K, to the sample time."""
-    found = step_response(MomentumObserver(gain=gain), STEP, 2)
-    assert found == pytest.approx(np.full(2, np.log(10.0) / gain), abs=1.5 * STEP)
-
-
-def test_a_response_is_read_within_three_seconds() -> None:
-    """ln(10)/K is 2.88 s and 3.29 s; of the slower one nothing is known."""
-    seen, late = (step_response(MomentumObserver(gain=gain), STEP, 1)[0] for gain in (0.8, 0.7))
-    assert seen == pytest.approx(2.878, abs=1.5 * STEP)
-    assert np.isnan(late)
+def test_a_first_order_filter_reaches_nine_tenths_at_its_time() -> None:
+    """ln(10)/K, to the sample time; within 3 s: of K = .7 1/s, 3.29 s, nothing is known."""
+    for gain in (20.0, 5.0, 0.8):
+        found = step_response(MomentumObserver(gain=gain), STEP, 2)
+        assert found == pytest.approx(np.full(2, np.log(10.0) / gain), abs=1.5 * STEP)
+    assert np.isnan(step_response(MomentumObserver(gain=0.7), STEP, 1)[0])
 
 
 def test_an_observers_rmse_is_its_own_mean_over_joints() -> None:

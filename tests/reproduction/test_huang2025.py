@@ -31,37 +31,28 @@ def test_every_experiment_gives_its_function_what_that_asks_for() -> None:
     assert {experiment.run for experiment in EXPERIMENTS.values()} == set(RUNS)
 
 
-def test_table_one_prints_what_the_published_table_does() -> None:
-    printed = {line.key: line.number for line in ITEMS["table1"].lines}
-    assert len(printed) == 24
-    assert printed["kfo-zoh/6"] == TABLE_1.rmse["kfo-zoh"][5] == 0.9440
-
-
-def test_the_printed_ratios_are_those_of_the_printed_times() -> None:
-    """58.3627 s over 10.8690 s and over 17.5776 s, Table II."""
-    printed = {line.key: line.number for line in ITEMS["table2"].lines}
-    assert printed["zoh/fdo"] == 5.37
-    assert printed["zoh/kfo-fe"] == 3.32
-
-
-def test_what_is_printed_from_detection_on_stands_beside_what_is_timed_so() -> None:
-    """6.52 → 6.76 s, 17.72 → 18.00, 8.60 → 8.86, 20.16 → 20.28 s of Fig. 6; and those of Fig. 9."""
-    timed = {"fig6": ("0.24", "0.28", "0.26", "0.12"), "fig9": ("0.16", "0.16", "0.16", "0.12")}
-    for name, numbers in timed.items():
-        printed = {line.key: line.printed for line in ITEMS[name].lines if line.printed}
-        assert printed == dict(
-            zip(("reaction/1", "reaction/2", "stop/1", "stop/2"), numbers, strict=True)
-        )
-
-
-def test_a_row_of_several_is_a_line_for_each_with_its_own_print() -> None:
-    """Table II prints 10.869 s to 58.363 s; Fig. 7 one advance of 0.64 s for both phases."""
+def test_the_printed_numbers_are_the_papers() -> None:
+    """Tables I and II; Figs. 6 and 9 from detection on; Fig. 7's one advance of .64 s."""
+    printed = {
+        name: {line.key: line.printed for line in item.lines} for name, item in ITEMS.items()
+    }
+    assert len(printed["table1"]) == 24
+    assert printed["table1"]["kfo-zoh/6"] == f"{TABLE_1.rmse['kfo-zoh'][5]:.4f}" == "0.9440"
+    # 58.3627 s over 10.8690 s and over 17.5776 s.
+    ratios = [printed["table2"][key] for key in ("zoh/fdo", "zoh/kfo-fe")]
+    assert ratios == ["5.37", "3.32"]
     times = [line for line in ITEMS["table2"].lines if line.key.startswith("seconds/")]
     assert [line.label for line in times] == [
         f"{name}: time" for name in ("FDO", "GMO", "KFO-FE", "KFO-ZOH")
     ]
     assert [line.number for line in times] == [10.869, 10.541, 17.578, 58.363]
     assert not any(line.compared for line in times)
+    # 6.52 → 6.76 s, 17.72 → 18.00, 8.60 → 8.86, 20.16 → 20.28 s of Fig. 6.
+    timed = {"fig6": ("0.24", "0.28", "0.26", "0.12"), "fig9": ("0.16", "0.16", "0.16", "0.12")}
+    for name, numbers in timed.items():
+        keys = ("reaction/1", "reaction/2", "stop/1", "stop/2")
+        shown = {key: text for key, text in printed[name].items() if text}
+        assert shown == dict(zip(keys, numbers, strict=True))
     turns = [line for line in ITEMS["fig7"].lines if line.key.startswith("turn/1.9/")]
     assert [(line.label.split(", ")[-1], line.printed) for line in turns] == [
         ("phase I", "0.64"),

@@ -22,7 +22,6 @@ from vftcli.reproduction.scoring import (
     planted,
     rows_of,
     truth_of,
-    weighed,
     worst_of,
 )
 from vftcli.robots import load_robot
@@ -103,6 +102,8 @@ def test_every_row_is_that_of_plain_numpy() -> None:
     up, asked = -answer.wrench[:, 2], (t >= 1.0) & (t <= 18.0)
     here = asked & np.isfinite(up)
     assert found["weight"]["mean_N"] == pytest.approx((w * up)[here].sum() / w[here].sum())
+    square = (w * (up - LOG.weight_N) ** 2)[here].sum() / w[here].sum()
+    assert found["weight"]["rms_error_N"] == pytest.approx(np.sqrt(square))
     assert found["weight"]["answered"] == pytest.approx(w[here].sum() / w[asked].sum())
     # A row finds the first contact, one is false, one lies where nobody vouches.
     keys = ("true_contacts", "found", "false", "hardest_false_N", "peaks_held")
@@ -147,14 +148,6 @@ def test_the_worst_span_is_where_the_error_is() -> None:
     assert found["worst_t"][-1] > 22.98
     assert found["worst_t"][-1] - found["worst_t"][0] == pytest.approx(10.0, abs=0.02)
     assert max(found["worst_estimate"]) == 4.0
-
-
-def test_a_weight_is_of_what_is_answered() -> None:
-    up = np.array([20.0, 30.0, np.nan, 40.0])
-    found = weighed(up, 27.0, np.array([1.0, 1.0, 1.0, 2.0]))
-    assert found["mean_N"] == pytest.approx((20 + 30 + 80) / 4)
-    assert found["rms_error_N"] == pytest.approx(np.sqrt((49 + 9 + 2 * 169) / 4))
-    assert found["answered"] == pytest.approx(4 / 5)
 
 
 def read_truth(path: Path, columns: dict[str, Any], words: str, **more: Any) -> KnownTruth:
