@@ -5,10 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.admittance.choice import (
-    ControlChoice,
-    released_robot,
-)
+from vftcli.admittance.choice import ControlChoice, released_robot
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, RobotError

@@ -95,12 +95,7 @@ def pushed(
     robot = load_robot("ur5")
     p = from_table(robot.admittance, robot.name, parse_settings(["threshold_mode=soft"]))
     return run_closed_loop(
-        scenario,
-        variable(p),
-        observer("ur5", "discrete"),
-        seed=1,
-        torque=torque,
-        zero=zero,
+        scenario, variable(p), observer("ur5", "discrete"), seed=1, torque=torque, zero=zero
     )
 
 

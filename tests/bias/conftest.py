@@ -23,9 +23,7 @@ OBSERVERS = ObserverChoice(
 def request_() -> AnalysisChoice:
     truth = f"file:{FIXTURE}.truth.parquet"
     return AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=OBSERVERS,
-        reference=ReferenceChoice(name=truth),
+        robot=RobotChoice(name="ur5"), observers=OBSERVERS, reference=ReferenceChoice(name=truth)
     )
 
 

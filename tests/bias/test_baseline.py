@@ -6,12 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.bias.baseline import (
-    Baseline,
-    Baselines,
-    baseline_of,
-    free_reading,
-)
+from vftcli.bias.baseline import Baseline, Baselines, baseline_of, free_reading
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.observers import MomentumObserver

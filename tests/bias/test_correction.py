@@ -128,9 +128,7 @@ def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
     six = analyse_log(
         FIXTURE,
         replace(
-            request_,
-            read=ReadChoice(interval=(0.0, 6.0)),
-            free=FreeChoice(spans=((0.0, 4.0),)),
+            request_, read=ReadChoice(interval=(0.0, 6.0)), free=FreeChoice(spans=((0.0, 4.0),))
         ),
     )
     assert "whole-log-friction-alone" in codes(six)

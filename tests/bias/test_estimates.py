@@ -145,11 +145,7 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
 @pytest.mark.slow
 def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: AnalysisChoice) -> None:
     """Its quietest cycle is pushed too: hand-set gains, no bands, both said."""
-    always = replace(
-        request_,
-        read=ReadChoice(interval=(4.3, 20.0)),
-        observers=DENSITIES,
-    )
+    always = replace(request_, read=ReadChoice(interval=(4.3, 20.0)), observers=DENSITIES)
     analysis = analyse_log(FIXTURE, always)
     assert "free-part-not-quiet" in codes(analysis)
     np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)

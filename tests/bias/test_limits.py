@@ -4,12 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.bias.refine import (
-    STICTION,
-    Budget,
-    friction_share,
-    limits_remark,
-)
+from vftcli.bias.refine import STICTION, Budget, friction_share, limits_remark
 from vftcli.evaluation.references import paper_gap
 from vftcli.observers.paper import MomentumObserver
 

@@ -37,7 +37,7 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
         observers=ObserverChoice(
             names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"),
             settings={"kfo": {"noise_convention": "density"}},
-        ),
+        )
     )
     motion = read(run_of(log, robot, asked), asked)
     terms, found = motion.log.terms, model(motion, asked)

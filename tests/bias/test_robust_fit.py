@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from known_errors import STEP, drawn_error, fit_rows, shortened, ur10e, wrong_run
 
-from vftcli.bias.robust_fit import (
-    fit_robustly,
-    free_samples,
-    largest_around,
-)
+from vftcli.bias.robust_fit import fit_robustly, free_samples, largest_around
 
 STRIDE = 3
 DRY = np.array([17.0, 16.0, 6.0])

@@ -5,9 +5,7 @@ import pinocchio as pin
 import pytest
 from known_errors import motion
 
-from vftcli.bias.robust_fit import (
-    slow_loads,
-)
+from vftcli.bias.robust_fit import slow_loads
 from vftcli.robots import load_robot
 
 

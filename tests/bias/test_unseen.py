@@ -15,14 +15,8 @@ from known_errors import (
     wrong_run,
 )
 
-from vftcli.bias.model_error import (
-    smooth_motion,
-)
-from vftcli.bias.robust_fit import (
-    faded,
-    fit_robustly,
-    guarded,
-)
+from vftcli.bias.model_error import smooth_motion
+from vftcli.bias.robust_fit import faded, fit_robustly, guarded
 from vftcli.signals.rest import MOVES
 
 STRIDE = 3

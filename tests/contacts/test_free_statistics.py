@@ -11,11 +11,7 @@ from scipy.signal import lfilter
 import vftcli as vft
 from vftcli.bias.whole_log import whole_log_bias
 from vftcli.contacts import free_statistics as free_statistics_room
-from vftcli.contacts.free_statistics import (
-    free_part,
-    free_statistics,
-    observer_noise,
-)
+from vftcli.contacts.free_statistics import free_part, free_statistics, observer_noise
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.readers.reading import read

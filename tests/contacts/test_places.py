@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.contacts.windows import (
-    arm_parts,
-    point_fits,
-)
+from vftcli.contacts.windows import arm_parts, point_fits
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_jacobian, link_poses
 

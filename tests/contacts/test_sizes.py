@@ -5,13 +5,7 @@ import pytest
 from drawn_blocks import B
 
 from vftcli.contacts.search import split_at_turns, split_run
-from vftcli.contacts.windows import (
-    START,
-    WindowWrench,
-    contact_lanes,
-    learn_prior,
-    smooth_lanes,
-)
+from vftcli.contacts.windows import START, WindowWrench, contact_lanes, learn_prior, smooth_lanes
 from vftcli.robots.terms import Blocks
 from vftcli.wrench.model_error import TorqueNoise, error_process
 from vftcli.wrench.smoother import BlockLog

@@ -33,10 +33,7 @@ from typing import Any, NamedTuple
 ROOT = Path(__file__).parent.parent.parent
 
 ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
-    "observers": (
-        ["observers/*.py"],
-        ["tests/observers", "tests/test_pipeline.py"],
-    ),
+    "observers": (["observers/*.py"], ["tests/observers", "tests/test_pipeline.py"]),
     "free_motion": (
         ["free_motion/*.py"],
         [
@@ -58,18 +55,9 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["identification/*.py"],
         ["tests/identification", "tests/cli/test_identify.py"],
     ),
-    "admittance": (
-        ["admittance/*.py"],
-        ["tests/admittance", "tests/cli/test_admit.py"],
-    ),
-    "bias": (
-        ["bias/*.py"],
-        ["tests/bias", "tests/test_pipeline.py", "tests/outputs"],
-    ),
-    "robots": (
-        ["robots/*.py"],
-        ["tests/robots", "tests/test_pipeline.py"],
-    ),
+    "admittance": (["admittance/*.py"], ["tests/admittance", "tests/cli/test_admit.py"]),
+    "bias": (["bias/*.py"], ["tests/bias", "tests/test_pipeline.py", "tests/outputs"]),
+    "robots": (["robots/*.py"], ["tests/robots", "tests/test_pipeline.py"]),
     "doctor": (["doctor/*.py"], ["tests/doctor", "tests/cli/test_inspect.py"]),
     "readers": (
         ["readers/*.py", "readers/bags/*.py"],
