@@ -49,16 +49,6 @@ def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
     np.testing.assert_allclose(wider, np.hypot(plain, 0.7), rtol=1e-6)
 
 
-def test_rest_and_motion_have_bands_of_their_own(found: Baseline) -> None:
-    """Every sample of a joint has one of two values, by whether it rests."""
-    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
-    sd, rests = with_band(found, reading).error_sd, found.motion.log.rests
-    for j in range(6):
-        for where in (rests[:, j], ~rests[:, j]):
-            assert len(np.unique(sd[where, j])) <= 1
-    assert len(np.unique(sd[:, 4])) == 2  # J5 rests, and slides where it is pushed hard
-
-
 def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
     reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
     assert with_band(replace(found, spectra=None), reading).error_sd is None

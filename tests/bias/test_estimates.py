@@ -31,32 +31,6 @@ def codes(analysis: Analysis) -> set[str]:
     return {remark.code for remark in analysis.remarks if isinstance(remark, Remark)}
 
 
-def mean_rmse(analysis: Analysis, observer: str) -> float:
-    rows = analysis.errors.filter(pl.col("observer") == observer)
-    rows = rows.filter(pl.col("joint").is_in(MOVING.tolist()))
-    return float(rows["rmse_Nm"].mean())
-
-
-@pytest.mark.slow
-def test_ratios_to_the_hand_set_filter(worked_up: Analysis, request_: AnalysisChoice) -> None:
-    """Bounds of the reference simulation for this one run, seed 1 of mixed pushes."""
-    discrete = replace(
-        request_.observers,
-        names=("kfo-zoh", "kfo-rts"),
-        settings={"kfo": {"noise_convention": "discrete"}},
-    )
-    by_hand = mean_rmse(worked_up, "kfo-zoh")
-    quick = analyse_log(FIXTURE, replace(request_, observers=discrete))
-    faster = mean_rmse(quick, "kfo-zoh")
-    for error, bounds in (
-        (mean_rmse(quick, "kfo-rts"), (0.60, 0.85)),
-        (mean_rmse(worked_up, "rts-auto"), (0.45, 0.70)),
-    ):
-        assert error <= bounds[0] * by_hand
-        assert error <= bounds[1] * faster
-    assert mean_rmse(worked_up, "kfo-auto") <= 1.05 * min(by_hand, faster)
-
-
 @pytest.mark.slow
 def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None:
     rows = worked_up.errors.filter(pl.col("joint").is_in(MOVING.tolist()))

@@ -4,16 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from known_errors import (
-    best_by_hand,
-    by_hand,
-    dense,
-    drawn_error,
-    fit_rows,
-    shortened,
-    ur10e,
-    wrong_run,
-)
+from known_errors import best_by_hand, dense, drawn_error, fit_rows, shortened, ur10e, wrong_run
 
 JOINTS, STRIDE = 4, 10
 
@@ -46,17 +37,6 @@ def test_the_solution_is_that_of_the_dense_matrix(rows, weight, scale):
     np.testing.assert_allclose(found.loads, expected[P:], atol=1e-6)
 
 
-def test_the_model_alone_is_solved_alike(rows, weight):
-    A, P = dense(rows), rows.unknowns
-    alone = replace(rows, loads=rows.loads.none)
-    found = alone.solution(alone.sums(weight)[0])
-    u, _ = by_hand(A[:, :, :P], rows.d, weight, np.ones(P))
-    np.testing.assert_allclose(found.model, u, atol=1e-6)
-    torque = np.einsum("tnp,p->tn", A[:, :, :P], u)
-    np.testing.assert_allclose(rows.modelled(found.model), torque, atol=1e-5)
-    np.testing.assert_allclose(rows.modelled(found.model, slice(7, 20)), torque[7:20], atol=1e-5)
-
-
 def test_the_spread_is_that_of_the_inverse(rows, weight):
     """diag(A N⁻¹ Aᵀ) with the loads' columns in N."""
     P, found = rows.unknowns, rows.solution(rows.sums(weight)[0], 0.3)
@@ -69,27 +49,6 @@ def test_the_spread_is_that_of_the_inverse(rows, weight):
     covariance = np.linalg.inv(N)[:P, :P]
     expected = np.sqrt(np.einsum("tnp,pq,tnq->tn", A[:, :, :P], covariance, A[:, :, :P]))
     np.testing.assert_allclose(rows.spread(found.covariance), expected, rtol=1e-6)
-
-
-def test_sums_over_parts_are_sums_over_their_samples(rows, weight):
-    """Parts that overlap, and samples that are left out: each against its own samples alone."""
-    samples = len(rows.d)
-    taken = np.random.default_rng(6).uniform(size=samples) > 0.3
-    places = np.arange(samples)
-    parts = [(places >= 20) & (places < 90), (places >= 80) & (places < 200)]
-    whole, *sums = rows.sums(weight, taken, parts)
-    A = dense(rows)
-    for part, found in zip(parts, sums, strict=True):
-        kept = part & taken
-        flat, w = A[kept].reshape(-1, A.shape[-1]), weight[kept].ravel()
-        d = rows.d[kept].ravel()
-        np.testing.assert_allclose(found.gram, flat.T @ (flat * w[:, None]), atol=1e-8)
-        np.testing.assert_allclose(found.right, flat.T @ (w * d), atol=1e-8)
-        assert found.square == pytest.approx(np.sum(w * d**2))
-        rest = taken & ~part
-        flat, w = A[rest].reshape(-1, A.shape[-1]), weight[rest].ravel()
-        left = whole.minus(found)
-        np.testing.assert_allclose(left.gram, flat.T @ (flat * w[:, None]), atol=1e-8)
 
 
 def test_no_load_is_believed_where_there_is_none(rows):
