@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
-from planted_pushes import joint_torque, moving_window, planted, with_torque
+from planted_pushes import joint_torque, moving_window, planted, pushes, with_torque
 
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.readers.library import Library
@@ -78,8 +78,7 @@ def read(path, columns):
 
 def planted_cases(logs, robot=None, seeds=(1, 2, 3)) -> Iterator[Case]:
     """The three free logs with random pushes; the robot of the estimators may be another."""
-    profile = load_robot("ur10e")
-    arm = profile if robot is None else load_robot(robot)
+    profile, arm = load_robot("ur10e"), load_robot(robot or "ur10e")
     for log in UR10E:
         recording = read(logs / "ur10e" / log, COLUMNS)
         for seed in seeds:
@@ -91,31 +90,22 @@ def planted_cases(logs, robot=None, seeds=(1, 2, 3)) -> Iterator[Case]:
 
 def piece_cases(logs, robot=None, length=10.0) -> Iterator[Case]:
     """Pieces of the planted logs, pushes from 1 s on."""
-    profile = load_robot("ur10e")
-    arm = profile if robot is None else load_robot(robot)
+    profile, arm = load_robot("ur10e"), load_robot(robot or "ur10e")
     for log in UR10E:
         window = moving_window(read(logs / "ur10e" / log, COLUMNS))
         for number in range(int(window.t[-1] / length)):
             cut = window.between(number * length, (number + 1) * length)
             # the recipe leaves the first 8 s alone: the piece is laid at 7 s
             late = replace(cut, t=cut.t - cut.t[0] + 7.0)
-            torque = planted_from(late, profile, number + 1)
+            torque = joint_torque(pushes(late.t, number + 1), late, profile)
             piece = with_torque(replace(cut, t=cut.t - cut.t[0]), profile, torque)
             free = FreeChoice.parsed(free=["0:1"])
             yield Case("pieces", f"{log.split('.')[0]} {number}", piece, arm, free, torque)
 
 
-def planted_from(recording, profile, seed):
-    """Torque of random pushes on a log, by its own clock. (T, n) [N·m]"""
-    from planted_pushes import pushes
-
-    return joint_torque(pushes(recording.t, seed), recording, profile)
-
-
 def steady_cases(logs, robot=None) -> Iterator[Case]:
     """The three free logs under pushes that last, each alone."""
-    profile = load_robot("ur10e")
-    arm = profile if robot is None else load_robot(robot)
+    profile, arm = load_robot("ur10e"), load_robot(robot or "ur10e")
     for log in UR10E:
         window = moving_window(read(logs / "ur10e" / log, COLUMNS))
         for force, begin, joint in STEADY:

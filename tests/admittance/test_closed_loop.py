@@ -206,6 +206,5 @@ def test_bearing_is_guided_assembled_released_and_knocks_do_not_move_it() -> Non
     knocked = loop.dragged[(t > 23.9) & (t < 27.0)]
     assert not np.any(knocked)
     still = x[(t > 24.0) & (t < 27.0), :3] - x[np.searchsorted(t, 24.0), :3]
-    assert (
-        np.linalg.norm(still, axis=1).max() < 2e-3
-    )  # servo give under a 10 N knock, and the tail
+    # servo give under a 10 N knock, and the tail
+    assert np.linalg.norm(still, axis=1).max() < 2e-3

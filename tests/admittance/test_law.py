@@ -1,5 +1,7 @@
 """The variable law: analytic responses, the issue's release figures, its energy, its escape."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,14 +18,12 @@ from vftcli.admittance.law import (
 from vftcli.admittance.motion import AxisMotion, release, run
 from vftcli.robots import load_robot
 
+UR5 = from_table(load_robot("ur5").admittance, "ur5", {})
+
 
 def parameters(**changes: object) -> Admittance:
     """UR5's Table III with changes."""
-    both = [("mass", 3.0, 0.1), ("damping", 5.0, 0.3), ("stiffness", 8.0, 0.5)]
-    both += [("threshold", 20.0, 6.0), ("speed_limit", 0.9, 1.0)]
-    values: dict[str, object] = {name: np.repeat([a, b], 3) for name, a, b in both}
-    values |= {"alpha": np.full(6, 1.6), "period": 0.008}
-    return Admittance(**(values | changes))
+    return replace(UR5, **changes)  # type: ignore[arg-type]
 
 
 def returned(motion: AxisMotion, n: int, share: float, axis: int = 0) -> float:

@@ -1,24 +1,16 @@
 """Rotations under the law: large turns without a jump, axes kept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from vftcli.admittance.law import Admittance, variable
+from vftcli.admittance.law import from_table, variable
 from vftcli.admittance.motion import release, run
+from vftcli.robots import load_robot
 
-
-def admittance(**changes: object) -> Admittance:
-    """A soft rotation that a small moment can turn far."""
-    values: dict[str, object] = {
-        "mass": np.full(6, 0.1),
-        "damping": np.full(6, 0.3),
-        "stiffness": np.full(6, 0.5),
-        "alpha": np.full(6, 1.6),
-        "threshold": np.full(6, 0.1),
-        "speed_limit": 1.0,
-        "period": 0.008,
-    }
-    return Admittance(**(values | changes))
+UR5 = from_table(load_robot("ur5").admittance, "ur5", {})
+"""A soft rotation that a small moment can turn far."""
 
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.6, -0.5, 0.62), (-1.0, 0.2, 0.1)])
@@ -29,7 +21,7 @@ def test_large_rotations_have_no_jump(axis: tuple[float, float, float]) -> None:
     force[:700, 3:] = 2.2 * unit  # settles at 4.4 rad, beyond π
     dragged = np.zeros_like(force, dtype=bool)
     dragged[:700, 3:] = True
-    motion = run([variable(admittance())], force, dragged)
+    motion = run([variable(UR5)], force, dragged)
     angle = np.linalg.norm(motion.x[:, 0, 3:], axis=1)
     assert angle.max() > 3.5
     steps = np.linalg.norm(np.diff(motion.x[:, 0, 3:], axis=0), axis=1)
@@ -40,7 +32,7 @@ def test_large_rotations_have_no_jump(axis: tuple[float, float, float]) -> None:
 
 def test_three_radians_return() -> None:
     x = np.concatenate([np.zeros(3), 3.0 * np.array([0.48, -0.6, 0.64])])
-    motion = release([variable(admittance())], x, 12.0)
+    motion = release([variable(UR5)], x, 12.0)
     assert np.linalg.norm(motion.x[-1, 0, 3:]) < 1e-3
     assert np.linalg.norm(np.diff(motion.x[:, 0, 3:], axis=0), axis=1).max() < 0.05
 
@@ -48,7 +40,7 @@ def test_three_radians_return() -> None:
 def test_equal_axes_turn_about_the_start_s_own_axis() -> None:
     """With equal parameters a release stays on its axis, so it is the scalar law along it."""
     unit = np.array([0.48, -0.6, 0.64])
-    wide = admittance(speed_limit=np.inf, alpha=np.ones(6), speed_scale=1e9)
+    wide = replace(UR5, speed_limit=np.inf, alpha=np.ones(6), speed_scale=1e9)
     slanted = release([variable(wide)], np.concatenate([np.zeros(3), 0.3 * unit]), 4.0)
     straight = release([variable(wide)], np.array([0, 0, 0, 0.3, 0, 0.0]), 4.0)
     along = slanted.x[:, 0, 3:] @ unit

@@ -122,13 +122,6 @@ def test_the_condition_decides_what_happens() -> None:
     period = 0.008
     for share, decays in ((0.97, True), (1.03, False)):
         damping = share * (4.0 - period**2 * 8.0 / 3.0) / (2.0 * period) * 3.0
-        p = Admittance(
-            mass=np.full(6, 3.0),
-            damping=np.full(6, damping),
-            stiffness=np.full(6, 8.0),
-            alpha=np.ones(6),
-            threshold=np.ones(6),
-            period=period,
-        )
+        p = replace(profile("ur5"), damping=np.full(6, damping))
         motion = release([traditional(p)], np.array([0.1, 0, 0, 0, 0, 0]), 3.0)
         assert (np.abs(motion.v[-1, 0, 0]) < 0.1) == decays

@@ -1,26 +1,21 @@
 """Phases: thresholds per axis, hard and soft, hysteresis, unknown forces."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vftcli.admittance.law import Admittance
+from vftcli.admittance.law import Admittance, from_table
 from vftcli.admittance.motion import phases
+from vftcli.robots import load_robot
 
 
 def parameters(mode: str = "hard", hysteresis: float = 0.0) -> Admittance:
     """Thresholds 4, 4, 15 N and 2 N·m, the Panda's."""
-    return Admittance(
-        mass=np.ones(6),
-        damping=np.ones(6),
-        stiffness=np.ones(6),
-        alpha=np.ones(6),
-        threshold=np.array([4.0, 4.0, 15.0, 2.0, 2.0, 2.0]),
-        hysteresis=hysteresis,
-        period=0.01,
-        threshold_mode=mode,
-    )
+    profile = from_table(load_robot("panda").admittance, "panda", {})
+    return replace(profile, threshold_mode=mode, hysteresis=hysteresis)
 
 
 def column(*values: float) -> np.ndarray:

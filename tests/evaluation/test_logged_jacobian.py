@@ -102,11 +102,8 @@ def test_a_log_that_lacks_a_part_is_refused(tmp_path: Path, lost: str) -> None:
 @pytest.mark.parametrize(
     ("column", "value", "reported"),
     [
-        (
-            "jacobian_4_2",
-            1e200,
-            "jacobian cell 31 is 1e[+]200 in sample 201",
-        ),  # its square: infinite
+        # Its square is infinite.
+        ("jacobian_4_2", 1e200, "jacobian cell 31 is 1e[+]200 in sample 201"),
         ("tau_ext_3", -1e200, "tau_ext of joint 4 is -1e[+]200 in sample 201"),
         ("fy", float("nan"), "wrench axis 2 is nan in sample 201"),
         ("timestamp", 1e300, "time runs backwards"),

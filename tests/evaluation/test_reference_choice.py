@@ -18,6 +18,7 @@ from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import AXES
 from vftcli.wrench.sensor_reading import SensorReading
 from vftcli.wrench.solvers import VirtualSensor
 
@@ -32,23 +33,17 @@ MOTION = FreeMotion(log=Run(recording=RECORDING, robot=ROBOT))
 WRENCH = 5.0 * RNG.standard_normal((300, 6))
 
 
-def write(path: Path, t: np.ndarray = T, **groups: np.ndarray) -> ReferenceChoice:
+def write(
+    path: Path, t: np.ndarray = T, wrench: np.ndarray | None = None, **groups: np.ndarray
+) -> ReferenceChoice:
     """A reference file of groups of columns, chosen."""
     columns = {"t": t}
     for name, values in groups.items():
         columns |= {f"{name}/{k + 1}": values[:, k] for k in range(values.shape[1])}
+    if wrench is not None:
+        columns |= {f"wrench/{axis}": wrench[:, k] for k, axis in enumerate(AXES)}
     pl.DataFrame(columns).write_parquet(path)
     return ReferenceChoice(name=f"file:{path}")
-
-
-def write_wrench(path: Path, values: np.ndarray, **groups: np.ndarray) -> ReferenceChoice:
-    choice = write(path, **groups)
-    axes = [f"wrench/{a}" for a in ("fx", "fy", "fz", "mx", "my", "mz")]
-    table = pl.read_parquet(path).with_columns(
-        pl.Series(name, values[:, k]) for k, name in enumerate(axes)
-    )
-    table.write_parquet(path)
-    return choice
 
 
 def test_an_unknown_name_is_refused_before_any_log_is_read() -> None:
@@ -73,7 +68,7 @@ def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> Non
     monkeypatch.setattr(
         references, "read_reference", lambda *a: reads.append(a) or read_reference(*a)
     )
-    choice = write_wrench(tmp_path / "truth.parquet", WRENCH)
+    choice = write(tmp_path / "truth.parquet", wrench=WRENCH)
     reference = make_reference(MOTION, choice)
     wrench = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
     assert len(reads) == 1
@@ -82,7 +77,7 @@ def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> Non
 
 
 def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) -> None:
-    choice = write_wrench(tmp_path / "truth.parquet", WRENCH)
+    choice = write(tmp_path / "truth.parquet", wrench=WRENCH)
     tau = make_reference(MOTION, choice).torque.tau
     J = flange_jacobian(ROBOT.chain, Q)
     np.testing.assert_allclose(tau[7], J[7].T @ WRENCH[7], atol=1e-12)
@@ -91,14 +86,14 @@ def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) ->
 def test_a_file_may_say_that_nobody_touched_the_arm(tmp_path) -> None:
     """Zero throughout is a truth; of a log's own wrench it means that nothing was measured."""
     zero = np.zeros((300, 6))
-    both = make_reference(MOTION, write_wrench(tmp_path / "x.parquet", zero, tau_ext=zero))
+    both = make_reference(MOTION, write(tmp_path / "x.parquet", wrench=zero, tau_ext=zero))
     assert not both.torque.tau.any()
     assert not both.wrench.values.any()
 
 
 def test_torques_of_a_file_go_before_its_wrench(tmp_path) -> None:
     tau = RNG.standard_normal((300, 6))
-    choice = write_wrench(tmp_path / "truth.parquet", WRENCH, tau_ext=tau)
+    choice = write(tmp_path / "truth.parquet", wrench=WRENCH, tau_ext=tau)
     reference = make_reference(MOTION, choice)
     np.testing.assert_allclose(reference.torque.tau, tau, atol=1e-12)
     assert reference.wrench is not None
@@ -119,7 +114,7 @@ def test_samples_beyond_the_file_are_unknown_half_a_sample_allowed(tmp_path) -> 
 @pytest.mark.parametrize("what", ["tau_ext", "wrench"])
 def test_a_clock_of_another_day_is_refused(tmp_path, what) -> None:
     path = tmp_path / "truth.parquet"
-    choice = write_wrench(path, WRENCH) if what == "wrench" else write(path, tau_ext=WRENCH)
+    choice = write(path, wrench=WRENCH) if what == "wrench" else write(path, tau_ext=WRENCH)
     pl.read_parquet(path).with_columns(pl.col("t") + 1e6).write_parquet(path)
     with pytest.raises(ReferenceTorqueError, match="does not overlap the log's"):
         make_reference(MOTION, choice)
@@ -156,6 +151,6 @@ def test_a_lag_behind_the_sensor_is_said_where_the_sensor_is_the_reference(tmp_p
     (lag,) = (remark for remark in found.remarks if remark.code == "lag-behind-sensor")
     assert lag.values["lag_ms"] == pytest.approx(0.0, abs=5.0)  # half a sample
     assert lag.values["correlation"] == pytest.approx(1.0)
-    file = write_wrench(tmp_path / "truth.parquet", WRENCH)
+    file = write(tmp_path / "truth.parquet", wrench=WRENCH)
     found = judge(motion, [estimate], read, file)[2]
     assert found.remarks == ()

@@ -33,11 +33,8 @@ def leaves(tree: object) -> dict[str, list[object]]:
     return json.loads(json.dumps(found))  # as it is kept
 
 
-def test_nothing_moves_by_itself() -> None:
+def test_a_moved_number_is_found_by_its_size_and_nothing_moves_by_itself() -> None:
     assert moves(CONTACTS) == []
-
-
-def test_a_moved_number_is_found_by_its_size() -> None:
     moved = json.loads(json.dumps(CONTACTS))
     moved["peak"][1]["force_N"] *= 1 + 1e-6
     assert [line.split(":")[0] for line in moves(moved)] == ["log.peak[].force_N"]
@@ -53,7 +50,8 @@ def test_whole_numbers_and_empty_values_are_exact(key: str, value: float) -> Non
     ]
 
 
-def test_a_vanished_code_is_found() -> None:
+def test_a_vanished_code_is_found_and_a_sentence_may_be_reworded() -> None:
+    assert moves(CONTACTS | {"remarks": [{"code": "at-rest", "message": "other words"}]}) == []
     (code, count) = moves(CONTACTS | {"remarks": []})
     assert (code, count) == (
         "log.remarks[].code: gone",
@@ -71,10 +69,6 @@ def test_a_new_row_is_found() -> None:
         "log.peak[] count", "log.peak[].force_N", "log.peak[].where"
     }  # fmt: skip
     assert any("+elbow" in line for line in found)
-
-
-def test_a_sentence_may_be_reworded() -> None:
-    assert moves(CONTACTS | {"remarks": [{"code": "at-rest", "message": "other words"}]}) == []
 
 
 def test_a_column_counts_in_all_of_its_rows(tmp_path: Path) -> None:

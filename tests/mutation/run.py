@@ -32,103 +32,45 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parent.parent.parent
 
-ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
-    "observers": (["observers/*.py"], ["tests/observers", "tests/test_pipeline.py"]),
-    "free_motion": (
-        ["free_motion/*.py"],
-        [
-            "tests/free_motion",
-            "tests/bias/test_reference_runs.py",
-            "tests/evaluation/test_reference_choice.py",
-            "tests/test_pipeline.py",
-        ],
-    ),
-    "wrench": (
-        ["wrench/**/*.py"],
-        ["tests/wrench", "tests/contacts", "tests/evaluation", "tests/outputs"],
-    ),
-    "evaluation": (
-        ["evaluation/*.py"],
-        ["tests/evaluation", "tests/wrench/test_sensor.py", "tests/test_pipeline.py"],
-    ),
-    "identification": (
-        ["identification/*.py"],
-        ["tests/identification", "tests/cli/test_identify.py"],
-    ),
-    "admittance": (["admittance/*.py"], ["tests/admittance", "tests/cli/test_admit.py"]),
-    "bias": (["bias/*.py"], ["tests/bias", "tests/test_pipeline.py", "tests/outputs"]),
-    "robots": (["robots/*.py"], ["tests/robots", "tests/test_pipeline.py"]),
-    "doctor": (["doctor/*.py"], ["tests/doctor", "tests/cli/test_inspect.py"]),
-    "readers": (
-        ["readers/*.py", "readers/bags/*.py"],
-        [
-            "tests/readers",
-            "tests/evaluation/test_logged_jacobian.py",
-            "tests/cli/test_bad_input.py",
-        ],
-    ),
-    "signals": (
-        ["signals/*.py"],
-        ["tests/signals", "tests/free_motion", "tests/observers", "tests/wrench"],
-    ),
-    "contacts": (
-        ["contacts/*.py"],
-        ["tests/contacts", "tests/outputs/test_thresholds.py", "tests/cli/test_contacts.py"],
-    ),
-    "simulation": (["simulation/*.py"], ["tests/simulation", "tests/cli/test_simulate.py"]),
-    "reproduction": (
-        ["reproduction/*.py"],
-        ["tests/reproduction", "tests/cli/test_benchmark.py", "tests/cli/test_reproduce.py"],
-    ),
-    "outputs": (
-        ["outputs/**/*.py"],
-        ["tests/outputs", "tests/bias/test_outputs.py", "tests/cli/test_parts.py"],
-    ),
-    "batch": (
-        ["batch/**/*.py"],
-        ["tests/batch", "tests/cli/test_batch.py", "tests/cli/test_annotate.py"],
-    ),
-    "cli": (
-        ["cli/*.py", "*.py"],
-        ["tests/cli", "tests/test_pipeline.py", "tests/test_notebook.py"],
-    ),
+ROOMS: Mapping[str, str] = {
+    "observers": "observers test_pipeline.py",
+    "free_motion": "free_motion bias/test_reference_runs.py evaluation/test_reference_choice.py "
+    "test_pipeline.py",
+    "wrench": "wrench contacts evaluation outputs",
+    "evaluation": "evaluation wrench/test_sensor.py test_pipeline.py",
+    "identification": "identification cli/test_identify.py",
+    "admittance": "admittance cli/test_admit.py",
+    "bias": "bias test_pipeline.py outputs",
+    "robots": "robots test_pipeline.py",
+    "doctor": "doctor cli/test_inspect.py",
+    "readers": "readers evaluation/test_logged_jacobian.py cli/test_bad_input.py",
+    "signals": "signals free_motion observers wrench",
+    "contacts": "contacts outputs/test_thresholds.py cli/test_contacts.py",
+    "simulation": "simulation cli/test_simulate.py",
+    "reproduction": "reproduction cli/test_benchmark.py cli/test_reproduce.py",
+    "outputs": "outputs bias/test_outputs.py cli/test_parts.py",
+    "batch": "batch cli/test_batch.py cli/test_annotate.py",
+    "cli": "cli test_pipeline.py test_notebook.py",
 }
-"""Room → files that are mutated, and tests that should notice, nearest first.
+"""Room → the tests, below tests/, that should notice a mutant of it, nearest first.
 
-The file's own test, `tests/ROOM/test_FILE.py`, always goes before them.
+The file's own test, `tests/ROOM/test_FILE.py`, always goes before them. The files that belong to no
+room are mutated with the command line.
 """
 
-SWAPS = {
-    "+": "-",
-    "-": "+",
-    "*": "/",
-    "/": "*",
-    "%": "*",
-    "//": "*",
-    "**": "*",
-    "&": "|",
-    "|": "&",
-}
+SWAPS = (
+    "Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Mod_Mul", "FloorDiv_Mul", "Pow_Mul",
+    "BitAnd_BitOr", "BitOr_BitAnd",
+)  # fmt: skip
 """Arithmetic, and the and/or of masks: each operator and the one it turns into."""
 
-NAMES = {
-    "+": "Add",
-    "-": "Sub",
-    "*": "Mul",
-    "/": "Div",
-    "%": "Mod",
-    "//": "FloorDiv",
-    "**": "Pow",
-    "&": "BitAnd",
-    "|": "BitOr",
-}
 NO_TESTS = 5  # pytest's exit code where no test has these marks
 COMPARISONS = ("Eq", "NotEq", "Lt", "LtE", "Gt", "GtE")
 
 
 def operator_names() -> list[str]:
     """The operators of cosmic-ray that are drawn from."""
-    arithmetic = [f"core/ReplaceBinaryOperator_{NAMES[a]}_{NAMES[b]}" for a, b in SWAPS.items()]
+    arithmetic = [f"core/ReplaceBinaryOperator_{swap}" for swap in SWAPS]
     comparisons = [
         f"core/ReplaceComparisonOperator_{a}_{b}"
         for a in COMPARISONS
@@ -167,7 +109,8 @@ def sites() -> dict[tuple[str, str, tuple[int, int]], list[Mutant]]:
 
     found: dict[tuple[str, str, tuple[int, int]], list[Mutant]] = {}
     operators = {name: get_operator(name)() for name in operator_names()}
-    for room, (globs, _) in ROOMS.items():
+    for room in ROOMS:
+        globs = (f"{room}/**/*.py", "*.py") if room == "cli" else (f"{room}/**/*.py",)
         for path in (p for glob in globs for p in sorted((ROOT / "vftcli").glob(glob))):
             source = path.read_text(encoding="utf-8")
             nodes = list(ast_nodes(get_ast(source)))
@@ -238,7 +181,8 @@ def tests_of(mutant: Mutant) -> list[str]:
     path = Path(mutant.file)
     own = Path("tests", path.parent.relative_to("vftcli"), f"test_{path.name}")
     listed = [str(own)] if (ROOT / own).exists() else []
-    return [*listed, *(test for test in ROOMS[mutant.room][1] if (ROOT / test).exists())]
+    others = (f"tests/{test}" for test in ROOMS[mutant.room].split())
+    return [*listed, *(test for test in others if (ROOT / test).exists())]
 
 
 def mutated(source: str, mutant: Mutant) -> str:

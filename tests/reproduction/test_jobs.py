@@ -29,10 +29,8 @@ def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
     with heard_by(lambda *words: reported.append(words)):
         results = run_jobs(jobs, workers=0)
     assert list(results) == jobs
-    assert reported[-1] == (
-        "6 of 6 runs done: timed, seed 0",
-        1.0,
-    )  # what takes the time has the machine for itself
+    # What takes the time has the machine for itself.
+    assert reported[-1] == ("6 of 6 runs done: timed, seed 0", 1.0)
     found = gather(cheap, tuple(cheap.items), results)
     assert found["fig1"].values["a"][CORRECTED] == [3.0, 4.0, 5.0]
     assert found["fig1"].values["b"][CORRECTED] == [-1.0, None, None]
