@@ -1,24 +1,20 @@
-"""Accuracy on logs whose external torque is known: python tests/accuracy/run.py planted circle …
+"""Accuracy on real logs whose external torque is known: python tests/accuracy/run.py planted …
 
 For every log the RMSE, mean of the joints [N·m], of the smoother with gains tuned
 
-- today: on the spectra as they are measured (as before the cap of S_τ),
-- capped: with what is faster than 5 Hz capped,
+- without: on the spectra as they are measured,
 - whole: the same on terms corrected by the whole log,
-- oracle: with the fixed natural frequencies that are best against the truth (--oracle),
 
-the joints that were corrected, and, where the pipeline has an observer `best` (--best), its RMSE,
-the share of samples its 95 % band holds, joints moving and at rest apart, and the band's half
-width over the RMSE. `steady` prints slopes and ratios of the smoother with the robot's own gains.
-Real logs are those of VFT_LOGS. Nothing here is timed.
+the joints that were corrected, and, with --best, the RMSE of the pipeline's observer `best`, the
+share of samples its 95 % band holds, joints moving and at rest apart, and the band's half width
+over the RMSE. `steady` prints slopes and ratios of the smoother with the robot's own gains. The
+logs are those of VFT_LOGS; `vftcli benchmark sim` and `field` score others. Nothing is timed.
 """
 
 import argparse
-import math
 import os
 import sys
 from collections import defaultdict
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -32,15 +28,11 @@ from vftcli.free_motion.free_motion import FreeMotion  # noqa: E402
 from vftcli.observers import spectra  # noqa: E402
 from vftcli.observers.choice import ObserverChoice  # noqa: E402
 from vftcli.observers.table import Setup, build_observers  # noqa: E402
-from vftcli.observers.tuning import (  # noqa: E402
-    kalman_smoother,
-    natural_frequencies,
-    tune_to_spectra,
-)
+from vftcli.observers.tuning import tune_to_spectra  # noqa: E402
 from vftcli.robots.run import Run, RunSamples  # noqa: E402
 from vftcli.signals.rest import standing  # noqa: E402
 
-GROUPS = ("planted", "pieces", "steady", *scenarios.SIMULATED, "bullet")
+GROUPS = ("planted", "pieces", "steady")
 
 
 def main() -> None:
@@ -50,11 +42,8 @@ def main() -> None:
     parser.add_argument(
         "--robot", help="robot file for the real UR10e logs instead of the profile"
     )
-    parser.add_argument("--oracle", action="store_true", help="the best fixed gains too")
     parser.add_argument("--best", action="store_true", help="the pipeline's observer `best` too")
     parser.add_argument("--length", type=float, default=10.0, help="of the pieces [s]")
-    stated = list(scenarios.STICKS)
-    parser.add_argument("--set", action="append", default=stated, help="of the simulated arms")
     chosen = parser.parse_args()
     lines = defaultdict(list)
     for group in chosen.groups:
@@ -66,7 +55,7 @@ def main() -> None:
         columns = [key for key in found[0] if isinstance(found[0][key], float)]
         show(f"{group} mean", {key: float(np.mean([x[key] for x in found])) for key in columns})
         for key in columns:
-            if key.endswith(("/today", "/without")):
+            if key.endswith("/without"):
                 show(f"{group} worst {key}", {key: max(x[key] for x in found)})
 
 
@@ -79,10 +68,6 @@ def show(name: str, line: dict[str, object]) -> None:
 def cases_of(group: str, chosen):
     """The logs of a group."""
     logs = Path(os.environ.get("VFT_LOGS", ""))
-    if group in scenarios.SIMULATED:
-        return scenarios.simulated_cases(group, chosen.set)
-    if group == "bullet":
-        return scenarios.bullet_cases(logs)
     if group == "pieces":
         return scenarios.piece_cases(logs, chosen.robot, chosen.length)
     make = scenarios.planted_cases if group == "planted" else scenarios.steady_cases
@@ -92,17 +77,6 @@ def cases_of(group: str, chosen):
 def rmse(estimate, truth) -> np.ndarray:
     """Root mean square error of each joint over every sample. (n,) [N·m]"""
     return np.sqrt(np.mean((estimate - truth) ** 2, axis=0))
-
-
-@contextmanager
-def uncapped():
-    """Tuning as it was before the spectrum of the external torque was capped."""
-    slow = spectra.SLOW
-    spectra.SLOW = math.inf
-    try:
-        yield
-    finally:
-        spectra.SLOW = slow
 
 
 def tuned(run, free):
@@ -115,32 +89,14 @@ def tuned_line(case, chosen) -> dict[str, object]:
     """What the tuned smoothers reach on one log."""
     run = Run(recording=case.recording, robot=case.robot)
     free = FreeMotion(log=run, choice=case.free).part.own
-    with uncapped():
-        today = rmse(tuned(run, free), case.truth)
-    capped = rmse(tuned(run, free), case.truth)
+    without = rmse(tuned(run, free), case.truth)
     bias = whole_log_bias(run)
     whole = rmse(tuned(bias.corrected(run), free), case.truth)
-    line = {name: float(x.mean()) for name, x in
-            (("today", today), ("capped", capped), ("whole", whole))}  # fmt: skip
-    line["whole/today"] = line["whole"] / line["today"]
-    line["whole/capped"] = line["whole"] / line["capped"]
-    if chosen.oracle:
-        best = oracle(run.terms, case.truth)
-        line |= {
-            "oracle": float(best.mean()),
-            "capped/oracle": float(capped.mean() / best.mean()),
-        }
-        line["single joints"] = np.round(capped / best, 2).tolist()
+    line = {"without": float(without.mean()), "whole": float(whole.mean())}
+    line["whole/without"] = line["whole"] / line["without"]
     line["applied"] = "".join(str(int(x)) for x in bias.applied)
     line["free"] = round(float(bias.free.mean()), 2)
     return line | (best_line(case) if chosen.best else {})
-
-
-def oracle(terms, truth) -> np.ndarray:
-    """The least error of each joint with one fixed natural frequency of the tuner's grid. (n,)"""
-    grid = natural_frequencies(float(np.median(np.diff(terms.t))))
-    tried = (kalman_smoother(np.full(truth.shape[1], omega)) for omega in grid)
-    return np.min([rmse(one.estimate(terms).tau, truth) for one in tried], axis=0)
 
 
 def best_line(case) -> dict[str, object]:
@@ -170,7 +126,7 @@ def steady_line(case) -> dict[str, object]:
     setup = Setup(gains=case.robot.gains, settings={}, joints=case.robot.joints,
                   step=case.recording.median_step, as_printed=False)  # fmt: skip
     (observer,), _ = build_observers(("kfo-rts",), setup)
-    taus = [observer.estimate(terms).tau for terms in (run.terms, bias.corrected(run.terms))]
+    taus = [observer.estimate(terms).tau for terms in (run.terms, bias.corrected(run).terms)]
     slopes = [float(np.sum(tau * case.truth) / np.sum(case.truth**2)) for tau in taus]
     errors = [float(rmse(tau, case.truth).mean()) for tau in taus]
     line = {"slope without": slopes[0], "slope": slopes[1], "change": abs(slopes[1] - slopes[0])}

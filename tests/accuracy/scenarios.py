@@ -1,15 +1,10 @@
 """Logs whose external torque is known, and what the harness needs to know of each.
 
-Real logs of a UR10e with planted pushes, cut into pieces too; the same under steady pushes; what
-the built-in scenarios simulate; and a log of a third simulator (Bullet), whose arm is identified.
+Real logs of a UR10e with planted pushes, cut into pieces too, and the same under steady pushes.
 """
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -20,24 +15,9 @@ from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
-from vftcli.simulation import load_scenario
-from vftcli.simulation.experiment import simulate
 
 UR10E = ("free_12harm.csv", "free_12harm_40s.csv.gz", "free_10harm.csv.gz")
 COLUMNS = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
-BULLET = "t=t,q=q{i},dq=dq{i},-tau=tau{i}"
-TRUTH = "t=t,q=q{i},dq=dq{i},-tau=tau{i},-tau_ext=tau_ext{i}"
-
-STICKS = ("friction.presliding=0",)
-"""The joints that the bars were set for."""
-
-SIMULATED = {
-    "circle": ("ur5-circle", (), None, (1, 2, 3, 4)),
-    "table1": ("ur5-table1", ("contacts.hand.force=[10,136]",), None, (1, 2, 3, 4)),
-    "drag": ("ur5-drag", (), "0:2", (1, 2, 3)),
-    "panda-bearing": ("panda-bearing", (), "0:4", (1, 2, 3)),
-}
-"""Name → the built-in scenario, its settings and free part if any are stated, and the seeds."""
 
 STEADY = (
     ((0, 0, -20), 0.0, None),
@@ -127,30 +107,3 @@ def torque_at_joint(force, recording, robot, joint):
         lever = poses.translation[:, joint] - poses.translation[:, j]
         torque[:, j] = np.sum(poses.rotation[:, j, :, 2] * np.cross(lever, force), axis=1)
     return torque
-
-
-def simulated_cases(name, more=STICKS) -> Iterator[Case]:
-    """A built-in scenario with several seeds; the estimators know the profile."""
-    scenario, settings, part, seeds = SIMULATED[name]
-    for seed in seeds:
-        run = simulate(load_scenario(scenario, [*settings, *more]), seed)
-        free = FreeChoice() if part is None else FreeChoice.parsed(free=[part])
-        recording = run.recording
-        truth = run.truth.tau_ext[np.unique(run.measured.rows)]
-        yield Case(name, str(seed), recording, run.nominal, free, truth)
-
-
-def bullet_cases(logs) -> Iterator[Case]:
-    """Bullet's file 7 with its two torques; the arm is identified from files 5 and 6."""
-    folder = logs / "bullet_ur5"
-    with TemporaryDirectory() as place:
-        robot = Path(place) / "arm.toml"
-        words = ["identify", *(str(folder / f"free_{k}.csv.gz") for k in (5, 6))]
-        words += ["--robot", "ur5", "--method", "base", "--columns", BULLET, "-o", str(robot)]
-        program = "from vftcli.cli import launch; launch()"
-        subprocess.run([sys.executable, "-c", program, *words], check=True, capture_output=True)
-        arm = load_robot(str(robot))
-    for kind in ("const", "vary"):
-        recording = read(folder / f"pushed_7_{kind}.csv.gz", TRUTH)
-        free = FreeChoice.parsed(free=["0:8"])
-        yield Case("bullet", kind, recording, arm, free, recording.tau_ext)
