@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.admittance.motion import Drag, Phases, drags_of, overshoot, releases_of, return_time
+from vftcli.admittance.motion import Drag, Phases, drags_of, overshoot, return_time
 
 PERIOD = 0.1
 T = np.arange(101) * PERIOD
@@ -24,14 +24,6 @@ def test_a_drag_lasts_to_the_next_one_or_the_end() -> None:
     (drag,) = drags_of(phases((10, 30), (39, 50)), PERIOD)  # .9 s apart: one
     assert (drag.begin, drag.release) == (10, 50)
     assert len(drags_of(phases((10, 30), (40, 50)), PERIOD)) == 2  # 1 s apart
-
-
-def test_a_release_is_a_drag_that_is_over() -> None:
-    found = releases_of(np.array([0.3, 0, 0, 0, -0.1, 0]), 50)
-    assert found == (
-        Drag(axis=0, number=1, begin=0, release=0, end=50),
-        Drag(axis=4, number=1, begin=0, release=0, end=50),
-    )
 
 
 RELEASE = Drag(axis=0, number=1, begin=0, release=20, end=101)

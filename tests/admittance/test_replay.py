@@ -124,6 +124,18 @@ def test_joints_follow_the_flange() -> None:
     assert np.max(np.abs(np.diff(found.path.q, axis=0))) < 0.1  # no branch is changed
 
 
+def test_the_arm_waits_where_it_cannot_follow() -> None:
+    x = np.zeros((30, 1, 6))
+    x[10:19, 0, 0] = 3.0  # out of reach for nine rows, and one that is nowhere
+    x[19] = np.nan
+    x[20:, 0, 1] = 0.01
+    path = follow(UR5, START, x, 0.008)
+    waits = np.r_[[False] * 10, [True] * 10, [False] * 10]
+    np.testing.assert_array_equal(path.reached[:, 0], ~waits)
+    np.testing.assert_array_equal(path.q[10:20, 0], np.tile(path.q[9, 0], (10, 1)))
+    assert not np.allclose(path.q[25, 0], START)
+
+
 def test_redundant_arm_stays_inside_its_limits() -> None:
     panda = load_robot("panda")
     q = np.array(panda.admittance["start"])
