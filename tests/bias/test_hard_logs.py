@@ -11,6 +11,8 @@ from known_errors import drawn_error, wrong_run
 
 from vftcli.doctor.examination import Examiner
 from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.spectra import Spectra
+from vftcli.observers.tuning import noise_level
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.robots import load_robot
 from vftcli.signals.recording import Recording
@@ -91,3 +93,16 @@ def test_an_hour_without_samples_costs_no_band(slow, panda):
     (best,) = analyse(run_of(replace(slow, t=t), panda, choice), choice).estimates
     assert np.isfinite(best.tau).all()
     assert np.isfinite(best.error_sd).all()
+
+
+def test_no_noise_in_the_loaded_part_still_leaves_a_filter():
+    """S_d as it comes out where impacts are extrapolated, below zero, and S_n of 1 (N·m)²/Hz."""
+    frequency = np.linspace(0.0, 16.0, 65)
+    quiet = np.ones((65, 2)) * [1.0, 0.0]
+    spectra = Spectra(frequency=frequency, free=quiet, loaded=-quiet, step=0.03, segments=(1, 1))
+    r = noise_level(np.array([1.0, 1.0]), spectra)
+    heard = noise_level(np.array([1.0, 1.0]), replace(spectra, loaded=quiet))
+    # a thousandth of the noise's size is a millionth of its variance
+    np.testing.assert_allclose(r[0], 1e-6 * heard[0], rtol=1e-12)
+    # R is the variance of a sample's momentum times Ts: that of 1e-6 N·m over .03 s
+    np.testing.assert_allclose(r[1], (1e-6 * 0.03) ** 2 * 0.03, rtol=1e-12)

@@ -11,11 +11,19 @@ from scipy.signal import lfilter
 import vftcli as vft
 from vftcli.bias.whole_log import whole_log_bias
 from vftcli.contacts import free_statistics as free_statistics_room
-from vftcli.contacts.free_statistics import free_part, free_statistics, observer_noise
+from vftcli.contacts.free_statistics import (
+    free_part,
+    free_statistics,
+    observer_noise,
+    torque_level,
+)
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.readers.reading import read
+from vftcli.robots import load_robot
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 
 LOG = read(FIXTURES / "ur5_circle.csv")
@@ -52,6 +60,22 @@ def test_cycles_of_which_none_was_recorded_are_no_free_part() -> None:
     keep = (t < 4.79) | (t > 8.79)
     kept = Recording(t=LOG.t[keep], **{k: LOG.require(k)[keep] for k in ("q", "dq", "current")})
     assert free_part(motion(kept, "ur5")) is None
+
+
+def test_the_level_is_that_of_the_free_samples_that_move() -> None:
+    """2 N·m while J1 moves, 9 at rest, 20 in the first .1 s, in which the observer settles.
+
+    Its gain of 30 1/s leaves 18 e^(−30 · .2) N·m of that after .3 s, .05.
+    """
+    t = 0.005 * np.arange(600)
+    moves = (t < 2.0)[:, None] * (np.arange(6) == 0)
+    torque = np.where(t[:, None] < 0.1, 20.0, np.where(moves, 2.0, 9.0))
+    log = Recording(t=t, q=np.zeros((600, 6)), dq=0.5 * moves, torque=0.0 * torque)
+    p = np.cumsum(0.005 * torque, axis=0)
+    run = Run(recording=log, robot=load_robot("ur5"))
+    run = run.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
+    level = torque_level([RunSamples(run, t < 2.8)])
+    np.testing.assert_allclose(level, np.array([2.0, 9.0, 9.0, 9.0, 9.0, 9.0]) / 1.96, rtol=0.02)
 
 
 def test_a_load_in_the_free_part_is_no_noise() -> None:
