@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance.joints import follow
+from vftcli.admittance.joints import follow, largest_speed
 from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.robots import load_robot
@@ -134,6 +134,17 @@ def test_the_arm_waits_where_it_cannot_follow() -> None:
     np.testing.assert_array_equal(path.reached[:, 0], ~waits)
     np.testing.assert_array_equal(path.q[10:20, 0], np.tile(path.q[9, 0], (10, 1)))
     assert not np.allclose(path.q[25, 0], START)
+
+
+def test_speed_is_a_share_of_the_limit_between_reached_samples() -> None:
+    q = np.zeros((4, 2, 6))
+    q[1:, 0, 2] = 0.02
+    q[2:, 0, 4] = 5.0  # a leap to a pose that is not reached
+    reached = np.array([[True, True], [True, True], [False, True], [False, True]])
+    share = largest_speed(UR5, q, reached, 0.01)
+    assert share[0] == pytest.approx(0.02 / 0.01 / UR5.limits.qd_max[2])
+    assert share[1] == 0.0
+    assert np.isnan(largest_speed(UR5, q, np.zeros((4, 2), dtype=bool), 0.01)).all()
 
 
 def test_redundant_arm_stays_inside_its_limits() -> None:
