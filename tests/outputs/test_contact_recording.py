@@ -24,7 +24,6 @@ from vftcli.signals.remarks import Where, caution
 
 def test_the_force_stands_in_its_band_above_the_spans(touched: Analysis) -> None:
     ((plot,), wrench) = plot_groups(touched)["Contacts"], touched.wrench
-    assert wrench is not None
     lines = {line.name: line.values[:, 0] for line in plot.series}
     size = np.linalg.norm(wrench.known[:, :3], axis=1)
     np.testing.assert_allclose(lines["|F|"], size, rtol=1e-12)
@@ -37,7 +36,6 @@ def test_the_force_stands_in_its_band_above_the_spans(touched: Analysis) -> None
         np.testing.assert_array_equal(np.isfinite(bar), (t >= start) & (t <= stop))
         assert np.nanmax(bar) < 0.0
     (peaks,) = (line for line in plot.series if line.x is not None)
-    assert peaks.x is not None
     assert peaks.x.tolist() == [1.2, 2.4]
     assert lines["peaks"].tolist() == [64.8, 64.8]
 
@@ -72,7 +70,6 @@ def test_the_log_says_when_how_hard_and_where() -> None:
 
 def test_the_touched_links_are_painted(touched: Analysis) -> None:
     """The flange moves with the last link."""
-    assert touched.contacts is not None
     found = painted_links(touched.contacts, 6)
     assert sorted(found) == [3, 5, 6]
     assert found[6] == {1.0: PLACES["wrist"], 1.5: ""}

@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 from contact_rows import contact, contact_list
 
-from vftcli.contacts.contact_list import SURE_NATS, CarriedLoad, Unexplained
+from vftcli.contacts.contact_list import (
+    OF_FORCES,
+    SURE_NATS,
+    CarriedLoad,
+    ContactList,
+    Unexplained,
+)
 from vftcli.outputs.contacts import (
     answer,
     contact_grid,
@@ -21,7 +27,6 @@ from vftcli.outputs.contacts import (
     hardest_rows,
     hardest_words,
     otherwise,
-    place_words,
     reason,
     stored_list,
     stored_record,
@@ -39,26 +44,22 @@ ROW = {"number", "start_s", "stop_s", "peak_s", "peak_force_N", "peak_force_band
 """And of a contact."""
 
 
+BARE = replace(contact(number=2, is_load=True), **dict.fromkeys(OF_FORCES))
+"""Of an arm whose joints tell no force."""
+
+
 def test_the_record_holds_what_scripts_rely_on() -> None:
-    record = jsonable(contacts_record(contact_list(contact())))
+    record = jsonable(contacts_record(contact_list(contact(), BARE)))
     assert set(record) >= KEYS
-    (row,) = record["contacts"]
+    row, bare = record["contacts"]
     assert set(row) >= ROW
+    assert bare["force_N"] is None
     assert row["force_N"] == [0.4, 51.9, -38.8]
     assert row["moment_Nm"] == [0.2, 0.1, 0.0]
     assert row["places"] == ["flange", 5, 6]
     assert row["vendor_force_N"] is None
     assert record["free_part"] == "free part: 0.3 to 4 s, as given"
     assert record["remarks"][0]["code"] == "arm-stopped-abruptly"
-
-
-def test_an_arm_without_a_wrench_has_no_newtons() -> None:
-    bare = contact(peak_force=None, peak_band=None, wrench=None, wrench_sd=None, mean_force=None,
-                   impulse=None, anywhere=None)  # fmt: skip
-    (row,) = jsonable(contacts_record(contact_list(bare)))["contacts"]
-    assert row["force_N"] is None
-    assert contact_grid([bare]).columns[2].heading == "joint torque [N·m]"
-    assert answer(contact_list(bare, smallest_force=None)) == "1 contact."
 
 
 def test_csv_has_a_row_a_contact_and_vectors_taken_apart() -> None:
@@ -84,17 +85,6 @@ def test_the_table_for_a_paper_has_units_and_bands() -> None:
     assert "force ON the robot" in lines[-2]
 
 
-def test_a_size_that_depends_on_the_place_is_a_range() -> None:
-    by_place = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
-    unknown = contact(remarks=(by_place,), anywhere=(20.0, 248.0))
-    assert answer(contact_list(unknown)) == (
-        "1 contact. Its size depends on where it touched, unknown: 20–248 N."
-    )
-    (row,) = contact_grid([unknown]).rows
-    assert row[2:4] == ["unknown", "20–248"]
-    assert "The hardest of known size" in answer(contact_list(unknown, contact(number=2)))
-
-
 def test_the_hardest_rows_are_in_the_order_of_time() -> None:
     many = [contact(number=k, start=float(k), peak_force=100.0 - k) for k in range(30, 0, -1)]
     assert [row.number for row in hardest_rows(many)] == list(range(1, 21))
@@ -103,55 +93,71 @@ def test_the_hardest_rows_are_in_the_order_of_time() -> None:
     assert [row.number for row in hardest_rows([wide, contact()], 1)] == [1]
 
 
-def test_the_answer_is_a_sentence() -> None:
-    found = contact_list(contact())
-    assert answer(found) == "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist."
-    assert answer(contact_list()) == "Nothing touched the arm, as far as this log shows."
-    load = contact(is_load=True, mean_force=np.array([0.0, 0.0, -27.0]), peak_force=27.0)
-    assert answer(contact_list(load)) == (
-        "A load, or a wrong payload, or a wrong model: 27 ± 7 N on average, down."
-    )
+LOAD = CarriedLoad(2.88, 0.09, "ur10e", None, (4.7, 50.5))
+BY_PLACE = contact(
+    remarks=(caution("size-goes-with-place", least_N=20.0, most_N=248.0),), anywhere=(20.0, 248.0)
+)
+WIDE = contact(number=2, peak_force=88.0, peak_band=170.0)
+"""A force within its band."""
+FELT = contact(peak_force=33.0, peak_band=7.0, peak=12.9)
+UNSURE = contact(peak_force=21.0, place_band=None, peak=3.04)
+NO_SIZE = contact(peak_force=None)
 
 
-def test_what_may_have_been_touched_is_never_called_untouched() -> None:
-    empty = contact_list(basis="whole log")
-    assert answer(empty) == "No contact stands out."
-    likely = replace(empty, candidates=(contact(peak_force=33.0, peak_band=7.0, peak=12.9),))
-    assert answer(likely).startswith(
-        "No contact stands out. Up to 40 N near 12.9 s this model cannot explain: name free motion "
-    )
-    # A press of 3 N on an arm that the model misses by 5 N·m: one candidate of any size.
-    hidden = replace(contact_list(), candidates=likely.candidates)
-    assert not hidden.tells_untouched
-    assert answer(hidden) == (
-        "No contact stands out. Up to 40 N near 12.9 s this model cannot explain: measure your "
-        "friction (vftcli identify)."
-    )
-    assert otherwise(hidden) == "Pushes below 6 N do not show. 1 candidate more: --all."
-    nothing = contact_list(basis="none", unexplained=Unexplained(22.1, 4, 3.2))
-    assert answer(nothing).startswith(
-        "Largest unexplained torque: 22 N·m on J4 at 3.2 s: a contact or a model error."
-    )
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (contact_list(contact()), "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist."),
+        (contact_list(), "Nothing touched the arm, as far as this log shows."),
+        (contact_list(contact(is_load=True, mean_force=np.array([0, 0, -27.0]), peak_force=27.0)),
+         "or a wrong model: 27 ± 7 N on average, down."),
+        (contact_list(contact(peak_force=3.0, peak_band=5.0, is_load=True)),
+         "or a wrong model: below 8 N on average."),
+        (contact_list(replace(BARE, is_load=False), smallest_force=None), "1 contact."),
+        (contact_list(BY_PLACE), "depends on where it touched, unknown: 20–248 N."),
+        (contact_list(BY_PLACE, contact(number=2)),
+         "The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."),
+        (contact_list(contact(), WIDE),
+         "2 contacts. The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."),
+        (contact_list(WIDE), "1 contact. How hard is unknown: below 258 N."),
+        (contact_list(contact(peak_band=30.0, where="cannot tell")), "s: 65 ± 30 N (weak)."),
+        # What may have been touched is never called untouched.
+        (contact_list(basis="whole log"), "No contact stands out."),
+        (contact_list(basis="whole log", candidates=(FELT,)),
+         "No contact stands out. Up to 40 N near 12.9 s this model cannot explain: name free "
+         "motion (--free) or measure your friction (vftcli identify)."),
+        # A press of 3 N on an arm that the model misses by 5 N·m: one candidate of any size.
+        (contact_list(candidates=(FELT,)),
+         "Up to 40 N near 12.9 s this model cannot explain: measure your friction (vftcli "
+         "identify)."),
+        (contact_list(candidates=(NO_SIZE,)), "No contact stands out."),
+        (contact_list(candidates=(NO_SIZE, UNSURE, contact(peak_force=5.0))),
+         "Up to 21 N near 3.0 s this model cannot explain: measure your friction (vftcli "
+         "identify)."),
+        (contact_list(false_on_free=2), "the free part, which itself shows 2: was nobody there?"),
+        (contact_list(basis="none", unexplained=Unexplained(22.1, 4, 3.2)),
+         "Largest unexplained torque: 22 N·m on J4 at 3.2 s: a contact or a model error. To list "
+         "contacts name free motion (--free) or give a robot with friction (vftcli identify)."),
+        # ± is a band of 95 %.
+        (contact_list(basis="whole log", load=LOAD),
+         "carries 2.88 ± 0.18 kg that ur10e does not know of (4.7–50.5 s). No contact stands out."),
+        (contact_list(load=LOAD._replace(payload="franka_hand")),
+         "50.5 s): franka_hand? Add --payload franka_hand. Nothing touched the arm, as far as this "
+         "log shows."),
+    ],
+)  # fmt: skip
+def test_the_answer_is_a_sentence(found: ContactList, words: str) -> None:
+    assert answer(found).endswith(words)
 
 
-def test_a_load_that_the_model_lacks_is_in_the_headline() -> None:
-    load = CarriedLoad(2.88, 0.09, "ur10e", None, (4.7, 50.5))
-    assert answer(contact_list(basis="whole log", load=load)) == (
-        "The arm carries 2.88 ± 0.09 kg that ur10e does not know of (4.7–50.5 s). "
-        "No contact stands out."
-    )
-    hand = answer(contact_list(load=load._replace(payload="franka_hand")))
-    assert "(4.7–50.5 s): franka_hand? Add --payload franka_hand." in hand
-
-
-def test_places_that_cannot_be_reported_apart_are_named() -> None:
-    def words_of(*links: int) -> str:
-        return place_words(contact(where="cannot tell", places=links))
-
-    assert words_of(2, 3, 6) == "link 2 … link 6"
-    assert words_of(0, 3, 6) == "link 3 … flange"
-    assert words_of(2) == "link 2"
-    assert place_words(contact()) == "wrist"
+def test_a_row_names_size_range_and_places() -> None:
+    rows = [contact(where="cannot tell", places=each) for each in ((2, 3, 6), (0, 3, 6), (2,))]
+    grid = contact_grid([BY_PLACE, *rows])
+    assert grid.rows[0][2:4] == ["unknown", "20–248"]
+    places = [row[-2].text for row in grid.cells]
+    assert places == ["wrist", "link 2 … link 6", "link 3 … flange", "link 2"]
+    assert contact_grid([BARE]).columns[2].heading == "joint torque [N·m]"
+    assert hardest_words(contact_list(WIDE)) == "unknown (88 ± 170 N at 4.7 s)"
 
 
 @pytest.mark.parametrize(
@@ -171,19 +177,6 @@ def test_a_direction_names_every_axis_that_holds_much(
 ) -> None:
     """More than .35 of the force: 0.35² is an eighth of its square."""
     assert direction(np.array(force)) == words
-
-
-def test_the_answer_is_no_force_within_its_band() -> None:
-    wide = contact(number=2, peak_force=88.0, peak_band=170.0)
-    assert answer(contact_list(contact(), wide)) == (
-        "2 contacts. The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."
-    )
-    assert answer(contact_list(wide)) == ("1 contact. How hard is unknown: below 258 N.")
-    assert hardest_words(contact_list(wide)) == "unknown (88 ± 170 N at 4.7 s)"
-    load = contact(peak_force=3.0, peak_band=5.0, is_load=True)
-    assert answer(contact_list(load)).endswith("or a wrong model: below 8 N on average.")
-    weak = contact(peak_band=30.0, where="cannot tell")
-    assert answer(contact_list(weak)) == "1 contact. The hardest, at 4.7 s: 65 ± 30 N (weak)."
 
 
 def test_trust_says_why() -> None:
@@ -220,33 +213,20 @@ def test_trust_says_why() -> None:
         ({"smallest_force": np.nan}, ""),
         ({"smallest_force": np.inf},
          "A push along one axis may go unseen: the pose hardly shows it."),
-        ({"basis": "whole log"}, "Pushes below 6 N do not show."),
         ({"basis": "whole log", "contacts": (contact(),)}, "Pushes below 6 N do not show."),
-        ({"candidates": (contact(), contact(number=2))},
+        ({"candidates": (contact(),)}, "Pushes below 6 N do not show. 1 candidate more: --all."),
+        ({"candidates": (contact(), contact(number=2)), "basis": "friction"},
          "Pushes below 6 N do not show. 2 candidates more: --all."),
+        ({"smallest_force": 3473.0},
+         "A push along one axis may go unseen: the pose hardly shows it."),
     ],
 )  # fmt: skip
 def test_what_can_be_said_of_the_rest(changed: dict[str, object], words: str) -> None:
     assert otherwise(contact_list(**changed)) == words
 
 
-def test_a_log_without_contacts_says_what_its_free_part_and_candidates_allow() -> None:
-    assert answer(contact_list(false_on_free=2)) == (
-        "No contact stands out from the free part, which itself shows 2: was nobody there?"
-    )
-    weak = contact(peak_force=21.0, place_band=None, peak=3.04)
-    unknown = contact(peak_force=None)
-    assert answer(contact_list(candidates=(unknown,))) == "No contact stands out."
-    assert answer(contact_list(candidates=(unknown, weak, contact(peak_force=5.0)))) == (
-        "No contact stands out. Up to 21 N near 3.0 s this model cannot explain: measure your "
-        "friction (vftcli identify)."
-    )
-
-
 def test_a_list_survives_its_record() -> None:
-    bare = contact(number=2, peak_force=None, peak_band=None, wrench=None, wrench_sd=None,
-                   mean_force=None, impulse=None, anywhere=None, is_load=True)  # fmt: skip
-    record = json.loads(to_json(contacts_record(contact_list(contact(), bare, free=()))))
+    record = json.loads(to_json(contacts_record(contact_list(contact(), BARE, free=()))))
     assert json.loads(to_json(contacts_record(stored_list(record)))) == record
 
 

@@ -22,7 +22,7 @@ from vftcli.outputs.error_tables import (
     nothing_to_compare,
     rmse_grid,
 )
-from vftcli.outputs.grid import GridCell, latex, markdown, terminal
+from vftcli.outputs.grid import latex, markdown, terminal
 from vftcli.outputs.grids import contact_grids, drift_grid, pairs_text
 from vftcli.outputs.page.shell import part
 from vftcli.signals.wrench import AXES
@@ -90,7 +90,6 @@ def test_at_the_floor_is_within_a_fifth_of_it() -> None:
     assert block.title == "run.csv against two-cycle, 100 to 103 samples"
     grid = rmse_grid(block)
     first = grid.rows[0][1]
-    assert isinstance(first, GridCell)
     assert first.mark == "*"
     assert grid.rows[-1][0] == "floor"
     assert grid.summaries == 1

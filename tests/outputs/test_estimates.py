@@ -68,7 +68,6 @@ def test_an_extra_is_one_more_file_of_its_format(
 
 
 def test_every_sample_says_which_contact_it_lies_in(analysis: Analysis) -> None:
-    assert analysis.contacts is not None
     table = estimates_table(analysis)
     t, number = table["t"].to_numpy(), table["contact"]
     for contact in analysis.contacts.contacts:
@@ -81,8 +80,6 @@ def test_every_sample_says_which_contact_it_lies_in(analysis: Analysis) -> None:
 def test_what_the_pose_hides_is_apart(analysis: Analysis) -> None:
     """By plain least squares nothing is: it would be anything."""
     sensed, reference, count = analysis.virtual_sensor, analysis.reference, len(analysis.t)
-    assert sensed is not None
-    assert reference is not None
     rising, first = np.arange(float(count)), np.arange(count) < 5
     sd = np.tile(rising[:, None], 6)
     wrench = replace(sensed.wrenches[0], masked=first, null_space=rising, sigma_min=2.0 * rising)

@@ -80,7 +80,6 @@ def test_forces_stand_above_moments_or_beside_them(pushed: Analysis) -> None:
 
 
 def test_the_force_has_its_band_and_the_number_of_each_contact(touched: Analysis) -> None:
-    assert touched.contacts is not None
     course = ForceCourse(np.array([1.0, 1.2, 1.5]), np.array([5.0, 65.0, 8.0]), np.full(3, 7.0))
     first, *others = touched.contacts
     found = replace(touched.contacts, contacts=(replace(first, course=course), *others))
@@ -103,7 +102,6 @@ def test_a_log_without_wrench_and_errors_has_no_figures_of_them(
 
 def test_errors_are_drawn_as_the_table_has_them(pushed: Analysis) -> None:
     errors = pushed.errors
-    assert errors is not None
     (axes,) = drawn(error_figures(errors)["errors"]).axes
     rows = errors.filter((pl.col("observer") == "fdo") & pl.col("joint").is_not_null())
     order = list(dict.fromkeys(errors["observer"].drop_nulls()))
@@ -123,7 +121,6 @@ def test_errors_of_chosen_joints_and_observers_alone_are_plotted(
 
 
 def test_of_many_logs_only_what_stands_for_all_is_drawn(pushed: Analysis) -> None:
-    assert pushed.errors is not None
     rows = pushed.errors.filter(pl.col("joint").is_not_null())
     many = [rows.with_columns(recording=pl.lit(f"{k}.csv")) for k in range(MOST + 1)]
     assert error_figures(pl.concat(many)) == {}

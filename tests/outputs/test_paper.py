@@ -62,7 +62,6 @@ def test_a_pdf_has_the_widths_of_the_ieee_and_its_fonts_embedded_as_truetype(
     found = written(tmp_path, "pdf")
     for name, points in (("a-single.pdf", 252.0), ("a-double.pdf", 515.52)):
         box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", found[name])
-        assert box is not None
         assert float(box[1]) == pytest.approx(points)
         fonts = re.findall(rb"/BaseFont /(\S+)", found[name])
         assert fonts

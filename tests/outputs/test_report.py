@@ -51,7 +51,6 @@ def test_the_list_of_contacts_is_written_as_it_is_printed(
 @pytest.mark.slow
 def test_the_table_of_contacts_is_beside_the_figures(touched: Analysis, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
-    assert touched.contacts is not None
     empty = replace(touched, contacts=replace(touched.contacts, contacts=()))
     for name, analysis in (("some", touched), ("none", empty)):
         write_report(tmp_path / name, [analysis], command="", form="svg")
@@ -70,7 +69,6 @@ def test_a_report_writes_an_mcap_on_request(touched: Analysis, tmp_path: Path) -
 def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:
     """The same run under another label, as a second log of the command would have one."""
     source = replace(analysis.recording.source, label=label)
-    assert analysis.errors is not None
     errors = analysis.errors.with_columns(recording=pl.lit(label))
     recording = replace(analysis.recording, source=source)
     return replace(as_if(analysis, recording), errors=errors)

@@ -118,7 +118,6 @@ def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> N
     names = ["|F|", "95 % upper", "95 % lower", "smallest that is listed", "touched: wrist",
              "touched: forearm", "peaks"]  # fmt: skip
     assert list(lines) == names
-    assert best.size_sd is not None
     np.testing.assert_array_equal(lines["|F|"], best.size)
     np.testing.assert_array_equal(tabs["Wrench"][4].series[0].values[:, 0], best.known[:, 4])
     np.testing.assert_array_equal(lines["95 % upper"], best.size + NORMAL_95 * best.size_sd)
@@ -130,7 +129,6 @@ def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> N
         expected = np.where(inside, level, np.nan)
         np.testing.assert_allclose(lines[f"touched: {where}"], expected, rtol=1e-15)
     peaks = force.series[-1]
-    assert peaks.x is not None
     assert (peaks.x.tolist(), lines["peaks"].tolist()) == ([1.2, 2.4], [64.8, 64.8])
 
 
@@ -159,7 +157,6 @@ def test_the_summary_says_what_the_log_is_and_what_the_arrow_means(
 
 def test_torques_read_back(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
     values = np.array([v for v in column(rows, "/tau_ext/J2", "Scalars:scalars") if v])
-    assert analysis.reference is not None
     best, *others = (e.tau[:, 1] for e in analysis.estimates)
     expected = [analysis.reference.tau[:, 1], *others, best]
     np.testing.assert_array_equal(values[:, : len(expected)], np.column_stack(expected))
@@ -230,8 +227,6 @@ def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
     rows = np.searchsorted(analysis.t, poses.t)
     arrow = force_arrow(analysis, poses, rows)
     reading = analysis.virtual_sensor
-    assert arrow is not None
-    assert reading is not None
     pose = frame_pose(frame, reading.sensor.mounting)
     flange = link_poses(analysis.robot.chain, poses.q)
     turn = np.eye(3) if frame == "base" else flange.rotation[:, -1] @ pose.rotation
@@ -254,7 +249,6 @@ def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_beg
     monkeypatch.setattr("vftcli.outputs.rerun_recording.AROUND", 0.2)
     monkeypatch.setattr("vftcli.outputs.rerun_recording.WHOLE_TIME", 0.4)
     t, found = analysis.t, analysis.contacts
-    assert found is not None
     strongest = max(found.contacts, key=lambda contact: contact.peak_force or 0.0)
     near = t[np.abs(t - strongest.start) <= 0.2]
     whole = {plot.key: plot for tab in tabs_of(analysis, FULL) for plot in tab.plots}

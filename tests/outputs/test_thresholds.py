@@ -45,8 +45,6 @@ def made(joints: int = 7, *, own: bool = True, axes: int = 6) -> Thresholds:
 def test_libfranka_gets_contacts_at_the_threshold_and_collisions_at_its_upper_end() -> None:
     text = calls(made())["libfranka"]
     call = ast.parse(text).body[0]
-    assert isinstance(call, ast.Expr)
-    assert isinstance(call.value, ast.Call)
     lists = [ast.literal_eval(argument) for argument in call.value.args]
     # Rounded up to hundredths.
     assert lists == [

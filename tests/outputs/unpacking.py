@@ -4,6 +4,7 @@ import base64
 import json
 import re
 import zlib
+from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ import numpy as np
 def page_data(html: str) -> dict[str, Any]:
     """The data that stand in a page."""
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', html, re.S)
-    assert found is not None
     return json.loads(found[1])
 
 
@@ -39,7 +39,34 @@ def clock_of(data: dict[str, Any], rows: list[np.ndarray], number: int = 0) -> n
     return np.cumsum(rows[low] + rows[high])
 
 
-def line_of(data: dict[str, Any], chart: str, name: str) -> dict[str, Any]:
-    """A line of a chart."""
-    (found,) = (c for c in data["charts"] if c["key"] == chart)
-    return next(line for line in found["lines"] if line["name"] == name)
+class Page(HTMLParser):
+    """Collects elements, their attributes and the page's words."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        self.part(tag)
+        if tag not in {"meta", "br", "link", "img", "input"}:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+        self.part(tag)
+
+    def part(self, tag: str) -> None:
+        """A span goes on in a word, every other element begins or ends one."""
+        self.words.append("" if tag == "span" else " ")
+
+    def handle_data(self, data: str) -> None:
+        if not self.open or self.open[-1] not in {"script", "style"}:
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join("".join(self.words).split())

@@ -43,7 +43,6 @@ def test_the_page_shows_every_part(release: Replay) -> None:
     # An option is in an element of its own, which no line breaks.
     assert "vftcli admit --release x=0.1" in re.sub("</?span[^>]*>", "", page)
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
-    assert data is not None
     assert json.loads(data.group(1))["charts"][0]["panels"] == ["x", "y", "z", "rx", "ry", "rz"]
 
 

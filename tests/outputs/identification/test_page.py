@@ -47,7 +47,6 @@ def test_the_page_is_whole_and_loads_nothing(found):
     assert not re.search(r"(src|href)\s*=\s*[\"']?https?:", page)
     assert page.count("<title>Residual over velocity, J") == 6
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
-    assert data is not None
     assert len(json.loads(data.group(1))["charts"][0]["panels"]) == 6
     for heading in ("How much torque is left unexplained", "Residual over velocity"):
         assert f"<h2>{heading}</h2>" in page

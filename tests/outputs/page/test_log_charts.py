@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import OF_FORCES
 from vftcli.outputs.charts import REFERENCE
 from vftcli.outputs.page.log_charts import (
     LOWEST,
@@ -25,14 +24,12 @@ def test_the_best_is_drawn_at_once_the_others_on_demand(analysis: Analysis) -> N
     assert [line.name for line in chart.series if line.shown] == ["reference (vendor)", "best"]
     assert len({line.dash for line in chart.series[1:]}) == 5  # none differs by its colour alone
     assert chart.series[0].colour == REFERENCE
-    assert chart.band is not None
     assert chart.band.tolist() == [0.5] * 6
     np.testing.assert_array_equal(chart.series[2].values, analysis.estimates[2].tau)
     assert chart.panels == tuple(f"J{j}" for j in range(1, 7))
 
 
 def test_a_reference_at_rest_is_another_line(analysis: Analysis) -> None:
-    assert analysis.reference is not None
     moving = np.ones((len(analysis.t), 6), dtype=bool)
     moving[100:200, 2] = False
     partly = replace(analysis, reference=replace(analysis.reference, moving=moving))
@@ -69,7 +66,6 @@ def test_without_wrenches_there_is_no_section(without_reference: Analysis) -> No
 
 def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
     chart = wrench_chart(with_wrench)
-    assert chart is not None
     assert chart.panels == ("fx", "fy", "fz", "mx", "my", "mz")
     assert chart.units == ("N",) * 3 + ("N·m",) * 3
     assert chart.ends(0) == chart.ends(2) != chart.ends(3) == chart.ends(5)
@@ -85,14 +81,11 @@ def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
 
 def test_the_force_is_that_of_the_contacts_and_has_their_peaks(pushed: Analysis) -> None:
     found = pushed.contacts
-    assert found is not None
     chart = force_chart(pushed, found)
-    assert chart is not None
     (line,) = chart.series
     force, t = line.values[:, 0], pushed.t
     inside = np.zeros(len(t), dtype=bool)
     for c in found.contacts:
-        assert c.course is not None
         own = (t >= c.course.t[0]) & (t <= c.course.t[-1])
         inside |= own
         assert force[np.argmin(np.abs(t - c.peak))] == c.peak_force
@@ -105,7 +98,6 @@ def test_the_force_is_that_of_the_contacts_and_has_their_peaks(pushed: Analysis)
 
 def test_the_axis_of_the_force_holds_every_peak_with_its_band(pushed: Analysis) -> None:
     found = pushed.contacts
-    assert found is not None
     tops = [(c.peak_force or 0.0) + (c.peak_band or 0.0) for c in found.contacts]
     assert highest(found) > max(tops)
     assert highest(replace(found, contacts=())) == 2.5 * (found.detectable_force or 0.0)
@@ -114,22 +106,18 @@ def test_the_axis_of_the_force_holds_every_peak_with_its_band(pushed: Analysis) 
     wide = replace(found.contacts[0], peak_force=88.0, peak_band=900.0)
     assert highest(replace(found, contacts=(wide,))) < 250.0
     chart = force_chart(pushed, found)
-    assert chart is not None
     assert chart.ends(0) == (0.0, highest(found))
 
 
 def test_all_of_a_loads_force_is_in_its_chart_which_begins_at_zero(pushed: Analysis) -> None:
     """Its size is a mean of 20 N: what was felt, up to 32 ± 6 N, is in the chart all the same."""
     found = pushed.contacts
-    assert found is not None
     first = found.contacts[0]
-    assert first.course is not None
     load = replace(first, is_load=True, peak_force=20.0, peak_band=2.0, stop=first.course.t[-1])
     size = 26.0 + 6.0 * np.sin(9.0 * first.course.t)
     course = first.course._replace(force=size, band=np.full(len(size), 6.0))
     only = replace(found, contacts=(replace(load, course=course),))
     chart = force_chart(pushed, only)
-    assert chart is not None
     low, high = chart.ends(0)
     assert low == 0.0
     assert high >= size.max() + 6.0
@@ -140,13 +128,10 @@ def test_all_of_a_loads_force_is_in_its_chart_which_begins_at_zero(pushed: Analy
 def test_the_force_stands_before_the_logs_own_wrench(pushed: Analysis, as_if: Callable) -> None:
     wrench = np.zeros((len(pushed.t), 6))
     wrench[:, 1:3] = 30.0, -40.0
-    assert pushed.contacts is not None
     silent, felt = (
         as_if(pushed, replace(pushed.recording, wrench=w)) for w in (0 * wrench, wrench)
     )
     chart, bare = force_chart(felt, pushed.contacts), force_chart(silent, pushed.contacts)
-    assert chart is not None
-    assert bare is not None
     own, best = chart.series
     assert (own.colour, best.name) == (REFERENCE, "best")
     np.testing.assert_allclose(own.values, 50.0)
@@ -154,23 +139,10 @@ def test_the_force_stands_before_the_logs_own_wrench(pushed: Analysis, as_if: Ca
     assert "the log&#x27;s own wrench" in render(felt)
 
 
-def test_without_a_force_there_is_no_chart_of_it(pushed: Analysis) -> None:
-    assert pushed.contacts is not None
-    unfelt = [replace(c, **dict.fromkeys(OF_FORCES)) for c in pushed.contacts.contacts]
-    bare = replace(pushed.contacts, contacts=tuple(unfelt), smallest_force=None)
-    assert force_chart(pushed, bare) is None
-    html = render(replace(pushed, contacts=bare))
-    assert 'id="force"' not in html
-    assert 'id="contact-12"' in html
-
-
 def test_the_band_is_grey_where_no_contact_is_listed(pushed: Analysis) -> None:
     """The twelve pushes of the circle and their edges of a block; a wrench without a list: none."""
     chart = wrench_chart(pushed)
-    assert chart is not None
     (line,) = chart.series
-    assert pushed.contacts is not None
-    assert line.quiet is not None
     t, inside = pushed.t, np.zeros(len(pushed.t), dtype=bool)
     for row in pushed.contacts.contacts:
         inside |= (t > row.start) & (t < row.stop)

@@ -76,7 +76,6 @@ def test_the_worst_comes_first(pushed: Analysis) -> None:
 
 
 def test_the_headline_counts_logs(pushed: Analysis) -> None:
-    assert pushed.contacts is not None
     quiet = replace(pushed, contacts=replace(pushed.contacts, contacts=()))
     load = replace(pushed.contacts.contacts[0], is_load=True)
     loaded = replace(pushed, contacts=replace(pushed.contacts, contacts=(load,)))

@@ -24,7 +24,6 @@ from vftcli.robots.chain import link_poses
 
 
 def listed(analysis: Analysis) -> ContactList:
-    assert analysis.contacts is not None
     return analysis.contacts
 
 
@@ -66,12 +65,10 @@ def test_an_arm_that_stands_upright_or_knows_no_pose_has_a_view(pushed: Analysis
 
 def test_an_arrow_ends_where_the_force_acts(pushed: Analysis) -> None:
     view, hardest = view_of(pushed), listed(pushed).hardest
-    assert hardest is not None
     tail, tip = arrow_of(pushed, hardest, view.reach)
     at = int(np.argmin(np.abs(pushed.t - hardest.peak)))
     poses = link_poses(pushed.robot.chain, pushed.recording.q[at : at + 1]).translation[0]
     np.testing.assert_allclose(tip, poses[-1], atol=2e-3)  # the peak is between two samples
-    assert hardest.wrench is not None
     along = hardest.wrench[:3] / np.linalg.norm(hardest.wrench[:3])
     np.testing.assert_allclose(tip - tail, sum(SHARES) * view.reach * along, rtol=1e-9)
     link = replace(hardest, places=(2, 3))
