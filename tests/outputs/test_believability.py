@@ -1,7 +1,9 @@
 """What supports an answer and what limits it: from the analysis' data, each with its remedy."""
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -9,16 +11,29 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import Contact
 from vftcli.doctor.examination import in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.free_motion.free_motion import FreeRun
-from vftcli.outputs.believability import Ground, grounds, headline, health, joint_words, resting
-from vftcli.outputs.contacts import otherwise
+from vftcli.outputs.believability import (
+    SUBJECTS,
+    Ground,
+    grounds,
+    headline,
+    health,
+    remedy_of,
+    resting,
+    subject_of,
+)
+from vftcli.outputs.examination import command
 from vftcli.outputs.screen import facts
+from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+from vftcli.signals.remarks import words as words_of
 
 
 def of(analysis: Analysis, subject: str) -> list[Ground]:
@@ -77,62 +92,53 @@ def test_a_load_nobody_reported_is_first_with_its_command_which_is_given_once(
     assert (row.standing, row.remedy) == ("bad", None)
 
 
+def listed(*rows: Contact, **changed: object) -> dict[str, object]:
+    return {"contacts": contact_list(*rows, **{"remarks": (), **changed})}
+
+
+TOUCHED = warning(
+    "reference-zero-touched", Where(joints=(6,), span=(8.5, 8.7)), torque_Nm=7.0, quiet_Nm=0.8,
+    spans=2, begin_s=8.7, end_s=18.6,
+)  # fmt: skip
+ZERO = ExternalTorque(name="zero", t=np.arange(600.0), tau=np.zeros((600, 6)), remarks=(TOUCHED,))
+OTHER = warning("other-robot", own="ur5 30 %", best="ur5e 1 %", robot="ur5e")
+COLD = fact(
+    "no-temperature", robot="ur5", reference_C=35.0, least_percent=20.0, most_percent=24.0
+)
+UNTOLD = {"contacts": None, "remarks": (caution("contacts-not-listed", reason="no samples"),)}
+OF_VENDOR = listed(contact(vendor_force=61.2), contact(vendor_force=None))
+
+
 @pytest.mark.parametrize(
-    ("finding", "subject", "standing", "remedy"),
+    ("changed", "subject", "standing", "words", "remedy"),
     [
-        (warning("other-robot", own="ur5 30 %", best="ur5e 1 %", robot="ur5e"), "robot", "bad",
-         "--robot ur5e"),
-        (fact("no-temperature", robot="ur5", reference_C=35.0, least_percent=20.0,
-              most_percent=24.0), "temperature", "caution", ""),
+        ({"findings": OTHER}, "robot", "bad", "", "--robot ur5e"),
+        ({"findings": COLD}, "temperature", "caution", "", ""),
+        (listed(contact()), "free motion", "good", "0 contacts listed in its 4 s", ""),
+        (listed(false_on_free=1), "free motion", "caution", "1 contact listed in its 4 s", ""),
+        (listed(basis="friction", free=()), "free motion", "caution", "none is given: pushes",
+         "--free free.csv"),
+        (listed(basis="none", free=()), "free motion", "unknown", "no contact is listed",
+         "--free free.csv"),
+        ({"reference": ZERO}, "reference", "caution", "looks touched", ""),
+        ({}, "friction", "caution", "", "vftcli identify free.csv --robot ur5 -o my_ur5.toml"),
+        ({"contacts": contact_list(contact())}, "stop", "caution", "", ""),
+        (UNTOLD, "contacts", "unknown", "", ""),
+        (listed(contact()), "no reference", "unknown", "", ""),
+        (OF_VENDOR, "vendor", "unknown", "61, – N at the peaks", "--reference vendor --robot ur5"),
     ],
 )  # fmt: skip
-def test_a_finding_has_its_subject_and_remedy(
-    without_reference: Analysis, finding: Remark, subject: str, standing: str, remedy: str
-) -> None:
-    (ground,) = of(examined(without_reference, finding), subject)
-    assert ground.standing == standing
-    assert (ground.remedy or "").endswith(remedy)
-
-
-@pytest.mark.parametrize(
-    ("changed", "standing", "words", "remedy"),
-    [
-        ({"false_on_free": 0}, "good", "0 contacts listed in its 4 s", ""),
-        ({"false_on_free": 1}, "caution", "1 contact listed in its 4 s", ""),
-        (
-            {"basis": "friction", "free": ()},
-            "caution",
-            "none is given: pushes",
-            "--free free.csv",
-        ),
-        ({"basis": "none", "free": ()}, "unknown", "no contact is listed", "--free free.csv"),
-    ],
-)
-def test_free_motion_counts_its_false_rows_or_is_asked_for(
-    without_reference: Analysis,
-    changed: dict[str, object],
-    standing: str,
-    words: str,
+def test_a_ground_has_its_subject_its_words_and_its_remedy(
+    without_reference: Analysis, changed: dict[str, Any], subject: str, standing: str, words: str,
     remedy: str,
-) -> None:
-    found = contact_list(contact(), remarks=(), **changed)
-    (ground,) = of(replace(without_reference, contacts=found), "free motion")
+) -> None:  # fmt: skip
+    findings = [value for key, value in changed.items() if key == "findings"]
+    rest = {key: value for key, value in changed.items() if key != "findings"}
+    made = examined(without_reference, *findings) if findings else without_reference
+    (ground,) = of(replace(made, **rest), subject)
     assert ground.standing == standing
     assert words in ground.sentence
     assert (ground.remedy or "").endswith(remedy)
-
-
-def test_a_reference_that_a_warning_speaks_against_is_a_caution(
-    without_reference: Analysis,
-) -> None:
-    t, q = without_reference.recording.t, without_reference.recording.q
-    where = Where(joints=(6,), span=(8.5, 8.7))
-    values = {"torque_Nm": 7.0, "quiet_Nm": 0.8, "spans": 2, "begin_s": 8.7, "end_s": 18.6}
-    touched = warning("reference-zero-touched", where, **values)
-    reference = ExternalTorque(name="zero", t=t, tau=np.zeros(q.shape), remarks=(touched,))
-    (ground,) = of(replace(without_reference, reference=reference), "reference")
-    assert ground.standing == "caution"
-    assert "looks touched" in ground.sentence
 
 
 def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> None:
@@ -146,25 +152,26 @@ def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> Non
         replace(made, examinations=()),
     ):
         assert "weight" not in headline(other)
+    assert "no contacts are listed" in headline(replace(made, contacts=None))
 
 
-def test_the_clock_tells_gaps_and_repairs(without_reference: Analysis) -> None:
+def test_the_clock_tells_gaps_and_repairs(without_reference: Analysis, as_if) -> None:
     """The fixture's log has one gap of .4 s at 3.2 s and one odd and one mended signal."""
     (ground,) = of(without_reference, "clock")
     assert ground.standing == "caution"
     assert ground.sentence.startswith("1 gap, the longest 0.41 s at 3.2 s; left out look & feel")
     assert ground.sentence.endswith("and 1 more")
-
-
-def test_a_sound_clock_says_how_sound(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
-    recording = without_reference.recording
-    source = replace(recording.source, remarks=())
-    sound = replace(recording, t=0.008 * np.arange(600.0), source=source)
-    (ground,) = of(as_if(without_reference, sound), "clock")
+    (ground,) = of(as_if(without_reference, sound(without_reference)), "clock")
     assert (ground.standing, ground.sentence) == ("good", "no gap above 8 ms, nothing repaired")
 
 
-def test_a_joint_at_rest_hides_its_dry_friction(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
+def sound(analysis: Analysis) -> Recording:
+    """The log without its gap and its remarks."""
+    log = analysis.recording
+    return replace(log, t=0.008 * np.arange(600.0), source=replace(log.source, remarks=()))
+
+
+def test_a_joint_at_rest_hides_its_dry_friction(without_reference: Analysis, as_if) -> None:
     recording = without_reference.recording
     dq = np.array(recording.require("dq"))
     dq[:, 4] = 0.0
@@ -177,14 +184,6 @@ def test_a_joint_at_rest_hides_its_dry_friction(without_reference: Analysis, as_
     assert len(of(still, "the arm is still")) == 1
 
 
-def test_friction_of_a_profile_names_the_command_for_ones_own(
-    without_reference: Analysis,
-) -> None:
-    (ground,) = of(without_reference, "friction")
-    assert ground.standing == "caution"
-    assert ground.remedy == "vftcli identify free.csv --robot ur5 -o my_ur5.toml"
-
-
 def test_friction_is_measured_from_the_free_log_with_its_columns(
     without_reference: Analysis,
 ) -> None:
@@ -195,32 +194,6 @@ def test_friction_is_measured_from_the_free_log_with_its_columns(
     (ground,) = of(replace(without_reference, motion=motion), "friction")
     typed = "vftcli identify f.csv --columns=t,q:6 --robot ur5 -o my_ur5.toml"
     assert ground.remedy == typed
-
-
-def test_what_limits_the_list_is_reported_with_its_subject(without_reference: Analysis) -> None:
-    (stop,) = of(replace(without_reference, contacts=contact_list(contact())), "stop")
-    assert stop.standing == "caution"
-    reason = caution("contacts-not-listed", reason="no samples")
-    untold = replace(without_reference, contacts=None, remarks=(reason,))
-    (ground,) = of(untold, "contacts")
-    assert ground.standing == "unknown"
-
-
-def test_what_measures_the_force(analysis: Analysis, without_reference: Analysis) -> None:
-    (reference,) = of(analysis, "reference")
-    assert reference.sentence == "vendor, its own error 0.5 N·m a joint"
-    t = without_reference.t
-    bare = ExternalTorque(name="sensor", t=t, tau=np.zeros((len(t), 6)))
-    (floorless,) = of(replace(without_reference, reference=bare), "reference")
-    assert floorless.sentence == "sensor"
-    without = replace(without_reference, contacts=contact_list(contact()))
-    (none,) = of(without, "no reference")
-    assert none.standing == "unknown"
-    vendor = contact_list(contact(vendor_force=61.2), contact(vendor_force=None))
-    (own,) = of(replace(without_reference, contacts=vendor), "vendor")
-    assert "61, – N at the peaks" in own.sentence
-    assert own.standing == "unknown"
-    assert "--reference vendor" in own.remedy
 
 
 @pytest.mark.parametrize(
@@ -242,7 +215,7 @@ def test_a_row_that_misses_the_sensor_by_more_than_its_band_is_a_caution(
     made = replace(without_reference, contacts=listed)
     (ground,) = of(made, "force sensor")
     assert (ground.standing, ground.of_log) == (standing, standing == "caution")
-    off = f"{abs(64.8 - row['sensor_force']):.1f}"  # type: ignore[operator]
+    off = f"{abs(64.8 - row['sensor_force']):.1f}"
     words = f"; off by more than the band: row 2 by {off} N" if standing == "caution" else ""
     reading = f"{row['sensor_force']:.0f}"
     assert ground.sentence == f"the log's own sensor reads 64, {reading} N at the peaks{words}"
@@ -256,15 +229,14 @@ def test_few_rows_that_miss_the_sensor_are_named(without_reference: Analysis) ->
 
 def test_a_check_and_a_caution_do_not_share_their_name(
     without_reference: Analysis, as_if
-) -> None:  # type: ignore[no-untyped-def]
+) -> None:
     """The joints that a free part leaves still, and stamps that repeat between sound ones."""
     found = contact_list(
         contact(), remarks=(caution("free-part-misses-joints", Where(joints=(5,))),)
     )
-    log = without_reference.recording
-    sound = replace(log, t=0.008 * np.arange(600.0), source=replace(log.source, remarks=()))
     odd = warning("repeated-stamps", repeats=3, rows=603, share_percent=0.5)
-    made = replace(examined(as_if(without_reference, sound), odd), contacts=found)
+    made = as_if(without_reference, sound(without_reference))
+    made = replace(examined(made, odd), contacts=found)
     names = {
         side: {ground.subject for ground in grounds(made) if (ground.standing == "good") == side}
         for side in (True, False)
@@ -281,40 +253,71 @@ def test_the_references_error_is_the_mean_that_the_table_prints(analysis: Analys
         reference_trusted=~rests,
         reference_floor_Nm=pl.when(rests).then(5.0).otherwise(pl.col("reference_floor_Nm")),
     )
-    (ground,) = of(replace(analysis, errors=errors), "reference")
-    assert ground.sentence == "vendor without J5, its own error 0.5 N·m a joint"
-
-
-def test_the_rest_of_the_log(without_reference: Analysis) -> None:
-    assert otherwise(contact_list(contact())).startswith("Nothing else above 6 N.")
-    inferred = contact_list(contact(), basis="friction", smallest_force=29.7)
-    assert otherwise(inferred) == "Pushes below 30 N do not show."
-    more = replace(inferred, candidates=(contact(), contact()))
-    assert otherwise(more) == "Pushes below 30 N do not show. 2 candidates more: --all."
-    assert otherwise(contact_list(contact(is_load=True))) == ""
-    assert otherwise(contact_list(smallest_force=float("nan"))) == ""
-    assert "A push along one axis may go unseen" in otherwise(contact_list(smallest_force=3473.0))
-    faint = contact_list(contact(peak_force=5.0, peak_band=2.0))
-    assert otherwise(faint) == "Nothing else above 6 N (less at good poses)."
-    assert otherwise(contact_list(smallest_force=None)) == ""
-    listed = replace(without_reference, contacts=contact_list())
-    assert headline(listed) == "Nothing touched the arm, as far as this log shows."
-    assert "no contacts are listed" in headline(replace(listed, contacts=None))
+    bare = ExternalTorque(name="sensor", t=analysis.t, tau=np.zeros((len(analysis.t), 6)))
+    sentences = {
+        ground.sentence
+        for made in (
+            analysis,
+            replace(analysis, errors=errors),
+            replace(analysis, errors=None, reference=bare),
+        )
+        for ground in of(made, "reference")
+    }
+    assert sentences == {
+        "vendor, its own error 0.5 N·m a joint",
+        "vendor without J5, its own error 0.5 N·m a joint",
+        "sensor",
+    }
 
 
 def test_health_is_the_worst_of_the_log_itself(without_reference: Analysis) -> None:
-    sound = [
-        Ground(standing="good", subject="robot, gravity", sentence="fits"),
-        Ground(standing="caution", subject="friction", sentence="…", of_log=False),
-        Ground(standing="unknown", subject="no reference", sentence="…", of_log=False),
+    fine = [
+        Ground("good", "robot, gravity", "fits"),
+        Ground("caution", "friction", "…", of_log=False),
+        Ground("unknown", "no reference", "…", of_log=False),
     ]
-    assert health(sound).sentence == "fits"
-    odd = Ground(standing="caution", subject="clock", sentence="2 gaps")
-    assert health([*sound, odd]) is odd
+    assert health(fine).sentence == "fits"
+    odd = Ground("caution", "clock", "2 gaps")
+    assert health([*fine, odd]) is odd
     gap = warning("stuck-effort", Where(joints=(2,)), signal="current", longest_s=1.0, at_s=2.0)
     assert health(grounds(examined(without_reference, gap))).subject == "effort"
 
 
-def test_words_of_joints() -> None:
-    assert joint_words([0, 1, 2]) == "J1…J3"
-    assert joint_words([0, 2, 3]) == "J1, J3, J4"
+def test_every_subject_stands_for_remarks_that_exist_once() -> None:
+    codes = [code for group in SUBJECTS.values() for code in group]
+    assert len(codes) == len(set(codes))
+    for code in codes:
+        assert words_of(code)["short"]
+    assert subject_of("saturation") == "effort"
+
+
+@pytest.mark.parametrize(
+    ("code", "ending"),
+    [
+        ("light-load", "--method payload --robot ur5 -o loaded.toml"),
+        ("payload-not-mounted", "--robot ur5 --payload log"),
+        ("no-robot-fits", "--robot ur5 --method base -o my_robot.toml"),
+        ("saturation", "--robot ur5"),
+    ],
+)
+def test_the_command_of_a_finding_quotes_names_and_names_the_robots_own_file(
+    without_reference: Analysis, code: str, ending: str
+) -> None:
+    made = without_reference
+    typed = remedy_of(warning(code), made.recording, made)
+    assert f"'{made.recording.source.path}'" in typed
+    assert typed.endswith(ending)
+    log = made.motion.log
+    log = replace(log, robot=replace(log.robot, path=Path("my.toml")))
+    own = replace(made, motion=replace(made.motion, log=log))
+    assert "--robot my.toml" in remedy_of(warning(code), made.recording, own)
+
+
+def test_a_command_names_the_columns_that_the_log_was_read_by(tmp_path: Path) -> None:
+    """Without them the log may not be read, or its torques for currents."""
+    table = tmp_path / "log.csv"
+    rows = (f"{0.01 * k},{0.1 * k},{0.2 * k},{0.1},{1.0}\n" for k in range(20))
+    table.write_text("t,a1,a2,b1,b2\n" + "".join(rows), encoding="utf-8")
+    log = read(table, columns="t=t,q=a{i},-tau=b{i}")
+    typed = shlex.split(command("inspect", log, "--robot", "ur5"))
+    assert typed[3:] == ["--columns=t=t,q=a{i},-tau=b{i}", "--robot", "ur5"]

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
@@ -14,8 +13,6 @@ from vftcli.outputs.screen import (
     force_bars,
     forces_of_list,
     log_screen,
-    placed,
-    seconds,
 )
 from vftcli.signals.arrays import Array
 
@@ -54,20 +51,6 @@ def test_bars_are_as_high_as_the_force_and_stand_where_it_is() -> None:
     assert force_bars(*force, [], Canvas(width=72)) == BARS.splitlines()[:-1]
 
 
-@pytest.mark.parametrize(
-    ("span", "line"),
-    [
-        (2.0, "0              0.5            1              1.5            2 s"),
-        (0.9, "0      0.1   0.2    0.3    0.4   0.5    0.6    0.7   0.8    0.9 s"),
-        (45.0, "0      5     10     15     20    25     30     35    40     45 s"),
-        (600.0, "0         100       200       300       400       500       600 s"),
-    ],
-)
-def test_seconds_count_in_round_steps(span: float, line: str) -> None:
-    """Nine steps at most, of 1, 2 or 5 times a power of ten."""
-    assert seconds(np.array([0.0, span]), 60) == line
-
-
 def test_every_sample_counts_in_a_column_and_a_gap_is_bridged() -> None:
     one = pushed((5.0, 5.001, 70.0))  # a single sample
     assert column_peaks(*one, 60).max() == 70.0
@@ -96,10 +79,3 @@ def risen(start: float, stop: float, peak: float) -> ForceCourse:
 def test_without_forces_there_are_no_bars(without_reference: Analysis) -> None:
     for found in (None, contact_list()):
         assert "┤" not in log_screen(replace(without_reference, contacts=found), Canvas())
-
-
-def test_texts_have_a_blank_between_and_room_to_the_end() -> None:
-    """A line is eight letters longer than what is drawn above it."""
-    texts = [(0, "a"), (2, "b"), (3, "c"), (60, "x" * 9)]
-    assert placed(texts, 60) == "a b"
-    assert placed([(60, "x" * 7)], 60) == " " * 60 + "x" * 7

@@ -31,19 +31,17 @@ FORCE = {"hardest_N": 80.4, "hardest_band_N": 6.2, "hardest_s": 11.3}
 BAD = {"log": "b<i>.csv", "health": "bad", "reason": "effort: turned", "contacts": 0}
 
 
-def test_the_index_links_every_report(pushed: Analysis, without_reference: Analysis) -> None:
-    html = render_index([("a b", pushed), ('"><script>', without_reference)])
+def test_the_index_links_every_report_and_names_what_is_left_out(
+    pushed: Analysis, without_reference: Analysis
+) -> None:
+    reports = [("a b", pushed), ('"><script>', without_reference)]
+    html = render_index(reports, {"<bad>.csv": "no log"})
     assert 'href="a%20b/index.html"' in html
     assert 'href="%22%3E%3Cscript%3E/index.html"' in html
     assert '"><script>/' not in html
     assert "RMSE in N·m" in html
-    assert "2 logs · Universal Robots UR5 (CB3)</p>" in html
-
-
-def test_a_log_that_is_left_out_is_named(pushed: Analysis) -> None:
-    html = render_index([("a", pushed)], {"<bad>.csv": "no log"})
+    assert "3 logs · Universal Robots UR5 (CB3)</p>" in html
     assert "✗ &lt;bad&gt;.csv is left out: no log" in html
-    assert ">2 logs · Universal Robots UR5 (CB3)<" in html
 
 
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
@@ -80,13 +78,9 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
     load = replace(pushed.contacts.contacts[0], is_load=True)
     loaded = replace(pushed, contacts=replace(pushed.contacts, contacts=(load,)))
     title, words = index_headline([pushed, quiet, loaded])
-    assert title == "Something pushed the arm in 1 of 3 logs."
-    assert words == (
-        "Hardest in ur5_circle.csv: 91 ± 7 N at 5.1 s. "
-        "1 more bears a load, or a wrong payload or model."
-    )
-    title, words = index_headline([quiet, quiet])
-    assert (title, words) == ("Nothing pushed the arm, as far as these logs can tell.", "")
+    assert "1 of 3 logs" in title
+    assert "ur5_circle.csv: 91 ± 7 N at 5.1 s. 1 more bears a load" in words
+    assert index_headline([quiet, quiet])[0].startswith("Nothing pushed the arm")
     none = replace(pushed, contacts=None)
     assert index_headline([none]) == ("External joint torques from 1 logs.", "")
 

@@ -83,27 +83,19 @@ def test_of_a_long_log_every_stretch_keeps_its_ends(long: tuple[np.ndarray, np.n
     assert len(rows[second["low"][0]]) == -(-len(times) // 4)
 
 
-def test_a_short_log_is_whole(long: tuple[np.ndarray, np.ndarray]) -> None:
+def test_a_short_log_is_whole_and_charts_of_one_clock_share_it(
+    long: tuple[np.ndarray, np.ndarray],
+) -> None:
     t, y = (values[:WHOLE] for values in long)
-    data = packed([chart(t, ChartLine("a", y))])
-    (line,) = data["charts"][0]["lines"]
-    assert "spread" not in line
-    rows = unpacked(data)
-    step = data["steps"][line["low"][0]]
-    np.testing.assert_allclose(rows[line["low"][0]], y[:, 0], atol=0.5 * step * (1 + 1e-9))
-
-
-def test_charts_of_one_log_share_a_clock(long: tuple[np.ndarray, np.ndarray]) -> None:
-    t, y = (values[:100] for values in long)
-    other = t.copy()
-    charts = [
-        chart(t, ChartLine("a", y)),
-        chart(t, ChartLine("b", y)),
-        chart(other, ChartLine("c", y)),
-    ]
+    charts = [chart(x, ChartLine("a", y)) for x in (t, t, t.copy())]
     data = packed(charts)
     assert [each["clock"] for each in data["charts"]] == [0, 0, 1]
     assert len(data["clocks"]) == 2
+    (line,) = data["charts"][0]["lines"]
+    assert "spread" not in line
+    row = line["low"][0]
+    half = 0.5 * data["steps"][row] * (1 + 1e-9)
+    np.testing.assert_allclose(unpacked(data)[row], y[:, 0], atol=half)
 
 
 def test_the_page_holds_every_estimate_and_position(analysis: Analysis) -> None:

@@ -1,10 +1,11 @@
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.contacts.contact_list import OF_FORCES, Contact
 from vftcli.outputs.page.packing import Blob, PageClock
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.page.stage import (
@@ -23,14 +24,18 @@ from vftcli.outputs.shapes import capsules
 from vftcli.robots.chain import link_poses
 
 
-def listed(analysis: Analysis) -> ContactList:
-    return analysis.contacts
+def listing(analysis: Analysis, *contacts: Contact, **changed: object) -> Analysis:
+    """The analysis with another list, of some contacts or otherwise changed."""
+    changed |= {"contacts": contacts} if contacts else {}
+    return replace(analysis, contacts=replace(analysis.contacts, **changed))
+
+
+def staged(analysis: Analysis) -> dict:
+    return stage_data(analysis, view_of(analysis), {}, PageClock(Blob(), analysis.t))
 
 
 def numbers(path: str) -> np.ndarray:
     """Points of a path that has moves after its first."""
-    import re
-
     points = np.array(re.findall(r"-?\d*\.?\d+", path), dtype=float).reshape(-1, 2)
     return np.cumsum(points, axis=0)
 
@@ -64,7 +69,7 @@ def test_an_arm_that_stands_upright_or_knows_no_pose_has_a_view(pushed: Analysis
 
 
 def test_an_arrow_ends_where_the_force_acts(pushed: Analysis) -> None:
-    view, hardest = view_of(pushed), listed(pushed).hardest
+    view, hardest = view_of(pushed), pushed.contacts.hardest
     tail, tip = arrow_of(pushed, hardest, view.reach)
     at = int(np.argmin(np.abs(pushed.t - hardest.peak)))
     poses = link_poses(pushed.robot.chain, pushed.recording.q[at : at + 1]).translation[0]
@@ -76,29 +81,22 @@ def test_an_arrow_ends_where_the_force_acts(pushed: Analysis) -> None:
     np.testing.assert_allclose(tip, 0.5 * (poses[2] + poses[3]), atol=2e-3)
 
 
-def test_the_cone_is_that_of_a_force_known_evenly(pushed: Analysis) -> None:
-    """Every axis known to ±s: across the force 1.96 s in each of two directions."""
-    hardest = listed(pushed).contacts[0]
+def test_the_cone_is_that_of_the_band_across_a_force(pushed: Analysis) -> None:
+    """Every axis known to ±s: across the force 1.96 s in each of two directions.
+
+    Beyond 45°, where it is as long as the force, it is left out and said.
+    """
+    one = pushed.contacts.contacts[0]
     wrench = np.array([30.0, -40.0, 0.0, 0.0, 0.0, 0.0])
-    even = replace(hardest, wrench=wrench, peak_force=50.0, wrench_sd=np.full(6, 5.0))
+    even = replace(one, wrench=wrench, peak_force=50.0, wrench_sd=np.full(6, 5.0))
     assert cone_of(even) == pytest.approx(np.arctan(1.96 * 5.0 / 50.0))
-    # What is known badly along the force alone opens no cone.
-    along = replace(
-        even, wrench=np.array([50.0, *[0.0] * 5]), wrench_sd=np.array([9.0, *[0.0] * 5])
-    )
+    along = replace(even, wrench=50.0 * np.eye(6)[0], wrench_sd=9.0 * np.eye(6)[0])
     assert cone_of(along) == 0.0
     assert cone_of(replace(even, wrench=None, wrench_sd=None)) == 0.0
-
-
-def test_a_cone_that_would_fill_the_picture_is_left_out_and_said(pushed: Analysis) -> None:
-    """The band across the force is 2 s: at 45° it is as long as the force."""
-    one = replace(
-        listed(pushed).contacts[0], wrench=np.array([50.0, *[0.0] * 5]), peak_force=50.0
-    )
     for half, words in ((49.0, ""), (51.0, " (± 46°)")):
-        wide = replace(one, wrench_sd=np.full(6, half / 1.96))
-        data = staged(replace(pushed, contacts=replace(listed(pushed), contacts=(wide,))))
-        (row,) = data["contacts"]
+        (row,) = staged(listing(pushed, replace(along, wrench_sd=np.full(6, half / 1.96))))[
+            "contacts"
+        ]
         assert row["words"] == f"contact 1 · wrist · +x{words}"
         assert row["cone"] == (0 if words else pytest.approx(np.arctan(half / 50.0), abs=1e-3))
 
@@ -107,20 +105,19 @@ def test_a_cone_that_would_fill_the_picture_is_left_out_and_said(pushed: Analysi
 def test_the_touched_links_are_marked(
     pushed: Analysis, places: tuple[int, ...], hit: set[int]
 ) -> None:
-    contact = replace(listed(pushed).contacts[0], places=places)
+    contact = replace(pushed.contacts.contacts[0], places=places)
     drawn = still_arm(pushed, view_of(pushed), contact)
     parts = sum(len(capsules(pushed.robot.chain)[frame]) for frame in hit)
     assert [kind for _, _, kind in drawn.parts].count("hit") == parts
     assert part("svg/still", drawn, "The arm", "9 N").count('class="shaft"') == 1
-    data = staged(replace(pushed, contacts=replace(listed(pushed), contacts=(contact,))))
-    (row,) = data["contacts"]
+    (row,) = staged(listing(pushed, contact))["contacts"]
     assert row["frames"] == sorted(hit)
     assert tuple(row["spot"]) == ((3, 4) if 3 in hit else (7, 7))  # of a link both its ends
 
 
 def test_the_drawing_holds_the_arm_and_its_arrow(pushed: Analysis) -> None:
     view = view_of(pushed)
-    for contact in listed(pushed).contacts:
+    for contact in pushed.contacts.contacts:
         drawn = still_arm(pushed, view, contact)
         shaft, head = map(numbers, drawn.arrow)
         places = np.vstack(
@@ -128,7 +125,7 @@ def test_the_drawing_holds_the_arm_and_its_arrow(pushed: Analysis) -> None:
         )
         assert places.min() > 0.0
         assert (places.max(axis=0) < (WIDTH, HEIGHT)).all()
-    bare = replace(listed(pushed).contacts[0], wrench=None)
+    bare = replace(pushed.contacts.contacts[0], wrench=None)
     assert still_arm(pushed, view, bare).arrow == []
     assert 'class="shaft"' not in part("svg/still", still_arm(pushed, view, None), "x", "")
 
@@ -137,17 +134,13 @@ def test_the_free_part_is_the_first_round(pushed: Analysis) -> None:
     ((start, stop),) = free_spans(pushed)
     np.testing.assert_allclose((start, stop), (0.0, 4.0), atol=0.02)  # a round of 4 s
     # What is only guessed is not called free.
-    assert free_spans(replace(pushed, contacts=replace(listed(pushed), basis="friction"))) == []
+    assert free_spans(listing(pushed, basis="friction")) == []
     assert free_spans(replace(pushed, contacts=None)) == []
-
-
-def staged(analysis: Analysis) -> dict:
-    return stage_data(analysis, view_of(analysis), {}, PageClock(Blob(), analysis.t))
 
 
 def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None:
     data = staged(pushed)
-    for row, contact in zip(data["contacts"], listed(pushed).contacts, strict=True):
+    for row, contact in zip(data["contacts"], pushed.contacts.contacts, strict=True):
         assert abs(pushed.t[row["i"]] - contact.peak) <= 0.004 + 1e-9  # half a sample
         shown = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N"
         low, high = contact.anywhere or (0.0, 0.0)
@@ -162,28 +155,18 @@ def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None
 def test_a_log_without_a_list_claims_nothing(pushed: Analysis) -> None:
     data = staged(replace(pushed, contacts=None))
     assert (data["contacts"], data["none"]) == ([], ("–", "", ""))
-    guessed = staged(replace(pushed, contacts=replace(listed(pushed), basis="friction")))
-    assert guessed["none"] == ("–", "", "no contact listed")
+    assert staged(listing(pushed, basis="friction"))["none"] == ("–", "", "no contact listed")
 
 
 def test_what_touches_a_loaded_arm_comes_before_its_load(pushed: Analysis) -> None:
-    first, second, *rest = listed(pushed).contacts
+    first, *rest = pushed.contacts.contacts
     load = replace(first, is_load=True, start=0.0, stop=20.0)
-    data = staged(
-        replace(pushed, contacts=replace(listed(pushed), contacts=(load, second, *rest)))
-    )
-    assert [row["number"] for row in data["contacts"]] == [*range(2, 13), 1]
-
-
-def few(contact: Contact) -> Contact:
-    return replace(
-        contact, peak_force=None, peak_band=None, wrench=None, wrench_sd=None, anywhere=None
-    )
+    rows = staged(listing(pushed, load, *rest))["contacts"]
+    assert [row["number"] for row in rows] == [*range(2, 13), 1]
 
 
 def test_few_joints_have_contacts_without_a_force(pushed: Analysis) -> None:
-    bare = replace(listed(pushed), contacts=tuple(map(few, listed(pushed).contacts)))
-    data = staged(replace(pushed, contacts=bare))
-    assert {(row["size"], row["force"], row["sized"]) for row in data["contacts"]} == {
-        (None, "", False)
-    }
+    nothing = dict.fromkeys(OF_FORCES)
+    bare = (replace(row, **nothing) for row in pushed.contacts.contacts)
+    rows = staged(listing(pushed, *bare))["contacts"]
+    assert {(row["size"], row["force"], row["sized"]) for row in rows} == {(None, "", False)}
