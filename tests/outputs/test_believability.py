@@ -304,9 +304,8 @@ def test_the_command_of_a_finding_quotes_names_and_names_the_robots_own_file(
     without_reference: Analysis, code: str, ending: str
 ) -> None:
     made = without_reference
-    typed = remedy_of(warning(code), made.recording, made)
-    assert f"'{made.recording.source.path}'" in typed
-    assert typed.endswith(ending)
+    assert remedy_of(warning(code), made.recording, made).endswith(ending)
+    assert f"'{made.recording.source.path}'" in command("inspect", made.recording)
     log = made.motion.log
     log = replace(log, robot=replace(log.robot, path=Path("my.toml")))
     own = replace(made, motion=replace(made.motion, log=log))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from vftcli.outputs.rerun_arm import (
 )
 from vftcli.outputs.rerun_file import Tab, rerun_file
 from vftcli.outputs.shapes import capsules
-from vftcli.robots import PROFILES, load_robot
+from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Mesh
 from vftcli.signals.pose import Pose, rotation_about
@@ -28,28 +29,37 @@ from vftcli.signals.pose import Pose, rotation_about
 ROBOT = load_robot("ur5")
 UR5 = ROBOT.chain
 POSES = motion(UR5, np.linspace(0.0, 4.0, 201), np.zeros((201, 6)))
-TABS = [Tab("none", [])]
 
 
-def test_an_unknown_force_has_no_arrow(tmp_path: Path) -> None:
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "r.rrd"
+
+
+def opened(path: Path) -> Any:
+    """A recording that nothing is plotted in."""
+    return rerun_file(path, "r", [Tab("none", [])], {"Summary": ""}, POSES, "Arm")
+
+
+def test_an_unknown_force_has_no_arrow(path: Path) -> None:
     force = np.array([[2.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [0.0, 0.0, -400.0]])
-    with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+    with opened(path) as stream:
         send_force(stream, "/force", np.arange(3.0), np.zeros((3, 3)), force)
     # 200 N are a metre
-    assert rows_of(tmp_path / "r.rrd", "/force", "Arrows3D:vectors") == [
+    assert rows_of(path, "/force", "Arrows3D:vectors") == [
         [[pytest.approx(0.01), 0.0, 0.0]],
         [],
         [[0.0, 0.0, -2.0]],
     ]
-    radii = np.concatenate(rows_of(tmp_path / "r.rrd", "/force", "Arrows3D:radii"))
+    radii = np.concatenate(rows_of(path, "/force", "Arrows3D:radii"))
     assert 0.005 < radii.min() == radii.max() < 0.03  # thinner than a link, seen beside it
 
 
-def test_capsules_point_where_they_should(tmp_path: Path) -> None:
+def test_capsules_point_where_they_should(path: Path) -> None:
     """Rerun's lie along z of their own axes; the upper arm is its link's longest shape."""
-    with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+    with opened(path) as stream:
         send_arm(stream, ROBOT, POSES, {})
-    (turns,) = rows_of(tmp_path / "r.rrd", "/robot/link_2", "Capsules3D:quaternions")
+    (turns,) = rows_of(path, "/robot/link_2", "Capsules3D:quaternions")
     for (x, y, z, w), shape in zip(turns, capsules(UR5)[2], strict=True):
         turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
         unit = shape.direction / np.linalg.norm(shape.direction)
@@ -62,14 +72,14 @@ def test_the_hardest_force_fits(hardest: float, scale: float) -> None:
     assert hardest <= LONGEST * scale or scale == 2000.0
 
 
-def test_a_link_is_painted_while_it_is_touched(tmp_path: Path) -> None:
+def test_a_link_is_painted_while_it_is_touched(path: Path) -> None:
     """Its own colour, then that of the span, then its own again; other links keep theirs."""
     painted = {2: {1.0: "#dd6415", 2.0: ""}}
-    with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+    with opened(path) as stream:
         send_arm(stream, ROBOT, POSES, painted)
 
     def colours(link: int) -> list[list[int]]:
-        return rows_of(tmp_path / "r.rrd", f"/robot/link_{link}", "Capsules3D:colors")
+        return rows_of(path, f"/robot/link_{link}", "Capsules3D:colors")
 
     found = [row for row in colours(2) if row is not None]
     assert len(found) == 3
@@ -81,7 +91,7 @@ def test_a_link_is_painted_while_it_is_touched(tmp_path: Path) -> None:
     assert rgba("#dd6415")[0] not in still
 
 
-def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path) -> None:
+def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path, path: Path) -> None:
     """They are in the recording once, where they are on the link; else its capsules are too."""
     file, pose = tmp_path / "a.stl", Pose(rotation_about("z", 0.5 * np.pi), np.array([0.1, 0, 0]))
     file.write_bytes(b"\0" * 84)
@@ -90,11 +100,8 @@ def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path) -> Non
     (tmp_path / "b.dae").write_bytes(b'<COLLADA><unit meter="0.5"/></COLLADA>')
     gone = whole._replace(link=4, file=tmp_path / "gone.stl")
     meshes = (whole, coloured, gone, whole._replace(link=5), whole._replace(link=5, file=None))
-    path, painted = (
-        tmp_path / "r.rrd",
-        {2: {1.0: "#dd6415", 2.0: ""}, 3: {1.0: "#dd6415", 2.0: ""}},
-    )
-    with rerun_file(path, "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+    painted = {link: {1.0: "#dd6415", 2.0: ""} for link in (2, 3)}
+    with opened(path) as stream:
         send_arm(stream, replace(ROBOT, meshes=meshes), POSES, painted)
     capsules_of = [rows_of(path, f"/robot/link_{j}", "Capsules3D:lengths") for j in range(1, 7)]
     assert list(map(bool, capsules_of)) == [True, False, False, True, True, True]
@@ -138,31 +145,13 @@ def test_a_dae_is_in_metres_with_z_up(head: str, unit: float) -> None:
     assert collada(found) == (found, 1.0)
 
 
-@pytest.mark.parametrize("name", PROFILES)
-def test_capsules_join_the_joints(name: str) -> None:
-    """In every link the capsule ends where the next frame begins, if they are apart at all."""
-    chain = load_robot(name).chain
-    offsets = np.vstack([chain.translation, chain.flange_translation])
-    length = np.linalg.norm(offsets, axis=1).sum()
-    for shapes, offset in zip(capsules(chain), offsets, strict=True):
-        for shape in shapes:
-            if shape.kind != "joint":
-                np.testing.assert_array_equal(shape.start + shape.direction, offset)
-        links = [shape for shape in shapes if shape.kind != "joint"]
-        assert bool(links) == (np.linalg.norm(offset) > 0.02 * length)
-
-
-def test_motion_follows_the_log_at_its_rate() -> None:
+def test_motion_follows_the_log_at_its_rate_and_of_a_long_one_draws_few_poses() -> None:
     chain = load_robot("panda").chain
     t = 0.001 * np.arange(5000)
     q = np.sin(t[:, None] * np.arange(1, 8))
     poses = motion(chain, t, q)
     np.testing.assert_allclose(np.diff(poses.t), 0.02, atol=1e-9)
     np.testing.assert_array_equal(poses.translation, link_poses(chain, q[::20]).translation)
-
-
-def test_of_a_long_log_no_more_poses_are_drawn_than_can_be_looked_at() -> None:
     t = 0.02 * np.arange(50_001)  # 1000 s at the rate that is drawn
-    chain = load_robot("panda").chain
     poses = motion(chain, t, np.zeros((len(t), chain.joints)))
     assert MOST_POSES / 2 < len(poses.t) <= MOST_POSES

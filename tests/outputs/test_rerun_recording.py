@@ -9,21 +9,26 @@ import pytest
 import rerun.chunk
 from contact_rows import contact, contact_list
 from made_runs import analyse_log
-from rerun_rows import rows_of
+from rerun_rows import rows_of, times_of
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import Unexplained
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import FULL, LEVELS
+from vftcli.outputs.charts import PLACES
 from vftcli.outputs.contacts import answer
-from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
+from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion, painted_links
 from vftcli.outputs.rerun_recording import (
     contact_log,
     force_arrow,
+    newton_per_metre,
+    plot_groups,
     summary,
     tabs_of,
     write_rrd,
 )
 from vftcli.outputs.run_record import all_remarks
+from vftcli.outputs.shapes import touched_point
 from vftcli.pipeline import AnalysisChoice
 from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice
@@ -61,28 +66,25 @@ def column(rows: dict[str, dict[str, list]], entity: str, ending: str) -> list:
 
 
 @pytest.mark.slow
-def test_the_file_verifies(path: Path) -> None:
-    """The text is asserted: for a file that is no recording the exit code is 0 as well."""
-    command = [sys.executable, "-m", "rerun", "rrd", "verify", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "1 file verified without error" in done.stdout + done.stderr
+def test_the_file_verifies_and_its_blueprint_is_in_use_when_it_is_opened(path: Path) -> None:
+    """The text is asserted: for a file that is no recording the exit code is 0 as well.
 
-
-@pytest.mark.slow
-def test_the_blueprint_is_in_use_when_the_file_is_opened(path: Path) -> None:
-    """One that is a default alone comes too late for a viewer in a browser."""
-    command = [sys.executable, "-m", "rerun", "rrd", "print", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "make_active: true, make_default: true" in done.stdout
-
-
-def test_a_blueprint_is_in_the_file(path: Path) -> None:
+    A blueprint that is a default alone comes too late for a viewer in a browser.
+    """
+    said = {}
+    for word in ("verify", "print"):
+        command = [sys.executable, "-m", "rerun", "rrd", word, str(path)]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        said[word] = done.stdout + done.stderr
+    assert "1 file verified without error" in said["verify"]
+    assert "make_active: true, make_default: true" in said["print"]
     reader = rerun.chunk.RrdReader(str(path))
-    assert len(reader.blueprints()) == 1
-    assert len(reader.recordings()) == 1
+    assert (len(reader.blueprints()), len(reader.recordings())) == (1, 1)
 
 
-def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> None:
+def test_every_line_and_its_times_read_back(
+    rows: dict[str, dict[str, list]], analysis: Analysis
+) -> None:
     for j in range(1, 7):
         assert column(rows, f"/tau_ext/J{j}", "SeriesLines:names")[-1] == [
             "reference (vendor)", "fdo", "gmo", "kfo-fe", "kfo-zoh", "best", "best 95 % upper",
@@ -92,6 +94,17 @@ def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> No
     for entity in ("/q", "/dq", "/drive_torque"):
         assert column(rows, entity, "SeriesLines:names")[-1] == [f"J{j}" for j in range(1, 7)]
     assert {"/summary", "/errors"} <= set(rows)
+    values = np.array([v for v in column(rows, "/tau_ext/J2", "Scalars:scalars") if v])
+    best, *others = (e.tau[:, 1] for e in analysis.estimates)
+    expected = [analysis.reference.tau[:, 1], *others, best]
+    np.testing.assert_array_equal(values[:, : len(expected)], np.column_stack(expected))
+    left = np.array([v for v in column(rows, "/residual/J2", "Scalars:scalars") if v])
+    plain = np.column_stack([*others, best]) - analysis.reference.tau[:, 1:2]
+    np.testing.assert_array_equal(left, plain)
+    times = [t for t in rows["/q"]["t"] if t is not None]
+    seconds = [t.total_seconds() if hasattr(t, "total_seconds") else t / 1e9 for t in times]
+    # Rerun counts nanoseconds, Python's timedelta microseconds
+    np.testing.assert_allclose(seconds, analysis.t, atol=1e-6)
 
 
 def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> None:
@@ -153,23 +166,6 @@ def test_the_summary_says_what_the_log_is_and_what_the_arrow_means(
         f"first observer; 1 m is {NEWTON_PER_METRE:g} N; none where the pose leaves it open"
         in summary(bare)
     )
-
-
-def test_torques_read_back(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
-    values = np.array([v for v in column(rows, "/tau_ext/J2", "Scalars:scalars") if v])
-    best, *others = (e.tau[:, 1] for e in analysis.estimates)
-    expected = [analysis.reference.tau[:, 1], *others, best]
-    np.testing.assert_array_equal(values[:, : len(expected)], np.column_stack(expected))
-    left = np.array([v for v in column(rows, "/residual/J2", "Scalars:scalars") if v])
-    plain = np.column_stack([*others, best]) - analysis.reference.tau[:, 1:2]
-    np.testing.assert_array_equal(left, plain)
-
-
-def test_time_reads_back_in_seconds(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
-    times = [t for t in rows["/q"]["t"] if t is not None]
-    seconds = [t.total_seconds() if hasattr(t, "total_seconds") else t / 1e9 for t in times]
-    # Rerun counts nanoseconds, Python's timedelta microseconds
-    np.testing.assert_allclose(seconds, analysis.t, atol=1e-6)
 
 
 def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> None:
@@ -264,17 +260,88 @@ def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_beg
 def test_a_line_of_the_log_stands_at_the_time_that_it_is_about() -> None:
     """A contact at its start, a remark at the start of its span, else at the log's."""
     there = caution("arm-stopped-abruptly", Where(span=(3.0, 4.0)), at_s=3.0)
-    found = contact_list(contact(start=1.5), remarks=(there, caution("contact-is-load")))
-    lines = contact_log(found)
-    assert [line[1] for line in lines] == [1.5, 3.0, 0.0]
-    assert [line[0] for line in lines] == ["/contacts/1", "/remarks", "/remarks"]
-    assert lines[0][2] == (
-        "1.50 s: contact 1 begins, for 3.28 s: 65 ± 7 N, +y, down, wrist (good)"
-    )
     by_joint = contact(number=2, peak_force=None, wrench=None, where="cannot tell", places=(2, 3))
-    assert contact_log(contact_list(by_joint))[0][2] == (
+    remarks = (there, caution("contact-is-load"))
+    found = contact_list(contact(start=1.5), by_joint, remarks=remarks)
+    lines = contact_log(found)
+    places = [(line.path, line.t, line.colour, line.level) for line in lines]
+    (grey,) = {line.colour for line in lines[2:]}
+    assert places == [
+        ("/contacts/1", 1.5, PLACES["wrist"], "INFO"),
+        ("/contacts/2", 4.602, PLACES["cannot tell"], "INFO"),
+        ("/remarks", 3.0, grey, "WARN"),
+        ("/remarks", 0.0, grey, "WARN"),
+    ]
+    assert (
+        lines[0].text == "1.50 s: contact 1 begins, for 3.28 s: 65 ± 7 N, +y, down, wrist (good)"
+    )
+    assert lines[1].text == (
         "4.60 s: contact 2 begins, for 0.18 s: joint torques 0.0, 1.0, 2.0, 3.0, 4.0, 5.0 N·m, "
         "link 2 … link 3 (weak)"
     )
-    (nothing,) = contact_log(contact_list(remarks=()))
-    assert nothing[:3] == ("/remarks", 0.0, answer(contact_list()))
+    unknown = contact_list(remarks=(), unexplained=Unexplained(13.0, 4, 17.0))
+    for empty in (contact_list(remarks=()), unknown):
+        (nothing,) = contact_log(empty)
+        assert nothing[:3] == ("/remarks", 0.0, answer(empty))
+
+
+def test_without_a_wrench_there_is_no_force_and_a_load_has_no_peak(touched: Analysis) -> None:
+    assert not list(plot_groups(replace(touched, virtual_sensor=None))["Contacts"])
+    load = contact_list(contact(start=1.0, stop=4.0, peak=2.0, is_load=True))
+    (plot,) = plot_groups(replace(touched, contacts=load))["Contacts"]
+    assert all(line.x is None for line in plot.series)
+    assert "load 1 begins" in contact_log(load)[0].text
+
+
+def test_the_touched_links_are_painted(touched: Analysis) -> None:
+    """The flange moves with the last link."""
+    found = painted_links(touched.contacts, 6)
+    assert sorted(found) == [3, 5, 6]
+    assert found[6] == {1.0: PLACES["wrist"], 1.5: ""}
+    assert found[3] == {2.2: PLACES["forearm"], 2.6: ""}
+
+
+@pytest.mark.parametrize(("places", "point"), [((0, 6), 6.0), ((2, 3), 2.5), ((), 6.0)])
+def test_the_arrow_stands_at_the_place(places: tuple[int, ...], point: float) -> None:
+    """Link k lies between the origins k − 1 and k; here each origin has its own number as x."""
+    origins = np.tile(np.arange(7.0)[None, :, None], (1, 1, 3))
+    assert touched_point(contact(places=places), origins)[0, 0] == point
+
+
+def test_arrows_are_there_while_the_contact_lasts_and_no_longer(
+    touched: Analysis, tmp_path: Path
+) -> None:
+    path = tmp_path / "r.rrd"
+    write_rrd(path, touched)
+    for number, start, stop in ((1, 1.0, 1.5), (2, 2.2, 2.6)):
+        arrows = rows_of(path, f"/contacts/{number}", "Arrows3D:vectors")
+        t = times_of(path, f"/contacts/{number}", "Arrows3D:vectors")
+        drawn = [time for time, arrow in zip(t, arrows, strict=True) if arrow]
+        # Poses are drawn 50 times a second.
+        assert start <= drawn[0] < start + 0.02
+        assert stop - 0.02 < drawn[-1] <= stop
+        assert not arrows[-1]
+    # On a link it is the force of the peak, whatever the flange's would be.
+    expected = np.array([0.4, 51.9, -38.8]) / newton_per_metre(touched)
+    np.testing.assert_allclose(arrows[0][0], expected, rtol=1e-6)  # float32
+    assert not rows_of(path, "/robot/flange_force", "Arrows3D:vectors")
+
+
+def test_the_arrow_goes_even_where_a_pose_is_drawn_as_the_contact_ends(
+    touched: Analysis, tmp_path: Path
+) -> None:
+    """Each second sample is drawn: 2.016 s is one of them."""
+    stop = float(touched.t[252])
+    found = contact_list(contact(start=1.0, stop=stop, peak=1.2))
+    write_rrd(tmp_path / "r.rrd", replace(touched, contacts=found))
+    arrows = rows_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
+    t = times_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
+    assert t[-2] == pytest.approx(stop, abs=1e-6)  # whole microseconds
+    assert arrows[-2]
+    assert not arrows[-1]
+
+
+def test_without_a_list_the_force_runs_on(touched: Analysis, tmp_path: Path) -> None:
+    write_rrd(tmp_path / "r.rrd", replace(touched, contacts=None))
+    assert rows_of(tmp_path / "r.rrd", "/robot/flange_force", "Arrows3D:vectors")
+    assert not rows_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
