@@ -28,14 +28,13 @@ def test_parquet_holds_flat_float_columns(analysis: Analysis, tmp_path: Path) ->
     np.testing.assert_array_equal(table["t"].to_numpy(), analysis.t)
 
 
-def test_unknown_is_null(analysis: Analysis) -> None:
+def test_unknown_is_null_and_what_is_not_there_has_no_column(
+    analysis: Analysis, without_reference: Analysis
+) -> None:
     """The reference of the fixture is unknown in its first 20 samples."""
     column = estimates_table(analysis)["tau_ext/reference/3"]
     assert column.null_count() == 20
     assert not column.is_nan().any()
-
-
-def test_without_a_reference_there_is_no_column(without_reference: Analysis) -> None:
     assert not [c for c in estimates_table(without_reference).columns if "reference" in c]
 
 
@@ -46,9 +45,8 @@ def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
     assert list(rows[0]) == estimates_table(analysis).columns
     assert rows[0]["tau_ext/reference/1"] == ""
     # nine printed digits
-    np.testing.assert_allclose(
-        [float(r["q/2"]) for r in rows], analysis.recording.q[:, 1], atol=1e-9
-    )
+    found = [float(r["q/2"]) for r in rows]
+    np.testing.assert_allclose(found, analysis.recording.q[:, 1], atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -58,11 +58,6 @@ def test_the_terminal_keeps_digits_below_digits(grid: Grid) -> None:
     ]
 
 
-def test_a_table_without_headings_has_no_line_for_them() -> None:
-    columns = (Column("", words=True), Column("", form=".2f"))
-    assert terminal(Grid(given=columns, rows=(("a", 1.0), ("b", 22)))) == "a  1.00\nb    22\n"
-
-
 def test_units_stand_behind_headings_and_below_them_in_latex() -> None:
     grid = Grid(given=(Column("who", words=True), Column("fx", "N·m")), rows=(("a", 1.0),))
     assert terminal(grid).startswith("who  fx [N·m]\n")
@@ -74,7 +69,7 @@ def test_units_stand_behind_headings_and_below_them_in_latex() -> None:
     ]
 
 
-def test_markdown_escapes_every_text_and_bolds_the_best(grid: Grid) -> None:
+def test_markdown_and_latex_escape_every_text_and_bold_the_best(grid: Grid) -> None:
     lines = markdown(grid).splitlines()
     assert lines[0] == r"**a\_b.csv, RMSE in N·m**"
     assert lines[2:5] == [
@@ -83,25 +78,14 @@ def test_markdown_escapes_every_text_and_bolds_the_best(grid: Grid) -> None:
         "| fdo | **0.550** | 12.3 |",
     ]
     assert r"\<b\>&\_%\|\*$#" in lines[5]
-
-
-def test_latex_escapes_every_text_and_bolds_the_best(grid: Grid) -> None:
     text = latex(grid)
     assert r"\caption{a\_b.csv, RMSE in N\,m}" in text
     assert r"\label{tab:a-b-csv}" in text
     assert r"fdo & \textbf{0.550}\rlap{$^{*}$} & 12.3 \\" in text
     assert r"\&\_\%" in text
     assert text.index("2.00") < text.rindex(r"\cmidrule") < text.index("floor")
-
-
-def test_a_bound_is_one_number_in_latex() -> None:
-    assert escape_latex("< 6") == r"$<$\,6"
     assert escape_latex("\\") == r"\textbackslash{}"
-
-
-def test_a_title_is_no_command_of_latex() -> None:
-    grid = Grid(title="a\n\\input{b}", given=(Column("c"),), rows=())
-    assert r"\input" not in latex(grid)
+    assert r"\input" not in latex(Grid(title="a\n\\input{b}", given=(Column("c"),), rows=()))
 
 
 def test_decimal_points_of_latex_stand_below_one_another() -> None:
@@ -237,8 +221,11 @@ def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom
     assert least.splitlines()[-2:] == ["b         10.0", "No room for: work of all."]
 
 
-def test_a_table_without_rows_is_its_headings(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_without_rows_is_its_headings_and_one_without_headings_its_rows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    columns = (Column("", words=True), Column("", form=".2f"))
+    assert terminal(Grid(given=columns, rows=(("a", 1.0), ("b", 22)))) == "a  1.00\nb    22\n"
     grid = Grid(given=(Column("name", words=True), Column("", unit="")), rows=())
-    assert terminal(grid) == "name\n"
     monkeypatch.setenv("COLUMNS", "3")
     assert terminal(grid) == "name\n"

@@ -30,10 +30,7 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
         "left out look & feel of /odd: it does not cover the joints' time"
     ]
     assert record["reference"]["name"] == "vendor"
-
-
-def test_run_json_has_every_observers_parameters(analysis: Analysis) -> None:
-    record = json.loads(to_json(analysis.run))
+    assert (record["robot"]["name"], record["robot"]["file"]) == ("ur5", None)  # built in
     found = {o["name"]: o for o in record["observers"]}
     assert list(found) == ["best", "fdo", "gmo", "kfo-fe", "kfo-zoh"]
     assert found["gmo"]["parameters"]["gain"] == [5.0, 3.0, 4.0, 10.0, 10.0, 10.0]
@@ -43,17 +40,9 @@ def test_run_json_has_every_observers_parameters(analysis: Analysis) -> None:
             assert len(observer[key]) == 6
 
 
-def test_a_built_in_robot_has_no_path(analysis: Analysis) -> None:
-    assert analysis.run["robot"]["name"] == "ur5"
-    assert analysis.run["robot"]["file"] is None
-
-
-def test_what_is_not_finite_becomes_null() -> None:
+def test_lists_stand_on_one_line_and_what_is_not_finite_becomes_null() -> None:
     value = {"a": np.array([1.0, np.nan]), "b": float("inf"), "c": (np.float64(2.0), True, "x")}
     assert jsonable(value) == {"a": [1.0, None], "b": None, "c": [2.0, True, "x"]}
-
-
-def test_lists_of_numbers_stand_on_one_line() -> None:
     record = {"gain": [1.0, None, 3.0], "words": ["a [", "] b"]}
     text = to_json(record)
     assert '"gain": [ 1.0, null, 3.0 ]' in text
