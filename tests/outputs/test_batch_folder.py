@@ -25,27 +25,18 @@ def folder(tmp_path: Path) -> BatchFolder:
     return made
 
 
-def test_rows_are_found_again(folder: BatchFolder) -> None:
-    assert folder.keys() == {KEY}
-
-
 def test_the_table_is_in_the_order_of_the_logs_and_equal_logs_share_rows(
     folder: BatchFolder,
 ) -> None:
+    assert folder.keys() == {KEY}
     folder.put_rows(OTHER, rows(OTHER, 7))
-    logs = pl.DataFrame(
-        {"log": ["z", "b", "a"], "episode": [None, 1, None], "key": [OTHER, KEY, KEY]},
-        schema=LOGS,
-    )
-    (table,) = folder.gather(logs, {})
+    found = {"log": ["z", "b", "a"], "episode": [None, 1, None], "key": [OTHER, KEY, KEY]}
+    (table,) = folder.gather(pl.DataFrame(found, schema=LOGS), {})
     assert list(table.select("log", "joint").iter_rows()) == [
         ("z", 7), ("b", 1), ("b", 2), ("a", 1), ("a", 2)
     ]  # fmt: skip
-
-
-def test_without_a_log_the_table_has_its_columns(folder: BatchFolder) -> None:
     schema = {"key": pl.String, "joint": pl.Int64}
-    (table,) = folder.gather(pl.DataFrame(schema=LOGS), schema)
+    (table,) = folder.gather(pl.DataFrame(schema=LOGS), schema)  # no log
     assert table.columns == ["log", "episode", "key", "joint"]
 
 
@@ -70,13 +61,12 @@ def test_other_options_are_refused_but_not_for_an_empty_batch(
             pass
 
 
-def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
+def test_a_folder_of_something_else_or_of_a_batch_that_runs_is_refused(
+    folder: BatchFolder, tmp_path: Path
+) -> None:
     (tmp_path / "run.json").touch()
     with pytest.raises(OutputError, match="no batch wrote"):
         BatchFolder(tmp_path).opened("options", {}, force=False).__enter__()
-
-
-def test_two_batches_at_once_are_refused(folder: BatchFolder) -> None:
     with (
         folder.opened("options", {}, force=False),
         pytest.raises(OutputError, match="another batch"),

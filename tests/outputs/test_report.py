@@ -28,24 +28,16 @@ def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
     assert "vftcli report x" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
 
 
-def test_without_a_reference_there_are_no_error_tables(
-    without_reference: Analysis, tmp_path: Path
-) -> None:
-    write_report(tmp_path, [without_reference], command="")
-    found = {p.name for p in tmp_path.iterdir()}
-    assert found == set(FILES) - set(ERROR_TABLES)
-
-
-def test_the_list_of_contacts_is_written_as_it_is_printed(
+def test_the_list_of_contacts_is_written_as_it_is_printed_beside_an_mcap(
     touched: Analysis, tmp_path: Path
 ) -> None:
-    write_report(tmp_path / "one", [touched], command="")
-    record = json.loads((tmp_path / "one/contacts.json").read_text(encoding="utf-8"))
+    choice = OutputChoice(extras=("mcap",))
+    write_report(tmp_path, [touched], command="", choice=choice)
+    assert {p.name for p in tmp_path.iterdir()} == {*FILES, "estimates.mcap"}
+    record = json.loads((tmp_path / "contacts.json").read_text(encoding="utf-8"))
     assert [row["number"] for row in record["contacts"]] == [1, 2]
-    rows = pl.read_csv(tmp_path / "one/contacts.csv")
+    rows = pl.read_csv(tmp_path / "contacts.csv")
     assert rows["start_s"].to_list() == [1.0, 2.2]
-    write_report(tmp_path / "none", [replace(touched, contacts=None)], command="")
-    assert not (tmp_path / "none/contacts.json").exists()
 
 
 @pytest.mark.slow
@@ -58,12 +50,6 @@ def test_the_table_of_contacts_is_beside_the_figures(touched: Analysis, tmp_path
     assert table.read_text("utf-8") == contacts_latex(touched.contacts)
     assert "figures/contacts.tex" in digests(tmp_path / "some")
     assert {path.suffix for path in (tmp_path / "none/figures").iterdir()} == {".svg"}
-
-
-def test_a_report_writes_an_mcap_on_request(touched: Analysis, tmp_path: Path) -> None:
-    write_report(tmp_path / "out", [touched], command="", choice=OutputChoice(extras=("mcap",)))
-    found = {p.name for p in (tmp_path / "out").iterdir()}
-    assert found == {*FILES, "estimates.mcap"}
 
 
 def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:
@@ -118,20 +104,18 @@ def test_a_failing_writer_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_existing_report_needs_force(without_reference: Analysis, tmp_path: Path) -> None:
-    write_report(tmp_path, [without_reference], command="first")
-    with pytest.raises(OutputError, match="--force"):
-        write_report(tmp_path, [without_reference], command="second")
-    assert json.loads((tmp_path / "run.json").read_text())["command"] == "first"
-    write_report(tmp_path, [without_reference], command="second", force=True)
-    assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
-
-
-def test_a_report_without_a_recording_takes_away_the_one_that_was_there(
+def test_a_report_takes_away_what_it_does_not_write_but_needs_force(
     without_reference: Analysis, tmp_path: Path
 ) -> None:
+    first = replace(without_reference, contacts=None)
     write_report(tmp_path, [without_reference], command="")
-    assert (tmp_path / "recording.rrd").exists()
+    found = {p.name for p in tmp_path.iterdir()}
+    assert found == set(FILES) - set(ERROR_TABLES)
+    with pytest.raises(OutputError, match="--force"):
+        write_report(tmp_path, [first], command="second")
+    assert {p.name for p in tmp_path.iterdir()} == found
     none = OutputChoice(detail=NONE)
-    write_report(tmp_path, [without_reference], command="", force=True, choice=none)
-    assert not (tmp_path / "recording.rrd").exists()
+    write_report(tmp_path, [first], command="second", force=True, choice=none)
+    gone = {"recording.rrd", "contacts.json", "contacts.csv"}
+    assert {p.name for p in tmp_path.iterdir()} == found - gone
+    assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
