@@ -87,9 +87,11 @@ def test_a_command_without_figures_loads_no_matplotlib(loaded) -> None:
     assert "matplotlib" not in loaded(", ".join(("vftcli.cli.report", *modules)))
 
 
-def test_no_files_without_a_form_and_names_beside_a_file() -> None:
+def test_files_have_their_names_and_long_names_are_cut() -> None:
     assert figure_files(None, ["a"]) == []
     assert figure_files("svg", ["a"], "arm-") == ["arm-a-single.svg", "arm-a-double.svg"]
+    assert shortened("a" * 44) == "a" * 44
+    assert shortened("a" * 60) == "a" * 43 + "…"
 
 
 def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
@@ -105,13 +107,6 @@ def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
         assert figure.legends[0]._ncols == columns  # it has no public name
         assert figure.get_figheight() - bare == pytest.approx(room)
 
-
-def test_long_names_are_cut() -> None:
-    assert shortened("a" * 44) == "a" * 44
-    assert shortened("a" * 60) == "a" * 43 + "…"
-
-
-pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
 T = np.linspace(0.0, 10.0, 4001)
 
@@ -135,20 +130,16 @@ def drawn_lines(width: float, *words: Any, **more: Any) -> Any:
     return figure
 
 
-@pytest.mark.parametrize(("width", "rows"), [(3.5, 3), (7.16, 2)])
-def test_every_axis_has_its_unit_and_rows_share_one_below(width: float, rows: int) -> None:
-    figure = drawn_lines(width, plots_of(chart()))
-    assert figure.get_size_inches()[0] == width
-    columns = 6 // rows
-    assert [axes.get_ylabel() for axes in figure.axes] == [f"J{j} (N·m)" for j in range(1, 7)]
-    below = [axes.get_xlabel() for axes in figure.axes]
-    assert below == [""] * (6 - columns) + ["Time (s)"] * columns
-
-
-@pytest.mark.parametrize(("width", "height"), [(3.5, 3 * 0.95), (7.16, 2 * 1.15)])
-def test_a_figure_is_as_high_as_its_rows(width: float, height: float) -> None:
+@pytest.mark.parametrize(("width", "rows", "height"), [(3.5, 3, 3 * 0.95), (7.16, 2, 2 * 1.15)])
+def test_every_axis_has_its_unit_and_a_figure_is_as_high_as_its_rows(
+    width: float, rows: int, height: float
+) -> None:
     made = plots_of(chart(series=(ChartLine("a", np.zeros((len(T), 6))),)))
-    assert drawn_lines(width, made).get_figheight() == pytest.approx(height + 0.22)
+    figure = drawn_lines(width, made)
+    assert figure.get_size_inches() == pytest.approx([width, height + 0.22])
+    assert [axes.get_ylabel() for axes in figure.axes] == [f"J{j} (N·m)" for j in range(1, 7)]
+    below, columns = [axes.get_xlabel() for axes in figure.axes], 6 // rows
+    assert below == [""] * (6 - columns) + ["Time (s)"] * columns
     numbered = drawn_lines(width, made, numbers={1: 1.0})
     assert numbered.get_figheight() == pytest.approx(height + 0.34)
 
@@ -195,28 +186,30 @@ def test_lines_are_reported_apart_without_colour() -> None:
             assert one.get_linewidth() != other.get_linewidth()
 
 
-def test_the_legend_names_a_ribbon_where_no_contact_is_listed() -> None:
-    first = chart().series[1]
+def named(figure: Any) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_a_legend_names_lines_bands_and_contacts_but_no_line_alone() -> None:
+    first, *_ = lines = chart().series[1:]
     quiet = chart(series=(first._replace(quiet=T < 5.0),))
-    for made, names in ((quiet, ["line 0", "95 % band", QUIET]), (chart(series=(first,)), 2)):
-        (legend,) = drawn_lines(7.16, plots_of(made)).legends
-        texts = [text.get_text() for text in legend.get_texts()]
-        assert texts == (names if isinstance(names, list) else ["line 0", "95 % band"])
+    assert named(drawn_lines(7.16, plots_of(quiet))) == ["line 0", "95 % band", QUIET]
+    alone = chart(series=(first,))
+    assert named(drawn_lines(7.16, plots_of(alone))) == ["line 0", "95 % band"]
+    assert not drawn_lines(7.16, plots_of(chart(series=lines[1:2]))).legends
 
 
 def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:
-    figure = drawn_lines(
-        3.5, plots_of(chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor"))
-    )
-    boxes = [axes.get_tightbbox() for axes in figure.axes] + [
-        figure.legends[0].get_window_extent()
-    ]
-    wide, high = figure.bbox.width, figure.bbox.height
-    for box in boxes:
-        assert box.x0 >= -1.0
-        assert box.y0 >= -1.0
-        assert box.x1 <= wide + 1.0
-        assert box.y1 <= high + 1.0
+    made = chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")
+    figure = drawn_lines(3.5, plots_of(made))
+    names = named(figure)
+    assert names[0] == "reference"
+    assert names[-3:] == ["95 % band", "± floor", "contact"]
+    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    boxes.append(figure.legends[0].get_window_extent())
+    corners = np.array([box.extents for box in boxes])
+    assert corners.min() >= -1.0
+    assert (corners[:, 2:].max(axis=0) <= np.array(figure.bbox.size) + 1.0).all()
     assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
@@ -228,16 +221,6 @@ def test_spikes_stay_and_few_points_are_drawn() -> None:
     line = drawn_lines(3.5, plots_of(made)).axes[0].lines[0]
     assert len(line.get_xdata()) <= 1002
     assert line.get_ydata().max() == 5.0
-
-
-@pytest.mark.slow
-def test_a_legend_names_lines_bands_and_contacts_but_no_line_alone() -> None:
-    made = chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")
-    (legend,) = drawn_lines(7.16, plots_of(made)).legends
-    named = [text.get_text() for text in legend.get_texts()]
-    assert named[0] == "reference"
-    assert named[-3:] == ["95 % band", "± floor", "contact"]
-    assert not drawn_lines(7.16, plots_of(chart(series=made.series[2:3]))).legends
 
 
 def test_contacts_are_numbered_above_the_first_row_where_there_is_room() -> None:
@@ -274,10 +257,7 @@ def test_marks_stand_where_they_are_reported_each_shape_its_own() -> None:
     assert list(one.get_xdata()) == [3.0]
     assert one.get_marker() != other.get_marker()
     assert figure.axes[0].get_xlabel() == "Rate (Hz)"
-    assert [text.get_text() for text in figure.legends[0].get_texts()][-2:] == [
-        "a, chosen",
-        "b, chosen",
-    ]
+    assert named(figure)[-2:] == ["a, chosen", "b, chosen"]
 
 
 def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
@@ -292,8 +272,6 @@ def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
     bottoms = [plots[k].get_position().y0 for k in (0, 2, 4, 6)]
     np.testing.assert_allclose(np.diff(bottoms), np.diff(bottoms).mean(), atol=0.01)
 
-
-pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
 LARGE, SMALL = np.array([5.0, 2.0]), np.array([0.4, np.nan])
 
@@ -327,12 +305,8 @@ def test_dots_stand_side_by_side_with_their_intervals_and_the_floor() -> None:
     ends = gmo.lines[2][0].get_segments()[0][:, 1]
     assert ends == pytest.approx([4.5, 6.0])
     assert axes.get_yscale() == "log"  # 5 is more than ten times .4
-    named = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert named == ["gmo", "best", "floor of the reference"]
-
-
-def test_observers_are_reported_apart_without_colour() -> None:
-    gmo, best = drawn_dots([plot()]).axes[0].containers
+    assert named(figure) == ["gmo", "best", "floor of the reference"]
+    # They are told apart without colour, too.
     assert gmo.lines[0].get_marker() != best.lines[0].get_marker()
     assert gmo.lines[0].get_markerfacecolor() != best.lines[0].get_markerfacecolor()
 
