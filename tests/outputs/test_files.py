@@ -46,34 +46,28 @@ def test_a_failing_block_leaves_the_old_file_and_nothing_else(tmp_path: Path) ->
     assert (tmp_path / "a.txt").read_text() == "old"
 
 
-def test_an_existing_file_needs_force(tmp_path: Path) -> None:
+def test_an_existing_file_needs_force_and_no_file_is_no_place_for_one(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "old")
     with pytest.raises(OutputError, match=r"a\.txt exists.*--force"):
         write_text(tmp_path / "a.txt", "new")
     write_text(tmp_path / "a.txt", "new", force=True)
     assert (tmp_path / "a.txt").read_text() == "new"
+    with pytest.raises(OutputError, match="no such folder"):
+        write_text(tmp_path / "no" / "a.txt", "text")
+    with pytest.raises(OutputError, match="is a folder"):
+        write_text(tmp_path, "text", force=True)
 
 
-def test_a_link_is_written_through(tmp_path: Path) -> None:
+def test_a_link_is_written_through_and_a_device_straight(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "link.txt").symlink_to(tmp_path / "there" / "a.txt")
     write_text(tmp_path / "link.txt", "text", force=True)
     assert (tmp_path / "link.txt").is_symlink()
     assert (tmp_path / "there" / "a.txt").read_text() == "text"
-
-
-def test_a_device_is_written_straight() -> None:
     with atomic(Path("/dev/null")) as path:
         assert path == Path("/dev/null")
         path.write_text("gone")
     assert Path("/dev/null").is_char_device()
-
-
-def test_a_missing_folder_and_a_folder_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="no such folder"):
-        write_text(tmp_path / "no" / "a.txt", "text")
-    with pytest.raises(OutputError, match="is a folder"):
-        write_text(tmp_path, "text", force=True)
 
 
 def test_a_folder_gets_all_files_at_once(tmp_path: Path) -> None:

@@ -17,21 +17,6 @@ class Line(NamedTuple):
     alarms: np.ndarray | None
 
 
-def test_one_robot_joint_by_joint() -> None:
-    """First joint of the Panda: 4.971 kg, no torque constant, 87 N·m."""
-    lines = terminal(joints_grid(load_robot("panda"))).splitlines()
-    assert len(lines) == 9
-    assert lines[1].split() == ["joint", "[kg]", "[kg·m²]", "[N·m/A]", "[N·m]", "friction"]
-    assert lines[2].split()[:5] == ["joint1", "4.971", "0.000", "–", "87.0"]
-    assert lines[0].index("tau_max") + len("tau_max") == lines[2].index("87.0") + len("87.0")
-
-
-def test_friction_is_reported_with_its_numbers_and_how_far_to_trust_it() -> None:
-    text = joints_grid(load_robot("panda")).rows[0][-1]
-    assert str(text).startswith("sigmoid (amplitude 0.54615, ")
-    assert str(text).endswith("; published")
-
-
 def test_the_list_of_robots_fits_a_terminal() -> None:
     head, *lines = terminal(robots_grid(map(load_robot, PROFILES))).splitlines()
     assert head.split() == ["name", "arm", "joints", "effort", "friction"]
@@ -58,7 +43,13 @@ def test_a_robot_in_full_has_its_gains_notes_sources_and_payloads() -> None:
     panda = load_robot("panda")
     head, _, *lines = robot_text(panda).splitlines()
     assert head == "Franka Emika Panda (FER) (panda): 7 joints, torque from link_torque"
-    assert lines[:9] == terminal(joints_grid(panda)).splitlines()
+    table = terminal(joints_grid(panda)).splitlines()
+    assert lines[:9] == table
+    assert table[1].split() == ["joint", "[kg]", "[kg·m²]", "[N·m/A]", "[N·m]", "friction"]
+    assert table[2].split()[:5] == ["joint1", "4.971", "0.000", "–", "87.0"]
+    assert table[0].index("tau_max") + len("tau_max") == table[2].index("87.0") + len("87.0")
+    assert "sigmoid (amplitude 0.54615, " in table[2]
+    assert table[2].endswith("; published")
     (note,) = panda.remarks
     assert lines[9:15] == [
         "",

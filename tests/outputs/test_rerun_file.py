@@ -32,10 +32,7 @@ def plot(path: str, values: np.ndarray, step: float = 1.0, *, family: int = 0) -
 
 def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:
     first = np.arange(8.0).reshape(4, 2)
-    tabs = [
-        Tab("one", [plot("/one", first)]),
-        Tab("two", [plot("/two", first[:3, :1], 0.5)]),
-    ]
+    tabs = [Tab("one", [plot("/one", first)]), Tab("two", [plot("/two", first[:3, :1], 0.5)])]
     words = {"Summary": "words → here"}
     with rerun_file(tmp_path / "r.rrd", "名 title", tabs, words, POSES, "Arm"):
         pass
@@ -46,19 +43,16 @@ def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:
     assert len(rerun.chunk.RrdReader(str(tmp_path / "r.rrd")).blueprints()) == 1
 
 
-@pytest.mark.parametrize(
-    ("text", "drawn"),
-    [
-        ("J2 [N·m] ±0.5 τ²", "J2 [N·m] ±0.5 τ²"),
-        ("Jᵀ ≤ −1 → √2", "J^T <= -1 -> sqrt 2"),
-        ("ṗ = μ", "p = μ"),
-        ("日志.csv\t\x00", "??.csv??"),
-        ("a\nb", "a\nb"),
-    ],
-)
-def test_the_viewer_gets_letters_it_can_draw(text: str, drawn: str) -> None:
+def test_the_viewer_gets_letters_it_can_draw() -> None:
     """Viewer 0.41 stops at a letter its font lacks; Latin-1 and Greek were seen to be drawn."""
-    assert drawable(text) == drawn
+    drawn = {
+        "J2 [N·m] ±0.5 τ²": "J2 [N·m] ±0.5 τ²",
+        "Jᵀ ≤ −1 → √2": "J^T <= -1 -> sqrt 2",
+        "ṗ = μ": "p = μ",
+        "日志.csv\t\x00": "??.csv??",
+        "a\nb": "a\nb",
+    }
+    assert {text: drawable(text) for text in drawn} == drawn
 
 
 def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
@@ -74,12 +68,8 @@ def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
     tab = Tab("one", [force], log)
     with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, POSES, "Arm"):
         pass
-    assert rows_of(tmp_path / "r.rrd", "/force", "Scalars:scalars") == [
-        [0.0],
-        [1.0],
-        [2.0],
-        [3.0],
-    ]
+    found = rows_of(tmp_path / "r.rrd", "/force", "Scalars:scalars")
+    assert np.ravel(found).tolist() == [0.0, 1.0, 2.0, 3.0]
     assert rows_of(tmp_path / "r.rrd", "/force/points", "Scalars:scalars") == [[7.0]]
     assert rows_of(tmp_path / "r.rrd", "/contacts/2", "TextLog:text") == [["second -> end"]]
     assert rows_of(tmp_path / "r.rrd", "/remarks", "TextLog:text") == [["first"], ["last"]]

@@ -28,7 +28,6 @@ from vftcli.outputs.rerun_recording import (
     write_rrd,
 )
 from vftcli.outputs.run_record import all_remarks
-from vftcli.outputs.shapes import touched_point
 from vftcli.pipeline import AnalysisChoice
 from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice
@@ -169,7 +168,10 @@ def test_the_summary_says_what_the_log_is_and_what_the_arrow_means(
 
 
 def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> None:
-    """About 50 arrows a second: every second sample of this log at 125 Hz, of the best."""
+    """About 50 arrows a second: every second sample of this log at 125 Hz, of the best.
+
+    Without a list of contacts it runs on.
+    """
     write_rrd(tmp_path / "r.rrd", replace(analysis, contacts=None))
     drawn = rows_of(tmp_path / "r.rrd", "/robot/flange_force", "Arrows3D:vectors")
     (best,) = (wrench for wrench in analysis.wrenches if wrench.name == "best")
@@ -301,13 +303,6 @@ def test_the_touched_links_are_painted(touched: Analysis) -> None:
     assert found[3] == {2.2: PLACES["forearm"], 2.6: ""}
 
 
-@pytest.mark.parametrize(("places", "point"), [((0, 6), 6.0), ((2, 3), 2.5), ((), 6.0)])
-def test_the_arrow_stands_at_the_place(places: tuple[int, ...], point: float) -> None:
-    """Link k lies between the origins k − 1 and k; here each origin has its own number as x."""
-    origins = np.tile(np.arange(7.0)[None, :, None], (1, 1, 3))
-    assert touched_point(contact(places=places), origins)[0, 0] == point
-
-
 def test_arrows_are_there_while_the_contact_lasts_and_no_longer(
     touched: Analysis, tmp_path: Path
 ) -> None:
@@ -339,9 +334,3 @@ def test_the_arrow_goes_even_where_a_pose_is_drawn_as_the_contact_ends(
     assert t[-2] == pytest.approx(stop, abs=1e-6)  # whole microseconds
     assert arrows[-2]
     assert not arrows[-1]
-
-
-def test_without_a_list_the_force_runs_on(touched: Analysis, tmp_path: Path) -> None:
-    write_rrd(tmp_path / "r.rrd", replace(touched, contacts=None))
-    assert rows_of(tmp_path / "r.rrd", "/robot/flange_force", "Arrows3D:vectors")
-    assert not rows_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
