@@ -7,11 +7,11 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs import NONE, OutputChoice, report
+from vftcli.outputs import FULL, LEVELS, NONE, OutputChoice, report
 from vftcli.outputs.contacts import contacts_latex
 from vftcli.outputs.files import digests
 from vftcli.outputs.report import ERROR_TABLES, FILES, SUMMARY_FILES, write_report
-from vftcli.signals.errors import OutputError
+from vftcli.signals.errors import OutputError, ParameterError
 
 
 def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
@@ -119,3 +119,18 @@ def test_a_report_takes_away_what_it_does_not_write_but_needs_force(
     gone = {"recording.rrd", "contacts.json", "contacts.csv"}
     assert {p.name for p in tmp_path.iterdir()} == found - gone
     assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
+
+
+def test_a_report_has_its_recording_unless_none_is_asked_for() -> None:
+    assert OutputChoice.parsed() == OutputChoice(extras=(), detail=LEVELS)
+    assert OutputChoice(extras=("rrd",), detail=FULL).detail == FULL
+    assert OutputChoice.parsed(settings={"recording.detail": NONE}).detail == NONE
+
+
+def test_words_that_mean_nothing_are_refused() -> None:
+    with pytest.raises(
+        ParameterError, match=r"recording\.detail=much is none of full, levels and none"
+    ):
+        OutputChoice.parsed(settings={"recording.detail": "much"})
+    with pytest.raises(ParameterError, match="writes no recording"):
+        OutputChoice(extras=("rrd",), detail=NONE)
