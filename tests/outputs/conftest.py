@@ -95,11 +95,8 @@ def with_wrench(recording: Recording) -> Analysis:
     return analyse(run_of(recording, load_robot("ur5"), request), request)
 
 
-Reworked = Callable[..., Analysis]
-
-
 @pytest.fixture(scope="session")
-def as_if() -> Reworked:
+def as_if() -> Callable[..., Analysis]:
     """Makes an analysis look as if it were of another recording, or of another arm."""
 
     def as_if(analysis: Analysis, recording: Recording | None = None, arm: str = "") -> Analysis:
@@ -126,12 +123,7 @@ BROWSERS = "chromium", "chromium-browser", "google-chrome"
 
 
 class Tab:
-    """A page opened in a browser, and what its console says.
-
-    Attributes:
-        page: The page, as Playwright has it.
-        errors: Errors of its scripts, and everything it wrote to the console.
-    """
+    """A page opened in a browser; errors of its scripts, and all that it wrote to the console."""
 
     def __init__(self, page: Any, path: Path) -> None:
         self.page = page

@@ -26,17 +26,11 @@ TOUCHED = (11.1, 11.5)
 
 
 class Picture(NamedTuple):
-    """One picture of what a command made.
+    """One picture of what a command made."""
 
-    Attributes:
-        name: File in docs/pictures, without `.png`.
-        source: File that the commands made.
-        height: How much of a page is shown [px].
-    """
-
-    name: str
-    source: str
-    height: int = 0
+    name: str  # of the file in docs/pictures, without `.png`
+    source: str  # file that the commands made
+    height: int = 0  # how much of a page is shown [px]
 
 
 class Exhibit(NamedTuple):

@@ -3,6 +3,7 @@
 Example: VFT_LOGS=logs python tests/outputs/screens.py
 """
 
+import contextlib
 import os
 import re
 import shlex
@@ -24,16 +25,10 @@ COLUMNS = "88"
 
 
 class Screen(NamedTuple):
-    """One command of the page.
+    """One command of the page."""
 
-    Attributes:
-        command: As it is typed, beside the logs.
-        files: Every file that it names → where that is, under the fixtures or the real logs.
-        real: Whether they are under the real logs.
-    """
-
-    command: str
-    files: Mapping[str, str]
+    command: str  # as it is typed, beside the logs
+    files: Mapping[str, str]  # that it names → where they are, under fixtures or the real logs
     real: bool
 
 
@@ -71,21 +66,11 @@ OF_STORY = {
 
 
 def shown(screen: Screen, logs: Path, folder: Path) -> str:
-    """What a command prints, run in a folder that holds the logs it names.
-
-    Args:
-        screen: The command.
-        logs: Where its files are looked for.
-        folder: An empty folder.
-    """
+    """What a command prints, run in an empty folder that gets the logs it names."""
     for name, place in screen.files.items():
         (folder / name).symlink_to((logs / place).resolve())
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
+    with contextlib.chdir(folder):
         result = CliRunner(env={"COLUMNS": COLUMNS}).invoke(app, shlex.split(screen.command)[1:])
-    finally:
-        os.chdir(before)
     assert result.exit_code == 0, result.output
     return result.stdout
 

@@ -10,6 +10,10 @@ from vftcli.evaluation.scores import LAGS
 from vftcli.outputs.benchmark import Results, arm_texts, dots, list_texts, text_of
 from vftcli.reproduction.scoring import SCHEMA
 
+COMMON = {
+    "protocol": "online", "future": False, "exact_model": False, "marked": False,
+    "truth_error_Nm": 0.3,
+}  # fmt: skip
 CELLS = np.full(10, 2.0)
 """Ten cells of 2 s, more than the eight that a bootstrap needs; all alike, so it has no width."""
 
@@ -18,14 +22,8 @@ def rows_of(
     log: str, arm: str, method: str, part: str, *, error: float, truth: float, **more: Any
 ) -> list[dict[str, Any]]:
     """Two joints with a constant error against a constant torque [N·m]; band of ±2 N·m."""
-    share, shared = more.pop("missing", 0.0), {"protocol": "online", "part": part} | more
+    share, shared = more.pop("missing", 0.0), COMMON | {"part": part} | more
     shared |= {"log": log, "arm": arm, "method": method}
-    shared = {
-        "future": False,
-        "exact_model": False,
-        "marked": False,
-        "truth_error_Nm": 0.3,
-    } | shared
     sums = {
         "seconds": CELLS, "missing": share * CELLS, "squares": error**2 * CELLS,
         "sizes": error * CELLS, "truth": truth**2 * CELLS, "banded": CELLS,
@@ -40,8 +38,7 @@ def rows_of(
 
 def counted(log: str, arm: str, **counts: Any) -> dict[str, Any]:
     """A row of a list of contacts."""
-    row = {"log": log, "arm": arm, "method": "best", "protocol": "online", "part": "list"}
-    row |= {"future": True, "exact_model": False, "marked": False, "truth_error_Nm": 0.3}
+    row = COMMON | {"log": log, "arm": arm, "method": "best", "part": "list", "future": True}
     values = {"split": 0, "found_as_load": 0, "peaks_held": 0, "onset_s": [], "peak_error_N": []}
     return row | values | {"true_peak_N": []} | counts
 

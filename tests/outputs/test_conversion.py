@@ -58,11 +58,9 @@ def test_every_signal_reads_back(tmp_path: Path, ending: str, names: tuple[str, 
 @pytest.mark.parametrize("ending", WRITERS)
 @pytest.mark.parametrize("kept", [("current",), ("torque",), ()])
 def test_the_kind_of_effort_survives(tmp_path: Path, ending: str, kept: tuple[str, ...]) -> None:
-    recording = full(6)
-    recording = Recording(
-        t=recording.t, q=recording.q, **{k: getattr(recording, k) for k in kept}
-    )
-    convert(recording, tmp_path / f"x{ending}")
+    log = full(6)
+    log = Recording(t=log.t, q=log.q, **{name: getattr(log, name) for name in kept})
+    convert(log, tmp_path / f"x{ending}")
     assert read(tmp_path / f"x{ending}").signals == ("q", *kept)
 
 
@@ -114,22 +112,19 @@ def messages_of(path: Path) -> dict[str, list]:
     return found
 
 
-def test_every_topic_has_every_sample(messages: dict[str, list]) -> None:
+def test_mcap_reads_what_rosbags_reads_and_every_topic_has_every_sample(
+    path: Path, messages: dict[str, list]
+) -> None:
+    """Every message of the file by the format's own reader, in the order of time as written."""
     observers = ("best", "fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
     topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
-    topics.append("/vftcli/wrench/best")
-    assert {topic: len(messages[topic]) for topic in topics} == dict.fromkeys(topics, 600)
-    assert len(messages["/vftcli/contacts/log"]) == 4
-    assert set(messages) == {*topics, "/vftcli/contacts/log"}
-
-
-def test_mcap_reads_what_rosbags_reads(path: Path, messages: dict[str, list]) -> None:
-    """Every message of the file by the format's own reader, in the order of time as written."""
+    counts = dict.fromkeys([*topics, "/vftcli/wrench/best"], 600) | {"/vftcli/contacts/log": 4}
+    assert {topic: len(found) for topic, found in messages.items()} == counts
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         assert reader.get_header().profile == "ros2"
         found = list(reader.iter_messages(log_time_order=False))
-    assert len(found) == sum(map(len, messages.values()))
+    assert len(found) == sum(counts.values())
     stamps = [message.log_time for _, _, message in found]
     assert stamps == sorted(stamps)
     assert {schema.encoding for schema, _, _ in found} == {"ros2msg"}
