@@ -66,9 +66,7 @@ def push() -> Replay:
     return replay(wrench, np.tile(START, (500, 1)), load_robot("ur5"), laws, source=source)
 
 
-def test_a_replay_becomes_a_folder_whose_rows_are_not_rounded(
-    release: Replay, tmp_path: Path
-) -> None:
+def test_a_replay_becomes_a_folder_of_unrounded_rows(release: Replay, tmp_path: Path) -> None:
     write_admittance(tmp_path / "out", Replayed(release), "vftcli admit")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
     record = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))
@@ -250,9 +248,7 @@ def drawn(replay: Replay, width: str = "single") -> Any:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_a_release_is_one_plot_of_its_axis_with_a_line_a_controller(
-    release: Replay, width: str
-) -> None:
+def test_a_release_is_a_plot_with_a_line_a_controller(release: Replay, width: str) -> None:
     figure = drawn(release, width)
     (axes,) = figure.axes
     assert (axes.get_ylabel(), axes.get_xlabel()) == ("x (m)", "Time (s)")

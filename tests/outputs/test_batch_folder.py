@@ -25,9 +25,7 @@ def folder(tmp_path: Path) -> BatchFolder:
     return made
 
 
-def test_the_table_is_in_the_order_of_the_logs_and_equal_logs_share_rows(
-    folder: BatchFolder,
-) -> None:
+def test_the_table_is_in_the_logs_order_and_equal_logs_share_rows(folder: BatchFolder) -> None:
     assert folder.keys() == {KEY}
     folder.put_rows(OTHER, rows(OTHER, 7))
     found = {"log": ["z", "b", "a"], "episode": [None, 1, None], "key": [OTHER, KEY, KEY]}
@@ -48,9 +46,7 @@ def test_the_seal_is_the_last_file_and_lists_the_others(folder: BatchFolder) -> 
     assert set(record["files"]) == {"batch.parquet", "failures.parquet", "index.html"}
 
 
-def test_other_options_are_refused_but_not_for_an_empty_batch(
-    folder: BatchFolder, tmp_path: Path
-) -> None:
+def test_other_options_are_refused_if_it_has_rows(folder: BatchFolder, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="other options"):
         folder.opened("others", {}, force=False).__enter__()
     with folder.opened("others", {}, force=True):
@@ -61,9 +57,7 @@ def test_other_options_are_refused_but_not_for_an_empty_batch(
             pass
 
 
-def test_a_folder_of_something_else_or_of_a_batch_that_runs_is_refused(
-    folder: BatchFolder, tmp_path: Path
-) -> None:
+def test_a_folder_of_others_or_busy_is_refused(folder: BatchFolder, tmp_path: Path) -> None:
     (tmp_path / "run.json").touch()
     with pytest.raises(OutputError, match="no batch wrote"):
         BatchFolder(tmp_path).opened("options", {}, force=False).__enter__()

@@ -80,9 +80,7 @@ def test_an_arm_is_believed_by_its_misfit(
 LOAD = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
 
 
-def test_a_load_nobody_reported_is_first_with_its_command_which_is_given_once(
-    without_reference: Analysis,
-) -> None:
+def test_a_load_nobody_reported_is_first_with_its_command(without_reference: Analysis) -> None:
     list_of_load = contact_list(contact(is_load=True), remarks=(caution("contact-is-load"),))
     made = replace(examined(without_reference, LOAD), contacts=list_of_load)
     first, (row,) = grounds(made)[0], of(made, "lasting contact")
@@ -184,9 +182,7 @@ def test_a_joint_at_rest_hides_its_dry_friction(without_reference: Analysis, as_
     assert len(of(still, "the arm is still")) == 1
 
 
-def test_friction_is_measured_from_the_free_log_with_its_columns(
-    without_reference: Analysis,
-) -> None:
+def test_friction_is_measured_from_the_free_log_as_read(without_reference: Analysis) -> None:
     log = without_reference.motion.log
     source = replace(log.recording.source, path=Path("f.csv"), columns="t,q:6", sha256="f")
     run = replace(log, recording=replace(log.recording, source=source))
@@ -227,9 +223,7 @@ def test_few_rows_that_miss_the_sensor_are_named(without_reference: Analysis) ->
     assert ground.sentence.endswith("row 3 by 45 N, row 4 by 45 N and 2 more")
 
 
-def test_a_check_and_a_caution_do_not_share_their_name(
-    without_reference: Analysis, as_if
-) -> None:
+def test_a_check_and_a_caution_have_their_own_names(without_reference: Analysis, as_if) -> None:
     """The joints that a free part leaves still, and stamps that repeat between sound ones."""
     found = contact_list(
         contact(), remarks=(caution("free-part-misses-joints", Where(joints=(5,))),)
@@ -300,9 +294,7 @@ def test_every_subject_stands_for_remarks_that_exist_once() -> None:
         ("saturation", "--robot ur5"),
     ],
 )
-def test_the_command_of_a_finding_quotes_names_and_names_the_robots_own_file(
-    without_reference: Analysis, code: str, ending: str
-) -> None:
+def test_a_finding_has_its_command(without_reference: Analysis, code: str, ending: str) -> None:
     made = without_reference
     assert remedy_of(warning(code), made.recording, made).endswith(ending)
     assert f"'{made.recording.source.path}'" in command("inspect", made.recording)

@@ -172,9 +172,7 @@ def test_a_row_names_size_range_and_places() -> None:
         ((0.0, 0.0, 0.0), "–"),
     ],
 )
-def test_a_direction_names_every_axis_that_holds_much(
-    force: tuple[float, float, float], words: str
-) -> None:
+def test_a_direction_names_its_large_axes(force: tuple[float, float, float], words: str) -> None:
     """More than .35 of the force: 0.35² is an eighth of its square."""
     assert direction(np.array(force)) == words
 
@@ -238,9 +236,7 @@ def test_a_list_survives_its_record() -> None:
         ('{"contacts": null, "input": {"path": "a.csv", "sha256": ""}}', "log, a.csv"),
     ],
 )
-def test_without_a_list_the_log_is_asked_for(
-    text: str | None, words: str, tmp_path: Path
-) -> None:
+def test_without_a_list_a_log_is_asked_for(text: str | None, words: str, tmp_path: Path) -> None:
     if text is not None:
         (tmp_path / "run.json").write_text(text, encoding="utf-8")
     with pytest.raises(LogError, match=words):

@@ -112,9 +112,7 @@ def messages_of(path: Path) -> dict[str, list]:
     return found
 
 
-def test_mcap_reads_what_rosbags_reads_and_every_topic_has_every_sample(
-    path: Path, messages: dict[str, list]
-) -> None:
+def test_mcap_and_rosbags_read_every_sample(path: Path, messages: dict[str, list]) -> None:
     """Every message of the file by the format's own reader, in the order of time as written."""
     observers = ("best", "fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
     topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
@@ -130,9 +128,7 @@ def test_mcap_reads_what_rosbags_reads_and_every_topic_has_every_sample(
     assert {schema.encoding for schema, _, _ in found} == {"ros2msg"}
 
 
-def test_the_wrench_of_best_stands_in_the_flange(
-    messages: dict[str, list], touched: Analysis
-) -> None:
+def test_the_best_wrench_is_at_the_flange(messages: dict[str, list], touched: Analysis) -> None:
     found = [message for _, message in messages["/vftcli/wrench/best"]]
     assert {message.header.frame_id for message in found} == {"flange"}
     force = [[m.wrench.force.x, m.wrench.force.y, m.wrench.force.z] for m in found]
@@ -140,9 +136,7 @@ def test_the_wrench_of_best_stands_in_the_flange(
     np.testing.assert_array_equal(np.hstack([force, moment]), touched.wrenches[0].known)
 
 
-def test_wrenches_in_base_axes_say_about_which_point(
-    with_wrench: Analysis, tmp_path: Path
-) -> None:
+def test_wrenches_in_base_axes_say_about_where(with_wrench: Analysis, tmp_path: Path) -> None:
     """The flange is where their moment refers to: the frame of base would be another."""
     write_mcap(tmp_path / "wrench.mcap", with_wrench)
     found = messages_of(tmp_path / "wrench.mcap")
@@ -167,9 +161,7 @@ def test_contacts_are_logged(messages: dict[str, list]) -> None:
     assert first.sec * 10**9 + first.nanosec == logged[0][0]
 
 
-def test_joint_states_are_the_log_and_estimates_are_efforts(
-    messages: dict[str, list], analysis: Analysis
-) -> None:
+def test_states_are_the_log_and_estimates(messages: dict[str, list], analysis: Analysis) -> None:
     """The log's first stamp is 100.25 s."""
     states = [message for _, message in messages["/joint_states"]]
     recording = analysis.recording

@@ -34,9 +34,7 @@ def test_parquet_holds_flat_float_columns(analysis: Analysis, tmp_path: Path) ->
     assert schema.field("tau_ext/gmo/2").metadata[b"unit"] == "N·m".encode()
 
 
-def test_unknown_is_null_and_what_is_not_there_has_no_column(
-    analysis: Analysis, without_reference: Analysis
-) -> None:
+def test_unknown_is_null_or_no_column(analysis: Analysis, without_reference: Analysis) -> None:
     """The reference of the fixture is unknown in its first 20 samples."""
     column = estimates_table(analysis)["tau_ext/reference/3"]
     assert column.null_count() == 20
@@ -119,9 +117,7 @@ def test_a_long_table_is_written_in_groups_that_hold_the_same(
     assert described[0] == described[1]
 
 
-def test_a_log_in_blocks_gives_the_folder_of_a_whole_one(
-    analysis: Analysis, tmp_path: Path
-) -> None:
+def test_a_log_in_blocks_gives_the_same_folder(analysis: Analysis, tmp_path: Path) -> None:
     choice = OutputChoice(extras=("csv",))
     write_estimate_folder(tmp_path / "whole", analysis, "", choice)
     blocks = [slice(start, start + 250) for start in range(0, len(analysis.t), 250)]

@@ -137,9 +137,7 @@ def tuned(spectra: Spectra) -> tuple[Tuned, ...]:
     return tune_all(spectra, parse_goal("auto"))
 
 
-def test_spectra_bear_every_response_and_curves_what_was_chosen(
-    spectra: Spectra, tuned: tuple[Tuned, ...]
-) -> None:
+def test_spectra_bear_responses_and_choices(spectra: Spectra, tuned: tuple[Tuned, ...]) -> None:
     found = tuned_figures(spectra, tuned)
     assert list(found) == list(TUNED_FIGURES)
     first, second = (drawn(drawing, "single") for drawing in found.values())
@@ -150,9 +148,7 @@ def test_spectra_bear_every_response_and_curves_what_was_chosen(
     assert gmo.get_ydata()[0] == pytest.approx(tuned[1].rmse[1])
 
 
-def test_the_least_of_a_curve_is_what_is_chosen_for_the_smallest_error(
-    spectra: Spectra, tuned: tuple[Tuned, ...]
-) -> None:
+def test_the_least_of_a_curve_is_chosen(spectra: Spectra, tuned: tuple[Tuned, ...]) -> None:
     curves = tuning_curves(spectra)
     for line, name in ((tuned[1], "fdo, gmo"), (tuned[2], "kfo-zoh"), (tuned[3], "kfo-rts")):
         np.testing.assert_array_equal(curves[name].best, line.rate)
@@ -177,9 +173,7 @@ def test_gains_and_figures_appear_together(
     assert {p.name for p in tmp_path.iterdir()} == wanted
 
 
-def test_a_plot_for_a_notebook_is_of_the_joints_and_observers_asked_for(
-    analysis: Analysis,
-) -> None:
+def test_a_plot_for_a_notebook_is_of_what_is_asked_for(analysis: Analysis) -> None:
     figure = plot(analysis, "torques", [2, 5], "gmo")
     assert [axes.get_ylabel() for axes in figure.axes] == ["J2 (N·m)", "J5 (N·m)"]
     assert names_in(figure) == ["reference (vendor)", "gmo", "± floor of the reference"]

@@ -138,9 +138,7 @@ def test_an_error_of_the_system_becomes_one_line(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
-def test_a_move_that_fails_half_way_is_undone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_move_that_fails_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second of three files cannot be moved: the first is what it was, the third not there."""
     for name in ("a.txt", "b.txt", "stale.txt"):
         (tmp_path / name).write_text("old")
@@ -215,9 +213,7 @@ def test_a_seal_is_not_believed_outside_its_folder(tmp_path: Path) -> None:
         ("gone", "log.csv", False),
     ],
 )
-def test_what_a_command_reads_is_not_overwritten(
-    tmp_path: Path, given: str, written: str, refused: bool
-) -> None:
+def test_what_is_read_is_kept(tmp_path: Path, given: str, written: str, refused: bool) -> None:
     """By whatever name; but what an earlier run wrote into a folder that is read."""
     sealed(tmp_path, {"made.csv": "made"})
     (tmp_path / "sub").mkdir()
@@ -233,9 +229,7 @@ def test_what_a_command_reads_is_not_overwritten(
     refuse_existing(tmp_path / written, force=True)
 
 
-def test_the_seal_goes_first_and_comes_last(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_seal_goes_first_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     moved = []
     move = Path.replace
 
@@ -291,9 +285,7 @@ def test_runs_into_one_folder_at_once_do_not_mix(tmp_path: Path) -> None:
     assert listed == {name: digest(tmp_path / name) for name in found}
 
 
-def test_a_kill_before_any_rename_leaves_no_two_runs_under_one_seal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_kill_mixes_no_sealed_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder with sub-folders, each sealed, above them a seal for all; the new run has others."""
     out, copies = tmp_path / "out", []
     move = Path.replace

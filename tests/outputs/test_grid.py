@@ -197,9 +197,7 @@ def test_a_name_that_a_spreadsheet_would_run_is_a_text_in_csv(first: str) -> Non
     assert row == {"log": f"'{shown}", "value": "-1.5", "at": "'-"}
 
 
-def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_table_without_room_leaves_out_what_is_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
     columns = (
         Column("name", words=True),
         Column("time to the peak", "m, rad", ".1f"),
@@ -221,9 +219,7 @@ def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom
     assert least.splitlines()[-2:] == ["b         10.0", "No room for: work of all."]
 
 
-def test_a_table_without_rows_is_its_headings_and_one_without_headings_its_rows(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_table_has_rows_or_headings_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     columns = (Column("", words=True), Column("", form=".2f"))
     assert terminal(Grid(given=columns, rows=(("a", 1.0), ("b", 22)))) == "a  1.00\nb    22\n"
     grid = Grid(given=(Column("name", words=True), Column("", unit="")), rows=())

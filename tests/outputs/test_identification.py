@@ -54,9 +54,7 @@ def found(log: Recording) -> Any:
     return identify([log], load_robot("ur5"), Task(method="friction", name="mine"), [log])
 
 
-def test_all_files_are_written_and_the_robot_loads(
-    found: Any, log: Recording, tmp_path: Path
-) -> None:
+def test_all_files_are_written_and_it_loads(found: Any, log: Recording, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     text = write_identification(path, found, [examine(log)], "vftcli identify", force=False)
     names = ["mine.html", "mine.run.json", "mine.toml"]

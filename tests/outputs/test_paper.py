@@ -42,9 +42,7 @@ def written(folder: Path, form: str) -> dict[str, bytes]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["pdf", "svg", "png"])
-def test_the_same_figure_has_the_same_bytes_whatever_its_user_prefers(
-    form: str, tmp_path: Path
-) -> None:
+def test_a_figure_has_the_same_bytes_for_every_user(form: str, tmp_path: Path) -> None:
     first = written(tmp_path / "one", form)
     with matplotlib.rc_context({"font.size": 20.0, "font.family": "monospace"}):
         assert written(tmp_path / "two", form) == first
@@ -55,9 +53,7 @@ def test_the_same_figure_has_the_same_bytes_whatever_its_user_prefers(
         assert not re.search(rb"20\d\d-\d\d-\d\dT", content)
 
 
-def test_a_pdf_has_the_widths_of_the_ieee_and_its_fonts_embedded_as_truetype(
-    tmp_path: Path,
-) -> None:
+def test_a_pdf_has_the_ieee_s_widths_and_embeds_truetype(tmp_path: Path) -> None:
     """3.5 in and 7.16 in are 252 and 515.52 points."""
     found = written(tmp_path, "pdf")
     for name, points in (("a-single.pdf", 252.0), ("a-double.pdf", 515.52)):
@@ -131,9 +127,7 @@ def drawn_lines(width: float, *words: Any, **more: Any) -> Any:
 
 
 @pytest.mark.parametrize(("width", "rows", "height"), [(3.5, 3, 3 * 0.95), (7.16, 2, 2 * 1.15)])
-def test_every_axis_has_its_unit_and_a_figure_is_as_high_as_its_rows(
-    width: float, rows: int, height: float
-) -> None:
+def test_axes_have_units_and_figures_heights(width: float, rows: int, height: float) -> None:
     made = plots_of(chart(series=(ChartLine("a", np.zeros((len(T), 6))),)))
     figure = drawn_lines(width, made)
     assert figure.get_size_inches() == pytest.approx([width, height + 0.22])

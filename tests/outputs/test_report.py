@@ -28,9 +28,7 @@ def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
     assert "vftcli report x" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
 
 
-def test_the_list_of_contacts_is_written_as_it_is_printed_beside_an_mcap(
-    touched: Analysis, tmp_path: Path
-) -> None:
+def test_contacts_are_written_beside_an_mcap(touched: Analysis, tmp_path: Path) -> None:
     choice = OutputChoice(extras=("mcap",))
     write_report(tmp_path, [touched], command="", choice=choice)
     assert {p.name for p in tmp_path.iterdir()} == {*FILES, "estimates.mcap"}
@@ -60,9 +58,7 @@ def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:
     return replace(as_if(analysis, recording), errors=errors)
 
 
-def test_of_several_logs_one_that_is_left_is_written_as_one_of_several(
-    touched: Analysis, tmp_path: Path
-) -> None:
+def test_one_that_is_left_is_one_of_several_logs(touched: Analysis, tmp_path: Path) -> None:
     write_report(tmp_path, [touched], command="", failed={"bad.csv": "no log"})
     (place,) = (p for p in tmp_path.iterdir() if p.is_dir())
     assert {p.name for p in tmp_path.iterdir() if p.is_file()} <= set(SUMMARY_FILES)
@@ -72,9 +68,7 @@ def test_of_several_logs_one_that_is_left_is_written_as_one_of_several(
         write_report(tmp_path, [touched], command="")
 
 
-def test_several_logs_get_a_folder_each_and_an_index(
-    analysis: Analysis, as_if: Callable, tmp_path: Path
-) -> None:
+def test_several_logs_get_folders(analysis: Analysis, as_if: Callable, tmp_path: Path) -> None:
     """Two logs of one file name: folders are numbered, rows bear the labels."""
     labels = ["a/run.csv", "b/run.csv"]
     analyses = [labelled(analysis, label, as_if) for label in labels]
@@ -104,9 +98,7 @@ def test_a_failing_writer_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_report_takes_away_what_it_does_not_write_but_needs_force(
-    without_reference: Analysis, tmp_path: Path
-) -> None:
+def test_a_report_replaces_another_by_force(without_reference: Analysis, tmp_path: Path) -> None:
     first = replace(without_reference, contacts=None)
     write_report(tmp_path, [without_reference], command="")
     found = {p.name for p in tmp_path.iterdir()}

@@ -133,9 +133,7 @@ except OutputError as error:
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no file's size")
 @pytest.mark.parametrize("room", [4096, 60_000])
-def test_a_full_disk_is_one_error_at_once_and_nothing_is_said_beside_it(
-    tmp_path: Path, room: int
-) -> None:
+def test_a_full_disk_is_one_error_at_once_and_no_more(tmp_path: Path, room: int) -> None:
     """Rerun's own writer logged four lines and was waited for without end, its output piped."""
     script = [sys.executable, "-c", FULL, str(tmp_path / "r.rrd"), str(room)]
     ended = subprocess.run(script, capture_output=True, text=True, timeout=60, check=False)

@@ -81,9 +81,7 @@ def test_the_file_verifies_and_its_blueprint_is_in_use_when_it_is_opened(path: P
     assert (len(reader.blueprints()), len(reader.recordings())) == (1, 1)
 
 
-def test_every_line_and_its_times_read_back(
-    rows: dict[str, dict[str, list]], analysis: Analysis
-) -> None:
+def test_lines_and_times_read_back(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
     for j in range(1, 7):
         assert column(rows, f"/tau_ext/J{j}", "SeriesLines:names")[-1] == [
             "reference (vendor)", "fdo", "gmo", "kfo-fe", "kfo-zoh", "best", "best 95 % upper",
@@ -144,9 +142,7 @@ def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> N
     assert (peaks.x.tolist(), lines["peaks"].tolist()) == ([1.2, 2.4], [64.8, 64.8])
 
 
-def test_the_summary_says_what_the_log_is_and_what_the_arrow_means(
-    touched: Analysis, without_reference: Analysis
-) -> None:
+def test_the_summary_tells_log_and_arrow(touched: Analysis, without_reference: Analysis) -> None:
     lines = summary(touched).splitlines()
     assert lines[:3] == [
         r"# script\>&\_%.csv",
@@ -187,9 +183,7 @@ def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> 
             assert not arrow
 
 
-def test_without_a_reference_there_are_no_residuals(
-    without_reference: Analysis, tmp_path: Path
-) -> None:
+def test_without_a_reference_is_no_residual(without_reference: Analysis, tmp_path: Path) -> None:
     write_rrd(tmp_path / "r.rrd", without_reference)
     reader = rerun.chunk.RrdReader(str(tmp_path / "r.rrd"))
     entities = {chunk.entity_path for chunk in reader.stream()}
@@ -239,9 +233,7 @@ def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
     np.testing.assert_allclose(arrow.origin, point, atol=1e-12)
 
 
-def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_begin(
-    touched: Analysis, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_long_log_is_held_by_levels(touched: Analysis, monkeypatch: pytest.MonkeyPatch) -> None:
     analysis = touched
     monkeypatch.setattr("vftcli.outputs.rerun_recording.STRETCHES", 20)
     monkeypatch.setattr("vftcli.outputs.rerun_recording.AROUND", 0.2)
@@ -303,9 +295,7 @@ def test_the_touched_links_are_painted(touched: Analysis) -> None:
     assert found[3] == {2.2: PLACES["forearm"], 2.6: ""}
 
 
-def test_arrows_are_there_while_the_contact_lasts_and_no_longer(
-    touched: Analysis, tmp_path: Path
-) -> None:
+def test_arrows_last_as_long_as_the_contact(touched: Analysis, tmp_path: Path) -> None:
     path = tmp_path / "r.rrd"
     write_rrd(path, touched)
     for number, start, stop in ((1, 1.0, 1.5), (2, 2.2, 2.6)):
@@ -322,9 +312,7 @@ def test_arrows_are_there_while_the_contact_lasts_and_no_longer(
     assert not rows_of(path, "/robot/flange_force", "Arrows3D:vectors")
 
 
-def test_the_arrow_goes_even_where_a_pose_is_drawn_as_the_contact_ends(
-    touched: Analysis, tmp_path: Path
-) -> None:
+def test_the_arrow_goes_with_the_contact_s_last_pose(touched: Analysis, tmp_path: Path) -> None:
     """Each second sample is drawn: 2.016 s is one of them."""
     stop = float(touched.t[252])
     found = contact_list(contact(start=1.0, stop=stop, peak=1.2))

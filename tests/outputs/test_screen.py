@@ -143,9 +143,7 @@ CLOCK = """\
 """
 
 
-def test_several_logs_are_a_line_each_then_the_worst_three(
-    without_reference: Analysis, as_if
-) -> None:
+def test_several_logs_are_a_line_each_and_the_worst(without_reference: Analysis, as_if) -> None:
     logs = [named(without_reference, f"log{k}.csv", as_if, k) for k in range(5)]
     load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
     (own, *_) = without_reference.examinations
@@ -259,9 +257,7 @@ END = [
         ]),
     ],
 )  # fmt: skip
-def test_a_list_is_its_rows_and_what_can_be_said_of_the_rest(
-    most: int | None, weak: int, lines: list[str]
-) -> None:
+def test_a_list_is_rows_and_a_word_on_more(most: int | None, weak: int, lines: list[str]) -> None:
     rows = [contact(number=k, start=k * 1.0, peak_force=50.0 + k) for k in (1, 2, 3, 4)]
     found = contact_list(*rows[:3], candidates=tuple(rows[3:][:weak]))
     assert list_lines(found, most, Canvas(width=72)) == lines

@@ -24,9 +24,7 @@ def words(text: str) -> Iterator[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCREENS)
-def test_a_screen_is_what_the_command_prints(
-    name: str, request: pytest.FixtureRequest, tmp_path: Path
-) -> None:
+def test_a_screen_is_as_shown(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     screen = SCREENS[name]
     logs: Path = request.getfixturevalue("logs") if screen.real else ROOT / "fixtures"
     ours = list(words(shown(screen, logs, tmp_path)))

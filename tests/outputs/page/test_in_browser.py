@@ -127,9 +127,7 @@ def test_the_page_is_small(html: str) -> None:
     assert (HERE / "page.css").stat().st_size <= 13_000
 
 
-def test_it_opens_at_the_hardest_contact_and_says_one_number(
-    opened: Callable, html: str, pushed: Analysis
-) -> None:
+def test_it_opens_at_the_hardest_contact(opened: Callable, html: str, pushed: Analysis) -> None:
     page = live(opened(html))
     assert number(page) == "91 ± 7 N"
     assert number(page) in " ".join(page.locator("h1").inner_text().split())
@@ -156,9 +154,7 @@ def test_a_row_goes_there_everywhere(opened: Callable, html: str, pushed: Analys
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["pushed", "recording_of_a_panda"])
-def test_the_arm_moves_as_the_kinematics_have_it(
-    opened: Callable, request: pytest.FixtureRequest, name: str
-) -> None:
+def test_the_arm_has_poses(opened: Callable, request: pytest.FixtureRequest, name: str) -> None:
     """At 20 times, within 1 mm: positions are held to 2e-4 rad."""
     analysis: Analysis = request.getfixturevalue(name)
     page = live(opened(render(analysis)))
@@ -263,9 +259,7 @@ def test_meshes_are_drawn_where_the_links_are(opened: Callable, shaped: Analysis
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [6, 1])
-def test_the_force_is_drawn_where_it_acts_and_comes_from_where_it_should(
-    opened: Callable, html: str, pushed: Analysis, number: int
-) -> None:
+def test_the_force_has_arrow(opened: Callable, html: str, pushed: Analysis, number: int) -> None:
     """The projection of the still drawing, for the size of the canvas."""
     page = live(opened(html, reduced_motion="reduce"))
     click(page, f"#contact-{number}")
@@ -307,9 +301,7 @@ def test_a_line_is_broken_at_a_gap_of_the_clock(opened: Callable, analysis: Anal
     assert [400, 200] in [[len(piece) for piece in pieces] for _, pieces in drawn]
 
 
-def test_a_look_shows_one_moment_everywhere_and_comes_back(
-    opened: Callable, html: str, pushed: Analysis
-) -> None:
+def test_a_look_shows_one_moment_and_ends(opened: Callable, html: str, pushed: Analysis) -> None:
     page = live(opened(html))
     before = number(page), page.locator("#clock").inner_text()
     t = 13.0
@@ -337,9 +329,7 @@ def test_a_look_shows_one_moment_everywhere_and_comes_back(
 
 
 @pytest.mark.slow
-def test_a_click_stays_a_drag_zooms_and_a_file_holds_what_is_seen(
-    opened: Callable, html: str, pushed: Analysis
-) -> None:
+def test_a_click_stays_a_drag_zooms(opened: Callable, html: str, pushed: Analysis) -> None:
     page = live(opened(html))
     x, y = place_of(page, "#force", 6.3)
     page.mouse.click(x, y)
@@ -445,9 +435,7 @@ def test_keys_go_play_zoom_and_turn(opened: Callable, html: str) -> None:
     assert page.evaluate("vftcli.clock.head") > before
 
 
-def test_the_slider_goes_by_samples_and_seconds_and_says_what_it_reads(
-    opened: Callable, html: str
-) -> None:
+def test_the_slider_goes_by_samples_and_says_what_it_reads(opened: Callable, html: str) -> None:
     page = live(opened(html))
     page.locator("#slider").focus()
     before = page.evaluate("vftcli.clock.head")
@@ -479,9 +467,7 @@ def test_a_finger_goes_to_the_time_it_touches(opened: Callable, html: str) -> No
     assert "contact 3" in said(page)
 
 
-def test_the_arm_docks_covers_no_button_follows_and_stays_shut(
-    opened: Callable, html: str
-) -> None:
+def test_the_arm_docks_covers_no_button_and_stays_shut(opened: Callable, html: str) -> None:
     """The file button of the torques is where the arm is docked, at 1280 by 900."""
     page = live(opened(html))
     dock, button = page.locator("#dock"), page.locator("#torques .csv")
@@ -518,9 +504,7 @@ def test_the_arm_is_grabbed_while_it_is_turned(opened: Callable, html: str) -> N
     assert page.evaluate(cursor) == "grab"
 
 
-def test_a_long_list_is_shaded_below_until_its_end_and_keeps_the_line_of_the_chosen_row(
-    opened: Callable, html: str, pushed: Analysis
-) -> None:
+def test_a_long_list_is_shaded_below(opened: Callable, html: str, pushed: Analysis) -> None:
     page = live(opened(html, reduced_motion="reduce"))
     box = page.locator("#contacts").bounding_box()
 
@@ -581,9 +565,7 @@ def test_without_a_script_the_page_answers(opened: Callable, html: str) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [400, 1280])
-def test_nothing_sticks_out_and_every_word_can_be_read(
-    opened: Callable, html: str, width: int, scheme: str
-) -> None:
+def test_it_fits_and_can_be_read(opened: Callable, html: str, width: int, scheme: str) -> None:
     tab = opened(html, width, color_scheme=scheme)
     live(tab)
     assert tab.overflow <= 0
@@ -673,9 +655,7 @@ def test_a_long_log_reads_and_keeps_its_extremes(opened: Callable) -> None:
     assert max(float(row.split(",")[2]) for row in rows) == pytest.approx(77.0, abs=0.1)
 
 
-def test_the_index_sorts_by_its_heads(
-    opened: Callable, pushed: Analysis, without_reference: Analysis
-) -> None:
+def test_the_index_sorts(opened: Callable, pushed: Analysis, without_reference: Analysis) -> None:
     tab = opened(render_index([("a", pushed), ("b", without_reference)]), 400)
     assert tab.errors == []
     assert tab.overflow <= 0

@@ -17,9 +17,7 @@ from vftcli.outputs.page.log_charts import (
 from vftcli.outputs.page.pages import render
 
 
-def test_every_line_has_its_look_and_joints_of_one_drive_size_share_a_scale(
-    analysis: Analysis,
-) -> None:
+def test_every_line_has_its_look_and_drives_of_a_size_a_scale(analysis: Analysis) -> None:
     chart = torque_chart(analysis)
     assert len({line.dash for line in chart.series[1:]}) == 5  # none differs by its colour alone
     assert chart.series[0].colour == REFERENCE

@@ -83,9 +83,7 @@ def test_of_a_long_log_every_stretch_keeps_its_ends(long: tuple[np.ndarray, np.n
     assert len(rows[second["low"][0]]) == -(-len(times) // 4)
 
 
-def test_a_short_log_is_whole_and_charts_of_one_clock_share_it(
-    long: tuple[np.ndarray, np.ndarray],
-) -> None:
+def test_a_short_log_is_whole_and_clocks_are_shared(long: tuple[np.ndarray, np.ndarray]) -> None:
     t, y = (values[:WHOLE] for values in long)
     charts = [chart(x, ChartLine("a", y)) for x in (t, t, t.copy())]
     data = packed(charts)

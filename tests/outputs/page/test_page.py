@@ -84,9 +84,7 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
 
 
 @pytest.mark.slow
-def test_without_contacts_the_page_says_why(
-    pushed: Analysis, without_reference: Analysis
-) -> None:
+def test_without_contacts_it_is_said_why(pushed: Analysis, without_reference: Analysis) -> None:
     reason = caution("contacts-not-listed", reason="a hostile <b>")
     bare = replace(pushed, contacts=None, remarks=(*pushed.remarks, reason))
     page = Page(render(bare))
@@ -128,9 +126,7 @@ def test_the_script_gets_every_chart_with_its_gap(html: str) -> None:
     assert data["clocks"][0]["gaps"] == [400]
 
 
-def test_without_a_reference_the_page_says_so_and_no_command_breaks_in_an_option(
-    without_reference: Analysis,
-) -> None:
+def test_without_a_reference_the_page_says_so(without_reference: Analysis) -> None:
     run = run_record(without_reference, "vftcli report a --free b")
     html = render(replace(without_reference, run=run))
     assert "Nothing was given that measures the force" in html
@@ -169,7 +165,7 @@ def test_the_files_beside_it_are_named_with_their_sizes(analysis: Analysis) -> N
     assert '<section id="files">' not in render(analysis)
 
 
-def test_a_ground_has_its_sign_and_remedy_and_a_file_keeps_its_letters(
+def test_grounds_have_sign_and_remedy(
     analysis: Analysis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What nothing is known of is no caution."""
@@ -259,9 +255,7 @@ FORCE = {"hardest_N": 80.4, "hardest_band_N": 6.2, "hardest_s": 11.3}
 BAD = {"log": "b<i>.csv", "health": "bad", "reason": "effort: turned", "contacts": 0}
 
 
-def test_the_index_links_every_report_and_names_what_is_left_out(
-    pushed: Analysis, without_reference: Analysis
-) -> None:
+def test_the_index_links_every_report(pushed: Analysis, without_reference: Analysis) -> None:
     reports = [("a b", pushed), ('"><script>', without_reference)]
     html = render_index(reports, {"<bad>.csv": "no log"})
     assert 'href="a%20b/index.html"' in html

@@ -53,9 +53,7 @@ def test_what_is_not_there_is_not_shown() -> None:
     assert "ur5 (built in)" in html
 
 
-def test_a_remark_is_said_once_in_its_long_words_and_the_worst_first(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_remark_is_said_once_at_length_the_worst_first(monkeypatch: pytest.MonkeyPatch) -> None:
     words = '[test-code]\nshort = "in short {a_s:.1f} s"\nlong = "at length {a_s:.2f} s"\n'
     own = remarks_module.catalogue()
     monkeypatch.setattr(remarks_module, "catalogue", lambda: (words, *own))

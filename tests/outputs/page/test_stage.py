@@ -102,9 +102,7 @@ def test_the_cone_is_that_of_the_band_across_a_force(pushed: Analysis) -> None:
 
 
 @pytest.mark.parametrize(("places", "hit"), [((0,), {6}), ((2, 3), {2, 3}), ((), set())])
-def test_the_touched_links_are_marked(
-    pushed: Analysis, places: tuple[int, ...], hit: set[int]
-) -> None:
+def test_hit_links_are_marked(pushed: Analysis, places: tuple[int, ...], hit: set[int]) -> None:
     contact = replace(pushed.contacts.contacts[0], places=places)
     drawn = still_arm(pushed, view_of(pushed), contact)
     parts = sum(len(capsules(pushed.robot.chain)[frame]) for frame in hit)
