@@ -47,23 +47,6 @@ def path(analysis: Analysis, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-@pytest.fixture(scope="module")
-def rows(path: Path) -> dict[str, dict[str, list]]:
-    """Entity → component → values of all its rows in time."""
-    found: dict[str, dict[str, list]] = {}
-    for chunk in rerun.chunk.RrdReader(str(path)).stream():
-        batch = chunk.to_record_batch()
-        entity = found.setdefault(chunk.entity_path, {})
-        for name in batch.schema.names:
-            entity.setdefault(name, []).extend(batch.column(name).to_pylist())
-    return found
-
-
-def column(rows: dict[str, dict[str, list]], entity: str, ending: str) -> list:
-    (name,) = [name for name in rows[entity] if name.endswith(ending)]
-    return rows[entity][name]
-
-
 @pytest.mark.slow
 def test_the_file_verifies_and_its_blueprint_is_in_use_when_it_is_opened(path: Path) -> None:
     """The text is asserted: for a file that is no recording the exit code is 0 as well.
@@ -81,27 +64,28 @@ def test_the_file_verifies_and_its_blueprint_is_in_use_when_it_is_opened(path: P
     assert (len(reader.blueprints()), len(reader.recordings())) == (1, 1)
 
 
-def test_lines_and_times_read_back(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
+def test_lines_and_times_read_back(path: Path, analysis: Analysis) -> None:
     for j in range(1, 7):
-        assert column(rows, f"/tau_ext/J{j}", "SeriesLines:names")[-1] == [
+        assert rows_of(path, f"/tau_ext/J{j}", "SeriesLines:names")[-1] == [
             "reference (vendor)", "fdo", "gmo", "kfo-fe", "kfo-zoh", "best", "best 95 % upper",
             "best 95 % lower",
         ]  # fmt: skip
-        assert f"/residual/J{j}" in rows
+        assert rows_of(path, f"/residual/J{j}", "Scalars:scalars")
     for entity in ("/q", "/dq", "/drive_torque"):
-        assert column(rows, entity, "SeriesLines:names")[-1] == [f"J{j}" for j in range(1, 7)]
-    assert {"/summary", "/errors"} <= set(rows)
-    values = np.array([v for v in column(rows, "/tau_ext/J2", "Scalars:scalars") if v])
+        names = rows_of(path, entity, "SeriesLines:names")
+        assert names[-1] == [f"J{j}" for j in range(1, 7)]
+    for entity in ("/summary", "/errors"):
+        assert rows_of(path, entity, "TextDocument:text")
+    values = np.array(rows_of(path, "/tau_ext/J2", "Scalars:scalars"))
     best, *others = (e.tau[:, 1] for e in analysis.estimates)
     expected = [analysis.reference.tau[:, 1], *others, best]
     np.testing.assert_array_equal(values[:, : len(expected)], np.column_stack(expected))
-    left = np.array([v for v in column(rows, "/residual/J2", "Scalars:scalars") if v])
+    left = np.array(rows_of(path, "/residual/J2", "Scalars:scalars"))
     plain = np.column_stack([*others, best]) - analysis.reference.tau[:, 1:2]
     np.testing.assert_array_equal(left, plain)
-    times = [t for t in rows["/q"]["t"] if t is not None]
-    seconds = [t.total_seconds() if hasattr(t, "total_seconds") else t / 1e9 for t in times]
     # Rerun counts nanoseconds, Python's timedelta microseconds
-    np.testing.assert_allclose(seconds, analysis.t, atol=1e-6)
+    times = times_of(path, "/q", "Scalars:scalars")
+    np.testing.assert_allclose(times, analysis.t, atol=1e-6)
 
 
 def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> None:

@@ -179,16 +179,6 @@ def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis: Ana
     assert f" 6 N  {least:.1f} N·m  △ " in lines[3]
 
 
-def test_the_short_screen_is_facts_and_answer(without_reference: Analysis) -> None:
-    made = replace(without_reference, contacts=contact_list(contact(), contact(number=2)))
-    head, said = short_screen(made, Canvas(width=80)).splitlines()
-    # The drives carry the model's gravity and noise: what is left is the inertia.
-    assert re.fullmatch(
-        r"script>&_%\.csv · ur5 \(model error 1\d\.\d %\) · 5\.2 s at 125 Hz", head
-    )
-    assert said == "  2 contacts. The hardest, at 4.7 s: 65 ± 7 N on the wrist."
-
-
 def test_only_paths_that_exist_are_printed(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("run.json").write_text("{}")
