@@ -61,8 +61,6 @@ def test_a_folder_of_others_or_busy_is_refused(folder: BatchFolder, tmp_path: Pa
     (tmp_path / "run.json").touch()
     with pytest.raises(OutputError, match="no batch wrote"):
         BatchFolder(tmp_path).opened("options", {}, force=False).__enter__()
-    with (
-        folder.opened("options", {}, force=False),
-        pytest.raises(OutputError, match="another batch"),
-    ):
+    busy = folder.opened("options", {}, force=False)
+    with busy, pytest.raises(OutputError, match="another batch"):
         BatchFolder(folder.path).opened("options", {}, force=False).__enter__()

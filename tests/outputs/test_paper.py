@@ -128,8 +128,13 @@ def drawn_lines(width: float, *words: Any, **more: Any) -> Any:
 
 @pytest.mark.parametrize(("width", "rows", "height"), [(3.5, 3, 3 * 0.95), (7.16, 2, 2 * 1.15)])
 def test_axes_have_units_and_figures_heights(width: float, rows: int, height: float) -> None:
-    made = plots_of(chart(series=(ChartLine("a", np.zeros((len(T), 6))),)))
+    values = np.zeros((len(T), 6))
+    values[1234, 0] = 5.0
+    made = plots_of(chart(series=(ChartLine("a", values),)))
     figure = drawn_lines(width, made)
+    line = figure.axes[0].lines[0]
+    assert line.get_ydata().max() == 5.0  # a spike of one sample stays
+    assert len(line.get_xdata()) <= 1002  # two of each of 500 stretches, and the two ends
     assert figure.get_size_inches() == pytest.approx([width, height + 0.22])
     assert [axes.get_ylabel() for axes in figure.axes] == [f"J{j} (N·m)" for j in range(1, 7)]
     below, columns = [axes.get_xlabel() for axes in figure.axes], 6 // rows
@@ -205,16 +210,6 @@ def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:
     assert corners.min() >= -1.0
     assert (corners[:, 2:].max(axis=0) <= np.array(figure.bbox.size) + 1.0).all()
     assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
-
-
-def test_spikes_stay_and_few_points_are_drawn() -> None:
-    """500 stretches, two samples each, and the two ends."""
-    values = np.zeros((len(T), 6))
-    values[1234, 0] = 5.0
-    made = chart(series=(ChartLine("a", values),))
-    line = drawn_lines(3.5, plots_of(made)).axes[0].lines[0]
-    assert len(line.get_xdata()) <= 1002
-    assert line.get_ydata().max() == 5.0
 
 
 def test_contacts_are_numbered_above_the_first_row_where_there_is_room() -> None:
