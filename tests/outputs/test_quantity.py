@@ -4,7 +4,7 @@ from vftcli.outputs.quantity import at_least_shown, banded, percent, signed, sig
 from vftcli.signals.parsing import counted
 
 
-def test_three_significant_digits() -> None:
+def test_numbers_have_their_digits_bands_and_a_true_minus() -> None:
     shown = {
         0.42649: "0.426", 12.346: "12.3", 1234.5: "1234", 0.0027812: "0.00278", 0.9996: "1.00",
         9.996: "10.0", 0.0: "0", -1.234: "-1.23", 1.5e-7: "1.50e-07", float("nan"): "–",
@@ -12,14 +12,8 @@ def test_three_significant_digits() -> None:
     }  # fmt: skip
     assert {value: significant(value) for value in shown} == shown
     assert [signed(value) for value in shown] == [t.replace("-", "−") for t in shown.values()]
-
-
-def test_a_share_has_one_digit_or_one_that_is_not_zero() -> None:
     shown = {0.00099: "0.1 %", 0.0004: "0.04 %", 0.123: "12.3 %", 2e-7: "<0.001 %", 0.0: "0 %"}
     assert {share: percent(share) for share in shown} == shown
-
-
-def test_values_bear_their_band_and_a_true_minus_and_a_force_is_never_rounded_to_none() -> None:
     assert banded(65.2, 7.4) == "65 ± 7 N"
     assert banded(-36.894, 2.15, ".2f", "") == "−36.89 ± 2.15"
     assert vector([-0.04, 2.0, -3.14]) == "0.0, 2.0, −3.1"

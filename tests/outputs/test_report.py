@@ -113,16 +113,12 @@ def test_a_report_replaces_another_by_force(without_reference: Analysis, tmp_pat
     assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
 
 
-def test_a_report_has_its_recording_unless_none_is_asked_for() -> None:
+def test_words_of_what_is_written_are_taken_or_refused() -> None:
     assert OutputChoice.parsed() == OutputChoice(extras=(), detail=LEVELS)
     assert OutputChoice(extras=("rrd",), detail=FULL).detail == FULL
     assert OutputChoice.parsed(settings={"recording.detail": NONE}).detail == NONE
-
-
-def test_words_that_mean_nothing_are_refused() -> None:
-    with pytest.raises(
-        ParameterError, match=r"recording\.detail=much is none of full, levels and none"
-    ):
+    words = r"recording\.detail=much is none of full, levels and none"
+    with pytest.raises(ParameterError, match=words):
         OutputChoice.parsed(settings={"recording.detail": "much"})
     with pytest.raises(ParameterError, match="writes no recording"):
         OutputChoice(extras=("rrd",), detail=NONE)

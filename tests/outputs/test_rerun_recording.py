@@ -167,19 +167,17 @@ def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> 
             assert not arrow
 
 
-def test_without_a_reference_is_no_residual(without_reference: Analysis, tmp_path: Path) -> None:
-    write_rrd(tmp_path / "r.rrd", without_reference)
-    reader = rerun.chunk.RrdReader(str(tmp_path / "r.rrd"))
-    entities = {chunk.entity_path for chunk in reader.stream()}
+def test_without_a_reference_is_no_residual_and_odd_names_do_no_harm(
+    without_reference: Analysis, as_if: Callable, tmp_path: Path
+) -> None:
+    log = without_reference.recording
+    source = replace(log.source, path=Path("日志 ᵀ.csv"), label="日志 ᵀ.csv")
+    write_rrd(tmp_path / "odd.rrd", as_if(without_reference, replace(log, source=source)))
+    chunks = list(rerun.chunk.RrdReader(str(tmp_path / "odd.rrd")).stream())
+    entities = {chunk.entity_path for chunk in chunks}
     assert "/tau_ext/J1" in entities
     assert not [entity for entity in entities if entity.startswith("/residual")]
-
-
-def test_odd_names_do_no_harm(analysis: Analysis, as_if: Callable, tmp_path: Path) -> None:
-    source = replace(analysis.recording.source, path=Path("日志 ᵀ.csv"), label="日志 ᵀ.csv")
-    odd = as_if(analysis, replace(analysis.recording, source=source))
-    write_rrd(tmp_path / "odd.rrd", odd)
-    for chunk in rerun.chunk.RrdReader(str(tmp_path / "odd.rrd")).stream():
+    for chunk in chunks:
         assert "ᵀ" not in str(chunk.to_record_batch().to_pydict())
 
 

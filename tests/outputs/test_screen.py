@@ -305,14 +305,11 @@ def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
     assert np.isclose(force[(t >= 1.0) & (t <= 1.5)].max(), 30.0, rtol=0.05)  # between samples
     assert np.isclose(force[(t >= 2.0) & (t <= 2.2)].max(), 12.0, rtol=0.1)
     assert not force[(t < 1.0) | (t > 2.2) | ((t > 1.5) & (t < 2.0))].any()
+    for found in (None, contact_list()):
+        assert "┤" not in log_screen(replace(without_reference, contacts=found), Canvas())
 
 
 def risen(start: float, stop: float, peak: float) -> ForceCourse:
     """A force that rises to a peak and falls."""
     force = np.array([0.0, peak, 0.0])
     return ForceCourse(np.array([start, (start + stop) / 2, stop]), force, 0.1 * force)
-
-
-def test_without_forces_there_are_no_bars(without_reference: Analysis) -> None:
-    for found in (None, contact_list()):
-        assert "┤" not in log_screen(replace(without_reference, contacts=found), Canvas())

@@ -93,6 +93,7 @@ def test_no_corner_moves_farther_than_the_diagonal_of_a_cell() -> None:
     diagonal = np.sqrt(3.0) * np.ptp(old, axis=0).max() / 2.0**2.5
     assert apart.min(axis=0).max() <= diagonal
     assert apart.min(axis=1).max() <= diagonal
+    assert packed(found) < 4000
 
 
 def test_capsules_are_thick_at_the_base_and_a_joint_lies_along_its_axis() -> None:
@@ -120,12 +121,6 @@ def packed(surface: Surface) -> int:
     for row in surface.faces.T:
         blob.add(row, 1.0)
     return len(blob.data()["blob"])
-
-
-def test_a_link_is_below_4_kb() -> None:
-    rough = sphere(0.3)
-    rough *= np.random.default_rng(1).uniform(0.9, 1.1, len(rough))[:, None, None]
-    assert packed(fewer(rough)) < 4000
 
 
 def written(file: Path, corners: np.ndarray) -> Path:

@@ -48,12 +48,6 @@ def test_a_first_order_response_is_3_db_down_at_its_cutoff(analysis: Analysis) -
     assert slow == pytest.approx(100.0, rel=0.01)  # 1/ω at frequencies far below it
 
 
-def test_without_wrenches_there_is_no_section(without_reference: Analysis) -> None:
-    bare = replace(without_reference, virtual_sensor=None)
-    assert wrench_chart(bare) is None
-    assert "Wrench axes" not in render(bare)
-
-
 def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
     chart = wrench_chart(with_wrench)
     assert chart.panels == ("fx", "fy", "fz", "mx", "my", "mz")
@@ -67,6 +61,9 @@ def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
     html = render(with_wrench)
     assert html.count('data-panel="5"') == 2  # J6 and mz
     assert "ON the robot in base axes" in html
+    bare = replace(with_wrench, virtual_sensor=None)
+    assert wrench_chart(bare) is None
+    assert "Wrench axes" not in render(bare)
 
 
 def test_the_force_is_that_of_the_contacts_and_has_their_peaks(pushed: Analysis) -> None:

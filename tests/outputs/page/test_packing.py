@@ -34,12 +34,9 @@ def test_values_are_kept_to_half_a_step(scale: float) -> None:
     np.testing.assert_allclose(found[row], values, atol=0.5 * step * (1 + 1e-9), rtol=0)
     assert found[0].tolist() == [0.0, 0.0, 0.0]
     assert np.isnan(found[2]).all()
-
-
-def test_a_step_grows_where_values_would_not_fit() -> None:
-    blob = Blob()
-    blob.add(np.array([-1e4, 1e4]), 0.01)
-    assert blob.steps[0] == pytest.approx(1e4 / MOST)
+    # A step grows where values would not fit.
+    row = blob.add(scale * np.array([-1e4, 1e4]), 0.01 * scale)
+    assert blob.steps[row] == pytest.approx(1e4 * scale / MOST)
 
 
 def test_a_clock_keeps_its_times_over_a_gap_of_an_hour() -> None:

@@ -329,10 +329,5 @@ def test_one_line_a_log_the_worst_first_and_what_failed() -> None:
     assert "1 log could not be analysed." in page
     assert "LogError" in page
     assert "ariaSort" in page
-
-
-def test_a_batch_of_failures_alone_has_a_page() -> None:
-    page = render_batch(
-        list(batch_lines(table(SOUND).clear(), {})), pl.DataFrame(schema=FAILURES)
-    )
-    assert "0 logs." in page
+    none = list(batch_lines(table(SOUND).clear(), {}))
+    assert "0 logs." in render_batch(none, failures)

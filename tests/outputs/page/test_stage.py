@@ -128,12 +128,15 @@ def test_the_drawing_holds_the_arm_and_its_arrow(pushed: Analysis) -> None:
     assert 'class="shaft"' not in part("svg/still", still_arm(pushed, view, None), "x", "")
 
 
-def test_the_free_part_is_the_first_round(pushed: Analysis) -> None:
+def test_the_free_part_is_the_first_round_and_nothing_is_claimed(pushed: Analysis) -> None:
     ((start, stop),) = free_spans(pushed)
     np.testing.assert_allclose((start, stop), (0.0, 4.0), atol=0.02)  # a round of 4 s
     # What is only guessed is not called free.
-    assert free_spans(listing(pushed, basis="friction")) == []
-    assert free_spans(replace(pushed, contacts=None)) == []
+    guessed, without = listing(pushed, basis="friction"), replace(pushed, contacts=None)
+    assert free_spans(guessed) == free_spans(without) == []
+    data = staged(without)
+    assert (data["contacts"], data["none"]) == ([], ("–", "", ""))
+    assert staged(guessed)["none"] == ("–", "", "no contact listed")
 
 
 def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None:
@@ -148,12 +151,6 @@ def test_the_stage_knows_each_contact_as_the_list_does(pushed: Analysis) -> None
     assert data["first"] == data["contacts"][0]["i"]
     assert data["none"] == ("< 2 N", "", "no contact")
     assert data["wrench"] == {"flange": True}
-
-
-def test_a_log_without_a_list_claims_nothing(pushed: Analysis) -> None:
-    data = staged(replace(pushed, contacts=None))
-    assert (data["contacts"], data["none"]) == ([], ("–", "", ""))
-    assert staged(listing(pushed, basis="friction"))["none"] == ("–", "", "no contact listed")
 
 
 def test_what_touches_a_loaded_arm_comes_before_its_load(pushed: Analysis) -> None:
