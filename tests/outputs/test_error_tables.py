@@ -62,9 +62,6 @@ def test_the_best_is_bold_where_the_reference_can_tell() -> None:
     assert block.best.tolist() == [[False, False], [True, True]]
     assert block.means.errors["fdo"] == 2.0
     assert "no sample" in marks(block)
-
-
-def test_an_observer_that_fails_is_named_with_the_share() -> None:
     (block,) = blocks(errors_of({"missing": 0.12}, {"missing": 0.03}))
     assert "fdo: no answer in up to 12 %" in marks(block)
     assert "no answer" not in marks(*blocks(errors_of()))
@@ -178,9 +175,6 @@ def test_what_is_for_details_can_be_left_out(errors: pl.DataFrame) -> None:
     assert "95 % interval" in tables.to_terminal(known)
     assert "95 % interval" not in tables.to_terminal(known, every=False)
     assert tables.to_terminal(errors, every=False) == tables.to_terminal(errors)
-
-
-def test_no_errors_are_said() -> None:
     assert "no errors to show" in tables.to_terminal(pl.DataFrame(schema=SCHEMA))
 
 
@@ -214,7 +208,9 @@ def test_logs_share_a_latex_table_where_the_same_joints_rest(errors: pl.DataFram
     text = tables.to_latex(pl.concat([errors, other, resting], how="diagonal"))
     shared, alone = text.split(r"\end{table}")[:2]
     assert text.count(r"\begin{table}") == 2
-    assert r"\textit{b.csv against two-cycle, 100 samples}" in shared
+    assert shared.count(r"\begin{tabular}") == 1
+    assert r"\caption{RMSE in N\,m}" in shared
+    assert r"\multicolumn{4}{l}{\textit{b.csv against two-cycle, 100 samples}} \\" in shared
     assert r"\multicolumn{1}{c}{$J_{2}$}" in shared
     assert r"\multicolumn{1}{c}{$J_{2}$$^\dagger$}" in alone
     assert r"$\dagger$: the joint rests" in alone

@@ -58,17 +58,6 @@ def test_the_terminal_keeps_digits_below_digits(grid: Grid) -> None:
     ]
 
 
-def test_units_stand_behind_headings_and_below_them_in_latex() -> None:
-    grid = Grid(given=(Column("who", words=True), Column("fx", "N·m")), rows=(("a", 1.0),))
-    assert terminal(grid).startswith("who  fx [N·m]\n")
-    lines = latex(grid).splitlines()
-    above = lines.index(r"\toprule") + 1
-    assert lines[above : above + 2] == [
-        r"Who & \multicolumn{1}{c}{fx} \\",
-        r" & \multicolumn{1}{c}{[N\,m]} \\",
-    ]
-
-
 def test_markdown_and_latex_escape_every_text_and_bold_the_best(grid: Grid) -> None:
     lines = markdown(grid).splitlines()
     assert lines[0] == r"**a\_b.csv, RMSE in N·m**"
@@ -108,15 +97,6 @@ def test_a_table_too_wide_for_a_column_takes_both(grid: Grid) -> None:
     wide = Grid(given=joint_columns(24), rows=(("1.234",) * 24,))
     assert r"\begin{table*}" in latex(wide)
     assert r"\begin{table}" in latex(grid)
-
-
-def test_several_logs_are_one_table_in_latex(grid: Grid) -> None:
-    other = replace(grid, title="b.csv", rows=(("gmo", 1.0, 2.0),), summaries=0, notes=("n",))
-    text = latex(grid, other)
-    assert text.count(r"\begin{tabular}") == text.count(r"\caption") == 1
-    assert r"\caption{RMSE in N\,m}" in text
-    assert r"\multicolumn{3}{l}{\textit{a\_b.csv}} \\" in text
-    assert text.index("b.csv}") < text.index("gmo") < text.index(r"\footnotesize n")
 
 
 def test_latex_takes_its_tables(grid: Grid, tmp_path: Path) -> None:
