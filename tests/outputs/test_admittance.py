@@ -207,24 +207,17 @@ def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
     assert charts(replace(push, controllers=free))[2].band is None
 
 
-def why(difference: str, release: Replay) -> str:
-    """What the page says of a difference from the paper."""
-    return page_of(release).partition(f"<li>{difference}")[2].partition("</li>")[0]
-
-
-@pytest.mark.parametrize(
-    ("name", "figures"), [("ur5", ("0.510", "0.671")), ("panda", ("2.74", "1.06"))]
-)
-def test_damping_ratios(name: str, figures: tuple[str, str], release: Replay) -> None:
-    reason = why("ξ is stated.", release)
-    ratio = parameters(name).xi
-    for value, figure in zip((ratio[0], ratio[3]), figures, strict=True):
-        assert figure in reason
-        assert value == pytest.approx(float(figure), abs=0.5 * 10.0 ** -len(figure.split(".")[1]))
-
-
-def test_the_escape_bound_of_the_ur5s_rotation(release: Replay) -> None:
-    assert "18°" in why("Rotation has a speed limit.", release)
+def test_differences_from_the_paper_are_said_in_numbers_that_hold(release: Replay) -> None:
+    page = page_of(release)
+    reason = page.partition("<li>ξ is stated.")[2].partition("</li>")[0]
+    ratios = {"ur5": ("0.510", "0.671"), "panda": ("2.74", "1.06")}
+    for name, figures in ratios.items():
+        xi = parameters(name).xi
+        for value, figure in zip((xi[0], xi[3]), figures, strict=True):
+            assert figure in reason
+            half = 0.5 * 10.0 ** -len(figure.split(".")[1])
+            assert value == pytest.approx(float(figure), abs=half), name
+    assert "18°" in page.partition("<li>Rotation has a speed limit.")[2].partition("</li>")[0]
     bound = variable(parameters("ur5")).escape[3]
     assert np.degrees(bound) == pytest.approx(18.0, abs=0.5)
 

@@ -179,11 +179,8 @@ def test_states_are_the_log_and_estimates(messages: dict[str, list], analysis: A
     assert stamps == inside == expected.tolist()
 
 
-def test_names_as_ros_allows_them() -> None:
+def test_names_and_stamps_are_as_ros_allows_them() -> None:
     assert [ros_name(name) for name in ("größe", "rts auto 2")] == ["gr__e", "rts_auto_2"]
-
-
-def test_stamps_that_ros_cannot_count_begin_at_zero() -> None:
     t = np.array([0.0, 0.5])
 
     def stamps(t0: float) -> list[int]:

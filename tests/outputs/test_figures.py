@@ -102,17 +102,6 @@ def test_errors_are_drawn_as_the_table_has_them(pushed: Analysis) -> None:
     np.testing.assert_array_equal(dots, rows.sort("joint")["rmse_Nm"].to_numpy())
 
 
-@pytest.mark.parametrize(
-    ("joints", "observers", "dots", "ticks"),
-    [(None, "fdo", 1, 6), ([2], None, 5, 1), (3, ["fdo", "gmo"], 2, 1)],
-)
-def test_errors_of_chosen_joints_and_observers_alone_are_plotted(
-    analysis: Analysis, joints: object, observers: object, dots: int, ticks: int
-) -> None:
-    (axes,) = plot(analysis, "errors", joints, observers).axes  # type: ignore[arg-type]
-    assert (len(axes.containers), len(axes.get_xticks())) == (dots, ticks)
-
-
 def test_of_many_logs_only_what_stands_for_all_is_drawn(pushed: Analysis) -> None:
     rows = pushed.errors.filter(pl.col("joint").is_not_null())
     many = [rows.with_columns(recording=pl.lit(f"{k}.csv")) for k in range(MOST + 1)]
@@ -180,5 +169,9 @@ def test_a_plot_for_a_notebook_is_of_what_is_asked_for(analysis: Analysis) -> No
     gmo = next(estimate for estimate in analysis.estimates if estimate.name == "gmo")
     ends = [np.nanmax(line.get_ydata()) for axes in figure.axes for line in axes.lines]
     assert {gmo.tau[:, 1].max(), gmo.tau[:, 4].max()} <= set(ends)  # no spike is lost
+    asked = {(None, "fdo"): (1, 6), ((2,), None): (5, 1), (3, ("fdo", "gmo")): (2, 1)}
+    for (joints, observers), counts in asked.items():
+        (axes,) = plot(analysis, "errors", joints, observers).axes
+        assert (len(axes.containers), len(axes.get_xticks())) == counts
     with pytest.raises(ParameterError, match="no joint 7; there is 1 to 6"):
         plot(analysis, "torques", 7, None)

@@ -170,15 +170,15 @@ def test_one_row_a_log_role_and_model_with_its_mean(found: Any, log: Recording) 
     numbers = [float(x) for x in lines[1].split()[-7:]]
     assert numbers[-1] == pytest.approx(sum(numbers[:-1]) / 6, abs=1e-3)  # three printed digits
     assert log.name in lines[1]
-
-
-def test_two_logs_of_one_label_are_two_rows(found: Any) -> None:
-    """They were one row of twelve numbers for six joints."""
+    # Two logs of one label were one row of twelve numbers for six joints.
     second = found.residuals.with_columns(log_index=pl.col("log_index") + 10)
     both = found._replace(residuals=pl.concat([found.residuals, second]))
     rows = residual_grid(both).rows
     assert len(rows) == 2 * len(residual_grid(found).rows)
     assert {len(row) for row in rows} == {8}
+    only = found._replace(residuals=found.residuals.clear())
+    assert tables_text(only).startswith("number ")
+    assert tables_text(only._replace(parameters=found.parameters.clear())) == ""
 
 
 def test_what_is_not_determined_is_said_and_what_is_no_number_is_a_dash(found: Any) -> None:
@@ -201,9 +201,3 @@ def test_the_chosen_friction_is_marked() -> None:
     lines = terminal(shape_choice_grid(choices)).splitlines()
     assert lines[2].split() == ["viscous", "J1", "0.500"]
     assert lines[3].split() == ["coulomb", "J1", "0.250", "chosen"]
-
-
-def test_what_was_not_identified_has_no_table(found: Any) -> None:
-    only = found._replace(residuals=found.residuals.clear())
-    assert tables_text(only).startswith("number ")
-    assert tables_text(only._replace(parameters=found.parameters.clear())) == ""

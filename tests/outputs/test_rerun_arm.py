@@ -55,17 +55,6 @@ def test_an_unknown_force_has_no_arrow(path: Path) -> None:
     assert 0.005 < radii.min() == radii.max() < 0.03  # thinner than a link, seen beside it
 
 
-def test_capsules_point_where_they_should(path: Path) -> None:
-    """Rerun's lie along z of their own axes; the upper arm is its link's longest shape."""
-    with opened(path) as stream:
-        send_arm(stream, ROBOT, POSES, {})
-    (turns,) = rows_of(path, "/robot/link_2", "Capsules3D:quaternions")
-    for (x, y, z, w), shape in zip(turns, capsules(UR5)[2], strict=True):
-        turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
-        unit = shape.direction / np.linalg.norm(shape.direction)
-        np.testing.assert_allclose(turned, unit, atol=1e-6)  # Rerun holds them in float32
-
-
 def test_the_hardest_force_fits() -> None:
     assert [arrow_scale(hardest) for hardest in (2.0, 90.0, 1e6)] == [5.0, 200.0, 2000.0]
     assert LONGEST * 200.0 >= 90.0
@@ -88,6 +77,12 @@ def test_a_link_is_painted_while_it_is_touched(path: Path) -> None:
     assert rgba(LINK)[0] in found[0]
     (still,) = [row for row in colours(3) if row is not None]
     assert rgba("#dd6415")[0] not in still
+    # Rerun's capsules lie along z of their own axes.
+    (turns,) = rows_of(path, "/robot/link_2", "Capsules3D:quaternions")
+    for (x, y, z, w), shape in zip(turns, capsules(UR5)[2], strict=True):
+        turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
+        unit = shape.direction / np.linalg.norm(shape.direction)
+        np.testing.assert_allclose(turned, unit, atol=1e-6)  # Rerun holds them in float32
 
 
 def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path, path: Path) -> None:

@@ -193,39 +193,14 @@ def test_only_paths_that_exist_are_printed(tmp_path: Path, monkeypatch) -> None:
     assert "index.html" not in "".join(written_lines(out, ["run.json"], wide))
 
 
-WAITS = Ground(
-    "caution",
-    "log",
-    "The clock waits 12 times, for 40 ms at most, and the velocities lag the positions by 8 ms, "
-    "which is more than most.",
-    "vftcli inspect log.csv --derive dq",
-)
-
-
-@pytest.mark.parametrize(
-    ("ground", "most", "about", "lines"),
-    [
-        (WAITS, None, "", [
-            "  △ log               The clock waits 12 times, for 40 ms at most, and",
-            "                      the velocities lag the positions by 8 ms, which is",
-            "                      more than most.",
-            "                      vftcli inspect log.csv --derive dq",
-        ]),
-        (WAITS, 1, "long_name.csv", [
-            "  △ long_name.csv: log",
-            "                      The clock waits 12 times, for 40 ms at most, and …",
-            "                      vftcli inspect log.csv --derive dq",
-        ]),
-        (WAITS._replace(remedy="x" * 51), 1, "", [
-            "  △ log               The clock waits 12 times, for 40 ms at most, and …",
-            "    " + "x" * 51,
-        ]),
-    ],
-)  # fmt: skip
-def test_a_ground_is_a_mark_a_subject_and_a_sentence_with_its_remedy_below(
-    ground: Ground, most: int | None, about: str, lines: list[str]
-) -> None:
-    assert list(ground_lines(ground, Canvas(width=72), most, about)) == lines
+def test_a_ground_is_a_mark_a_subject_and_a_sentence_with_its_remedy_below() -> None:
+    words = "The clock waits 12 times, for 40 ms at most, which is more than most are seen to."
+    ground = Ground("caution", "log", words, "x" * 51)
+    assert list(ground_lines(ground, Canvas(width=72), 1, "long_name.csv")) == [
+        "  △ long_name.csv: log",
+        "                      The clock waits 12 times, for 40 ms at most, …",
+        "    " + "x" * 51,
+    ]
 
 
 HEADS = "  #  from – to [s]    |F| [N]  range  direction  where  trust"

@@ -82,11 +82,8 @@ def test_an_option_is_one_word_and_the_text_stays() -> None:
     assert unescape(re.sub(r"<[^>]*>", "", html)) == text
 
 
-def test_a_command_without_a_page_loads_no_templates(loaded) -> None:
+def test_what_a_template_misses_is_an_error_and_none_is_loaded_without_a_page(loaded) -> None:
     assert "jinja2" not in loaded("vftcli.outputs.report")
-
-
-def test_what_a_template_misses_is_an_error() -> None:
     with pytest.raises(UndefinedError, match="words"):
         page("logs.html", "t", failures=None)
 
