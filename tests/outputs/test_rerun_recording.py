@@ -278,29 +278,23 @@ def test_the_touched_links_are_painted(touched: Analysis) -> None:
 
 
 def test_arrows_last_as_long_as_the_contact(touched: Analysis, tmp_path: Path) -> None:
-    path = tmp_path / "r.rrd"
-    write_rrd(path, touched)
-    for number, start, stop in ((1, 1.0, 1.5), (2, 2.2, 2.6)):
-        arrows = rows_of(path, f"/contacts/{number}", "Arrows3D:vectors")
-        t = times_of(path, f"/contacts/{number}", "Arrows3D:vectors")
+    """Also where a pose is drawn as it ends: each second sample is, that of 2.016 s too."""
+    first, second = touched.contacts.contacts
+    stop, path = float(touched.t[252]), tmp_path / "r.rrd"
+    found = replace(touched.contacts, contacts=(replace(first, stop=stop), second))
+    write_rrd(path, replace(touched, contacts=found))
+    last = []
+    for each in found.contacts:
+        arrows = rows_of(path, f"/contacts/{each.number}", "Arrows3D:vectors")
+        t = times_of(path, f"/contacts/{each.number}", "Arrows3D:vectors")
         drawn = [time for time, arrow in zip(t, arrows, strict=True) if arrow]
-        # Poses are drawn 50 times a second.
-        assert start <= drawn[0] < start + 0.02
-        assert stop - 0.02 < drawn[-1] <= stop
+        # Poses are drawn 50 times a second, at whole microseconds.
+        assert each.start <= drawn[0] < each.start + 0.02
+        assert each.stop - 0.02 < drawn[-1] <= each.stop + 1e-6
         assert not arrows[-1]
+        last.append(drawn[-1])
+    assert last[0] == pytest.approx(stop, abs=1e-6)
     # On a link it is the force of the peak, whatever the flange's would be.
     expected = np.array([0.4, 51.9, -38.8]) / newton_per_metre(touched)
     np.testing.assert_allclose(arrows[0][0], expected, rtol=1e-6)  # float32
     assert not rows_of(path, "/robot/flange_force", "Arrows3D:vectors")
-
-
-def test_the_arrow_goes_with_the_contact_s_last_pose(touched: Analysis, tmp_path: Path) -> None:
-    """Each second sample is drawn: 2.016 s is one of them."""
-    stop = float(touched.t[252])
-    found = contact_list(contact(start=1.0, stop=stop, peak=1.2))
-    write_rrd(tmp_path / "r.rrd", replace(touched, contacts=found))
-    arrows = rows_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
-    t = times_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
-    assert t[-2] == pytest.approx(stop, abs=1e-6)  # whole microseconds
-    assert arrows[-2]
-    assert not arrows[-1]

@@ -66,6 +66,11 @@ def number(page: Any) -> str:
     return " ".join(page.locator(".now b").inner_text().split())
 
 
+@pytest.fixture
+def page(opened: Callable, html: str) -> Any:
+    return live(opened(html))
+
+
 def click(page: Any, place: str) -> None:
     page.locator(place).click()
     page.wait_for_timeout(60)
@@ -127,8 +132,7 @@ def test_the_page_is_small(html: str) -> None:
     assert (HERE / "page.css").stat().st_size <= 13_000
 
 
-def test_it_opens_at_the_hardest_contact(opened: Callable, html: str, pushed: Analysis) -> None:
-    page = live(opened(html))
+def test_it_opens_at_the_hardest_contact(page: Any, pushed: Analysis) -> None:
     assert number(page) == "91 ± 7 N"
     assert number(page) in " ".join(page.locator("h1").inner_text().split())
     row = page.locator("tr[aria-current]")
@@ -139,8 +143,7 @@ def test_it_opens_at_the_hardest_contact(opened: Callable, html: str, pushed: An
 
 
 @pytest.mark.slow
-def test_a_row_goes_there_everywhere(opened: Callable, html: str, pushed: Analysis) -> None:
-    page = live(opened(html))
+def test_a_row_goes_there_everywhere(page: Any, pushed: Analysis) -> None:
     rows = page.locator(".contacts tbody tr")
     assert rows.count() == len(pushed.contacts.contacts)
     for k, contact in enumerate(pushed.contacts.contacts):
@@ -278,8 +281,7 @@ def test_the_force_has_arrow(opened: Callable, html: str, pushed: Analysis, numb
 
 
 @pytest.mark.slow
-def test_a_command_is_copied_and_play_has_four_speeds(opened: Callable, html: str) -> None:
-    page = live(opened(html))
+def test_a_command_is_copied_and_play_has_four_speeds(page: Any) -> None:
     copy = page.locator("button.copy").first
     command = page.locator("code.remedy").first.inner_text()
     copy.click()
@@ -301,8 +303,7 @@ def test_a_line_is_broken_at_a_gap_of_the_clock(opened: Callable, analysis: Anal
     assert [400, 200] in [[len(piece) for piece in pieces] for _, pieces in drawn]
 
 
-def test_a_look_shows_one_moment_and_ends(opened: Callable, html: str, pushed: Analysis) -> None:
-    page = live(opened(html))
+def test_a_look_shows_one_moment_and_ends(page: Any, pushed: Analysis) -> None:
     before = number(page), page.locator("#clock").inner_text()
     t = 13.0
     page.mouse.move(*place_of(page, "#torques", t, 2))
@@ -329,8 +330,7 @@ def test_a_look_shows_one_moment_and_ends(opened: Callable, html: str, pushed: A
 
 
 @pytest.mark.slow
-def test_a_click_stays_a_drag_zooms(opened: Callable, html: str, pushed: Analysis) -> None:
-    page = live(opened(html))
+def test_a_click_stays_a_drag_zooms(page: Any, pushed: Analysis) -> None:
     x, y = place_of(page, "#force", 6.3)
     page.mouse.click(x, y)
     page.mouse.move(5, 5)
@@ -371,8 +371,7 @@ def test_a_click_stays_a_drag_zooms(opened: Callable, html: str, pushed: Analysi
     assert not page.locator("#torques .whole").is_visible()
 
 
-def test_the_plain_wheel_scrolls_and_with_ctrl_it_zooms(opened: Callable, html: str) -> None:
-    page = live(opened(html))
+def test_the_plain_wheel_scrolls_and_with_ctrl_it_zooms(page: Any) -> None:
     x, y = place_of(page, "#force", 10.0)
     page.mouse.move(x, y)
     page.keyboard.down("Control")
@@ -435,8 +434,7 @@ def test_keys_go_play_zoom_and_turn(opened: Callable, html: str) -> None:
     assert page.evaluate("vftcli.clock.head") > before
 
 
-def test_the_slider_goes_by_samples_and_says_what_it_reads(opened: Callable, html: str) -> None:
-    page = live(opened(html))
+def test_the_slider_goes_by_samples_and_says_what_it_reads(page: Any) -> None:
     page.locator("#slider").focus()
     before = page.evaluate("vftcli.clock.head")
     page.keyboard.press("ArrowRight")
@@ -467,9 +465,8 @@ def test_a_finger_goes_to_the_time_it_touches(opened: Callable, html: str) -> No
     assert "contact 3" in said(page)
 
 
-def test_the_arm_docks_covers_no_button_and_stays_shut(opened: Callable, html: str) -> None:
+def test_the_arm_docks_covers_no_button_and_stays_shut(page: Any) -> None:
     """The file button of the torques is where the arm is docked, at 1280 by 900."""
-    page = live(opened(html))
     dock, button = page.locator("#dock"), page.locator("#torques .csv")
     assert not dock.is_visible()
     page.evaluate(f"scrollTo(0, {button.bounding_box()['y'] - 780})")
@@ -491,8 +488,7 @@ def test_the_arm_docks_covers_no_button_and_stays_shut(opened: Callable, html: s
     assert page.locator("#arm canvas").count() == 1
 
 
-def test_the_arm_is_grabbed_while_it_is_turned(opened: Callable, html: str) -> None:
-    page = live(opened(html))
+def test_the_arm_is_grabbed_while_it_is_turned(page: Any) -> None:
     cursor = "getComputedStyle(vftcli.arm.canvas).cursor"
     box = page.locator("#arm canvas").bounding_box()
     page.mouse.move(box["x"] + 200, box["y"] + 200)
@@ -528,8 +524,7 @@ def test_a_long_list_is_shaded_below(opened: Callable, html: str, pushed: Analys
     assert piece(box["y"] + box["height"] - 5) == plain
 
 
-def test_printed_everything_is_there(opened: Callable, html: str, pushed: Analysis) -> None:
-    page = live(opened(html))
+def test_printed_everything_is_there(page: Any, pushed: Analysis) -> None:
     printed = page.pdf(format="A4")
     assert 2 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 4
     assert len(printed) > 100_000  # a page of words and charts; a blank one is below 2 kB
@@ -581,8 +576,7 @@ def test_it_fits_and_can_be_read(opened: Callable, html: str, width: int, scheme
 
 
 @pytest.mark.slow
-def test_a_change_of_scheme_redraws(opened: Callable, html: str) -> None:
-    page = live(opened(html))
+def test_a_change_of_scheme_redraws(page: Any) -> None:
     before = page.locator("#force canvas").screenshot()
     page.emulate_media(color_scheme="dark")
     page.wait_for_timeout(100)
