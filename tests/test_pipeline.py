@@ -16,11 +16,11 @@ import numpy as np
 import polars as pl
 import pytest
 from made_runs import analyse_log
+from scipy.signal import butter, sosfiltfilt
 from typer.testing import CliRunner
 
 import vftcli as vft
 from vftcli import pipeline
-from vftcli.bias.choice import RefinementChoice
 from vftcli.cli import make_app
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion import free_motion
@@ -32,37 +32,40 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots import run as modelled
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
+from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.progress import heard_by
 from vftcli.signals.remarks import Remark
-from vftcli.wrench.choice import WrenchChoice
 
 app = make_app()
 
-FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
+FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
+def asked(
+    robot: str | Path, reference: str = "", *observers: str, **more: object
+) -> AnalysisChoice:
+    """A choice of robot, reference and observers, those of a complete log if none is named."""
+    if reference:
+        more["reference"] = ReferenceChoice(name=reference)
+    if observers:
+        more["observers"] = ObserverChoice(names=observers)
+    return AnalysisChoice(robot=RobotChoice(name=str(robot)), **more)  # type: ignore[arg-type]
+
+
 def rmse_of(analysis: vft.Analysis, observer: str = "gmo") -> np.ndarray:
-    assert analysis.errors is not None
     return analysis.errors.filter(pl.col("observer") == observer)["rmse_Nm"].to_numpy()
 
 
 @pytest.mark.slow
 def test_a_fixture_goes_all_the_way_to_a_table() -> None:
-    request = AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        reference=ReferenceChoice(name=f"file:{FIXTURE}.truth.parquet"),
-    )
-    analysis = analyse_log(FIXTURE, request)
-    assert analysis.errors is not None
+    analysis = analyse_log(FIXTURE, asked("ur5", f"file:{FIXTURE}.truth.parquet"))
     joint_rows = analysis.errors
     assert joint_rows.height == 5 * 6
     named = joint_rows["observer"].unique(maintain_order=True).to_list()
     assert named == ["best", "fdo", "gmo", "kfo-fe", "kfo-zoh"]  # the best leads
     assert joint_rows["samples"].to_list() == [analysis.recording.samples] * 30
     truth = analysis.reference
-    assert truth is not None
     # the estimates follow the pushes, most of which J1 carries; the smoother without lag
     for estimate, least in zip(analysis.estimates, (0.99, 0.8), strict=False):
         assert np.corrcoef(estimate.tau[:, 0], truth.tau[:, 0])[0, 1] > least
@@ -89,20 +92,12 @@ def test_the_log_must_settle_its_robot_or_be_reported() -> None:
         analyse_log(FIXTURE, AnalysisChoice(read=measured))
 
 
-def test_an_interval_keeps_the_logs_own_time() -> None:
-    analysis = analyse_log(
-        FIXTURE,
-        AnalysisChoice(read=ReadChoice(interval=(4.0, 8.0)), robot=RobotChoice(name="ur5")),
-    )
-    assert analysis.t[0] >= 4.0
-    assert analysis.t[-1] <= 8.0
-
-
-def test_as_printed_differs_and_says_so() -> None:
-    short = AnalysisChoice(read=ReadChoice(interval=(4.0, 6.0)), robot=RobotChoice(name="ur5"))
+def test_as_printed_differs_and_says_so_and_an_interval_keeps_the_logs_own_time() -> None:
+    short = asked("ur5", read=ReadChoice(interval=(4.0, 6.0)))
     printed = analyse_log(FIXTURE, replace(short, observers=ObserverChoice(as_printed=True)))
     corrected = analyse_log(FIXTURE, replace(short, observers=ObserverChoice(causal=True)))
     assert "as-printed" in {r.code for r in printed.remarks if isinstance(r, Remark)}
+    assert 4.0 <= printed.t[0] < printed.t[-1] <= 6.0
     for one, other in zip(printed.estimates, corrected.estimates, strict=True):
         assert np.max(np.abs(one.tau - other.tau)) > 0.1
 
@@ -127,17 +122,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return paths
 
 
-def asked(name: str, *free: Path, **more: object) -> AnalysisChoice:
-    """A choice of reference and free runs, bands measured."""
-    return AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("gmo", "rts-auto")),
-        reference=ReferenceChoice(name=name),
-        free=FreeChoice(logs=free),
-        **more,  # type: ignore[arg-type]
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "reads", "models", "alignments"),
@@ -152,13 +136,7 @@ def asked(name: str, *free: Path, **more: object) -> AnalysisChoice:
     ],
 )
 def test_every_log_is_read_modelled_and_aligned_once(
-    runs: list[Path],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    words: str,
-    reads: int,
-    models: int,
-    alignments: int,
+    runs: list[Path], tmp_path: Path, monkeypatch, words, reads, models, alignments
 ) -> None:
     """In a command."""
     counted = {"read_chosen": 0, "dynamics_terms": 0, "align": 0}
@@ -177,10 +155,9 @@ def test_every_log_is_read_modelled_and_aligned_once(
     count(free_motion, "align")
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
     names["TRUTH"] = Path(f"file:{FIXTURE}.truth.parquet")
-    line = words.replace("OUT.toml", str(tmp_path / "gains.toml"))
-    done = CliRunner().invoke(
-        app, [str(names.get(word, word)) for word in [*line.split(), "--robot", "ur5"]]
-    )
+    names["OUT.toml"] = tmp_path / "gains.toml"
+    line = [str(names.get(word, word)) for word in [*words.split(), "--robot", "ur5"]]
+    done = CliRunner().invoke(app, line)
     assert done.exit_code == 0, done.output
     assert counted == {"read_chosen": reads, "dynamics_terms": models, "align": alignments}
 
@@ -194,7 +171,7 @@ def test_a_free_run_as_long_as_the_log_is_distinct_from_it(runs: list[Path]) -> 
     for rows in (501, 499):
         log = load.with_name(f"load{rows}.csv")
         log.write_text("".join(load.read_text().splitlines(keepends=True)[:rows]))
-        choice = asked("two-cycle", one)
+        choice = asked("ur5", "two-cycle", "gmo", "rts-auto", free=FreeChoice(logs=(one,)))
         tunings.append(analyse_log(log, choice).tunings["rts-auto"].omega_n)
     np.testing.assert_allclose(*tunings, rtol=0.1)  # grid of 1.1: two samples change little
 
@@ -202,13 +179,9 @@ def test_a_free_run_as_long_as_the_log_is_distinct_from_it(runs: list[Path]) -> 
 def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
     """Seven tenths of it, after which its files are written."""
     heard: list[tuple[str, float]] = []
-    asked = AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        read=ReadChoice(interval=(0.0, 6.0)),
-        observers=ObserverChoice(names=("gmo",)),
-    )
+    choice = asked("ur5", "", "gmo", read=ReadChoice(interval=(0.0, 6.0)))
     with heard_by(lambda *step: heard.append(step)):
-        assert analyse_log(FIXTURE, asked).contacts is not None
+        assert analyse_log(FIXTURE, choice).contacts is not None
     words, begins = zip(*[step for step in heard if step[0]], strict=True)
     assert [each.rpartition(": ")[2].split()[0] for each in words] == [
         *("reading", "examining", "looking", "listing", "running", "comparing")
@@ -217,27 +190,6 @@ def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
     shares = [share for _, share in heard]
     assert sorted(shares) == shares
     assert shares[-1] < pipeline.WRITING == 0.7
-
-
-@pytest.mark.parametrize(
-    ("contacts", "causal", "listed"),
-    [(True, False, True), (False, False, False), (True, True, False), (False, True, False)],
-)
-def test_contacts_are_listed_where_they_are_asked_for_of_a_complete_log(
-    contacts: bool, causal: bool, listed: bool
-) -> None:
-    asked = AnalysisChoice(contacts=contacts, observers=ObserverChoice(causal=causal))
-    assert asked.lists_contacts == listed
-
-
-def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None:
-    online = AnalysisChoice(observers=ObserverChoice(causal=True), wrench=WrenchChoice())
-    with pytest.raises(ParameterError, match=r"bias\.method=whole-log needs the complete log"):
-        replace(online, refinement=RefinementChoice(bias="whole-log"))
-    with pytest.raises(
-        ParameterError, match=r"virtual-sensor\.solver=smoother needs the complete log"
-    ):
-        replace(online, wrench=WrenchChoice(solver="smoother"))
 
 
 def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_online(
@@ -253,15 +205,9 @@ def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_o
     record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
     assert record["input"]["derived"] == ["dq"]
     assert "derived-velocity" in {w["code"] for w in record["warnings"]}
-    for command in (
-        ["estimate", *words, "--causal", "-o", str(tmp_path / "o")],
-        ["admit", *words],
-    ):
+    for command in (["estimate", "--causal", "-o", str(tmp_path / "o")], ["admit"]):
         with pytest.raises(MissingSignalError, match="need the complete log"):
-            CliRunner().invoke(app, command, catch_exceptions=False)
-    never = ["estimate", *words, "--set", "log.derive=none", "-o", str(tmp_path / "o")]
-    with pytest.raises(MissingSignalError, match=r"--set log\.derive=dq"):
-        CliRunner().invoke(app, never, catch_exceptions=False)
+            CliRunner().invoke(app, [*command, *words], catch_exceptions=False)
 
 
 def test_the_pipeline_is_short_and_imports_nothing_on_its_way() -> None:
@@ -277,15 +223,14 @@ def test_the_pipeline_is_short_and_imports_nothing_on_its_way() -> None:
     assert not any(isinstance(node, ast.Import | ast.ImportFrom | ast.If) for node in inner)
 
 
+FAST = ObserverChoice.parsed(settings={"gmo.gain": "30"})
+
+
 @pytest.mark.slow
 def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:
     """An independent engine's log; its own truth is the vendor column. Prototype .426 … .058."""
     folder = logs / "mujoco_ur5e"
-    request = AnalysisChoice(
-        robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}),
-        reference=ReferenceChoice(name="vendor"),
-    )
+    request = asked(folder / "robot.toml", "vendor", observers=FAST)
     rmse = rmse_of(analyse_log(folder / "circle.csv", request))
     assert np.all(rmse <= [0.47, 0.54, 0.40, 0.13, 0.05, 0.08])
 
@@ -297,12 +242,8 @@ def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> N
     for name in ("pushes.csv", "pushes_truth.csv"):
         with gzip.open(folder / f"{name}.gz") as packed, (tmp_path / name).open("wb") as plain:
             shutil.copyfileobj(packed, plain)
-    request = AnalysisChoice(
-        read=ReadChoice(interval=(1.5, 27.5)),
-        robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}),
-        reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
-    )
+    truth, read = f"file:{tmp_path / 'pushes_truth.csv'}", ReadChoice(interval=(1.5, 27.5))
+    request = asked(folder / "robot.toml", truth, observers=FAST, read=read)
     rmse = rmse_of(analyse_log(tmp_path / "pushes.csv", request))
     assert np.all(rmse <= [0.16, 0.22, 0.19, 0.25, 0.04, 0.05, 0.02])
 
@@ -310,14 +251,12 @@ def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> N
 def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
     """Real, free motion: all that is estimated is error. Prototype .259 .575 .234 .274 …"""
     folder = logs / "panda_exciting"
-    load = {
-        key: np.loadtxt(folder / f"exciting_traj_{name}.txt")
-        for key, name in {
-            "t": "time", "q": "positions", "dq": "velocity", "torque": "torques"
-        }.items()
-    }  # fmt: skip
-    shaped = {key: load[key].reshape(-1, 7) for key in ("q", "dq", "torque")}
-    recording = vft.assemble(load["t"], **shaped)
+    t, q, dq, torque = (
+        np.loadtxt(folder / f"exciting_traj_{name}.txt")
+        for name in ("time", "positions", "velocity", "torques")
+    )
+    shaped = {"q": q.reshape(-1, 7), "dq": dq.reshape(-1, 7), "torque": torque.reshape(-1, 7)}
+    recording = vft.assemble(t, **shaped)
     run = vft.Run(recording=recording, robot=vft.load_robot("panda"))
     residual = vft.MomentumObserver(gain=10.0).estimate(run).tau
     rms = np.sqrt(np.mean(residual**2, axis=0))
@@ -328,12 +267,7 @@ def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
 def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
     """Real: the prototype's mean of six rms is 1.64 N·m; without rotor or friction it is worse."""
     path = logs / "ur10e" / "free_14harm.csv"
-    request = AnalysisChoice(
-        read=ReadChoice(columns=UR10E),
-        robot=RobotChoice(name="ur10e"),
-        observers=ObserverChoice(names=("gmo",)),
-        reference=ReferenceChoice(name="zero"),
-    )
+    request = asked("ur10e", "zero", "gmo", read=ReadChoice(columns=UR10E))
     full = rmse_of(analyse_log(path, request)).mean()
     without_friction = rmse_of(
         analyse_log(path, replace(request, robot=RobotChoice(name="ur10e", friction="none")))
@@ -352,46 +286,28 @@ def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
 def test_ur10e_payload_shows_in_the_two_cycle_difference(logs: Path) -> None:
     """A loaded run less a free one is the payload's own torque, 2.805 kg at the flange."""
     folder = logs / "ur10e"
-    request = AnalysisChoice(
-        free=FreeChoice(logs=(folder / "free_14harm.csv",)),
-        read=ReadChoice(columns=UR10E),
-        robot=RobotChoice(name="ur10e"),
-        observers=ObserverChoice(names=("gmo",)),
-        reference=ReferenceChoice(name="two-cycle"),
-    )
+    free = FreeChoice(logs=(folder / "free_14harm.csv",))
+    request = asked("ur10e", "two-cycle", "gmo", read=ReadChoice(columns=UR10E), free=free)
     analysis = analyse_log(folder / "load_14harm.csv", request)
-    assert analysis.reference is not None
-    assert analysis.errors is not None
     assert analysis.errors["reference_floor_Nm"].null_count() == 0
     tau, t = analysis.reference.tau, analysis.t
     known = np.all(np.isfinite(tau), axis=1)
     weight = np.array([0.0, 0.0, -27.5, 0.0, 0.0, 0.0])
     jacobian = flange_jacobian(analysis.robot.chain, analysis.recording.q)
     payload = np.einsum("tij,i->tj", jacobian, weight)
+    even = np.arange(t[known][0], t[known][-1], 0.01)
+    low_pass = butter(2, 1.0, fs=100.0, output="sos")  # of zero phase, 1 Hz, below
     for j in (1, 2):
-        smooth = [low_passed(t[known], x[known, j]) for x in (tau, payload)]
+        smooth = [
+            sosfiltfilt(low_pass, np.interp(even, t[known], x[known, j])) for x in (tau, payload)
+        ]
         assert np.corrcoef(*smooth)[0, 1] >= 0.97
 
 
-def low_passed(t: np.ndarray, x: np.ndarray, cutoff: float = 1.0) -> np.ndarray:
-    """Zero-phase 1 Hz low-pass on the log's own clock."""
-    from scipy.signal import butter, sosfiltfilt
-
-    even = np.arange(t[0], t[-1], 0.01)
-    sos = butter(2, cutoff, fs=100.0, output="sos")
-    return sosfiltfilt(sos, np.interp(even, t, x))
-
-
 def test_fr3_table_against_the_vendor(logs: Path) -> None:
-    columns = "t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13"
-    request = AnalysisChoice(
-        read=ReadChoice(columns=columns),
-        robot=RobotChoice(name="fr3"),
-        reference=ReferenceChoice(name="vendor"),
-        observers=ObserverChoice(causal=True),
-    )
+    read = ReadChoice(columns="t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13")
+    request = asked("fr3", "vendor", read=read, observers=ObserverChoice(causal=True))
     analysis = analyse_log(logs / "fr3" / "run_a.npy", request)
-    assert analysis.errors is not None
     assert analysis.errors.height == 4 * 7
     # J5 and J7 carry little friction and no unknown load: there both models tell the same story
     correlation = analysis.errors.filter(pl.col("observer") == "gmo")["correlation"].to_numpy()

@@ -3,9 +3,8 @@
 As tests/test_remedies.py, for the errors of the rooms below; those of the others have their own.
 """
 
-import ast
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,32 +16,29 @@ from moving_arms import moving
 from planted_faults import Table, gravity_torque, with_more_torque
 from test_remedies import (
     FIXTURES,
+    FLAG,
+    LEFT_OUT,
     NO_LIST,
     REFUSALS,
     WHOLE_LOG,
     Command,
     Row,
+    check_error,
     dropped,
     free_log,
     of,
     printed,
+    raised,
     robot_file,
     sound,
-    typed,
-    value_of,
 )
 
-import vftcli
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 
-PACKAGE = Path(vftcli.__file__).parent
 ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", "outputs",
          "bias", "free_motion", "reproduction", "simulation", "wrench",
          "answering.py", "notebook.py", "pipeline.py", "proposal.py", "streaming.py")  # fmt: skip
-
-AWAY, FLAG = "leave it away", "takes no value"
-"""What a row may do with its option in place of giving it a value."""
 
 
 def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
@@ -52,15 +48,8 @@ def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
 
 def fixture(name: str, span: str, *words: str) -> Command:
     """A command on a part of a fixture of the UR5."""
-    return lambda _: [
-        *words[:1],
-        FIXTURES / name,
-        "--robot",
-        "ur5",
-        "--interval",
-        span,
-        *words[1:],
-    ]
+    log = (FIXTURES / name, "--robot", "ur5", "--interval", span)
+    return lambda _: [*words[:1], *log, *words[1:]]
 
 
 def simulated(name: str, *words: str) -> Command:
@@ -216,17 +205,17 @@ ROWS = [
         "admit", "--release", "x=0", "--robot", "ur5"], "release"),
     Row("unstable: ", lambda _: ["admit", "--release", "x=0.3", "--robot", "ur5", "--set",
                                  "position.alpha=50"], "anyway", FLAG),
-    Row("needs the log itself", stored, "virtual-sensor.solver", AWAY),
+    Row("needs the log itself", stored, "virtual-sensor.solver", LEFT_OUT),
     Row("can be compared with its", by_jacobian("", "--reference", "vendor"), "reference"),
     Row("no wrench of a sensor to compare", by_jacobian("a", "--reference", "sensor"), "columns",
         "wrench=afx|afy|afz|amx|amy|amz"),
     Row("leave model.friction=none away", fixture("ur5_circle.csv", "0:8", *MAKE, "--method",
-        "targets", "--set", "model.friction=none"), "model.friction", AWAY),
+        "targets", "--set", "model.friction=none"), "model.friction", LEFT_OUT),
     Row("has no torque constants", cut(0, 8, *MAKE, "--method", "targets", robot="panda"),
         "method"),
     Row("--causal leaves out", cut(0, 4, *SMOOTHED, "--causal"), "observer", "gmo"),
-    Row("Leave --gains or", PRINTED_MATCHED, "gains", AWAY),
-    Row("Leave --gains or", PRINTED_MATCHED, "as-printed", AWAY),
+    Row("Leave --gains or", PRINTED_MATCHED, "gains", LEFT_OUT),
+    Row("Leave --gains or", PRINTED_MATCHED, "as-printed", LEFT_OUT),
     Row("--gains cannot tune", cut(0, 4, *SMOOTHED, "--gains", "delay=0.05"), "observer", "gmo"),
     Row("no such file of gains", cut(0, 4, *EST, "--gains", "mine.toml"), "gains", "paper"),
     Row("no such file of gains", cut(0, 4, *EST, "--gains", "mine.toml"), "gains", tuned),
@@ -237,13 +226,13 @@ ROWS = [
     Row("exists; give another -o", before(simulated("ur5-circle", "-o", "sim.csv")), "force",
         FLAG),
         Row("writes no recording", NO_RECORDING, "recording.detail",
-        AWAY),
+        LEFT_OUT),
     Row("add --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1"), "set",
         "alarm.threshold=5"),
     Row("raise --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1", "--set",
                                  "alarm.threshold=0.001"), "set", "alarm.threshold=50"),
-    Row("are for cycles of one log", ONE_LOG, "two-cycle.period", AWAY),
-    Row("are for cycles of one log", ONE_LOG, "free", AWAY),
+    Row("are for cycles of one log", ONE_LOG, "two-cycle.period", LEFT_OUT),
+    Row("are for cycles of one log", ONE_LOG, "free", LEFT_OUT),
     Row("alignment commanded needs", COMMANDED, "two-cycle.period", "4"),
     Row("nearly all of that is a gap", of(gap_at_the_end, *TWO, "--anyway"), "interval", "0:9"),
     Row("does not fit into", TOO_LONG, "two-cycle.period", "4"),
@@ -253,8 +242,8 @@ ROWS = [
         "rtde"),
     Row("cannot log in a UR", simulated("panda-bearing", "-o", "sim", "--as", "rtde"), "as",
         "libfranka"),
-    Row("whole-log needs the complete log", WHOLE_CAUSAL, "bias.method", AWAY),
-    Row("whole-log needs the complete log", WHOLE_CAUSAL, "causal", AWAY),
+    Row("whole-log needs the complete log", WHOLE_CAUSAL, "bias.method", LEFT_OUT),
+    Row("whole-log needs the complete log", WHOLE_CAUSAL, "causal", LEFT_OUT),
     Row("give another solver", cut(0, 4, *EST, "--wrench", *SMOOTHER, "--causal"),
         "virtual-sensor.solver", "pinv"),
     Row("--zero takes either start or", cut(0, 4, *EST, "--wrench", "--zero", "start", "--zero",
@@ -265,13 +254,11 @@ ROWS = [
                                        f"wrench[world]={W}"), "columns", f"wrench[base@tool]={W}"),
     Row("the forces lie on one line", fixture("ur5_sensor.parquet", "0:5", *SENSOR,
                                               *FIT), "virtual-sensor.sensor", "0,0,0.05"),
-    Row("six components of a wrench", of_five_joints, "wrench", AWAY),
+    Row("six components of a wrench", of_five_joints, "wrench", LEFT_OUT),
     Row("name a log of free motion by --free", LOG_AS_ZERO, "zero", "0:1"),
     Row("no unloaded start", cut(4.5, 9, *EST, "--wrench", "--zero", "start"), "zero", "0:1"),
     Row("or take it all with --anyway", touched_late, "interval", "0:30.5"),
     Row("or take it all with --anyway", touched_late, "anyway", FLAG),
-]  # fmt: skip
-DEARER = [
     Row("is for --method friction", cut(
         0, 8, *MAKE, *CONSTANTS, "--method", "base"), "method", "friction"),
     Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
@@ -280,7 +267,7 @@ DEARER = [
                                       "--columns", f"wrench[base]={W}"), "columns",
         f"wrench[sensor]={W}"),
     Row("--set identify.constants=yes needs motor currents", cut(0, 8, *MAKE, *CONSTANTS,
-                                                    robot="panda"), "set", AWAY),
+                                                    robot="panda"), "set", LEFT_OUT),
     Row("is not a free run of the trajectory", beside(
         cut(4.5, 9, *TWO), "--free", lambda folder: moved().write(folder / "other.csv")),
         "free", free_log),
@@ -289,10 +276,8 @@ DEARER = [
     Row("torque behind the gears", cut(0, 8, *MAKE, "--set", "model.friction=none", robot="panda"),
         "method"),
     Row("leave out --set identify.constants=yes", of(
-        against_gravity, *MAKE, *CONSTANTS, "--anyway"), "set", AWAY),
+        against_gravity, *MAKE, *CONSTANTS, "--anyway"), "set", LEFT_OUT),
 ]  # fmt: skip
-"""Rows over a second of processor time."""
-
 WITHOUT_ROW: dict[str, tuple[str, ...]] = {
     "names only the option that is wrong, or the words it takes": (
         "no such admittance parameter. Sections", "--release … is not …", "--only names nothing",
@@ -329,38 +314,14 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
 """Reason → texts, by words that only they have, that name an option and have no row."""
 
 
-def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
-    """The command with what the error says of an option."""
-    said, value = value_of(row.option, refused), row.value
-    left = dropped(words, row.option)
-    if value in {AWAY, FLAG}:
-        return left if value == AWAY else [*left, f"--{row.option}"]
-    given = value(Path.cwd()) if callable(value) else value
-    if "=VALUE" in said:
-        given = said.replace("VALUE", given)
-    return [*left, *typed(row.option, given or said)]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "row",
-    [*ROWS, *(pytest.param(row, marks=pytest.mark.slow) for row in DEARER)],
-    ids=lambda row: f"{row.code}-{row.option}",
-)
-def test_the_remedy_is_taken(row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.code}-{row.option}")
+def test_the_remedy_is_taken(row: Row, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    words = row.command(tmp_path)
-    code, refused = printed(words)
-    assert code == 1, refused
-    assert row.code in refused
-    code, after = printed(mended(words, refused[refused.index("error: ") :], row))
-    assert code == 0, after
-    assert row.code not in after
+    check_error(row, tmp_path)
 
 
-def test_a_remedy_of_two_options_is_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_remedy_of_two_options_is_taken(tmp_path: Path, monkeypatch) -> None:
     """A free run in the place of a period; a wrench left out with its solver."""
     monkeypatch.chdir(tmp_path)
     words = TOO_LONG(tmp_path)
@@ -378,34 +339,10 @@ def test_no_free_run_is_asked_for_where_none_helps(tmp_path: Path) -> None:
     assert "--free" not in refused
 
 
-def strings(node: ast.AST) -> Iterator[str]:
-    """The literal words of a node in their order, "…" for each value among them."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        yield node.value
-    elif isinstance(node, ast.FormattedValue) and not any(strings(node.value)):
-        yield "…"
-    else:
-        for child in ast.iter_child_nodes(node):
-            yield from strings(child)
-
-
-def texts() -> list[str]:
-    """What the errors of the rooms say that name an option or a command."""
-    files = [path for room in ROOMS for path in sorted(PACKAGE.glob(f"{room}/**/*.py"))]
-    files += [PACKAGE / room for room in ROOMS if room.endswith(".py")]
-    raised = [
-        "".join(strings(node.exc))
-        for path in files
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.Raise) and node.exc is not None
-    ]
-    return [text for text in raised if re.search(r"--[a-z]|vftcli [a-z]|[a-z]\.[a-z_-]+=", text)]
-
-
 @pytest.mark.slow
 def test_every_error_with_an_option_is_tried_or_says_why_not() -> None:
-    known = texts()
-    tried = {row.code for row in (*ROWS, *DEARER)}
+    known = raised(ROOMS).values()
+    tried = {row.code for row in ROWS}
     excused = {fragment for each in WITHOUT_ROW.values() for fragment in each}
     elsewhere = {row.code for row in REFUSALS}
     assert [t for t in known if not any(f in t for f in tried | excused | elsewhere)] == []

@@ -7,11 +7,7 @@ no row needs a reason.
 """
 
 import ast
-import re
-from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import polars as pl
 import pytest
@@ -49,33 +45,24 @@ from refused_commands import (
     xacro,
 )
 from seed_logs import ur_binary
-from test_remedies import Command, dropped, free_log, printed, typed
+from test_remedies import (
+    FIXTURES,
+    FLAG,
+    LEFT_OUT,
+    Command,
+    Row,
+    check_error,
+    free_log,
+    printed,
+    raised,
+    spoken,
+)
 
 import vftcli
 from vftcli.readers.reading import FORMATS
 
-PACKAGE = Path(vftcli.__file__).parent
-ROOMS = ("cli", "readers", "robots", "signals", "batch", "doctor")
-
-LEFT_OUT, FLAG = None, True
-"""The value of an option that the refusal says to leave out, and of one that takes none."""
-
-
-class Row(NamedTuple):
-    """A remedy that is tried.
-
-    Attributes:
-        text: Words that only this error has.
-        command: Makes what is refused in a folder, and the command that is refused.
-        options: The options that the refusal names, one behind the other.
-        value: What the user gives the last of them; "" for what the refusal says.
-    """
-
-    text: str
-    command: Command
-    options: str
-    value: str | bool | None = ""
-
+ROOMS = ("cli", "readers", "robots", "signals", "batch", "doctor", "answering.py",
+         "admittance/closed_loop.py")  # fmt: skip
 
 BY_SENSOR = "compare", "--reference", "sensor", "--wrench"
 
@@ -223,7 +210,7 @@ ROWS = [
 ]  # fmt: skip
 
 
-BAG = Path(__file__).parent.parent / "fixtures/panda_bag/panda_bag.mcap"
+BAG = FIXTURES / "panda_bag/panda_bag.mcap"
 COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
     "vftcli inspect LOG -o FILE writes one": (
         on(same, "inspect", "--config", "my.toml"),
@@ -248,37 +235,8 @@ COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
 """Error that names a command → what it refuses, and the commands that it names."""
 
 
-SLOW = {"positions alone carry no force", "the log waits", "the closed loop runs",
-        "holds still over a span", "free motion to identify the arm from"}  # fmt: skip
-"""Errors of commands that take seconds."""
-
-
-def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
-    """The command with the options that the refusal names, or without the one to leave out."""
-    *others, last = row.options.split()
-    for option in (*others, last):
-        found = re.search(rf"{option}(?![-a-z])(?:[ =]('[^']+'|[^\s,;)]+))?", refused)
-        assert found is not None, refused
-        value = row.value if option == last else ""
-        if value == "":
-            value = (found[1] or "").rstrip(".:").strip("'")
-        if "." in option:
-            words = dropped(words, option)
-            words = words if value is None else [*words, *typed(option, value)]
-            continue
-        while option in words:
-            at = words.index(option)
-            takes = len(words) > at + 1 and not str(words[at + 1]).startswith("-")
-            words = [*words[:at], *words[at + 1 + takes :]]
-        if value is not None:
-            words = [*words, option, *([] if value is FLAG else [value])]
-    return words
-
-
 @pytest.mark.parametrize("text", COMMANDS)
-def test_the_command_that_an_error_names_runs(
-    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_that_an_error_names_runs(text: str, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     refused, named = COMMANDS[text]
     code, said = printed(refused(tmp_path))
@@ -290,22 +248,10 @@ def test_the_command_that_an_error_names_runs(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", [
-    pytest.param(row, id=f"{row.text}-{row.options}",
-                 marks=[pytest.mark.slow] if row.text in SLOW else [])
-    for row in ROWS
-])  # fmt: skip
-def test_the_remedy_of_an_error_is_tried(
-    row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.code}-{row.option}")
+def test_the_remedy_of_an_error_is_tried(row: Row, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    words = row.command(tmp_path)
-    code, refused = printed(words)
-    assert code in {1, 2}
-    for piece in row.text.split("…"):
-        assert piece in refused
-    code, after = printed(mended(words, refused, row))
-    assert code == 0, after
+    check_error(row, tmp_path)
 
 
 NOTHING = "says what does not go together; what to do depends on the files of the user"
@@ -353,42 +299,25 @@ WITHOUT_ROW = {
 """Why a text has no row, and words that only it has."""
 
 
-@cache
 def texts() -> dict[str, str]:
-    """Every text of a raise that names an option or a command; a value in it is `…`."""
+    """Every text that names an option or a command; a value in it is `…`."""
     found = {f"formats: {name}": form.remedy for name, form in FORMATS.items() if form.remedy}
-    files = [path for room in ROOMS for path in sorted((PACKAGE / room).rglob("*.py"))]
-    for path in (*files, PACKAGE / "answering.py", PACKAGE / "admittance/closed_loop.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Raise) and node.exc is not None:
-                text = "".join(spoken(node.exc))
-                if re.search(r"--[a-z]|vftcli [a-z]|[a-z]\.[a-z_-]+=", text):
-                    found[f"{path.relative_to(PACKAGE)}:{node.lineno}"] = text
     # A refusal of all rooms, which each hands its remedy.
-    for node in ast.walk(ast.parse((PACKAGE / "free_motion/free_motion.py").read_text("utf-8"))):
+    source = (Path(vftcli.__file__).parent / "free_motion/free_motion.py").read_text("utf-8")
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "again":
             found["refuse_repeated_logs"] = "".join(spoken(node))
-    return found
-
-
-def spoken(node: ast.expr) -> Iterator[str]:
-    """The pieces of a text as they are written, `…` for a value."""
-    for part in ast.iter_child_nodes(node):
-        if isinstance(part, ast.FormattedValue):
-            yield "…"
-        elif isinstance(part, ast.Constant) and isinstance(part.value, str):
-            yield part.value
-        elif isinstance(part, ast.expr):
-            yield from spoken(part)
+    return found | raised(ROOMS)
 
 
 @pytest.mark.slow
 def test_every_text_with_an_option_is_tried_or_says_why_not() -> None:
-    tried = {row.text for row in ROWS} | COMMANDS.keys()
+    known = texts()
+    tried = {row.code for row in ROWS} | COMMANDS.keys()
     reasons = {words for each in WITHOUT_ROW.values() for words in each}
     assert not tried & reasons
-    for place, text in texts().items():
+    for place, text in known.items():
         by = [words for words in tried | reasons if words in text]
         assert len(by) == 1, f"{place}: {text!r} has {by}"
-    spoken_of = " ".join(texts().values())
+    spoken_of = " ".join(known.values())
     assert not [words for words in tried | reasons if words not in spoken_of]

@@ -6,7 +6,6 @@ import pytest
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import Effort, Failure, Outcome
-from vftcli.batch.keys import digest_of
 from vftcli.batch.log_work import LogJob
 from vftcli.batch.run import BatchCount, BatchRun, LogEntry
 from vftcli.outputs.batch_folder import BatchFolder
@@ -16,7 +15,6 @@ from vftcli.signals.progress import heard_by
 
 def batch(folder: Path, sizes: list[int], jobs: int | None, **more: int) -> BatchRun:
     """A batch of logs of these sizes [B], each of bytes of its own."""
-    digest_of.cache_clear()
     logs = []
     for k, size in enumerate(sizes):
         path = folder / f"{k:03}.csv"

@@ -9,6 +9,7 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.signals.errors import ParameterError
 
 KEY = Path("key.pem")
+OF_TLS = {"cluster.ca": KEY, "cluster.cert": KEY, "cluster.key": KEY}
 
 
 def test_without_dask_work_is_done_here_unless_workers_are_asked_for(
@@ -35,12 +36,7 @@ def test_with_dask_the_cores_are_used() -> None:
         {"cluster.address": "tcp://host:8786", "jobs": 2},
         {"cluster.address": "tls://host:8786", "cluster.ca": KEY},
         {"cluster.address": "tls://host:8786", "cluster.ca": KEY, "cluster.key": KEY},
-        {
-            "cluster.address": "tcp://host:8786",
-            "cluster.ca": KEY,
-            "cluster.cert": KEY,
-            "cluster.key": KEY,
-        },
+        {"cluster.address": "tcp://host:8786", **OF_TLS},
     ],
 )
 def test_what_does_not_go_together_is_refused(words: dict[str, object]) -> None:

@@ -1,16 +1,14 @@
 """What the tests of the commands share."""
 
-from collections.abc import Callable
+import re
 
 import pytest
 
 from vftcli.cli import main
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(monkeypatch, capsys):
     """Run the command line as installed; return its exit code, stdout and stderr."""
 
     def call(*words: object) -> tuple[int, str, str]:
@@ -25,3 +23,26 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
         return code, out, err
 
     return call
+
+
+@pytest.fixture
+def refused(run):
+    """Run a command that is to fail; return its error, the one line but for notes."""
+
+    def call(*words: object) -> str:
+        code, out, err = run(*words)
+        assert (code, out) == (1, "")
+        assert "Traceback" not in err
+        *before, error = err.splitlines()
+        assert all(re.match(r"note: |(.*: )?log health: ", line) for line in before), err
+        assert error.startswith("error: ")
+        return error
+
+    return call
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

@@ -11,27 +11,11 @@ PROGRAM = "import sys; sys.argv[0] = 'vftcli'; from vftcli.cli import launch; la
 LOG = str(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
 
 
-def offered(*words: str) -> set[str]:
-    """What bash is offered for the last word."""
-    asked = {
-        "_VFTCLI_COMPLETE": "complete_bash",
-        "COMP_WORDS": " ".join(("vftcli", *words)),
-        "COMP_CWORD": str(len(words)),
-    }
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, **asked},
-    )
-    assert done.stderr == ""
-    return set(done.stdout.split())
-
-
 @pytest.mark.parametrize(
     ("words", "values"),
     [
+        (("rep",), {"report", "reproduce"}),
+        (("report", "--fr"), {"--free", "--frame"}),
         (("contacts", "--robot", "ur1"), {"ur10", "ur10e", "ur16e"}),
         ((LOG, "--robot", "ur10"), {"ur10", "ur10e"}),
         (("--robot", "ur5", LOG, "--arm", "l"), {"left"}),
@@ -52,4 +36,11 @@ def offered(*words: str) -> set[str]:
     ],
 )
 def test_values_are_offered(words: tuple[str, ...], values: set[str]) -> None:
-    assert offered(*words) == values
+    asked = {
+        "_VFTCLI_COMPLETE": "complete_bash",
+        "COMP_WORDS": " ".join(("vftcli", *words)),
+        "COMP_CWORD": str(len(words)),
+    }
+    shell = {"capture_output": True, "text": True, "env": {**os.environ, **asked}}
+    done = subprocess.run([sys.executable, "-c", PROGRAM], check=False, **shell)
+    assert (set(done.stdout.split()), done.stderr) == (values, "")

@@ -4,37 +4,16 @@ import csv
 import io
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from vftcli.cli.console import LeftOut, canvas, detail, say, show, speaking
-from vftcli.readers.library import Library
-from vftcli.signals.errors import ParameterError
-
-Run = Callable[..., tuple[int, str, str]]
+from vftcli.cli.console import canvas, say, speaking
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 TAPS = FIXTURES / "ur5_taps_ur_rtde.csv"
 TRUTH = f"file:{TAPS}.truth.parquet"
 OTHER = FIXTURES / "panda_bag"
-
-
-def test_what_is_said_depends_on_what_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
-    def said(**asked: bool) -> tuple[str, str]:
-        with speaking(**asked):
-            say("usual")
-            detail("more")
-            show("result")
-        out, err = capsys.readouterr()
-        return out, err
-
-    assert said(details=False, quiet=False) == ("result\n", "usual\n")
-    assert said(details=True, quiet=False) == ("result\n", "usual\nmore\n")
-    assert said(details=False, quiet=True) == ("", "")
-    with pytest.raises(Exception, match="choose one of --details, --quiet"):
-        said(details=True, quiet=True)
 
 
 class Terminal(io.StringIO):
@@ -46,9 +25,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_lines_stay_lines_and_what_a_terminal_obeys_is_shown(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_lines_stay_lines_and_what_a_terminal_obeys_is_shown(capsys) -> None:
     with speaking(details=False, quiet=False):
         say("one\x1b[2J\ntwo\rthree")
     assert capsys.readouterr().err == "one\\x1b[2J\ntwo\\rthree\n"
@@ -58,29 +35,18 @@ def test_lines_stay_lines_and_what_a_terminal_obeys_is_shown(
     ("variables", "colour"),
     [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
 )
-def test_colours_are_for_terminals_that_want_them(
-    monkeypatch: pytest.MonkeyPatch, variables: dict[str, str], colour: bool
+def test_colours_and_letters_are_those_of_a_terminal_that_wants_them(
+    monkeypatch, variables: dict[str, str], colour: bool
 ) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setenv("TERM", "xterm")
-    for name, value in variables.items():
+    for name, value in {"TERM": "xterm", **variables}.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setattr("sys.stdout", Terminal())
     assert canvas().colour is colour
-    monkeypatch.setattr("sys.stdout", io.StringIO())
+    assert canvas().unicode
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BytesIO(), encoding="ascii"))
     assert not canvas().colour
-
-
-def test_letters_are_those_of_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    ascii_only = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    monkeypatch.setattr("sys.stdout", ascii_only)
     assert not canvas().unicode
-
-
-def test_of_a_single_log_the_error_is_the_commands_own() -> None:
-    library = Library(["a.csv"])
-    with pytest.raises(ParameterError):
-        LeftOut(library, [Path("a.csv")]).add(Path("a.csv"), ParameterError("no"))
 
 
 @pytest.fixture
@@ -92,9 +58,7 @@ def logs(tmp_path: Path) -> tuple[Path, Path]:
     return good, bad
 
 
-def test_a_report_writes_the_others_and_fails(
-    logs: tuple[Path, Path], tmp_path: Path, run: Run
-) -> None:
+def test_a_report_writes_the_others_and_fails(logs, tmp_path: Path, run) -> None:
     out = tmp_path / "out"
     code, stdout, err = run("report", *logs, "--robot", "ur5", "-o", out)
     assert code == 1
@@ -108,7 +72,7 @@ def test_a_report_writes_the_others_and_fails(
     assert [log["folder"] for log in record["logs"]] == ["good"]
 
 
-def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run: Run) -> None:
+def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run) -> None:
     words = (*logs, "--robot", "ur5")
     code, out, _ = run("contacts", *words, "--json")
     assert code == 1
@@ -119,7 +83,7 @@ def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run:
     assert {row["recording"] for row in rows} == {"good.csv"}
 
 
-def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run: Run) -> None:
+def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run) -> None:
     bad = [tmp_path / name for name in ("one.csv", "two.csv")]
     for path in bad:
         path.write_text("# no log\n")
@@ -132,23 +96,21 @@ def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run: Run) -> None:
     assert not out.exists()
 
 
-def test_each_log_has_the_robot_that_it_settles_itself(run: Run) -> None:
+def test_each_log_has_the_robot_that_it_settles_itself(run) -> None:
     code, out, _ = run("contacts", TAPS, OTHER)
     assert code == 0
     assert out.startswith("2 logs · ur5 and panda")
 
 
-def test_of_several_logs_each_health_line_names_its_own(run: Run) -> None:
+def test_of_several_logs_each_health_line_names_its_own(run) -> None:
     logs = (TAPS, FIXTURES / "ur5_circle.csv")
     words = ("--robot", "ur5", "--observer", "gmo", "--reference", "zero")
-    said = run("compare", *logs, *words)[2].splitlines()
-    assert [line for line in said if "health" in line] == [
-        f"{log.name}: log health: sound" for log in logs
-    ]
+    said = [line for line in run("compare", *logs, *words)[2].splitlines() if "health" in line]
+    assert said == [f"{log.name}: log health: sound" for log in logs]
     assert run("compare", TAPS, *words)[2].startswith("log health: sound\n")
 
 
-def test_quiet_prints_errors_only_and_tables_that_are_asked_for(tmp_path: Path, run: Run) -> None:
+def test_quiet_prints_errors_only_and_tables_that_are_asked_for(tmp_path: Path, run) -> None:
     words = ("--robot", "ur5", "--observer", "gmo", "-q")
     assert run("estimate", TAPS, *words, "-o", tmp_path / "out") == (0, "", "")
     code, out, err = run("compare", TAPS, *words, "--reference", TRUTH)
@@ -156,7 +118,7 @@ def test_quiet_prints_errors_only_and_tables_that_are_asked_for(tmp_path: Path, 
     assert "gmo" in out
 
 
-def test_details_say_everything_that_is_known(tmp_path: Path, run: Run) -> None:
+def test_details_say_everything_that_is_known(tmp_path: Path, run) -> None:
     words = ("estimate", TAPS, "--robot", "ur5", "--observer", "gmo")
     _, short, usual = run(*words, "-o", tmp_path / "one")
     _, same, details = run(*words, "-o", tmp_path / "two", "-v")
@@ -165,7 +127,7 @@ def test_details_say_everything_that_is_known(tmp_path: Path, run: Run) -> None:
     assert short.splitlines()[:2] == same.splitlines()[:2]
 
 
-def test_a_log_of_one_sample_has_no_rate(tmp_path: Path, run: Run) -> None:
+def test_a_log_of_one_sample_has_no_rate(tmp_path: Path, run) -> None:
     path = tmp_path / "one.csv"
     path.write_text("".join(TAPS.read_text().splitlines(keepends=True)[:2]))
     code, _, err = run("identify", path, "--robot", "ur5", "-o", tmp_path / "out.toml", "-v")

@@ -1,35 +1,24 @@
-"""`vftcli contacts` at the command line, and `vft.contacts` in notebooks."""
+"""`vftcli contacts` at the command line."""
 
 import csv
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
-import vftcli as vft
-
-Run = Callable[..., tuple[int, str, str]]
-
-FIXTURES = Path(__file__).parents[2] / "fixtures"
-TAPS = FIXTURES / "ur5_taps_ur_rtde.csv"
+TAPS = Path(__file__).parents[2] / "fixtures" / "ur5_taps_ur_rtde.csv"
 
 
-def test_the_answer_is_on_stdout_and_nothing_is_written(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_the_answer_is_on_stdout_and_nothing_is_written(run, here: Path) -> None:
     code, out, err = run("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
     assert code == 0
     assert "2 contacts. The hardest" in out
     assert err == ""
     assert "Can it be believed?" in out
     assert "log health: sound" in run("contacts", TAPS, "--robot", "ur5", "--json")[2]
-    assert not list(tmp_path.iterdir())
+    assert not list(here.iterdir())
 
 
-def test_json_and_csv_hold_the_same_rows(run: Run) -> None:
+def test_json_and_csv_hold_the_same_rows(run) -> None:
     words = ("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
     code, out, _ = run(*words, "--json")
     record = json.loads(out)
@@ -42,20 +31,11 @@ def test_json_and_csv_hold_the_same_rows(run: Run) -> None:
     assert run(*words, "--csv", "--json")[0] == 2
 
 
-def test_several_logs_are_an_array(run: Run) -> None:
-    other = FIXTURES / "panda_bag"
-    code, out, _ = run("contacts", TAPS, other, "--json")
-    assert code == 0
-    assert [record["recording"] for record in json.loads(out)["logs"]] == [TAPS.name, other.name]
+def test_a_free_part_that_is_not_there_is_refused(refused) -> None:
+    assert "free part" in refused("contacts", TAPS, "--robot", "ur5", "--free", "90:95")
 
 
-def test_a_free_part_that_is_not_there_is_refused(run: Run) -> None:
-    code, _, err = run("contacts", TAPS, "--robot", "ur5", "--free", "90:95")
-    assert code == 1
-    assert "free part" in err
-
-
-def test_estimates_are_listed_as_they_were_written(run: Run, tmp_path: Path) -> None:
+def test_estimates_are_listed_as_they_were_written(run, refused, tmp_path: Path) -> None:
     words = ("--robot", "ur5", "--free", "0.3:4")
     assert run("estimate", TAPS, *words, "-q", "-o", tmp_path)[0] == 0
     stored = tmp_path / "estimates.parquet"
@@ -65,13 +45,5 @@ def test_estimates_are_listed_as_they_were_written(run: Run, tmp_path: Path) -> 
     assert json.loads(out)["contacts"] == fresh["contacts"]
     assert "2 contacts. The hardest" in run("contacts", stored)[1]
     assert run("contacts", stored, "--csv")[1].count("\n") == 3
-    code, _, err = run("compare", stored, "--reference", "zero")
-    assert code == 1
-    assert "holds estimates, not what the drives measured; give the log" in err
-
-
-def test_a_notebook_asks_the_same() -> None:
-    found = vft.contacts(TAPS, robot="ur5", free=["0.3:4"])
-    assert len(found.contacts) == 2
-    assert found.hardest is not None
-    assert found.hardest.where == "wrist"
+    error = refused("compare", stored, "--reference", "zero")
+    assert "holds estimates, not what the drives measured; give the log" in error

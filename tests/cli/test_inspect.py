@@ -1,17 +1,13 @@
-"""inspect, formats and convert at the command line."""
+"""inspect and convert at the command line."""
 
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from vftcli.cli import make_app
-from vftcli.readers.reading import FORMATS
-from vftcli.signals.errors import VftError
-
-app = make_app()
+from vftcli.outputs.conversion import convert
+from vftcli.signals.recording import Recording
 
 KEYS = {"format", "joints", "samples", "duration_s", "rate_hz", "max_gap_s", "duplicates",
         "repairs", "warnings"}  # fmt: skip
@@ -26,15 +22,8 @@ def table(tmp_path: Path) -> Path:
     return path
 
 
-def run(*words: object) -> tuple[int, str]:
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    if isinstance(result.exception, VftError):
-        return 1, str(result.exception)
-    return result.exit_code, result.stdout
-
-
-def test_inspect_as_json(table: Path) -> None:
-    code, out = run("inspect", table, "--json")
+def test_inspect_as_json(run, table: Path) -> None:
+    code, out, _ = run("inspect", table, "--json")
     reported = json.loads(out)
     assert code == 0
     assert set(reported) >= KEYS
@@ -47,56 +36,32 @@ def test_inspect_as_json(table: Path) -> None:
     assert isinstance(reported["warnings"], list)
 
 
-def test_inspect_in_words(table: Path) -> None:
-    code, out = run("inspect", table)
+def test_inspect_in_words_and_strict_fails_on_warnings(run, table: Path) -> None:
+    code, out, _ = run("inspect", table)
     assert code == 0
     assert "400 of 401 rows" in out
     assert "no-profile" in out
-
-
-def test_strict_fails_on_warnings(table: Path) -> None:
     for logs, said in (
         ([table], "1 warning (--strict)\n"),
         ([table] * 2, "2 warnings (--strict)\n"),
     ):
-        result = CliRunner().invoke(app, ["inspect", *map(str, logs), "--strict"])
-        assert (result.exit_code, result.stderr) == (1, said)
+        code, _, err = run("inspect", *logs, "--strict")
+        assert (code, err) == (1, said)
 
 
-def test_names_with_control_characters_are_shown_harmlessly(tmp_path: Path) -> None:
-    from vftcli.outputs.conversion import convert
-    from vftcli.signals.recording import Recording
-
+def test_names_with_control_characters_are_shown_harmlessly(run, tmp_path: Path) -> None:
     names = ("\x1b[31mred", "two\nlines", "<b>three</b>")
     log = Recording(t=0.1 * np.arange(5), q=np.zeros((5, 3)), joint_names=names)
     convert(log, tmp_path / "x.parquet")
-    code, out = run("inspect", tmp_path / "x.parquet")
+    code, out, _ = run("inspect", tmp_path / "x.parquet")
     assert code == 0
     assert "\x1b" not in out
     assert r"two\nlines" in out
 
 
-def test_inspect_of_what_is_no_log(tmp_path: Path) -> None:
-    (tmp_path / "x").write_bytes(b"")
-    code, reported = run("inspect", tmp_path / "x")
-    assert code == 1
-    assert "empty" in reported
-
-
-def test_formats_lists_every_reader() -> None:
-    code, out = run("help", "formats")
-    assert code == 0
-    assert all(name in out for name in FORMATS)
-    assert "record:" in run("help", "formats", "mcap")[1]
-    assert "no format 'nonsense'" in run("help", "formats", "nonsense")[1]
-
-
 @pytest.mark.parametrize("ending", ["parquet", "csv", "mcap"])
-def test_convert(table: Path, tmp_path: Path, ending: str) -> None:
+def test_convert(run, refused, table: Path, tmp_path: Path, ending: str) -> None:
     out = tmp_path / f"x.{ending}"
     assert run("convert", table, "-o", out)[0] == 0
-    reported = json.loads(run("inspect", out, "--json")[1])
-    assert reported["samples"] == 400
-    code, message = run("convert", table, "-o", out)
-    assert code == 1
-    assert "--force" in message
+    assert json.loads(run("inspect", out, "--json")[1])["samples"] == 400
+    assert "--force" in refused("convert", table, "-o", out)

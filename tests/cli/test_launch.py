@@ -5,23 +5,30 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import polars as pl
 import pytest
 
 from vftcli.signals.errors import ParameterError
 
-FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 TRUTH = f"file:{FIXTURE}.truth.parquet"
 PROGRAM = "import sys; sys.argv[0] = 'vftcli'; from vftcli.cli import launch; launch()"
 
 
-def launched(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "vftcli", *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def launched(
+    *words: object, begin: tuple[str, ...] = ("-m", "vftcli"), **how: Any
+) -> subprocess.CompletedProcess[str]:
+    """The program as a process of its own, begun as a module unless another begin is given."""
+    command = [sys.executable, *begin, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **how)
+
+
+def limited(which: str, size: int) -> dict[str, Any]:
+    """How a process is begun with a limit."""
+    resource = pytest.importorskip("resource")
+    return {"preexec_fn": lambda: resource.setrlimit(getattr(resource, which), (size, size))}
 
 
 @pytest.mark.parametrize(
@@ -42,16 +49,13 @@ def test_long_output_arrives_whole_through_a_pipe() -> None:
 
 def test_functions_registered_for_the_exit_are_called() -> None:
     script = "import atexit; atexit.register(lambda: print('called at exit')); " + PROGRAM
-    done = subprocess.run(
-        [sys.executable, "-c", script, "--version"], capture_output=True, text=True, check=True
-    )
+    done = launched("--version", begin=("-c", script))
+    assert done.returncode == 0
     assert done.stdout.splitlines()[-1] == "called at exit"
 
 
 @pytest.mark.slow
 def test_files_are_complete_when_it_has_left(tmp_path: Path) -> None:
-    import polars as pl
-
     done = launched("estimate", FIXTURE, "--robot", "ur5", "-o", tmp_path / "out")
     assert done.returncode == 0
     assert pl.read_parquet(tmp_path / "out" / "estimates.parquet").height == 2501
@@ -94,12 +98,7 @@ def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: in
         f"shutil.rmtree = lambda *a, **k: (os.kill(os.getpid(), {int(number)}), remove(*a, **k))\n"
     )
     words = ["estimate", FIXTURE, "--robot", "ur5", "--csv", "--anyway", "-o", tmp_path / "out"]
-    done = subprocess.run(
-        [sys.executable, "-c", script + PROGRAM, *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = launched(*words, begin=("-c", script + PROGRAM))
     assert done.returncode == 128 + number
     lines = [line for line in done.stderr.splitlines() if not line.startswith("note: ")]
     assert lines == ["log health: sound", "error: interrupted; run the command again"]
@@ -112,40 +111,25 @@ def test_a_full_disk_is_one_error_in_words_of_the_system(
     tmp_path: Path, words: tuple[str, ...]
 ) -> None:
     """Polars' own "File out of specification: underlying IO error" stood around them."""
-    resource = pytest.importorskip("resource")
-    done = subprocess.run(
-        [sys.executable, "-m", "vftcli", "estimate", FIXTURE, "-o", tmp_path / "out", *words],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (60_000,) * 2),
-    )
+    limit = limited("RLIMIT_FSIZE", 60_000)
+    done = launched("estimate", FIXTURE, "-o", tmp_path / "out", *words, **limit)
     assert done.returncode == 1
     lines = [line for line in done.stderr.splitlines() if not line.startswith("note: ")]
-    full = "estimates.parquet cannot be written: file too large; give another -o"
+    full = "error: estimates.parquet cannot be written: file too large; give another -o"
     # With --details there is more between the two, on the log: the answer comes first.
-    assert [lines[0], *[x for x in lines if "error" in x]] == [
-        "log health: sound",
-        f"error: {full}",
-    ]
+    assert [lines[0], *[x for x in lines if "error" in x]] == ["log health: sound", full]
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> None:
     """Libraries ended the program with words of their own, thousands of lines at some limits."""
-    resource = pytest.importorskip("resource")
-    done = subprocess.run(
-        [sys.executable, "-m", "vftcli", "estimate", FIXTURE, "-o", tmp_path / "out"],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (700_000_000,) * 2),
-    )
+    limit = limited("RLIMIT_AS", 700_000_000)
+    done = launched("estimate", FIXTURE, "-o", tmp_path / "out", **limit)
     assert done.returncode == 1
-    assert done.stderr == (
-        "error: the memory limit of 0.7 GB (ulimit -v) is less than the 3 GB that the libraries "
-        "reserve; raise it\n"
+    assert done.stderr.startswith(
+        "error: the memory limit of 0.7 GB (ulimit -v) is less than the 3"
     )
+    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -175,22 +159,16 @@ def test_the_caller_s_threads_of_linear_algebra_change_no_byte(tmp_path: Path) -
     made = []
     for threads in ("1", "4"):
         folder = tmp_path / threads
-        words = ["estimate", FIXTURE, "--robot", "ur5", "--observer", "best", "-o", folder]
-        subprocess.run(
-            [sys.executable, "-m", "vftcli", *map(str, words)],
-            env={**os.environ, "OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads},
-            capture_output=True,
-            check=True,
-        )
+        env = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
+        words = ("--robot", "ur5", "--observer", "best", "-o", folder)
+        assert launched("estimate", FIXTURE, *words, env=env).returncode == 0
         made.append((folder / "estimates.parquet").read_bytes())
     assert made[0] == made[1]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["report", "estimate"])
-def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(
-    command: str, tmp_path: Path
-) -> None:
+def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(command: str, tmp_path) -> None:
     """The screen is there before anything is written, and before what writes is loaded."""
     script = (
         "import sys, vftcli.outputs.files as files\n"
@@ -201,16 +179,10 @@ def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(
         "from vftcli.cli import launch\n"
         "launch()\n"
     )
-    words = [command, str(FIXTURE), "--robot", "ur5", "-o", "out"]
+    words = [command, FIXTURE, "--robot", "ur5", "-o", "out"]
     if command == "report":
         words += ["--reference", "two-cycle"]
-    done = subprocess.run(
-        [sys.executable, "-c", script, *words],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = launched(*words, begin=("-c", script), cwd=tmp_path)
     assert "12 contacts" in done.stdout
     assert done.returncode == 1
     assert "loaded: []" in done.stderr

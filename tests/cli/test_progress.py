@@ -7,12 +7,12 @@ import re
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from vftcli.cli.progress import Stages, clock, fitted
+from vftcli.cli.progress import Stages, fitted
 from vftcli.signals.progress import heard_by, stage, steps
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -21,7 +21,7 @@ BEARING, EPISODES = FIXTURES / "panda_bearing.csv", FIXTURES / "panda_episodes"
 
 
 @pytest.fixture
-def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+def now(monkeypatch) -> list[float]:
     """The clock, which goes only as the test moves it; nothing ticks."""
     time = [0.0]
     monkeypatch.setattr("vftcli.cli.progress.time.monotonic", lambda: time[0])
@@ -38,16 +38,17 @@ def stages(now: list[float]) -> Iterator[Stages]:  # noqa: ARG001 - made on that
         yield line
 
 
+@pytest.fixture
+def shown(capsys) -> Callable[[], str]:
+    """What has been written to the terminal since it was asked before."""
+    return lambda: capsys.readouterr().err.replace("·", ".")
+
+
 def bar(done: int) -> str:
     return f"[{'#' * done}{'.' * (20 - done)}]"
 
 
-def test_work_over_a_second_shows_share_stage_and_time_left(
-    now: list[float], stages: Stages, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def shown() -> str:
-        return capsys.readouterr().err.replace("·", ".")
-
+def test_work_over_a_second_shows_share_stage_and_time_left(now, stages: Stages, shown) -> None:
     stage("reading")
     assert shown() == ""
     now[0] = 2.0
@@ -68,9 +69,7 @@ def test_work_over_a_second_shows_share_stage_and_time_left(
     assert shown() == ""
 
 
-def test_what_is_printed_takes_the_line_away_first(
-    now: list[float], stages: Stages, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_printed_takes_the_line_away_first(now, stages: Stages, capsys) -> None:
     stage("one")
     now[0] = 2.0
     stage("two")
@@ -83,53 +82,47 @@ def test_what_is_printed_takes_the_line_away_first(
 
 
 def test_the_line_comes_after_a_second_and_anew_each_second(
-    now: list[float],
-    stages: Stages,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    now: list[float], stages: Stages, shown, monkeypatch
 ) -> None:
     waited: list[float] = []
     monkeypatch.setattr(Stages, "_wait", lambda _, seconds: waited.append(seconds))
     stage("one")
     now[0] = 1.0
     stage("two", 0.02)
-    assert capsys.readouterr().err == ""
+    assert shown() == ""
     now[0] = 2.0
     stage("three", 0.02)  # a fiftieth is too little to guess the rest from
-    assert capsys.readouterr().err.endswith("]  2 %  three")
+    assert shown().endswith("]  2 %  three")
     stage("four", 0.03)  # 2 s · .97/.03
-    assert capsys.readouterr().err.endswith("]  3 %  four  1:05 left")
+    assert shown().endswith("]  3 %  four  1:05 left")
     stage("four", 0.04)  # what is the same stage waits for its second
-    assert capsys.readouterr().err == ""
+    assert shown() == ""
     stages._tick()
-    assert capsys.readouterr().err.rstrip().endswith("]  4 %  four  0:48 left")
+    assert shown().rstrip().endswith("]  4 %  four  0:48 left")
     assert waited == [1.0, 1.0]
+    for now[0], text in ((59.6, "1:00"), (3599.4, "59:59"), (3725.0, "1:02:05")):
+        stage(text, 0.5)
+        assert shown().rstrip().endswith(f"] 50 %  {text}  {text} left")
 
 
 @pytest.mark.usefixtures("stages")
-@pytest.mark.parametrize(("width", "shown"), [(60, 59), (80, 79), (200, 79)])
+@pytest.mark.parametrize(("width", "length"), [(60, 59), (80, 79), (200, 79)])
 def test_a_long_stage_is_cut_to_the_terminal(
-    now: list[float],
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    width: int,
-    shown: int,
+    now: list[float], shown, monkeypatch, width: int, length: int
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     stage("one")
     now[0] = 2.0
     stage("x" * 200, 0.5)
-    line = capsys.readouterr().err.lstrip("\r")
-    assert (len(line), line.endswith("x  0:02 left")) == (shown, True)
+    line = shown().lstrip("\r")
+    assert (len(line), line.endswith("x  0:02 left")) == (length, True)
     stage("y", 0.75)  # what is shorter blots out what was there
-    assert len(capsys.readouterr().err.lstrip("\r")) == shown
+    assert len(shown().lstrip("\r")) == length
 
 
 @pytest.mark.usefixtures("stages")
 @pytest.mark.parametrize(("encoding", "rest"), [("utf-8", "·"), ("ascii", ".")])
-def test_the_bar_is_of_letters_that_the_terminal_has(
-    now: list[float], monkeypatch: pytest.MonkeyPatch, encoding: str, rest: str
-) -> None:
+def test_the_bar_is_of_letters_that_the_terminal_has(now, monkeypatch, encoding, rest) -> None:
     stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
     monkeypatch.setattr("sys.stderr", stream)
     stage("one")
@@ -138,21 +131,6 @@ def test_the_bar_is_of_letters_that_the_terminal_has(
     stream.flush()
     shown = stream.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
     assert shown == f"\r[{'#' * 5}{rest * 15}] 25 %  two  0:06 left"
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [
-        (8.4, "0:08"),
-        (59.6, "1:00"),
-        (70.0, "1:10"),
-        (3599.4, "59:59"),
-        (3600.0, "1:00:00"),
-        (3725.0, "1:02:05"),
-    ],
-)
-def test_times_are_minutes_and_seconds_and_hours_from_one_on(seconds: float, text: str) -> None:
-    assert clock(seconds) == text
 
 
 #: A program whose work counts as long from its begin on, whatever the processor does.
@@ -241,11 +219,11 @@ COMMANDS = (
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [80, 120])
 @pytest.mark.parametrize("words", COMMANDS, ids=lambda words: " ".join(map(str, words))[-40:])
+@pytest.mark.usefixtures("here")
 def test_no_line_is_wider_than_the_terminal_or_printed_into_the_line(
-    words: tuple[object, ...], width: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    words: tuple[object, ...], width: int
 ) -> None:
     """Commands and paths may be, which are copied."""
-    monkeypatch.chdir(tmp_path)
     lines = on_a_terminal(*words, COLUMNS=str(width))
     assert len(lines) > 1
     assert lines[0]
@@ -260,11 +238,7 @@ def test_what_is_for_programs_is_printed_as_it_is() -> None:
     assert json.loads("\n".join(lines))["rows"][0]["observer"] == "gmo"
 
 
-def test_a_line_is_fitted_but_colours_have_no_width() -> None:
-    bright = "\x1b[32m" + "word " * 3 + "\x1b[0m"
-    assert fitted(f"{bright}\nvftcli {'x' * 20}\n  {'word ' * 5}", 16) == "\n".join(
-        [bright, f"vftcli {'x' * 20}", "  word word word", "    word word"]
-    )
+BRIGHT = "\x1b[32m" + "word " * 3 + "\x1b[0m"
 
 
 @pytest.mark.parametrize(
@@ -275,6 +249,8 @@ def test_a_line_is_fitted_but_colours_have_no_width() -> None:
         ("a bcdefg", 6, ["a", "  bcdefg"]),  # a word of the width is broken off,
         ("a bcdefgh", 6, ["a bcdefgh"]),  # a longer one is a path to copy
         ("  a-b c", 5, ["  a-b", "    c"]),
+        (f"{BRIGHT}\nvftcli cd ef", 15, [BRIGHT, "vftcli cd ef"]),  # colours have no width
+        ("vftcli cd ef", 6, ["vftcli cd ef"]),  # words to copy
     ],
 )
 def test_a_line_is_broken_where_it_does_not_fit(text: str, width: int, lines: list[str]) -> None:

@@ -10,9 +10,8 @@ from typer.testing import CliRunner
 from vftcli.admittance.choice import ControlChoice
 from vftcli.batch.choice import WorkersChoice
 from vftcli.bias.choice import RefinementChoice
-from vftcli.cli.options import FORMS, TableForm, checked_form, command
+from vftcli.cli.options import TableForm, command
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs import OutputChoice
@@ -20,7 +19,6 @@ from vftcli.pipeline import choice_of
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.errors import PackageError, ParameterError
 from vftcli.signals.option import Asked, Choice, Option
 from vftcli.wrench.choice import FIT, WrenchChoice
 
@@ -69,9 +67,7 @@ def test_a_command_is_handed_what_was_typed() -> None:
     assert choice == SizeChoice(word="w", size=7, loud=True, each=1)
     assert asked.words["csv"]
     assert (seen["name"], seen["times"], seen["at"]) == ("me", 2, None)
-
-
-def test_what_is_not_typed_has_its_default_and_limits_hold() -> None:
+    # What is not typed has its default, and limits hold.
     assert called("me")[1]["asked"].but(word="w").of(SizeChoice) == SizeChoice(word="w")
     assert called()[0] == 2  # the argument is missing
     assert called("me", "--size", "0")[0] == 2
@@ -117,17 +113,10 @@ def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, Any]) -> None:
     assert (asked.wrench is not None) == bool(typed)
 
 
-def test_a_reference_s_options_are_those_of_its_choice() -> None:
-    made = ReferenceChoice.parsed(reference="zero", reference_columns="t,tau_ext:6")
-    assert made == ReferenceChoice(name="zero", columns="t,tau_ext:6")
-
-
-def test_a_form_of_figures_is_checked_before_anything_is_computed(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.usefixtures("here")
+def test_figures_without_matplotlib_are_refused_before_anything_is_computed(
+    refused, monkeypatch
 ) -> None:
-    assert [checked_form(form) for form in FORMS] == list(FORMS)
-    with pytest.raises(ParameterError, match="'gif' is not pdf, svg or png"):
-        checked_form("gif")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(PackageError, match=r"pip install 'vftcli\[figures\]'"):
-        checked_form("pdf")
+    error = refused("compare", "no.csv", "--reference", "zero", "--figures", "pdf", "-o", "out")
+    assert "pip install 'vftcli[figures]'" in error

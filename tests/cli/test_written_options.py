@@ -11,14 +11,7 @@ from vftcli.cli.config import NAME
 from vftcli.cli.inspect import from_folder
 from vftcli.proposal import ProposedOption
 
-FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 
 def options(folder: Path) -> dict[str, object]:
@@ -54,23 +47,16 @@ def test_each_option_stands_under_its_reason(run, here: Path) -> None:
     words = (FIXTURES / "ur5_circle.csv", "--robot", "ur5", "--interval", "0:9", "-o", NAME)
     assert run("inspect", *words)[0] == 0
     parts = (here / NAME).read_text("utf-8").strip().split("\n\n")
-    reasons = [part.rpartition("\n") for part in parts[1:]]
-    assert [(why, option) for why, _, option in reasons if why.startswith("# ")] == [
-        ("# as given", 'interval = "0:9"'),
-        ("# as given", 'robot = "ur5"'),
-        (
-            "# the free motion is known too: the reference is the difference of the two",
-            'reference = "two-cycle"',
-        ),
-        (
-            "# ur5_circle.csv is recognised by its content; a file that is not needs this",
-            '# format = "ur-csv"',
-        ),
-        (
-            "# as the log calls it; the robot's model explains no other reading clearly better",
-            '# effort = "current"',
-        ),
-    ]
+    reasons = {option: why for why, _, option in (part.rpartition("\n") for part in parts[1:])}
+    expected = {
+        'interval = "0:9"': "# as given",
+        'robot = "ur5"': "# as given",
+        'reference = "two-cycle"': "# the free motion is known too: the reference is the diff",
+        '# format = "ur-csv"': "# ur5_circle.csv is recognised by its content; a file that is not",
+        '# effort = "current"': "# as the log calls it; the robot's model explains no other",
+    }
+    assert [option for option, why in reasons.items() if why.startswith("# ")] == [*expected]
+    assert all(reasons[option].startswith(why) for option, why in expected.items())
 
 
 def test_an_arm_is_looked_for_where_it_is_named_or_tells_what_an_effort_is(run) -> None:
@@ -122,14 +108,15 @@ def test_what_is_not_settled_is_there_to_be_taken(run, here: Path, logs: Path) -
     assert '# robot = "panda"\n' in (here / NAME).read_text("utf-8")
 
 
-def test_a_file_that_is_there_is_not_written_over(run, here: Path) -> None:
-    (here / NAME).write_text("robot = 'ur3'\n", "utf-8")
-    code, _, err = run("inspect", FIXTURES / "panda_bag", "-o", NAME)
-    assert (code, err.count("\n")) == (1, 1)
-    assert "--force" in err
-    assert options(here) == {"robot": "ur3"}
-    assert run("inspect", FIXTURES / "panda_bag", "-o", NAME, "--force", "-q")[0] == 0
-    assert options(here)["robot"] == "panda"
+def test_a_file_that_is_there_is_not_written_over(run, refused, here: Path) -> None:
+    """Nor is it read: what is written is what the log calls for, not what was kept before."""
+    (here / NAME).write_text("robot = 'ur3'\nno TOML", "utf-8")
+    words = ("inspect", FIXTURES / "panda_bag", "-o", NAME)
+    assert "--force" in refused(*words)
+    assert (here / NAME).read_text("utf-8") == "robot = 'ur3'\nno TOML"
+    code, _, err = run(*words, "--force")
+    assert (code, options(here)["robot"]) == (0, "panda")
+    assert "note: vftcli.toml gives" not in err
 
 
 def test_what_cannot_be_read_leaves_no_file(run, here: Path) -> None:
@@ -152,17 +139,8 @@ def test_files_are_named_from_the_folder_of_the_file(here: Path) -> None:
     assert named(here / "sub", "robot", "ur5") == "ur5"
 
 
-def test_the_file_that_is_there_is_not_read(run, here: Path) -> None:
-    """What is written is what the log calls for, not what was kept before."""
-    (here / NAME).write_text("robot = 'ur5'\nno TOML", "utf-8")
-    code, _, err = run("inspect", FIXTURES / "panda_bag", "-o", NAME, "--force")
-    assert (code, options(here)["robot"]) == (0, "panda")
-    assert "note: vftcli.toml gives" not in err
-
-
 def test_nothing_is_written_without_a_name(run, here: Path) -> None:
-    code, out, _ = run(
-        "inspect", FIXTURES / "panda_bag", FIXTURES / "ur5_sensor.parquet", "--json"
-    )
+    logs = (FIXTURES / "panda_bag", FIXTURES / "ur5_sensor.parquet")
+    code, out, _ = run("inspect", *logs, "--json")
     assert (code, list(here.iterdir())) == (0, [])
     assert [one["joints"] for one in json.loads(out)["logs"]] == [7, 6]
