@@ -107,9 +107,8 @@ def table(path: Path) -> Numbers:
         values = values[np.isfinite(values)]
         found[f"{column.name} samples"] = float(len(values))
         found[f"{column.name} mean"] = float(values.mean()) if len(values) else np.nan
-        found[f"{column.name} rms"] = (
-            float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
-        )
+        rms = np.sqrt(np.mean(values**2)) if len(values) else np.nan
+        found[f"{column.name} rms"] = float(rms)
     return found
 
 
@@ -263,20 +262,13 @@ def observers_permuted(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None
     equal(one, ask(logs.load, "--observer", "kfo-fe", "--observer", "gmo", *more))
 
 
-SENSOR = (
-    "--reference",
-    "sensor",
-    "--wrench",
-    "--zero",
-    "start",
-    "--set",
-    "virtual-sensor.sensor=0,0,0.03",
-)
+SENSOR = ("--reference", "sensor", "--wrench", "--zero", "start", "--set",
+          "virtual-sensor.sensor=0,0,0.03", "--interval", "0:9")  # fmt: skip
 
 
 def observers_permuted_before_a_sensor(ask: Ask, logs: Logs) -> None:
     sensed = logs._replace(load=FIXTURES / "ur5_sensor.parquet")
-    observers_permuted(ask, sensed, (*SENSOR, "--interval", "0:9"))
+    observers_permuted(ask, sensed, SENSOR)
 
 
 def free_run_repeated(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None:
@@ -320,8 +312,8 @@ def observer_added(ask: Ask, logs: Logs) -> None:
 def observer_added_before_a_sensor(ask: Ask, _: Logs) -> None:
     """Nor does the unloaded start, which the log itself tells."""
     log = FIXTURES / "ur5_sensor.parquet"
-    alone = ask(log, "--observer", "gmo", *SENSOR, "--interval", "0:9")
-    both = ask(log, "--observer", "fdo", "--observer", "gmo", *SENSOR, "--interval", "0:9")
+    alone = ask(log, "--observer", "gmo", *SENSOR)
+    both = ask(log, "--observer", "fdo", "--observer", "gmo", *SENSOR)
     equal(alone, {key: both[key] for key in alone if key in both}, but=("p_vs_best",))
 
 
@@ -360,10 +352,8 @@ def same_clock(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None:
 
 
 TWO_CYCLE = ("--reference", "two-cycle")
-SINGLE = ("inspect", "estimate", "compare", "report", "identify", "gains", "convert", "admit")
-MANY = ("compare", "report", "identify")
-OBSERVED = ("estimate", "compare", "report")
-FREE = ("estimate", "compare", "report")
+SINGLE, COMPARED = tuple(COMMANDS), ("compare", "report")
+MANY, OBSERVED = (*COMPARED, "identify"), ("estimate", *COMPARED)
 
 RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
     "rename": (renamed, SINGLE),
@@ -371,49 +361,34 @@ RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
     "copy: as a second log": (copy_is_no_second_log, MANY),
     "copy: as a free run": (copy_is_no_free_run, ("estimate", "gains")),
     "copy: as a free run of the reference": (
-        partial(copy_is_no_free_run, more=TWO_CYCLE),
-        ("compare", "report"),
-    ),
+        partial(copy_is_no_free_run, more=TWO_CYCLE), COMPARED),
     "permute logs": (logs_permuted, ("compare", "identify")),
-    "permute free runs": (partial(free_runs_permuted, more=TUNED), FREE),
-    "permute free runs of the reference": (
-        partial(free_runs_permuted, more=TWO_CYCLE),
-        ("compare", "report"),
-    ),
+    "permute free runs": (partial(free_runs_permuted, more=TUNED), OBSERVED),
+    "permute free runs of the reference": (partial(free_runs_permuted, more=TWO_CYCLE), COMPARED),
     "permute free runs of the gains": (free_runs_permuted, ("gains",)),
     "permute observers": (observers_permuted, OBSERVED),
     "permute observers of wrenches": (
-        partial(observers_permuted, more=("--wrench", "--zero", "0.5:3.5")),
-        OBSERVED,
-    ),
+        partial(observers_permuted, more=("--wrench", "--zero", "0.5:3.5")), OBSERVED),
     "permute observers before a sensor": (observers_permuted_before_a_sensor, ("compare",)),
     "repeat a free run": (free_run_repeated, ("estimate", "gains")),
-    "repeat a free run of the reference": (
-        partial(free_run_repeated, more=TWO_CYCLE),
-        ("compare", "report"),
-    ),
+    "repeat a free run of the reference": (partial(free_run_repeated, more=TWO_CYCLE), COMPARED),
     "repeat a log": (log_repeated, MANY),
     "shift the clock": (clock_shifted, SINGLE),
     "wrap a joint": (joint_wrapped, SINGLE),
-    "whole interval": (whole_interval, tuple(c for c in SINGLE if c != "inspect")),
+    "whole interval": (whole_interval, SINGLE[1:]),
     "add an observer": (observer_added, OBSERVED),
     "add an observer before a sensor": (observer_added_before_a_sensor, ("compare",)),
     "split reading: another format": (split, SINGLE),
     "split reading: two parts": (in_two_parts, ("convert",)),
-    "same clock": (partial(same_clock, more=TUNED), FREE),
+    "same clock": (partial(same_clock, more=TUNED), OBSERVED),
     "same clock of the gains": (same_clock, ("gains",)),
-}
+}  # fmt: skip
 """Relation → what it tries, and the commands that take it."""
-
-
-def cases() -> Iterator[Any]:
-    for relation, (_, commands) in RELATIONS.items():
-        for command in commands:
-            yield pytest.param(relation, command, id=f"{relation}, {command}")
+CASES = [(relation, command) for relation, (_, some) in RELATIONS.items() for command in some]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("relation", "command"), list(cases()))
+@pytest.mark.parametrize(("relation", "command"), CASES)
 def test_relation(relation: str, command: str, logs_of_one_motion: Logs, tmp_path: Path) -> None:
     logs = logs_of_one_motion
     count = 0

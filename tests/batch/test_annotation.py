@@ -33,7 +33,6 @@ def test_one_observer_over_whole_episodes() -> None:
 @pytest.mark.parametrize(
     "asked",
     [
-        ForceChoice(observers=ObserverChoice(names=("kfo-rts",))),
         ForceChoice(observers=ObserverChoice(names=("gmo",), gains="auto")),
         ForceChoice(wrench=WrenchChoice(solver="smoother")),
         ForceChoice(wrench=WrenchChoice(zero=ZeroChoice(start=True))),

@@ -17,7 +17,6 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import (
     EngineError,
     Failure,
-    Outcome,
     Workers,
     begin,
     connected,
@@ -37,7 +36,6 @@ def test_here_every_task_is_done_in_order_and_errors_are_outcomes() -> None:
     ended = list(run_tasks([(4.0,), (-1.0, 9.0)], math.sqrt, HERE, silent))
     assert [outcome.task for outcome in ended] == [4.0, -1.0, 9.0]
     assert [outcome.value for outcome in ended] == [2.0, None, 3.0]
-    assert ended[1].failure is not None
     assert ended[1].failure[:2] == ("starting", "ValueError")
     assert all(outcome.effort is not None for outcome in ended)
     said: list[str] = []
@@ -50,10 +48,7 @@ def test_a_failure_is_one_line_at_the_stage_that_was_begun() -> None:
     begin("reading")
     assert failure_of(ValueError("two\n  lines")) == Failure("reading", "ValueError", "two lines")
     assert failure_of(MemoryError()).line == "no words"
-
-
-def test_the_stage_of_one_task_is_not_that_of_the_next() -> None:
-    begin("writing")
+    # The stage of one task is not that of the next.
     failure = perform(math.sqrt, -1.0).failure
     assert failure == Failure("starting", "ValueError", "math domain error")
 
@@ -75,26 +70,21 @@ def pid_of(_task: int) -> int:
     return os.getpid()
 
 
-def test_what_is_asked_to_run_here_runs_here_however_long_it_takes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_asked_to_run_here_runs_here_however_long_it_takes(monkeypatch) -> None:
     monkeypatch.setattr("vftcli.batch.cluster.LITTLE", -1.0)
     ended = list(run_tasks([(0,), (1,)], pid_of, HERE, silent))
     assert [outcome.value for outcome in ended] == [os.getpid()] * 2
 
 
 @pytest.mark.slow
-def test_work_goes_to_workers_once_it_takes_longer_than_they_to_start(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_work_goes_to_workers_once_it_takes_longer_than_they_to_start(monkeypatch) -> None:
     tasks = [(0,), (1,), (2,)]
     own = f"{socket.gethostname()}:{os.getpid()}"
 
     def places(limit: float) -> list[bool]:
         monkeypatch.setattr("vftcli.batch.cluster.LITTLE", limit)
         ended = run_tasks(iter(tasks), float, WorkersChoice(), silent)
-        efforts = [outcome.effort for outcome in ended]
-        return [effort is not None and effort.place == own for effort in efforts]
+        return [outcome.effort.place == own for outcome in ended]
 
     assert places(60.0) == [True, True, True]
     assert places(-1.0) == [True, False, False]
@@ -105,13 +95,10 @@ def test_a_task_that_kills_its_worker_fails_alone_and_nothing_is_lost() -> None:
     """Eleven tasks that return, in groups too, and one that ends its process each time."""
     groups = [(0,)] * 4 + [(0, signal.SIGKILL, 0)] + [(0, 0)] * 2 + [(0,)]
     # raise(0) does nothing, by POSIX; raise(9) cannot be caught.
-    ended: list[Outcome[int]] = list(
-        run_tasks(groups, signal.raise_signal, WorkersChoice(jobs=2), silent)
-    )
+    ended = list(run_tasks(groups, signal.raise_signal, WorkersChoice(jobs=2), silent))
     assert len(ended) == 12
     failed = [outcome for outcome in ended if outcome.failure is not None]
     assert [outcome.task for outcome in failed] == [signal.SIGKILL]
-    assert failed[0].failure is not None
     assert failed[0].failure.type == "KilledWorker"
 
 
@@ -119,10 +106,8 @@ def test_a_task_that_kills_its_worker_fails_alone_and_nothing_is_lost() -> None:
 def test_workers_are_processes_with_one_thread_a_library() -> None:
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
     ended = list(run_tasks([names], os.getenv, WorkersChoice(jobs=1), silent))
-    assert sorted((outcome.task, outcome.value) for outcome in ended) == sorted(
-        (name, "1") for name in names
-    )
-    assert all(f":{os.getpid()}" not in (o.effort.place if o.effort else "") for o in ended)
+    assert {outcome.task: outcome.value for outcome in ended} == dict.fromkeys(names, "1")
+    assert all(f":{os.getpid()}" not in outcome.effort.place for outcome in ended)
 
 
 class Losing:
@@ -144,7 +129,7 @@ class Losing:
 
 @pytest.mark.parametrize(("own", "started"), [(True, 10), (False, 0)])
 def test_workers_that_stay_away_are_replaced_so_often_and_only_on_this_machine(
-    monkeypatch: pytest.MonkeyPatch, own: bool, started: int
+    monkeypatch, own: bool, started: int
 ) -> None:
     now = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])

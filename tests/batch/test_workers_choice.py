@@ -12,9 +12,7 @@ KEY = Path("key.pem")
 OF_TLS = {"cluster.ca": KEY, "cluster.cert": KEY, "cluster.key": KEY}
 
 
-def test_without_dask_work_is_done_here_unless_workers_are_asked_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_dask_work_is_done_here_unless_workers_are_asked_for(monkeypatch) -> None:
     monkeypatch.setattr(choice, "is_installed", lambda: False)
     assert WorkersChoice().in_process
     assert WorkersChoice(jobs=0).in_process
@@ -53,17 +51,13 @@ def test_a_cluster_that_asks_nobody_for_a_certificate_is_refused_unless_accepted
     with pytest.raises(ParameterError, match=r"run code as you; use tls://.* or --anyway"):
         opened.check_closed(anyway=False)
     opened.check_closed(anyway=True)
-    tls = {"ca": KEY, "cert": KEY, "key": KEY}
-    WorkersChoice(address="tls://host:8786", **tls).check_closed(anyway=False)
+    WorkersChoice(address="tls://host:8786", ca=KEY, cert=KEY, key=KEY).check_closed(anyway=False)
     WorkersChoice(jobs=0).check_closed(anyway=False)
 
 
-def test_workers_without_what_makes_certificates_are_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(
-        choice, "find_spec", lambda name: None if name == "cryptography" else name
-    )
+def test_workers_without_what_makes_certificates_are_refused(monkeypatch) -> None:
+    there = {"distributed"}
+    monkeypatch.setattr(choice, "find_spec", lambda name: name if name in there else None)
     assert WorkersChoice().in_process
     with pytest.raises(ParameterError, match=r"cryptography: pip install 'vftcli\[cluster\]'"):
         WorkersChoice(jobs=2)

@@ -130,8 +130,4 @@ def test_free_runs_are_examined_too_and_reported_by_name(turned: str, refused) -
 def test_inspect_examines_the_users_own_arm(turned: str, run) -> None:
     code, out, _ = run("inspect", turned, *UR5, "--json")
     assert code == 0
-    record = json.loads(out)
-    assert "effort-sign" in [finding["code"] for finding in record["findings"]]
-    keys = {"format", "joints", "samples", "duration_s", "rate_hz", "max_gap_s", "duplicates",
-            "repairs", "warnings", "findings"}  # fmt: skip
-    assert keys <= set(record)
+    assert "effort-sign" in [finding["code"] for finding in json.loads(out)["findings"]]

@@ -4,17 +4,15 @@ import json
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from vftcli.cli import make_app
 from vftcli.robots import load_robot
 
 
 @pytest.fixture(scope="module")
 def excitation(tmp_path_factory):
     """A simulated log of free motion."""
-    from typer.testing import CliRunner
-
-    from vftcli.cli import make_app
-
     path = tmp_path_factory.mktemp("logs") / "free.csv"
     words = ["simulate", "free-excitation", "-o", str(path), "--seed", "1"]
     result = CliRunner().invoke(make_app(), words)

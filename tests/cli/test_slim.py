@@ -7,6 +7,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from vftcli.readers.reading import read
+
 pytestmark = pytest.mark.statistical  # long: CI does the same in an environment without the three
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -30,17 +32,13 @@ def launched(*words: object) -> subprocess.CompletedProcess[str]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report, estimates with the wrench, and the log as Parquet, made without the three."""
     folder = tmp_path_factory.mktemp("slim")
+    bare = "parquet without units beside its columns: pip install pyarrow"
+    no_recording = "recording.rrd not written: pip install rerun-sdk"
+    estimate = ("estimate", FIXTURE, *FEW, "--observer", "gmo", "--wrench")
     for words, lines in {
-        ("report", FIXTURE, *FEW, "-o", folder / "report"): [
-            "recording.rrd not written: pip install rerun-sdk",
-            "estimates.parquet without units beside its columns: pip install pyarrow",
-        ],
-        ("estimate", FIXTURE, *FEW, "--observer", "gmo", "--wrench", "-o", folder / "out"): [
-            "estimates.parquet without units beside its columns: pip install pyarrow",
-        ],
-        ("convert", FIXTURE, "-o", folder / "log.parquet"): [
-            "log.parquet without units beside its columns: pip install pyarrow",
-        ],
+        ("report", FIXTURE, *FEW, "-o", folder / "report"): [no_recording, f"estimates.{bare}"],
+        (*estimate, "-o", folder / "out"): [f"estimates.{bare}"],
+        ("convert", FIXTURE, "-o", folder / "log.parquet"): [f"log.{bare}"],
     }.items():
         done = launched(*words)
         assert done.returncode == 0, done.stderr
@@ -55,8 +53,6 @@ def test_a_report_holds_all_but_the_recording(folder: Path) -> None:
 
 
 def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> None:
-    from vftcli.readers.reading import read
-
     made, logged = read(folder / "log.parquet"), read(FIXTURE)
     for name in logged.signals:
         assert (getattr(made, name) == getattr(logged, name)).all()
@@ -106,7 +102,5 @@ def test_a_parquet_or_arrow_file_is_named_with_the_remedy(start: bytes, tmp_path
     (tmp_path / "log").write_bytes(start + bytes(64))
     done = launched("inspect", tmp_path / "log")
     assert done.returncode == 1
-    assert done.stderr.endswith(
-        ": a Parquet or Arrow file needs pyarrow, which is not installed here: "
-        "pip install pyarrow\n"
-    )
+    assert ": a Parquet or Arrow file needs pyarrow" in done.stderr
+    assert done.stderr.endswith(": pip install pyarrow\n")

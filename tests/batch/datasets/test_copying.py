@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from vftcli.batch.datasets.copying import (
@@ -58,25 +59,22 @@ def test_only_an_earlier_copy_is_replaced(dataset: Path) -> None:
         check_copy(dataset, dataset.parent / "file", force=True)
 
 
-def test_films_are_linked_and_the_rest_is_copied(dataset: Path) -> None:
-    copy = dataset.parent / "copy"
-    copy_others(dataset, copy, {Path("data.h5")})
-    film, meta = copy / "videos" / "a.mp4", copy / "meta.json"
-    assert film.samefile(dataset / "videos" / "a.mp4")
-    assert film.read_bytes() == b"film"
-    assert not meta.samefile(dataset / "meta.json")
-    assert not (copy / "data.h5").exists()
-
-
-def test_a_film_is_copied_where_links_cannot_be(
-    dataset: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("links", [True, False])
+def test_films_are_linked_where_links_can_be_and_the_rest_is_copied(
+    dataset: Path, monkeypatch, links: bool
 ) -> None:
     def refuse(*_: object) -> None:
         raise OSError(18, "cross-device link")
 
-    monkeypatch.setattr("os.link", refuse)
-    copy_others(dataset, dataset.parent / "copy", ())
-    assert (dataset.parent / "copy" / "videos" / "a.mp4").read_bytes() == b"film"
+    if not links:
+        monkeypatch.setattr("os.link", refuse)
+    copy = dataset.parent / "copy"
+    copy_others(dataset, copy, {Path("data.h5")})
+    film, meta = copy / "videos" / "a.mp4", copy / "meta.json"
+    assert film.samefile(dataset / "videos" / "a.mp4") == links
+    assert film.read_bytes() == b"film"
+    assert not meta.samefile(dataset / "meta.json")
+    assert not (copy / "data.h5").exists()
 
 
 def test_a_finished_copy_takes_the_place_of_an_earlier_one(tmp_path: Path) -> None:
@@ -118,8 +116,6 @@ def test_a_run_that_did_nothing_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_rows_are_whole_or_not_there(tmp_path: Path) -> None:
-    import numpy as np
-
     put_rows(tmp_path / "rows.npz", reported=np.array("{}"), a=np.ones(2))
     held = stored_rows(tmp_path / "rows.npz")
     assert (str(held["reported"]), held["a"].tolist()) == ("{}", [1.0, 1.0])

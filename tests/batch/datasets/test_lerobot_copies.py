@@ -20,6 +20,7 @@ TORQUE = ForceColumn(
 )
 VALID = ForceColumn("valid", (), {})
 COLUMNS = [TORQUE, VALID]
+ADDED = "observation.external_torque"
 
 
 def forces(episodes: Any, seed: int = 1) -> dict[int, dict[str, Any]]:
@@ -33,6 +34,12 @@ def forces(episodes: Any, seed: int = 1) -> dict[int, dict[str, Any]]:
     }
 
 
+def statistics(episodes: Any) -> dict[int, dict[str, Any]]:
+    """Those of each episode's forces."""
+    made = forces(episodes).items()
+    return {k: {name: statistics_of(x) for name, x in own.items()} for k, own in made}
+
+
 def test_the_other_columns_the_rows_and_their_groups_stay(tmp_path: Path) -> None:
     dataset = LeRobotDataset(FIXTURE)
     for file in dataset.files():
@@ -41,18 +48,16 @@ def test_the_other_columns_the_rows_and_their_groups_stay(tmp_path: Path) -> Non
         dataset.write(file, COLUMNS, own, target)
         before, after = pq.read_table(source), pq.read_table(target)
         assert after.select(before.column_names).equals(before)
-        assert after.column_names[-2:] == ["observation.external_torque", "observation.valid"]
-        assert str(after.schema.field("observation.external_torque").type) == (
-            "fixed_size_list<element: float>[7]"
-        )
-        written = np.array(after.column("observation.external_torque").to_pylist(), np.float32)
-        np.testing.assert_array_equal(
-            written, np.concatenate([own[k]["external_torque"] for k in file.episodes])
-        )
+        assert after.column_names[-2:] == [ADDED, "observation.valid"]
+        kind = str(after.schema.field(ADDED).type)
+        assert kind == "fixed_size_list<element: float>[7]"
+        written = np.array(after.column(ADDED).to_pylist(), np.float32)
+        given = [own[k]["external_torque"] for k in file.episodes]
+        np.testing.assert_array_equal(written, np.concatenate(given))
         assert pq.ParquetFile(target).num_row_groups == pq.ParquetFile(source).num_row_groups
         reported = json.loads(after.schema.metadata[b"huggingface"])["info"]["features"]
         assert list(reported) == after.column_names
-        assert reported["observation.external_torque"]["length"] == 7
+        assert reported[ADDED]["length"] == 7
 
 
 @pytest.mark.parametrize("codec", ["none", "snappy", "zstd"])
@@ -74,7 +79,7 @@ def test_compression_row_groups_and_rows_in_any_order_are_kept(
     assert made.num_row_groups == 8
     packed = [made.metadata.row_group(k).column(0).compression.lower() for k in range(8)]
     assert packed == ["uncompressed" if codec == "none" else codec] * 8
-    written = np.array(made.read().column("observation.external_torque").to_pylist(), np.float32)
+    written = np.array(made.read().column(ADDED).to_pylist(), np.float32)
     np.testing.assert_array_equal(written[:160], own[1]["external_torque"])
     np.testing.assert_array_equal(written[160:], own[0]["external_torque"])
 
@@ -91,25 +96,25 @@ def test_what_was_edited_in_between_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_descriptions_tell_the_columns(tmp_path: Path) -> None:
-    statistics = {
-        k: {name: statistics_of(values) for name, values in own.items()}
-        for k, own in forces(range(3)).items()
-    }
-    LeRobotDataset(FIXTURE).finish(COLUMNS, statistics, tmp_path)
+    """Statistics of an episode are exact, those of the dataset are of all frames, but quantiles."""
+    LeRobotDataset(FIXTURE).finish(COLUMNS, statistics(range(3)), tmp_path)
     info = json.loads((tmp_path / "meta" / "info.json").read_text())
-    feature = info["features"].pop("observation.external_torque")
+    feature = info["features"].pop(ADDED)
     assert feature == {
         "dtype": "float32", "shape": [7], "names": list(TORQUE.elements), "fps": 25,
         "info": {"a": 1},
     }  # fmt: skip
     assert info["features"].pop("observation.valid")["names"] is None
     assert info == json.loads((FIXTURE / "meta" / "info.json").read_text())
-    stats = json.loads((tmp_path / "meta" / "stats.json").read_text())
-    whole = np.concatenate([own["external_torque"] for own in forces(range(3)).values()])
-    # float32 values, sums in double
-    np.testing.assert_allclose(
-        stats["observation.external_torque"]["mean"], whole.astype(float).mean(axis=0), atol=1e-12
-    )
+    stats = json.loads((tmp_path / "meta" / "stats.json").read_text())[ADDED]
+    each = [own["external_torque"].astype(float) for own in forces(range(3)).values()]
+    whole = np.concatenate(each)
+    for key in ("min", "max", "mean", "std"):
+        # float32 values, sums in double, in another order
+        np.testing.assert_allclose(stats[key], getattr(np, key)(whole, axis=0), atol=1e-12)
+    assert stats["count"] == [540]
+    medians = [len(own) * np.median(own, axis=0) for own in each]
+    np.testing.assert_allclose(stats["q50"], sum(medians) / 540, atol=1e-12)
     place = Path("meta", "episodes", "chunk-000", "file-000.parquet")
     before, after = pq.read_table(FIXTURE / place), pq.read_table(tmp_path / place)
     assert after.select(before.column_names).equals(before)
@@ -118,9 +123,12 @@ def test_the_descriptions_tell_the_columns(tmp_path: Path) -> None:
     for name in added:
         counts = name.endswith("/count")
         assert str(after.schema.field(name).type.value_type) == ("int64" if counts else "double")
-    assert after.column("stats/observation.external_torque/count").to_pylist() == [
-        [200], [160], [180]
-    ]  # fmt: skip
+    known = {"count": len, "q10": lambda own: np.quantile(own, 0.1, axis=0),
+             "std": lambda own: own.std(axis=0)}  # fmt: skip
+    for key, statistic in known.items():
+        of_episodes = after.column(f"stats/{ADDED}/{key}").to_pylist()
+        for found, own in zip(of_episodes, each, strict=True):
+            np.testing.assert_array_equal(found, np.atleast_1d(statistic(own)))
 
 
 def test_version_2_1_has_its_statistics_a_line_an_episode(tmp_path: Path) -> None:
@@ -131,8 +139,7 @@ def test_version_2_1_has_its_statistics_a_line_an_episode(tmp_path: Path) -> Non
     keys = ("min", "max", "mean", "std", "count")
     line = {"episode_index": 1, "stats": {"action": {key: [0.0] for key in keys}}}
     (dataset / "meta" / "episodes_stats.jsonl").write_text(json.dumps(line) + "\n")
-    statistics = {1: {n: statistics_of(v) for n, v in forces([1])[1].items()}}
-    LeRobotDataset(dataset).finish(COLUMNS, statistics, tmp_path / "copy")
+    LeRobotDataset(dataset).finish(COLUMNS, statistics([1]), tmp_path / "copy")
     text = (tmp_path / "copy" / "meta" / "episodes_stats.jsonl").read_text()
     assert tuple(json.loads(text)["stats"]["observation.valid"]) == keys
     reported = json.loads((tmp_path / "copy" / "meta" / "info.json").read_text())["features"]
@@ -146,13 +153,9 @@ def test_damaged_statistics_are_one_line(tmp_path: Path, name: str, text: str) -
     (tmp_path / "meta").mkdir()
     shutil.copyfile(FIXTURE / "meta" / "info.json", tmp_path / "meta" / "info.json")
     (tmp_path / "meta" / name).write_text(text)
-    statistics = {1: {n: statistics_of(v) for n, v in forces([1])[1].items()}}
     with pytest.raises(LogError, match=f"{name}: holds no statistics"):
-        LeRobotDataset(tmp_path).finish(COLUMNS, statistics, tmp_path / "copy")
-
-
-def test_features_without_names_are_one_line(tmp_path: Path) -> None:
-    (tmp_path / "meta").mkdir()
+        LeRobotDataset(tmp_path).finish(COLUMNS, statistics([1]), tmp_path / "copy")
+    # Features without names are one line too.
     (tmp_path / "meta" / "info.json").write_text('{"features": [["action"]]}')
     with pytest.raises(LogError, match=r"info\.json: not a readable description"):
         LeRobotDataset(tmp_path).finish(COLUMNS, {}, tmp_path / "copy")
@@ -165,11 +168,10 @@ def test_metadata_of_other_kinds_is_left_alone() -> None:
         "n": {"dtype": "int64", "_type": "Value"},
         "a": {"feature": {"dtype": "float32"}, "length": 3, "_type": "List"},
     }
-    reported = with_features(
-        {b"huggingface": json.dumps({"info": {"features": new}}).encode()}, COLUMNS
-    )
+    described = json.dumps({"info": {"features": new}}).encode()
+    reported = with_features({b"huggingface": described}, COLUMNS)
     features = json.loads(reported[b"huggingface"])["info"]["features"]
-    assert features["observation.external_torque"]["_type"] == "List"
+    assert features[ADDED]["_type"] == "List"
 
 
 def test_a_column_that_is_there_and_what_is_no_dataset_are_refused(tmp_path: Path) -> None:
