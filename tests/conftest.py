@@ -33,19 +33,10 @@ def cpu_time() -> float:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the two options on processor time."""
-    parser.addoption(
-        "--cpu-limit",
-        type=float,
-        metavar="SECONDS",
-        help="fail a test that is not marked slow and uses more processor time, its setup included",
-    )
-    parser.addoption(
-        "--cpu-record",
-        type=Path,
-        metavar="FILE",
-        help="append `test<TAB>seconds of processor time`; a worker of xdist to FILE.WORKER",
-    )
+    limit = "fail a test that is not marked slow and uses more processor time, its setup included"
+    keep = "append `test<TAB>seconds of processor time`; a worker of xdist to FILE.WORKER"
+    parser.addoption("--cpu-limit", type=float, metavar="SECONDS", help=limit)
+    parser.addoption("--cpu-record", type=Path, metavar="FILE", help=keep)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -80,7 +71,6 @@ class SharedTime:
     def pytest_fixture_setup(
         self, fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest
     ) -> Generator[None, object, object]:
-        """Add up the time of the session's fixtures; fail one that is dear and not named."""
         begun = cpu_time()
         result = yield
         if fixturedef.scope == "session":
@@ -102,7 +92,6 @@ def record(config: pytest.Config, name: str, spent: float) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
-    """Record the time of a test that passed; fail it if it is over the limit."""
     result = yield
     spent = cpu_time() - item.config.stash[SHARED] - item.stash[BEGUN]
     record(item.config, item.nodeid, spent)
@@ -136,9 +125,6 @@ def loaded() -> Callable[[str], set[str]]:
 
     def after(modules: str) -> set[str]:
         script = f"import sys, {modules}\nprint(*sys.modules)"
-        command = [sys.executable, "-c", script]
-        return set(
-            subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-        )
+        return set(subprocess.check_output([sys.executable, "-c", script], text=True).split())
 
     return after

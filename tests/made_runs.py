@@ -1,10 +1,12 @@
-"""Runs of terms that a test makes itself, without a motion behind them; a log's analysis."""
+"""Runs of terms that a test makes itself, without a motion behind them; analyses, commands."""
 
 from pathlib import Path
 
 import numpy as np
+from typer.testing import CliRunner
 
 from vftcli.analysis import Analysis
+from vftcli.cli import make_app
 from vftcli.pipeline import AnalysisChoice, analyse_logs
 from vftcli.robots import load_robot
 from vftcli.robots.robot import Robot
@@ -29,3 +31,10 @@ def samples_of(terms: DynamicsTerms, inside: Mask, q: Array | None = None) -> Ru
 def analyse_log(log: Path, choice: AnalysisChoice) -> Analysis:
     """The analysis of one log."""
     return next(analyse_logs([log], choice))
+
+
+def command(*words: object) -> str:
+    """What a command prints on stdout; its error is raised."""
+    done = CliRunner().invoke(make_app(), [str(word) for word in words], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.stdout

@@ -15,12 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 import pytest
-from typer.testing import CliRunner
+from made_runs import command as run
 
-from vftcli.cli import make_app
 from vftcli.signals.errors import VftError
-
-app = make_app()
 
 FIXTURES = Path(__file__).parent.parent / "fixtures"
 
@@ -67,15 +64,6 @@ def logs_of_one_motion(tmp_path_factory: pytest.TempPathFactory) -> Logs:
         run(*words, "--set", "duration=8", "--set", f"contacts.hand.begin={begin}")
         made.append(path)
     return Logs(*made, asked={}, folder=folder)
-
-
-def run(*words: object) -> str:
-    """A command's stdout; its error is raised."""
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    assert result.exit_code == 0, result.output
-    return result.stdout
 
 
 def flat(value: Any, path: str = "") -> Iterator[tuple[str, float]]:

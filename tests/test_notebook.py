@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from made_runs import command
 
 import vftcli as vft
-from vftcli.cli import make_app
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
 from vftcli.robots.choice import RobotChoice
@@ -98,10 +97,9 @@ def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_thresholds_are_those_of_the_command(tmp_path: Path) -> None:
     free = tmp_path / "free.parquet"
-    reported = ["simulate", "ur5-circle", "--set", "contacts=[]", "--set", "trajectory.cycles=9"]
-    assert CliRunner().invoke(make_app(), [*reported, "-o", str(free)]).exit_code == 0
-    ran = CliRunner().invoke(make_app(), ["thresholds", str(free), "--robot", "ur5", "--json"])
-    record = json.loads(ran.stdout)
+    words = ("--set", "contacts=[]", "--set", "trajectory.cycles=9")
+    command("simulate", "ur5-circle", *words, "-o", free)
+    record = json.loads(command("thresholds", free, "--robot", "ur5", "--json"))
     found = vft.thresholds(free, "ur5")
     rows = [row["threshold_Nm"] for row in record["joints"]]
     assert found.to_polars().filter(unit="N·m")["threshold"].to_list()[:6] == rows

@@ -15,13 +15,11 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from made_runs import analyse_log
+from made_runs import analyse_log, command
 from scipy.signal import butter, sosfiltfilt
-from typer.testing import CliRunner
 
 import vftcli as vft
 from vftcli import pipeline
-from vftcli.cli import make_app
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion import free_motion
 from vftcli.free_motion.choice import FreeChoice
@@ -35,8 +33,6 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.progress import heard_by
 from vftcli.signals.remarks import Remark
-
-app = make_app()
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -156,9 +152,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
     names["TRUTH"] = Path(f"file:{FIXTURE}.truth.parquet")
     names["OUT.toml"] = tmp_path / "gains.toml"
-    line = [str(names.get(word, word)) for word in [*words.split(), "--robot", "ur5"]]
-    done = CliRunner().invoke(app, line)
-    assert done.exit_code == 0, done.output
+    command(*(names.get(word, word) for word in words.split()), "--robot", "ur5")
     assert counted == {"read_chosen": reads, "dynamics_terms": models, "align": alignments}
 
 
@@ -199,15 +193,14 @@ def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_o
     table = pl.read_csv(FIXTURE, separator=" ").rename({"timestamp": "t", **kept})
     path = tmp_path / "log.csv"
     table.select("t", *kept.values()).write_csv(path)
-    words = [str(path), "--robot", "ur5", "--observer", "gmo"]
-    made = CliRunner().invoke(app, ["estimate", *words, "-o", str(tmp_path / "out")])
-    assert made.exit_code == 0, made.output
+    words = (path, "--robot", "ur5", "--observer", "gmo")
+    command("estimate", *words, "-o", tmp_path / "out")
     record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
     assert record["input"]["derived"] == ["dq"]
     assert "derived-velocity" in {w["code"] for w in record["warnings"]}
-    for command in (["estimate", "--causal", "-o", str(tmp_path / "o")], ["admit"]):
+    for online in (("estimate", "--causal", "-o", tmp_path / "o"), ("admit",)):
         with pytest.raises(MissingSignalError, match="need the complete log"):
-            CliRunner().invoke(app, [*command, *words], catch_exceptions=False)
+            command(*online, *words)
 
 
 def test_the_pipeline_is_short_and_imports_nothing_on_its_way() -> None:

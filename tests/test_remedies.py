@@ -408,7 +408,7 @@ def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
             words = [*words, named(option)]
         elif value is not LEFT_OUT:
             given = value(Path.cwd()) if callable(value) else value
-            if "=VALUE" in said:
+            if option == "set" and "=VALUE" in said:
                 given = said.replace("VALUE", given)
             words = [*words, *typed(option, given or said)]
     return words

@@ -9,26 +9,20 @@ TAPS = Path(__file__).parents[2] / "fixtures" / "ur5_taps_ur_rtde.csv"
 
 
 def test_the_answer_is_on_stdout_and_nothing_is_written(run, here: Path) -> None:
-    code, out, err = run("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
-    assert code == 0
-    assert "2 contacts. The hardest" in out
-    assert err == ""
-    assert "Can it be believed?" in out
-    assert "log health: sound" in run("contacts", TAPS, "--robot", "ur5", "--json")[2]
-    assert not list(here.iterdir())
-
-
-def test_json_and_csv_hold_the_same_rows(run) -> None:
+    """JSON and CSV hold the same rows."""
     words = ("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
-    code, out, _ = run(*words, "--json")
+    code, out, err = run(*words)
+    assert (code, err) == (0, "")
+    assert "2 contacts. The hardest" in out
+    assert "Can it be believed?" in out
+    code, out, err = run(*words, "--json")
     record = json.loads(out)
-    assert code == 0
-    assert record["recording"] == TAPS.name
+    assert (code, record["recording"]) == (0, TAPS.name)
+    assert "log health: sound" in err
     rows = list(csv.DictReader(io.StringIO(run(*words, "--csv")[1])))
-    assert [float(row["peak_force_N"]) for row in rows] == [
-        each["peak_force_N"] for each in record["contacts"]
-    ]
-    assert run(*words, "--csv", "--json")[0] == 2
+    peaks = [each["peak_force_N"] for each in record["contacts"]]
+    assert [float(row["peak_force_N"]) for row in rows] == peaks
+    assert not list(here.iterdir())
 
 
 def test_a_free_part_that_is_not_there_is_refused(refused) -> None:

@@ -58,3 +58,5 @@ def test_nothing_is_overwritten_without_force_or_simulated_without_a_place(run, 
     assert path.read_text() == "mine"
     code, _, err = run("simulate", "ur5-circle")
     assert (code, "-o PATH says where" in err) == (2, True)
+    code, _, err = run(*CIRCLE, "x.csv", "--seed", "-1")
+    assert (code, "'--seed': -1 is not in the range x>=0" in err) == (2, True)

@@ -45,9 +45,7 @@ def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run) -> 
     assert "collision_config:" in out
     assert "pushed.npy: 1 alarm, the weakest at" in out
     assert "these are extrapolated" in err
-
-
-def test_the_json_stands_alone_and_the_push_is_found(free: Path, pushed: Path, run) -> None:
+    # The JSON stands alone, and the push is found.
     words = ("--rate", 60, "--check", pushed, "--check", free, "--json")
     code, out, _ = run("thresholds", free, *COLUMNS, *words)
     assert code == 0
