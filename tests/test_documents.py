@@ -38,10 +38,10 @@ def blocks(path: Path, language: str) -> list[str]:
     )
 
 
-def commands(path: Path) -> list[str]:
+def commands(path: Path, language: str = "sh") -> list[str]:
     """The vftcli commands of a document's shell blocks, in order."""
-    text = "\n".join(blocks(path, "sh")).replace("\\\n", " ")
-    return re.findall(r"(?:^|&& (?:\S*/)?)(vftcli .*)$", text, re.MULTILINE)
+    text = "\n".join(blocks(path, language)).replace("\\\n", " ")
+    return re.findall(r"(?:^|&& (?:\S*/)?)(?:\$ )?(vftcli .*)$", text, re.MULTILINE)
 
 
 def in_the_menu() -> list[Path]:
@@ -117,13 +117,13 @@ def test_the_notebook_shows_what_is_kept_in_it() -> None:
     """Its tables and words; a picture's bytes go with matplotlib's version."""
     pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
     found = run_cells(notebook := json.loads(NOTEBOOK.read_text("utf-8")))
-    texts = [text_of(outputs) for outputs in found]
-    assert texts == [text_of(cell["outputs"]) for cell in code_cells(notebook)]
+    kept = [cell["outputs"] for cell in code_cells(notebook)]
+    texts, expected = (
+        [[o.get("text") or o["data"]["text/plain"] for o in outputs] for outputs in cells]
+        for cells in (found, kept)
+    )
+    assert texts == expected
     assert sum("image/png" in output.get("data", ()) for cell in found for output in cell) == 2
-
-
-def text_of(outputs: list[dict[str, Any]]) -> str:
-    return "".join(line for o in outputs for line in o.get("text") or o["data"]["text/plain"])
 
 
 def test_the_notebook_is_small_and_its_words_quote_its_cells() -> None:
@@ -138,20 +138,8 @@ def test_the_notebook_is_small_and_its_words_quote_its_cells() -> None:
 
 def test_the_notebook_says_that_it_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("VFT_LOGS", raising=False)
-    with pytest.raises(
-        SystemExit, match="VFT_LOGS names no folder of logs: this story is skipped"
-    ):
+    with pytest.raises(SystemExit, match="VFT_LOGS names no folder of logs"):
         run_cells(json.loads(NOTEBOOK.read_text("utf-8")))
-
-
-def as_typed(path: Path) -> list[str]:
-    """Every vftcli command of a document: of its blocks, and within its sentences."""
-    text = path.read_text("utf-8").replace("\\\n", " ").replace("\\|", "|")
-    fenced = re.findall(
-        r"^```(?:sh|bash|text|console)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
-    )
-    lines = re.findall(r"(?:^|&& (?:\S*/)?)(?:\$ )?(vftcli .*)$", "\n".join(fenced), re.MULTILINE)
-    return [*lines, *re.findall(r"`(vftcli [^`]+)`", text)]
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)
@@ -160,7 +148,9 @@ def test_every_command_as_typed_is_one_of_the_program(path: Path) -> None:
     if path.name == "changelog.md":
         return
     group: Any = typer.main.get_command(make_app())
-    for line in as_typed(path):
+    text = path.read_text("utf-8").replace("\\\n", " ").replace("\\|", "|")
+    within = re.findall(r"`(vftcli [^`]+)`", text)  # its sentences
+    for line in (*commands(path, "(?:sh|bash|text|console)"), *within):
         words = shlex.split(line.partition(" # ")[0])[1:]
         name = next((word for word in words if word in COMMANDS), "contacts")
         given = [word.partition("=")[0] for word in words if word.startswith("-")]
