@@ -21,7 +21,6 @@ Change = Callable[[pl.DataFrame], pl.DataFrame]
 
 
 def frame() -> pl.DataFrame:
-    """Two seconds of a sound log of a UR5: t, q1 …, dq1 …, current1 …."""
     return sound().between(0.0, 2.0).frame().select(pl.col("^(t|q.|dq.|current.)$"))
 
 
@@ -59,8 +58,6 @@ def same(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def arrays(names: dict[str, tuple[int, ...]], *words: str) -> Command:
-    """A conversion of an HDF5 file of these datasets, which hold a rising number."""
-
     def command(folder: Path) -> list[Any]:
         with h5py.File(folder / "log.hdf5", "w") as file:
             for name, shape in names.items():
@@ -71,7 +68,6 @@ def arrays(names: dict[str, tuple[int, ...]], *words: str) -> Command:
 
 
 def named_arrays(folder: Path) -> list[Any]:
-    """A conversion of an .npz, its columns counted."""
     table = frame()
     groups = {name: table.select(pl.col(f"^{name}.$")).to_numpy() for name in ("q", "dq")}
     np.savez(folder / "log.npz", t=table["t"].to_numpy(), **groups)
@@ -97,7 +93,6 @@ def on(log: Change, *words: Any) -> Command:
 
 
 def estimated(folder: Path, *words: str) -> Path:
-    """What an estimate of the log writes."""
     log = written(folder, lambda _: circle().head(500))
     code, said = printed(["estimate", log, "--robot", "ur5", "-o", folder / "made", *words])
     assert code == 0, said
@@ -105,7 +100,6 @@ def estimated(folder: Path, *words: str) -> Path:
 
 
 def judged(reference: Change, header: bool = True) -> Command:
-    """A comparison with a table of torques."""
     return lambda f: [
         "compare", written(f, same), *GMO, "--reference",
         f"file:{written(f, reference, 'truth.csv', header)}"]  # fmt: skip
@@ -116,7 +110,6 @@ def annotated(*words: str) -> Command:
 
 
 def mimicking(folder: Path) -> list[Any]:
-    """A description of an arm in which the third joint follows the second."""
     text = (FIXTURES / "arm.urdf").read_text("utf-8")
     parts = text.split("</joint>")
     parts[2] += '<mimic joint="' + re.findall('<joint name="([^"]+)"', text)[1] + '"/>'
@@ -140,18 +133,15 @@ def gripping(folder: Path) -> list[Any]:
 
 
 def circle() -> pl.DataFrame:
-    """The whole log, long enough to identify an arm from."""
     return sound().frame()
 
 
 def waiting(table: pl.DataFrame) -> pl.DataFrame:
-    """A pause of a day after three quarters."""
     last = table["t"][3 * len(table) // 4]
     return table.with_columns(t=pl.col("t") + 86400.0 * (pl.col("t") > last))
 
 
 def short_scenario(folder: Path) -> str:
-    """A scenario of three seconds."""
     text = (FIXTURES / "ur5_circle.csv.scenario.toml").read_text("utf-8")
     text = re.sub("(?m)^duration = .*", "duration = 3.0", text)
     (folder / "short.toml").write_text(text, encoding="utf-8")
@@ -159,14 +149,12 @@ def short_scenario(folder: Path) -> str:
 
 
 def edited_header(folder: Path) -> list[Any]:
-    """A conversion of a log of libfranka with one name changed."""
     path = libfranka_csv(folder / "log.csv")
     path.write_text(path.read_text("utf-8").replace("state.q[3]", "state.x[3]"), encoding="utf-8")
     return ["convert", path, "-o", "out.csv"]
 
 
 def two_bags(folder: Path) -> list[Any]:
-    """A conversion of a bag of two arms."""
     messages = [
         ur_message(k, name=[f"{side}_{name}" for name in ALPHABETICAL],
                    topic=f"/{side}/joint_states")

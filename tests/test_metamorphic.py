@@ -172,12 +172,10 @@ def equal(one: Numbers, other: Numbers, but: tuple[str, ...] = ()) -> None:
 
 
 def of(log: Path, numbers: Numbers, other: Path) -> Numbers:
-    """Numbers of another file as if they were this one's."""
     return {key.replace(other.name, log.name): value for key, value in numbers.items()}
 
 
 def changed(log: Path, change: Callable[[pl.DataFrame], pl.DataFrame], folder: str) -> Path:
-    """A log with its table changed, of the same name in another folder."""
     path = log.parent / folder / log.name
     if not path.exists():
         path.parent.mkdir(exist_ok=True)
@@ -186,7 +184,6 @@ def changed(log: Path, change: Callable[[pl.DataFrame], pl.DataFrame], folder: s
 
 
 def copied(log: Path, *parts: str) -> Path:
-    """A copy of a log under another name or in another folder."""
     path = log.parent.joinpath(*parts)
     path.parent.mkdir(exist_ok=True)
     shutil.copy(log, path)

@@ -54,7 +54,6 @@ TOOL = ("--set", "virtual-sensor.tool=0,0,0.1")
 
 @cache
 def sound(robot: str = "ur5") -> Table:
-    """A fixture's log as a plain table."""
     log = read(FIXTURES / LOGS[robot])
     signal, effort = ("current", log.current) if robot == "ur5" else ("tau", log.torque)
     return Table(t=log.t, q=log.q, dq=log.require("dq"), effort=effort, signal=signal,
@@ -76,7 +75,6 @@ def planted(name: str, *words: str, robot: str = "ur5") -> Command:
 
 
 def unnamed(plant: Callable[[Table], Table], robot: str = "ur5") -> Command:
-    """An examination that does not know which arm it is."""
     return lambda folder: of(plant, robot=robot)(folder)[:2]
 
 
@@ -113,7 +111,6 @@ def robot_file(folder: Path, gravity: str = "[0.0, 0.0, -9.81]", more: str = "")
 
 
 def free_log(folder: Path) -> str:
-    """Four seconds that nobody touches."""
     return str(sound().between(0.0, 3.9).write(folder / "free.csv"))
 
 
@@ -150,7 +147,6 @@ def rtde(folder: Path, left_out: str = "") -> Path:
 
 
 def controlled(folder: Path, left_out: str = "") -> list[Any]:
-    """A comparison with the controller's own wrench."""
     return ["compare", rtde(folder, left_out), "--robot", "ur5", "--observer", "gmo",
             "--reference", "sensor", "--details", "--anyway"]  # fmt: skip
 
@@ -206,7 +202,6 @@ SWAPPED = ("1", "3", "2", "4", "5", "6")
 
 
 def rehomed(table: Table) -> Table:
-    """The zero of J3 moved by .2 rad after 12 s."""
     moved = (table.t - table.t[0] > 12.0)[:, None] * np.eye(6)[2]
     return replace(table, q=table.q + 0.2 * moved)
 
@@ -366,7 +361,6 @@ def with_option(words: list[Any], said: str, row: Row) -> list[Any]:
 
 
 def named(option: str) -> str:
-    """An option as it is typed; a setting has a dot in its name."""
     return option if "." in option or option.startswith("-") else f"--{option}"
 
 
@@ -549,7 +543,6 @@ def test_a_load_that_one_motion_does_not_show_is_found_in_a_pair(tmp_path: Path)
 
 
 def unknown_estimate(table: Table) -> Table:
-    """The vendor's estimate is NaN for a while."""
     assert table.tau_ext is not None
     tau_ext = table.tau_ext.copy()
     tau_ext[1000:1050] = np.nan

@@ -42,18 +42,15 @@ ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", 
 
 
 def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
-    """A command on a part of the sound log. [s]"""
     return of(lambda table: table.between(start, stop), *words, robot=robot)
 
 
 def fixture(name: str, span: str, *words: str) -> Command:
-    """A command on a part of a fixture of the UR5."""
     log = (FIXTURES / name, "--robot", "ur5", "--interval", span)
     return lambda _: [*words[:1], *log, *words[1:]]
 
 
 def simulated(name: str, *words: str) -> Command:
-    """A second of a scenario."""
     return lambda _: ["simulate", name, "--set", "duration=1", *words]
 
 
@@ -91,20 +88,17 @@ def moved(seconds: float = 4.0) -> Table:
 
 
 def still(table: Table, seconds: float = 4.0) -> Table:
-    """The arm at rest."""
     table = table.between(0.0, seconds)
     held = {name: np.tile(value[0], (len(table.t), 1)) for name, value in table.series()}
     return replace(table, **held | {"dq": 0.0 * table.dq})
 
 
 def gap_at_the_end(table: Table) -> Table:
-    """Three samples a day after the others."""
     table = table.between(0.0, 9.0)
     return replace(table, t=np.append(table.t[:-3], table.t[-3:] + 1e5))
 
 
 def backwards(table: Table) -> Table:
-    """Velocities with their sign turned."""
     return replace(table, dq=-table.dq).between(0.0, 8.0)
 
 
@@ -123,7 +117,6 @@ def touched_late(folder: Path) -> list[Any]:
 
 
 def of_five_joints(folder: Path) -> list[Any]:
-    """A wrench of an arm of five joints."""
     text = (FIXTURES / "arm.urdf").read_text("utf-8")
     fixed = text.replace('"hand" type="revolute"', '"hand" type="fixed"')
     (folder / "five.urdf").write_text(fixed, "utf-8")
@@ -158,7 +151,6 @@ def stored(folder: Path) -> list[Any]:
 
 
 def gains(folder: Path) -> Path:
-    """A file of gains, as the error says."""
     (folder / "gains.toml").write_text("[observers.gmo]\ngain = 10.0\n", "utf-8")
     return folder / "gains.toml"
 
