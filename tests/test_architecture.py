@@ -270,12 +270,12 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 51_597,
+    "lines of Python": 51_549,
     "files": 239,
-    "functions": 2781,
+    "functions": 2776,
     "functions over 60 lines": 10,
-    "names, operators, numbers": 368_775,
-    "characters a line that is not blank": 50.44,
+    "names, operators, numbers": 368_774,
+    "characters a line that is not blank": 50.42,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7392,
 }
@@ -299,7 +299,7 @@ def test_the_package_does_not_grow() -> None:
     every = [f for tree in modules().values() for f in ast.walk(tree) if isinstance(f, FUNCTION)]
     data = [p for p in PACKAGE.rglob("*") if p.suffix in {".toml", ".js", ".css", ".html"}]
     size = {
-        "lines of Python": 51_597,
+        "lines of Python": sum(text.count("\n") for text in texts.values()),
         "files": len(texts),
         "functions": len(every),
         "functions over 60 lines": sum(f.end_lineno - f.lineno >= 60 for f in every),

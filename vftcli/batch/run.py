@@ -20,17 +20,13 @@ from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.files import SEAL
 from vftcli.outputs.page.pages import batch_lines, render_batch
 from vftcli.outputs.run_record import envelope, versions
-from vftcli.readers import reading
 from vftcli.readers.library import absolute, labelled
 from vftcli.readers.opening import files_of, open_log
 from vftcli.readers.reader import ALL, ReadChoice
-from vftcli.readers.reading import LogFormat
+from vftcli.readers.reading import LogFormat, read_chosen, recognise
 from vftcli.readers.references import stored_observers
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 from vftcli.signals.progress import stage
-
-TRUTH = ".truth.parquet"  #: Ending of what a simulation writes beside its log.
-METADATA = "metadata.yaml"  #: The file that lists the pieces of a bag of ROS 2.
 
 NUMBER = re.compile(rb"(?:^|[\s,;])[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(?=$|[\s,;])")
 #: A file of JSON beside logs that is smaller is read to see whether it is one. [B]
@@ -259,7 +255,7 @@ class LogCollection:
 
     def _parts(self, path: Path) -> Iterator[LogEntry]:
         try:
-            yield from self._episodes(path, reading.recognise(path, self._choice))
+            yield from self._episodes(path, recognise(path, self._choice))
         except (LogError, OSError):
             yield LogEntry(path, self._choice.episode, (path,))
 
@@ -285,9 +281,9 @@ class LogCollection:
             return
         self._searched.add(place)
         try:
-            reader = reading.recognise(folder, self._choice)
+            reader = recognise(folder, self._choice)
             # Without metadata.yaml a bag is a folder of several recordings, not pieces of one.
-            several_bags = reader.name == "rosbag2" and not (folder / METADATA).is_file()
+            several_bags = reader.name == "rosbag2" and not (folder / "metadata.yaml").is_file()
             if reader.name != "droid" and not several_bags:
                 yield from self._episodes(folder, reader)
                 return
@@ -309,17 +305,17 @@ class LogCollection:
 
     def _may_be_log(self, path: Path) -> bool:
         """Whether a folder's file may be a log, damaged ones too: their error is shown."""
-        if path.name.endswith((TRUTH, SEAL)):
+        if path.name.endswith((".truth.parquet", SEAL)):
             return False
         try:
-            reader = reading.recognise(path, self._choice)
+            reader = recognise(path, self._choice)
         except UnknownFormatError:
             return False
         except (LogError, OSError):
             return True
         if reader.name == "json" and path.stat().st_size < DESCRIPTION:
             try:
-                reading.read_chosen(path, self._choice)
+                read_chosen(path, self._choice)
             except NoLogError:
                 return False  # it describes something
             except LogError:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vftcli.doctor.causes import RANGE
-from vftcli.doctor.windows import Case, RobustFit, Terms, solve
+from vftcli.doctor.windows import Case, RobustFit, solve
 from vftcli.robots import Robot
 from vftcli.robots.friction import friction_factor, steady_torque
 from vftcli.robots.running_friction import measured_temperature
@@ -117,28 +117,26 @@ def masses_sd(case: Case, fit: RobustFit, loads: Array) -> Array:
     A, B = map(np.concatenate, (fitted, log.weights.columns[fit.kept]))
     by_links = np.linalg.lstsq(A, B)[0][masses]
     by_gain = gain_sd(log.recording, log.robot) * fit.values[masses]
-    parts = np.column_stack([fit.sd[masses], by_gain, by_links])
-    return np.asarray(np.linalg.norm(parts, axis=1))
+    return np.asarray(
+        np.linalg.norm(np.column_stack([fit.sd[masses], by_gain, by_links]), axis=1)
+    )
 
 
 def load_change(case: Case) -> Remark | None:
     """The finding on a load picked up or set down along the log, or None."""
     count, load = len(case.given), case.windows.load
 
-    def two_loads(split: int) -> Terms:
-        """The columns of two loads: before a window, and from it on."""
+    def with_two_loads(split: int) -> tuple[RobustFit, Array]:
+        """Fit by friction and two loads, before a window and from it on; their columns."""
         late = (np.arange(count) >= split)[:, None, None]
         columns = np.concatenate([load.columns * ~late, load.columns * late], axis=2)
-        return load._replace(columns=columns, prior=np.tile(load.prior, 2))
+        loads = load._replace(columns=columns, prior=np.tile(load.prior, 2))
+        return solve(case.given - case.needed, loads, case.windows.friction), columns
 
-    def with_two_loads(split: int) -> RobustFit:
-        """Fit by friction and two loads."""
-        return solve(case.given - case.needed, two_loads(split), case.windows.friction)
-
-    if with_two_loads(count // 2).size > HALVES * case.loaded.size:
+    if with_two_loads(count // 2)[0].size > HALVES * case.loaded.size:
         return None
     tried = {k: with_two_loads(k) for k in map(int, np.linspace(*BETWEEN, 7) * count)}
-    split, fit = min(tried.items(), key=lambda one: one[1].size)
+    split, (fit, loads) = min(tried.items(), key=lambda one: one[1][0].size)
     before, after = fit.values[0], fit.values[4]
     sd = np.hypot(fit.sd[0], fit.sd[4])
     # In one pose any residual passes for a load.
@@ -147,7 +145,7 @@ def load_change(case: Case) -> Remark | None:
         return None
     if abs(after - before) < max(CHANGE, SURE * sd):
         return None
-    at, sd = case.windows.t[split, 0], masses_sd(case, fit, two_loads(split).columns).max()
+    at, sd = case.windows.t[split, 0], masses_sd(case, fit, loads).max()
     return warning("load-changes", first_kg=before, last_kg=after, sd_kg=sd, at_s=at)
 
 

@@ -211,14 +211,13 @@ def error_model(
     )
     low = signal_edge(step) if cutoff is None else signal_edge(step, cutoff)
 
-    def motion_torque() -> Array:
-        return local_rms(low_pass(t, at(known, pair.model_difference), low), step)
-
     def slope_noise() -> Array:
         momentum = at(known, motion.momentum - pair.of_free("momentum"))
         return noise_below(t, momentum, moving, step, (low, 2.0 * low), low, slope=1)
 
-    motion_error = pair.cached("motion", low, motion_torque)
+    motion_error = pair.cached(
+        "motion", low, lambda: local_rms(low_pass(t, at(known, pair.model_difference), low), step)
+    )
     missed, own = np.maximum(LEAST_SHARE, pair.misfit), np.zeros(len(noise))
     if not corrected:
         # The model's torque differentiates momenta: their noise is no motion.

@@ -247,8 +247,11 @@ def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
     for series, t, y, _ in shown:
         axes.plot(t, y, label=shortened(series.name), **look(series))
     for series, t, y, halves in shown:
-        for half, style in zip(halves, ribbon_looks(series), strict=False):
-            axes.fill_between(t, y - half, y + half, **style)
+        own: Look = {"facecolor": look(series)["color"], "alpha": 0.25, "linewidth": 0.0}
+        # Grey where no contact is listed, if any is.
+        looks = {"label": "95 % band"}, {"facecolor": "0.4", "label": QUIET}
+        for half, style in zip(halves, looks[: 1 + (series.quiet is not None)], strict=False):
+            axes.fill_between(t, y - half, y + half, **own | style)
     if chart.band is not None and np.isfinite(chart.band[j]):
         for sign in (1.0, -1.0):
             axes.axhline(sign * chart.band[j], label=chart.band_label, **BAND_LOOK)
@@ -281,13 +284,6 @@ def dot_look(k: int, paint: str = "black", edge: float = 0.7, fill: str = "white
     """Look of the marks of one name: distinct by shape."""
     shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markerfacecolor": fill}
     return {"color": paint, "linestyle": "none", "markeredgewidth": edge, **shape}
-
-
-def ribbon_looks(series: ChartLine) -> list[Look]:
-    """Looks of a line's band: its own, and grey where no contact is listed, if any."""
-    own = {"facecolor": look(series)["color"], "alpha": 0.25, "linewidth": 0.0}
-    grey = own | {"facecolor": "0.4", "label": QUIET}
-    return [own | {"label": "95 % band"}, *[grey] * (series.quiet is not None)]
 
 
 def look(series: ChartLine) -> Look:

@@ -120,10 +120,7 @@ class NamedColumns:
                 "Name the columns with --columns."
             )
         if not group:
-            raise LogError(
-                f"{path}: {name} holds no number in its first row, so its width is unknown. "
-                "Cut the rows with empty lists out, or leave the column out with --columns."
-            )
+            raise LogError(f"{path}: {name} holds no number in its first row. Cut such rows out.")
         return tuple(group.values())
 
     def find(self, signal: str) -> Item | None:

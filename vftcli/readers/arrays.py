@@ -81,11 +81,10 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
         logs = skills or (inner if len(inner) == len(log) == 1 else logs)
     elif packed:
         raise LogError(
-            f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of "
-            "arrays. Save the log with np.savez."
+            f"{file.path}: the pickle holds a {type(log).__name__}, no arrays by name{RESAVE}"
         )
     elif log and all(isinstance(row, dict) for row in log):
-        logs = [columns_of(file, log, 1)]
+        logs = [columns_of(file, log)]
     yield {k: partial(_read_arrays, file, each) for k, each in enumerate(logs)}
 
 
@@ -168,8 +167,7 @@ def binary_table(file: LogFile) -> ArrayTable:
     names, types = first.decode("ascii", errors="replace").split(), second.split()
     if len(names) != len(types) or not names:
         raise LogError(
-            f"{file.path}: the header names {len(names)} columns and {len(types)} types; a binary "
-            "RTDE file has one type a column. It is damaged or cut."
+            f"{file.path}: {len(names)} columns, {len(types)} types in the header; damaged or cut."
         )
     if unknown := [word for word in types if word not in BINARY_TYPES]:
         raise LogError(f"{file.path}: unknown column type {unknown[0]!r} in the second line.")

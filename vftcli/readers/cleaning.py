@@ -243,10 +243,7 @@ def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         lost = unknown[:, column].sum()
         where = f"{path}: {name} {COLUMN.get(name, 'of joint')} {column + 1}"
         if np.isnan(value[:, column]).all():
-            raise LogError(
-                f"{where} holds no numbers at all, only empty cells or NaN. Record it, or "
-                f"{LEAVING_OUT}."
-            )
+            raise LogError(f"{where} holds no numbers at all. Record it, or {LEAVING_OUT}.")
         at = f"in sample {number_of(raw, row)} (t = {seconds(raw)[row]:.6g} s)"
         raise LogError(
             f"{where} is {value[row, column]:.6g} {at}, {lost} such in all. Nothing is filled in: "
@@ -269,8 +266,7 @@ def _restarts(raw: RawLog, path: Path, *, examining: bool) -> list[int]:
     # A clock that restarts begins near zero; any other step back is disorder.
     if np.any(np.abs(t[restarts]) > 3 * median_step(t)) or lengths.min() < SEGMENT_ROWS:
         raise ClockError(
-            f"{path}: time runs backwards {restarts.size}×, first {where}. Two logs in one file, "
-            "or rows out of order: split or sort it first."
+            f"{path}: time runs backwards {restarts.size}×, first {where}. Split or sort it first."
         )
     if not examining:
         raise ClockError(
@@ -286,22 +282,21 @@ def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
     rows, span, steps = len(t), float(t[-1]), np.diff(t)
     if not abs(start) <= FARTHEST_START:
         raise ClockError(
-            f"{path}: the clock starts at {start:.3g} s, which no clock shows. Say its unit with "
-            "--columns, as in t[ns]=…, or name another column."
+            f"{path}: the clock starts at {start:.3g} s, which no clock shows. Say its unit "
+            "with --columns, as in t[ns]=…"
         )
     if rows < 2:
         return
     if span == 0:
         raise ClockError(
-            f"{path}: the clock never moves: all {rows} samples have the stamp "
-            f"{raw.stamps[0]:.10g}. Name another column as t with --columns, or state the rate of "
-            "a log without a clock, as in t@125Hz."
+            f"{path}: the clock never moves: all {rows} samples are at {raw.stamps[0]:.10g}. "
+            "Name another column as t with --columns, or state the rate, as in t@125Hz."
         )
     usual = median(steps[steps > 0])
     if not (usual >= SHORTEST_STEP and span <= LONGEST_LOG):
         raise ClockError(
-            f"{path}: samples {usual:.3g} s apart over {span:.3g} s, which no robot's log is. Say "
-            "the unit of the clock with --columns, as in t[ms]=…, or name another column."
+            f"{path}: steps of {usual:.3g} s over {span:.3g} s, which no robot's log is. Say "
+            "the unit of the clock with --columns, as in t[ms]=…"
         )
 
 
@@ -330,9 +325,8 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
     repeats, different = again.size, int(changed.sum())
     if 2 * different > len(raw.stamps):
         raise ClockError(
-            f"{path}: the clock is coarser than the samples: {different} of {len(fresh)} rows "
-            "have the stamp of the row before but other values. Name a finer column as t with "
-            "--columns, or state the rate of a log without a clock, as in t@125Hz."
+            f"{path}: the clock is coarser than the samples: {different} of {len(fresh)} rows have "
+            "the stamp of the row before. Name a finer column as t, or state the rate: t@125Hz."
         )
     remarks = [fact("repeats-dropped", rows=repeats)]
     if different:

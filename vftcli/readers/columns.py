@@ -119,8 +119,7 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     for item in items:
         if named and not alone and item.pattern is None and item.rate is None:
             raise LogError(
-                f"--columns: {item.signal} has no column name while others have one. Name every "
-                "signal (q=joint_{i}), or count columns in file order (t,q:6), not both."
+                f"--columns: {item.signal} has no column name: name every signal, or count (t,q:6)."
             )
         if names.count(item.signal) > 1:
             raise LogError(
@@ -233,7 +232,13 @@ def guess_columns(columns: Sequence[Array]) -> Guess | None:
     if len(table) < 2 * STEPS[-1] or not np.isfinite(table).all() or not _is_clock(clock):
         return None
     t = (clock - clock[0]).astype(np.float64) * tick_of(clock, "")[0]
-    blocks = {n: _blocks(table, n) for n in JOINTS if 2 * n < table.shape[1]}
+    width = table.shape[1]
+    # The columns behind the first, as many at a time as there are joints.
+    blocks = {
+        n: [table[:, k : k + n] for k in range(1, width - n + 1, n)]
+        for n in JOINTS
+        if 2 * n < width
+    }
     fitting = [n for n, each in blocks.items() if _begins_with_motion(t, each)]
     if len(fitting) != 1:
         return None
@@ -260,12 +265,6 @@ TARGETS = ("current", "target_current", "target_torque")
 def _is_clock(stamps: Array) -> bool:
     steps, usual = np.diff(stamps), median_step(stamps)
     return bool(np.all(steps >= 0) and np.quantile(steps, 0.95) < EVEN * usual)
-
-
-def _blocks(table: Array, joints: int) -> list[Array]:
-    """The columns behind the first, as many at a time as there are joints."""
-    starts = range(1, table.shape[1] - joints + 1, joints)
-    return [table[:, start : start + joints] for start in starts]
 
 
 def _begins_with_motion(t: Array, blocks: Sequence[Array]) -> bool:

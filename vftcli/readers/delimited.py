@@ -286,8 +286,7 @@ def joint_names(table: TextTable) -> Names:
         if len(words) > 1:
             raise LogError(
                 f"{table.path}: the rows name different joints ({words[0][:60]} and "
-                f"{words[1][:60]}), as where two controllers publish on one topic. Keep the rows "
-                "of the arm."
+                f"{words[1][:60]}). Keep one controller's."
             )
     names: Any = tuple(words[0] for words in found)
     if len(names) == 1 and names[0].startswith(("[", "(")):

@@ -121,8 +121,7 @@ def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
     def look(name: str, item: Hdf5) -> None:
         if next(looked_at) > MOST_OBJECTS or name.count("/") > DEEPEST:
             raise LogError(
-                f"{path}: more than {MOST_OBJECTS} groups and datasets, or {DEEPEST} groups "
-                "inside one another; no log is."
+                f"{path}: more than {MOST_OBJECTS} objects or {DEEPEST} levels; no log has."
             )
         if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub":
             return
@@ -196,9 +195,8 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     for path, project in TORQUELESS.items():
         if any(f"/{name}".endswith(f"/{path}") for name in names):
             raise LogError(
-                f"{table.path}: laid out as {project}'s, which hold no torque, so no force can be "
-                "estimated. Where you added torques, name all with --columns, as in "
-                "t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
+                f"{table.path}: laid out as {project}'s, which hold no torque. Where you added "
+                "torques, name all: --columns t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
             )
     # The datasets of the one group that has positions by name, and those at the top.
     return from_table(table.within(level_of(table.path, names, "/"), top=True), request)

@@ -56,7 +56,7 @@ def columns_of_lines(file: LogFile, lines: Iterable[tuple[int, bytes]]) -> tuple
         if odd and odd[0] != part[-1][0]:
             raise LogError(f"{file.path}: line {odd[0]} is not one JSON object.")
         if objects := [found for found in each.values() if found is not None]:
-            blocks.append(columns_of(file, objects, part[0][0]))
+            blocks.append(columns_of(file, objects))
     if not blocks:
         raise LogError(f"{file.path}: no line holds a JSON object.")
     if any(block.keys() != blocks[0].keys() for block in blocks):
@@ -88,7 +88,7 @@ def flat(values: Object, levels: int, prefix: str = "") -> Iterator[tuple[str, D
             yield f"{prefix}{name}", value
 
 
-def columns_of(file: LogFile, objects: list[Object], first: int) -> Columns:
+def columns_of(file: LogFile, objects: list[Object]) -> Columns:
     """The numeric fields of some objects, a row an object."""
     columns: Columns = {}
     for name, value in objects[0].items():
@@ -100,8 +100,7 @@ def columns_of(file: LogFile, objects: list[Object], first: int) -> Columns:
         except (KeyError, ValueError, TypeError, OverflowError):
             shown = printable(name[:40])
             raise LogError(
-                f"{file.path}: {shown} is not the same numbers in each of the objects from "
-                f"{first} to {first + len(objects) - 1}."
+                f"{file.path}: {shown} is not the same numbers in each of the objects."
             ) from None
     return columns
 

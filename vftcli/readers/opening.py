@@ -192,8 +192,7 @@ def unpacked(path: Path, wrapping: Wrapping, enough: float = math.inf) -> tuple[
                 if total > limit:
                     raise LogError(
                         f"{path}: unpacks to more than {limit >> 20} MiB, more than a log this "
-                        f"small can hold. If it is genuine, unpack it ({wrapping} -d) and give "
-                        "the unpacked file."
+                        f"small can hold. If it is genuine, unpack it ({wrapping} -d)."
                     )
                 if total >= enough:
                     return b"".join(pieces), False

@@ -133,8 +133,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     path = Path(path)
     if choice.episode == ALL:
         raise ParameterError(
-            f"{path}: --episode all is for commands that take several logs (compare, report, "
-            "contacts, thresholds, identify); name one: --episode K"
+            f"{path}: --episode all is for commands that take several logs; name one: --episode K"
         )
     file = open_log(path)
     reader = _reader(file, choice)
@@ -164,10 +163,7 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
 
 
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
-    """A log as `read` gives it, or a file's first of several recordings or arms.
-
-    For examining a log: a part of it, and saying so, is better than an error.
-    """
+    """A log as `read` gives it, or a file's first of several recordings or arms."""
     return read_chosen(path, replace(choice or ReadChoice(), examining=True))
 
 
@@ -188,8 +184,7 @@ def _reader(file: LogFile, choice: ReadChoice) -> LogFormat:
     if not reader.takes_columns:
         takers = ", ".join(r.name for r in FORMATS.values() if r.takes_columns)
         raise LogError(
-            f"{file.path}: --columns does not apply to {reader.name}: its signals are known. "
-            f"It applies to {takers}."
+            f"{file.path}: --columns does not apply to {reader.name}, only to {takers}."
         )
     whole = reader.general or reader.describes or not file.lines
     return reader if whole else FORMATS["table"]
@@ -242,18 +237,13 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
     return cleaned(raw, Path(name), "arrays")
 
 
-#: How names of files end that may be logs; only to say so.
-LOGS = (".csv", ".tsv", ".txt", ".gz", ".zst", ".npy", ".npz", ".parquet", ".bag", ".mcap", ".db3",
-        ".pkl", ".log", ".bin", ".json", ".jsonl", ".mat", ".hdf5", ".h5", ".feather",
-        ".arrow")  # fmt: skip
-
-SHOWN = 4  #: Names of files that a message shows.
-
-
 def description(file: LogFile) -> str:
     """The kind of a path and the remedy, to follow its name."""
     if file.is_folder:
-        return of_folder(file.path, file.entries)
+        at, what = shlex.quote(printable(str(file.path))), listed(file.entries, 4) or "empty"
+        return (
+            f"a folder ({what}), no bag and no data set; vftcli batch {at} -o OUT reads its logs"
+        )
     if kind := known_kind(file):
         return kind
     if file.lines:
@@ -280,22 +270,3 @@ def known_kind(file: LogFile) -> str | None:
         if re.match(begins.encode("latin-1"), file.head, re.DOTALL):
             return str(words)
     return None
-
-
-def of_folder(path: Path, entries: Sequence[str]) -> str:
-    """A folder that is no bag and no data set."""
-    if not entries:
-        return "an empty folder; give a log, or the folder of a bag"
-    ours = (".truth.parquet", "estimates.parquet")
-    logs = [n for n in entries if n.lower().endswith(LOGS) and not n.lower().endswith(ours)]
-    if not logs:
-        shown = listed(entries, SHOWN)
-        return f"a folder without a log ({shown}); give a log, or the folder of a bag"
-    endings = [name[name.rindex(".") :] for name in logs]
-    ending = max(endings, key=endings.count)
-    every = f"{shlex.quote(printable(str(path)))}/*{ending}"
-    return (
-        f"a folder of files that may be logs ({listed(logs, SHOWN)}), no bag and no data set; give "
-        "them by name, all at once where the command takes several (vftcli report "
-        f"{every} -o OUT), or one by one: for f in {every}; do vftcli inspect $f; done"
-    )

@@ -161,8 +161,7 @@ def velocity_first(jacobian: Array, path: Path) -> Array:
         if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT):
             return J
     raise LogError(
-        f"{path}: neither the first nor the last three rows of the Jacobian are axes of revolute "
-        "joints, of length 1."
+        f"{path}: no three rows of the Jacobian are axes of revolute joints, of length 1."
     )
 
 
@@ -175,8 +174,7 @@ def estimates_columns(path: Path, observer: str) -> str | None:
         return None
     if observer not in held:
         raise LogError(
-            f"{path}: holds no estimates of {observer!r}; it holds {', '.join(held)}. Choose one "
-            "with --observer."
+            f"{path}: no estimates of {observer!r}; it holds {', '.join(held)} (--observer)."
         )
     return f"t=t,q=q/{{i}},tau_ext={PREFIX}{observer}/{{i}}"
 

@@ -185,26 +185,21 @@ def require_positions(table: Table, picks: Picks) -> None:
         there = listed(table.names) if table.names else f"{table.width} columns without names"
         if any(JACOBIAN.match(name) for name in table.names):
             raise JacobianError(
-                f"{table.path}: no joint positions (q), but a vendor's estimate beside its "
-                "Jacobian: no observer can run on that. Its torques and wrench are set beside the "
-                "log's sensor by `compare --reference sensor --wrench`.",
+                f"{table.path}: no joint positions (q), but a Jacobian: no observer can run on "
+                "that. `compare --reference sensor --wrench` compares its wrench with its sensor.",
                 table,
                 picks,
             )
         raise NoLogError(
             f"{table.path}: no joint positions (q) among {there}. Name their columns with "
-            "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm "
-            "(a reference goes to --reference file:PATH)."
+            "--columns, as in q=joint_pos_{i}; a reference goes to --reference file:PATH."
         )
     for signal, pick in picks.items():
         if signal in BESIDE:
             continue
         count, wrench = len(pick.cells), signal == "wrench"
         if len({cell[:2] for cell in pick.cells}) < count:
-            raise LogError(
-                f"{table.path}: --columns names a column of {signal} twice; every joint has "
-                "one of its own."
-            )
+            raise LogError(f"{table.path}: --columns names a column of {signal} twice.")
         if count != (6 if wrench else joints):
             expected = "a wrench has 6" if wrench else f"q has {joints}"
             raise LogError(

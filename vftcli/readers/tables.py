@@ -245,8 +245,7 @@ def _stamps(
     """The stamps of the rows (T,), the length of their tick and which clock they are."""
     if clock is None:
         raise LogError(
-            f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
-            "order), or say the rate of a log without one: t@125Hz."
+            f"{table.path}: no clock. Name its column (--columns t=…) or the rate (t@125Hz)."
         )
     if clock.rate is not None:
         words = clock_name or f"none: {clock.rate:g} Hz as stated"

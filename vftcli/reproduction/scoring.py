@@ -326,5 +326,10 @@ def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
         )
     picks["t"] = Item("t", unit="s", cells=(columns["t"],))
     raw = load_signals(table, picks, ReadChoice())
-    t, tau, sd = program_clock(raw, path), raw.signals[TORQUE], raw.signals.get("band")
-    return ExternalTorque(name=name, t=t, tau=tau, error_sd=sd), raw.signals.get("wrench")
+    torque = ExternalTorque(
+        name=name,
+        t=program_clock(raw, path),
+        tau=raw.signals[TORQUE],
+        error_sd=raw.signals.get("band"),
+    )
+    return torque, raw.signals.get("wrench")

@@ -215,14 +215,14 @@ class Plant:
         # The midpoint velocity needs an acceleration before it.
         if not self.moved:
             signs = self.signs
-            self.a = (self.impulses(tau, external) - self.v) / self.step
+            self.a = (self.velocity_after(tau, external) - self.v) / self.step
             self.signs, self.moved = signs, True
-        after = self.impulses(tau, external)
+        after = self.velocity_after(tau, external)
         self.a = (after - self.v) / self.step
         self.q = self.q + 0.5 * self.step * (self.v + after)
         self.v = after
 
-    def impulses(self, tau: Array, external: External | None) -> Array:
+    def velocity_after(self, tau: Array, external: External | None) -> Array:
         """Velocities after the step, v_m by the acceleration known so far. (n,) [rad/s]"""
         h, pin, model, data = self.step, self.pin, self.model, self.data
         q_mid = self.q + 0.5 * h * self.v

@@ -180,12 +180,13 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     wrenches: Rows = []
     torques: Rows = []
     for c in contacts:
-        record = c.record()
-        given = ((NORMAL_95 if "_sd_" in key else 1.0, record[key]) for key in VECTORS)
-        vectors = (None if x is None else vector(np.multiply(scale, x)) for scale, x in given)
-        rest = (c.evidence, c.lead, c.vendor_force, c.sensor_force)
+        vectors = (
+            None if x is None else vector(np.multiply(NORMAL_95 if "_sd_" in key else 1.0, x))
+            for key, x in zip(VECTORS, map(c.record().get, VECTORS), strict=True)
+        )
         ends = DASH if c.anywhere is None else ranged(*c.anywhere, unit="")
-        wrenches.append((str(c.number), f"{c.start:.2f} – {c.stop:.2f}", ends, *vectors, *rest))
+        row = str(c.number), f"{c.start:.2f} – {c.stop:.2f}", ends, *vectors, c.evidence
+        wrenches.append((*row, c.lead, c.vendor_force, c.sensor_force))
         bands = NORMAL_95 * c.joint_torque_sd
         each = map(banded, c.joint_torque, bands, repeat(".2f"), repeat(""))
         torques.append((str(c.number), *each, c.at_rest))

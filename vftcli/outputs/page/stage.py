@@ -114,7 +114,7 @@ def arrow_of(analysis: Analysis, contact: Contact, reach: float) -> Array:
 def along(contact: Contact) -> Array:
     """Direction of a contact's force at its peak. (3,)"""
     force = np.zeros(3) if contact.wrench is None else contact.wrench[:3]
-    return np.asarray(force / max(float(np.linalg.norm(force)), 1e-12))
+    return force / max(float(np.linalg.norm(force)), 1e-12)
 
 
 def most_force(contacts: Sequence[Contact]) -> float:

@@ -75,8 +75,7 @@ class MessageCount:
         counted = kept if self.counted is None else self.counted
         if kept > counted:
             raise budget.error(
-                f"{counter} counts {counted} messages, the chunks hold {kept}; "
-                "the file is damaged."
+                f"{counter} counts {counted} messages, the chunks hold {kept}; damaged."
             )
         if kept < counted:
             budget.note(warning("messages-missing", kept=kept, counted=counted, by=counter))
@@ -106,8 +105,7 @@ class ReadBudget:
         self.pieces -= pieces
         if self.pieces < 0:
             raise self.error(
-                "its chunks hold more records than a log of this size can. It is damaged or made "
-                "to fill time."
+                "more records than a log of this size can hold. Damaged, or made to fill time."
             )
 
     def claim(self, size: int) -> None:

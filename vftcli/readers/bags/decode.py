@@ -175,8 +175,8 @@ class Decoder:
                 self._take_matrix(channel, messages, places[own])
         except LayoutError as error:
             raise self.budget.error(
-                f"a message of {channel.topic} does not fit the definition of "
-                f"{channel.type} ({error}). The bag is damaged, or its definition is another's."
+                f"a message of {channel.topic} does not fit the definition of {channel.type} "
+                f"({error}). The bag is damaged, or its definition another's."
             ) from None
 
     def _take_matrix(self, channel: Channel, messages: Bytes, places: Integers) -> None:

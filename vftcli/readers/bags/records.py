@@ -88,13 +88,6 @@ def _bag_records(
             yield from of_chunk(_bag_records(chunk, budget), budget)
 
 
-def _connection(header: Header, data: bytes) -> Channel:
-    fields = _fields(data) | {b"topic": header[b"topic"]}
-    about = {name: value.decode("utf-8", "replace") for name, value in fields.items()}
-    topic, kind = printable(about[b"topic"]), type_name(about[b"type"])
-    return Channel(topic, kind, "ros1", about[b"message_definition"])
-
-
 def _check_index(starts: list[int], indexed: list[int], budget: ReadBudget) -> None:
     if indexed and sorted(indexed) != starts:
         raise budget.error("a chunk and its index count differently; it is damaged.")
@@ -115,7 +108,12 @@ def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
                 seconds, rest = struct.unpack("<II", header[b"time"])
                 yield channels.get(header[b"conn"]), seconds * 10**9 + rest, data
             elif kind == CONNECTION:
-                channels[header[b"conn"]] = _connection(header, data)
+                fields = _fields(data)
+                given = (header[b"topic"], fields[b"type"], fields[b"message_definition"])
+                topic, ros_type, definition = (text.decode("utf-8", "replace") for text in given)
+                channels[header[b"conn"]] = Channel(
+                    printable(topic), type_name(ros_type), "ros1", definition
+                )
             elif kind == INDEX:
                 indexed += [place for *_, place in struct.iter_unpack("<III", data)]
             elif kind == CHUNK:
@@ -300,17 +298,13 @@ def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
     query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND rootpage > 0"
     found = {name for name in TABLES if db.execute(query, (name,)).fetchone() is not None}
     if not found >= {"topics", "messages"}:
-        raise budget.error(
-            f"an SQLite database without plain tables of a ROS 2 bag (topics, "
-            f"messages; it has {', '.join(sorted(found)) or 'none of them'})."
-        )
+        raise budget.error("an SQLite database without the tables of a ROS 2 bag.")
     for name in sorted(found):
         # The last of a column's traits says whether it is hidden or computed.
         traits = db.execute(f"PRAGMA table_xinfo({name})").fetchall()
         if missing := sorted(TABLES[name] - {_text(row[1]) for row in traits if row[6] == 0}):
             raise budget.error(
-                f"the table {name} has no stored column {missing[0]}: it is "
-                "computed or not there. No recorder writes such a bag; it was edited."
+                f"the table {name} has no stored column {missing[0]}; no recorder writes that."
             )
     return found
 

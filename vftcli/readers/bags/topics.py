@@ -86,7 +86,7 @@ class Gathering:
             elif signal == "q":
                 raise LogError(
                     f"{self.path}: the positions in {lead.topic} are NaN in all "
-                    f"{lead.messages} messages, so nothing was measured. Record another topic."
+                    f"{lead.messages} messages. Record another topic."
                 )
             else:  # drivers publish NaN for what they do not measure
                 self.remarks.append(fact("signal-empty", signal=signal))
@@ -166,8 +166,7 @@ class Gathering:
             return frame
         if "wrench" not in self.signals:
             raise LogError(
-                f"{self.path}: --columns says something of a wrench, and no topic has one; leave "
-                "it out."
+                f"{self.path}: --columns has a wrench, and no topic has one; leave it out."
             )
         if not named:
             self.signals["wrench"] = self.signals["wrench"] * said.factor + 0.0
