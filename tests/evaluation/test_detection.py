@@ -44,6 +44,7 @@ def test_a_vouched_span_ends_with_the_log() -> None:
 def test_a_rate_has_its_exact_poisson_interval(count: int, low: float, high: float) -> None:
     assert rate_interval(count, 1.0) == pytest.approx((low, high), abs=1e-4)
     assert rate_interval(count, 2.0) == pytest.approx((low / 2, high / 2), abs=1e-4)
+    assert rate_interval(count, 0.0) == pytest.approx((NAN, NAN), nan_ok=True)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +56,3 @@ def test_a_share_has_its_wilson_interval(part: int, whole: int, low: float, high
     found = share_interval(part, whole)
     assert found == pytest.approx((low, high), abs=1e-5, nan_ok=True)
     assert not found[0] < 0.0
-
-
-def test_no_time_has_no_rate() -> None:
-    assert rate_interval(1, 0.0) == pytest.approx((NAN, NAN), nan_ok=True)

@@ -92,12 +92,9 @@ def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -
     ]
 
 
-def test_without_friction_a_current_tells_no_contact() -> None:
+def test_without_friction_or_a_quiet_level_a_log_is_not_judged() -> None:
     bare = Run(recording=FIXTURE, robot=UR5.without_friction())
     assert touches(bare) == ()
-
-
-def test_a_log_without_a_quiet_level_is_not_judged() -> None:
     assert touches(Run(recording=FIXTURE.between(5.0, 6.9), robot=UR5)) == ()
 
 

@@ -23,16 +23,9 @@ def errors(scale: float = 1.0, joints: int = 6) -> pl.DataFrame:
     for name in ("fdo", "gmo", "kfo-fe"):
         for j in range(joints):
             printed = TABLE_1.rmse["fdo" if name == "gmo" and j > 2 else name][min(j, 5)]
-            rows.append(
-                {
-                    "recording": "log",
-                    "observer": name,
-                    "joint": j + 1,
-                    "rmse_Nm": scale * printed,
-                    "reference_floor_Nm": 0.4,
-                }
-            )
-    return pl.DataFrame(rows)
+            rows.append(("log", name, j + 1, scale * printed, 0.4))
+    columns = ["recording", "observer", "joint", "rmse_Nm", "reference_floor_Nm"]
+    return pl.DataFrame(rows, schema=columns, orient="row")
 
 
 def test_sizes_and_winners_are_reported() -> None:

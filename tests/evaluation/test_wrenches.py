@@ -64,21 +64,14 @@ def test_without_a_deviation_or_a_known_sample_there_is_no_share() -> None:
 
 def test_contacts_stand_below_the_errors() -> None:
     detection = Detection(
-        contacts=3,
-        listed=5,
-        missed=1,
-        false_alarms=2,
-        false_alarms_per_h=7.5,
+        contacts=3, listed=5, missed=1, false_alarms=2, false_alarms_per_h=7.5,
         delay=(0.1, 0.3, np.nan),
-    )
+    )  # fmt: skip
     score = ContactScore(name="gmo", signal="torque", detection=detection)
     errors = pl.DataFrame({"recording": ["log"], "observer": ["gmo"]})
     row = with_contacts(errors, "log", "truth", [score]).row(1, named=True)
-    assert row["contacts"] == 3
-    assert row["listed_contacts"] == 5
-    assert row["found_contacts"] == 2
-    assert row["missed_contacts"] == 1
-    assert row["false_alarms"] == 2
+    names = ("contacts", "listed_contacts", "found_contacts", "missed_contacts", "false_alarms")
+    assert [row[name] for name in names] == [3, 5, 2, 1, 2]
     assert row["false_alarms_per_h"] == 7.5
     assert row["detection_delay_s"] == pytest.approx(0.2)  # the mean of those that were found
     assert row["longest_delay_s"] == pytest.approx(0.3)
