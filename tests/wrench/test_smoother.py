@@ -1,4 +1,4 @@
-"""From a log to its smoothed wrench: its prior, simulated truth, blind poses, gaps, a real payload."""
+"""The smoothed wrench: its prior, simulated truth, blind poses, gaps, a real payload."""
 
 from pathlib import Path
 
