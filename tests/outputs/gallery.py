@@ -33,15 +33,8 @@ class Picture(NamedTuple):
     height: int = 0  # how much of a page is shown [px]
 
 
-class Exhibit(NamedTuple):
-    """Commands and the pictures of what they make."""
-
-    commands: tuple[str, ...]
-    pictures: tuple[Picture, ...]
-
-
 EXHIBITS = (
-    Exhibit(
+    (
         (
             "vftcli report fixtures/ur5_circle.csv --robot ur5 --reference two-cycle"
             " --figures png -o circle",
@@ -55,22 +48,22 @@ EXHIBITS = (
             ),
         ),
     ),
-    Exhibit(
+    (
         ("vftcli report fixtures/ur5_circle.csv fixtures/ur5_table1.csv --robot ur5 -o logs",),
         (Picture("index", "logs/index.html", 290),),
     ),
-    Exhibit(
+    (
         (
             "vftcli simulate free-excitation -o excitation.csv",
             "vftcli identify excitation.csv --robot ur5 -o arm.toml",
         ),
         (Picture("identify", "arm.html", 985),),
     ),
-    Exhibit(
+    (
         ("vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9 -o release",),
         (Picture("admit", "release/index.html", 1062),),
     ),
-    Exhibit(
+    (
         (
             "vftcli identify ur10_exciting.db3 --columns tau=effort --robot ur10"
             " --interval 0:13.7 -o my_ur10.toml",
@@ -181,10 +174,10 @@ def main() -> None:
         (folder / "fixtures").symlink_to(ROOT / "fixtures")
         for log, place in OF_STORY.items():
             (folder / log).symlink_to(Path(os.environ["VFT_LOGS"]) / place)
-        for exhibit in EXHIBITS:
-            for command in exhibit.commands:
+        for commands, pictures in EXHIBITS:
+            for command in commands:
                 run(command, folder)
-            for picture in exhibit.pictures:
+            for picture in pictures:
                 take(picture, folder)
 
 

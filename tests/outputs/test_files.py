@@ -92,18 +92,13 @@ def test_a_failing_folder_leaves_what_was_there(tmp_path: Path) -> None:
     assert (tmp_path / "a.txt").read_text() == "old"
 
 
-def test_an_existing_output_is_refused_before_anything_is_made(tmp_path: Path) -> None:
-    (tmp_path / "run.json").write_text("old")
-    with (
-        pytest.raises(OutputError, match=r"run\.json exists.*--force"),
-        OutputFolder(tmp_path, names=["estimates.parquet", "run.json"]),
-    ):
-        pytest.fail("the block ran")
-    assert names(tmp_path) == ["run.json"]
-
-
-def test_an_undeclared_file_is_refused_at_the_end(tmp_path: Path) -> None:
+def test_an_existing_output_is_refused_at_once_an_undeclared_one_at_the_end(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "a.txt").write_text("old")
+    out = OutputFolder(tmp_path, names=["estimates.parquet", "a.txt"])
+    with pytest.raises(OutputError, match=r"a\.txt exists.*--force"), out:
+        pytest.fail("the block ran")
     with pytest.raises(OutputError, match="exists"), OutputFolder(tmp_path) as folder:
         (folder / "a.txt").write_text("new")
     assert names(tmp_path) == ["a.txt"]
@@ -129,10 +124,8 @@ def test_at_or_below_a_file_there_is_no_folder(tmp_path: Path, place: str, words
 
 
 def test_an_error_of_the_system_becomes_one_line(tmp_path: Path) -> None:
-    with (
-        pytest.raises(OutputError, match="no space left on device") as caught,
-        OutputFolder(tmp_path / "out"),
-    ):
+    out = OutputFolder(tmp_path / "out")
+    with pytest.raises(OutputError, match="no space left on device") as caught, out:
         raise OSError(28, "No space left on device")
     assert "\n" not in str(caught.value)
     assert names(tmp_path) == []
@@ -151,27 +144,26 @@ def test_a_move_that_fails_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(Path, "replace", failing)
     declared = ["a.txt", "b.txt", "c.txt", "stale.txt"]
-
-    def write() -> None:
-        with OutputFolder(tmp_path, force=True, names=declared) as folder:
-            for name in declared[:3]:
-                (folder / name).write_text("new")
-
-    with pytest.raises(OutputError, match="input/output error"):
-        write()
+    out = OutputFolder(tmp_path, force=True, names=declared)
+    with pytest.raises(OutputError, match="input/output error"), out as folder:
+        fill(folder, dict.fromkeys(declared[:3], "new"))
     assert names(tmp_path) == ["a.txt", "b.txt", "stale.txt"]
     assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}
 
 
-def test_equal_names_get_numbers_that_are_free():
+def test_equal_names_get_numbers_that_are_free() -> None:
     assert numbered(["a", "b", "a", "a-2", "a"]) == ["a", "b", "a-2", "a-2-2", "a-3"]
+
+
+def fill(folder: OutputFolder, texts: dict[str, str]) -> None:
+    for name, text in texts.items():
+        folder.write(name, text)
 
 
 def sealed(folder: Path, texts: dict[str, str], force: bool = True) -> None:
     """Write a run: the files, and a seal that lists them."""
     with OutputFolder(folder, force, ["run.json"]) as out:
-        for name, text in texts.items():
-            out.write(name, text)
+        fill(out, texts)
         out.write("run.json", json.dumps({"files": out.digests()}))
 
 

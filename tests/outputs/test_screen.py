@@ -27,6 +27,7 @@ from vftcli.outputs.screen import (
     list_lines,
     log_screen,
     logs_screen,
+    seconds,
     short_screen,
     written_lines,
 )
@@ -63,8 +64,10 @@ def test_never_more_than_forty_lines(analysis: Analysis, count: int) -> None:
 
 def test_a_name_that_a_terminal_would_obey_is_shown_as_it_is(analysis: Analysis, as_if) -> None:
     source = replace(analysis.recording.source, label="\x1b[31mred.csv")
-    made = as_if(analysis, replace(analysis.recording, source=source))
+    fast = replace(analysis.recording, source=source, t=1e-3 * np.arange(600.0))
+    made = as_if(analysis, fast)
     assert "\x1b" not in facts(made)
+    assert facts(made).endswith("at 1000 Hz")
     assert "\x1b" not in log_screen(listed(made, 3), CANVAS)
 
 
@@ -261,6 +264,9 @@ def test_bars_are_as_high_as_the_force_and_stand_where_it_is() -> None:
     plain = BARS.replace("┤", "|").replace("▁", ".").replace("█", "#")
     assert force_bars(*force, rows, Canvas(width=72, unicode=False)) == plain.splitlines()
     assert force_bars(*force, [], Canvas(width=72)) == BARS.splitlines()[:-1]
+    # Nine steps at most, of 1, 2 or 5 times a power of ten.
+    steps = {0.9: "0.1", 2.0: "0.5", 45.0: "5", 600.0: "100"}
+    assert {s: seconds(np.array([0.0, s]), 60).split()[1] for s in steps} == steps
 
 
 def test_every_sample_counts_in_a_column_and_a_gap_is_bridged() -> None:
