@@ -153,6 +153,8 @@ def test_brakes_are_cut_out_with_the_half_second_beside() -> None:
     (cut,) = sound.source.cuts
     assert (cut.code, cut.start <= 33, cut.stop >= 38 - 0.008) == ("brakes", True, True)
     assert cut.stop - cut.start < 5 + 4 * 0.5
+    bare = replace(log, current=None, torque_without_gravity=noise)  # which never carries it
+    assert Examiner().read_as(bare, ROBOT, ReadChoice()).source.cuts == ()
 
 
 def test_a_blow_is_no_bad_sample(circle: Recording) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import examine
-from vftcli.doctor.load import controller_findings, drive_constants, payload_mismatch, resting
+from vftcli.doctor.load import controller_findings
 from vftcli.robots import load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -14,14 +14,26 @@ from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
 
 T = 0.01 * np.arange(400)
-TEN = np.full(6, 10.0)
-"""Drive constants of 10 N·m/A, so that currents in A are a tenth of the torques in N·m."""
+UR10E = load_robot("ur10e")
+PROFILE = np.asarray(UR10E.torque_constant)
 
 
 def log(*extra: float) -> Recording:
     """An arm at rest whose joints carry more current than is expected, by so much. [A]"""
     rest = np.zeros((400, 6))
     return Recording(t=T, q=rest, dq=rest, current=rest + np.array(extra), target_current=rest)
+
+
+def with_constants(still: Recording, constant: float) -> Recording:
+    """A controller that has these drive constants, by an expected ampere on every joint. [N·m/A]"""
+    one = np.ones((400, 6))
+    return replace(
+        still, current=still.current + one, target_current=one, target_torque=constant * one
+    )
+
+
+def mismatches(still: Recording) -> list[Remark]:
+    return list(controller_findings(still, None))
 
 
 @pytest.mark.parametrize(
@@ -34,102 +46,96 @@ def log(*extra: float) -> Recording:
         ((36.0, 8.0, 0.0, 0.0, 36.0, 36.0), None),  # the base and the wrist do not tell a load
     ],
 )
-def test_two_heavy_joints_tell_a_load(torques: tuple, joints: tuple | None) -> None:
-    """Each of more than 4 N·m. [N·m]"""
-    found = list(payload_mismatch(log(*(np.array(torques) / TEN)), TEN))
+@pytest.mark.parametrize("constant", [0.0, 5.0, 20.0])
+def test_two_heavy_joints_tell_a_load(
+    torques: tuple[float, ...], joints: tuple[int, ...] | None, constant: float
+) -> None:
+    """Each of more than 4 N·m; an unknown constant is taken for a large drive's, 10 N·m/A."""
+    still = log(*(np.array(torques) / (constant or 10.0)))
+    found = mismatches(with_constants(still, constant) if constant else still)
     assert [remark.where.joints for remark in found] == ([] if joints is None else [joints])
 
 
-@pytest.mark.parametrize(("current", "reported"), [(0.39, False), (0.41, True)])
-def test_an_unknown_constant_is_taken_for_a_large_drive_s(current: float, reported: bool) -> None:
-    """Ten newton metres an ampere, so 0.4 A are the 4 N·m that tell."""
-    nowhere = np.full(6, np.nan)
-    assert len(list(payload_mismatch(log(0, current, current, 0, 0, 0), nowhere))) == reported
-    weak = np.full(6, 5.0)
-    assert not list(payload_mismatch(log(0, current, current, 0, 0, 0), weak))
-
-
 def test_the_numbers_of_a_mismatch() -> None:
-    still = log(0, 1.0, -2.0, 0.1, 0, 0)
-    assert still.target_current is not None
-    still = replace(still, current=2.0 + np.array([0, 1.0, -2.0, 0.1, 0, 0]) + 0 * still.q)
-    still = replace(still, target_current=still.target_current + 2.0)
-    (unstated,) = payload_mismatch(still, TEN)
-    assert (unstated.code, unstated.level) == ("payload-mismatch", "warning")
-    assert unstated.where.joints == (2, 3)
-    assert dict(unstated.values) == {
-        "carried_A": pytest.approx([3.0, 0.0]),
-        "expected_A": pytest.approx([2.0, 2.0]),
-        "extra_Nm": pytest.approx([10.0, -20.0]),
-        "payload_kg": None,
-    }
-    (reported,) = payload_mismatch(replace(still, payload_mass=0.0), TEN)
-    assert (reported.code, reported.values["payload_kg"]) == ("payload-mismatch", 0.0)
+    still = with_constants(log(0, 1.0, -2.0, 0.1, 0, 0), 10.0)
+    for payload in (None, 0.0):
+        (finding,) = mismatches(replace(still, payload_mass=payload))
+        assert (finding.code, finding.level) == ("payload-mismatch", "warning")
+        assert finding.where.joints == (2, 3)
+        assert dict(finding.values) == {
+            "carried_A": pytest.approx([2.0, -1.0]),
+            "expected_A": pytest.approx([1.0, 1.0]),
+            "extra_Nm": pytest.approx([10.0, -20.0]),
+            "payload_kg": payload,
+        }
 
 
 @pytest.mark.parametrize(("samples", "reported"), [(19, False), (20, True)])
-def test_a_mismatch_needs_twenty_samples_at_rest(samples: int, reported: bool) -> None:
-    still = log(0, 1, 1, 0, 0, 0)
-    dq = np.where(np.arange(400) < samples, 0.0, 1.0)[:, None] * np.ones(6)
-    assert len(list(payload_mismatch(replace(still, dq=dq), TEN))) == reported
+@pytest.mark.parametrize(
+    ("rest", "motion"),
+    [
+        # measured alone, up to 2 mrad/s
+        ((1.9e-3, None), (2.1e-3, None)),
+        ((-1.9e-3, None), (-2.1e-3, None)),
+        # commanded, which has no noise, up to 2 mrad/s, and measured up to 10
+        ((0.0, 1.9e-3), (0.0, 2.1e-3)),
+        ((9e-3, 0.0), (-11e-3, 0.0)),
+    ],
+)
+def test_a_mismatch_needs_twenty_samples_at_rest(
+    samples: int,
+    reported: bool,
+    rest: tuple[float, float | None],
+    motion: tuple[float, float | None],
+) -> None:
+    """Speeds at rest and in motion: measured, and commanded if there is any. [rad/s]"""
+    rests = (np.arange(400) < samples)[:, None] & np.ones(6, bool)
+    still = replace(log(0, 1, 1, 0, 0, 0), dq=np.where(rests, rest[0], motion[0]))
+    if rest[1] is not None:
+        still = replace(still, target_dq=np.where(rests, rest[1], motion[1]))
+    assert len(mismatches(still)) == reported
 
 
-def test_a_mismatch_needs_both_currents() -> None:
-    still = log(0, 1, 1, 0, 0, 0)
-    assert not list(payload_mismatch(replace(still, current=None), TEN))
-    assert not list(payload_mismatch(replace(still, target_current=None), TEN))
-    assert not list(payload_mismatch(replace(still, dq=None), TEN))
+@pytest.mark.parametrize("name", ["current", "target_current", "dq"])
+def test_a_mismatch_needs_both_currents_and_a_rest(name: str) -> None:
+    assert not mismatches(replace(log(0, 1, 1, 0, 0, 0), **{name: None}))
 
 
-def test_an_arm_rests_where_no_joint_is_meant_to_move_and_none_does() -> None:
-    """By what is commanded, which has no noise, up to 2 mrad/s; by what is measured to 10."""
-
-    def speeds(*values: float) -> Array:
-        dq = np.zeros((len(values), 6))
-        dq[:, 4] = values
-        return dq
-
-    def rest(measured: Array, commanded: Array | None) -> list[bool]:
-        q = np.zeros_like(measured)
-        clock = T[: len(q)]
-        return resting(Recording(t=clock, q=q, dq=measured, target_dq=commanded)).tolist()
-
-    around = speeds(1.9e-3, 2.1e-3, -1.9e-3, -2.1e-3)
-    assert rest(around, None) == [True, False, True, False]
-    assert rest(speeds(0, 0, 0, 0), around) == [True, False, True, False]
-    assert rest(speeds(9e-3, 11e-3, -9e-3, -11e-3), speeds(0, 0, 0, 0)) == [True, False] * 2
-
-
-def controlled(constants: Array, current: Array | None = None) -> Recording:
-    """An arm at rest whose controller expects currents and torques of these constants."""
-    still = log(0, 0, 0, 0, 0, 0)
+def constants_found(
+    constants: Array, current: Array | float | None = None, **changes: Array | None
+) -> list[Remark]:
+    """What is reported of a controller of these constants beside the UR10e profile's."""
     if current is None:
         # slowly changing loads of 1 to 3 A, as in a series of held poses
         current = 2 + np.sin(np.outer(T, np.arange(1, 7)))
-    return replace(
-        still, current=current, target_current=current, target_torque=current * constants
-    )
+    current = np.broadcast_to(current, (400, 6))
+    still = replace(log(0, 0, 0, 0, 0, 0), current=current, target_current=current)
+    still = replace(still, target_torque=current * constants)
+    found = controller_findings(replace(still, **changes), UR10E)
+    return [remark for remark in found if remark.code == "drive-constants"]
+
+
+OTHER = np.array([11.976, 11.976, 9.839, 7.7, 7.7, 7.7])
+"""The UR10e's, its wrists with the constants of a smaller joint. [N·m/A]"""
 
 
 def test_constants_are_the_controller_s_torque_per_current() -> None:
-    planted = np.array([14.0, 13.0, 10.0, 9.5, 9.0, -8.0])
-    found = drive_constants(controlled(planted))
-    assert found == pytest.approx(planted, rel=1e-12)
-    for name in ("target_torque", "target_current"):
-        assert np.isnan(drive_constants(replace(controlled(planted), **{name: None}))).all()
+    (found,) = constants_found(OTHER)
+    assert found.where.joints == (4, 5, 6)
+    assert found.values["found_Nm_A"] == pytest.approx([7.7] * 3, rel=1e-12)
+    assert not constants_found(OTHER, target_torque=None)
+    assert not constants_found(OTHER, target_current=None)
 
 
 @pytest.mark.parametrize(("current", "known"), [(0.019, False), (0.021, True), (-0.021, True)])
 def test_constants_need_a_fiftieth_of_an_ampere(current: float, known: bool) -> None:
-    found = drive_constants(controlled(TEN, np.full((400, 6), current)))
-    assert np.isfinite(found).all() == known
+    assert bool(constants_found(OTHER, current)) == known
 
 
 @pytest.mark.parametrize(("samples", "known"), [(9, False), (10, True)])
 def test_constants_need_ten_samples(samples: int, known: bool) -> None:
-    current = np.where(np.arange(400) < samples, 1.0, 0.0)[:, None] * np.ones(6)
-    found = drive_constants(controlled(TEN, current))
-    assert np.isfinite(found).all() == known
+    current = np.where(np.arange(400) < samples, 1.0, 0.0)[:, None]
+    assert bool(constants_found(OTHER, current)) == known
 
 
 @pytest.mark.parametrize(("noise", "known"), [(0.04, True), (0.06, False)])
@@ -137,35 +143,19 @@ def test_constants_need_torques_that_are_proportional_to_the_currents(
     noise: float, known: bool
 ) -> None:
     """Up to a twentieth of the torque, as with an offset or friction that the drive model adds."""
-    arm = controlled(TEN, np.ones((400, 6)))
-    assert arm.target_torque is not None
     wave = np.where(np.arange(400) % 2, 1 + noise, 1 - noise)[:, None]
-    found = drive_constants(replace(arm, target_torque=arm.target_torque * wave))
-    assert np.isfinite(found).all() == known
+    found = constants_found(OTHER, 1.0, target_torque=OTHER * wave)
+    assert bool(found) == known
     if known:
-        assert found == pytest.approx(TEN)
+        assert found[0].values["found_Nm_A"] == pytest.approx([7.7] * 3)
 
 
 def test_constants_come_from_resting_samples_only() -> None:
-    arm = controlled(TEN)
-    assert arm.target_torque is not None
-    moves = (np.arange(400) >= 200)[:, None]
-    found = drive_constants(
-        replace(
-            arm,
-            dq=np.where(moves, 0.5, 0.0) * np.ones(6),
-            target_torque=np.where(moves, 3.0, 1.0) * arm.target_torque,
-        )
+    moves = (np.arange(400) >= 200)[:, None] * np.ones(6)
+    (found,) = constants_found(
+        OTHER, 1.0, dq=0.5 * moves, target_torque=np.where(moves > 0, 3.0, 1.0) * OTHER
     )
-    assert found == pytest.approx(TEN)
-
-
-def reported_constants(factors: Array) -> list[Remark]:
-    """What is reported of a controller that has the UR10e profile's times these."""
-    robot = load_robot("ur10e")
-    assert robot.torque_constant is not None
-    found = controller_findings(controlled(robot.torque_constant * factors), robot)
-    return [remark for remark in found if remark.code == "drive-constants"]
+    assert found.values["found_Nm_A"] == pytest.approx([7.7] * 3)
 
 
 @pytest.mark.parametrize(
@@ -173,10 +163,7 @@ def reported_constants(factors: Array) -> list[Remark]:
 )
 def test_constants_of_another_joint_size_are_reported(wrist: float, reported: bool) -> None:
     """Of UR's sizes 7.7 N·m/A is one, 10.9 the UR10e's own to 2 %, and 8.5 is none."""
-    profile = np.asarray(load_robot("ur10e").torque_constant)
-    factors = np.ones(6)
-    factors[4] = wrist / profile[4]
-    found = reported_constants(factors)
+    found = constants_found(np.where(np.arange(6) == 4, wrist, PROFILE))
     assert len(found) == reported
     for remark in found:
         assert (remark.level, remark.where.joints) == ("warning", (5,))
@@ -189,13 +176,9 @@ def test_constants_of_another_joint_size_are_reported(wrist: float, reported: bo
 
 
 def test_no_constants_are_compared_without_a_robot_that_has_them() -> None:
-    arm = controlled(TEN)
+    arm = with_constants(log(0, 0, 0, 0, 0, 0), 10.0)
     assert list(controller_findings(arm, None)) == []
-    assert (
-        list(controller_findings(arm, replace(load_robot("ur10e"), torque_constant=None))) == []
-    )
-    unknown = replace(arm, target_torque=None)
-    assert list(controller_findings(unknown, load_robot("ur10e"))) == []
+    assert list(controller_findings(arm, replace(UR10E, torque_constant=None))) == []
 
 
 @pytest.mark.slow

@@ -29,9 +29,14 @@ def found(recording: Recording, robot: Robot = UR5E) -> list[Remark]:
     return list(temperature_findings(recording, robot))
 
 
-@pytest.mark.parametrize("temperature", [20.0, 28.0, 35.0, 60.0])
+@pytest.mark.parametrize("temperature", [5.0, 20.0, 60.0, 80.0])
 def test_where_the_law_holds_there_is_nothing_to_say(temperature: float) -> None:
-    assert found(log(temperature)) == []
+    if 15.0 < temperature < 65.0:
+        assert found(log(temperature)) == []
+        return
+    (remark,) = found(log(temperature))
+    assert (remark.code, remark.level) == ("temperature-beyond-law", "warning")
+    assert remark.values["seen_C"][0] == temperature
 
 
 def test_a_log_without_temperatures_is_reported_with_the_one_assumed() -> None:
@@ -61,9 +66,7 @@ def test_without_a_law_a_cold_log_is_reported_with_what_it_means() -> None:
     assert remark.where.joints == (1, 2, 3, 4, 5)  # the sixth rests
     # 10 K at 1.5 % a kelvin of 12.9 N·m at the median speed of |cos|, about .8 rad/s
     assert remark.values["wrong_Nm"][0] == pytest.approx(0.162 * 12.4, rel=0.1)
-    words = in_words(remark)
-    assert "N·m" in words.consequence
-    assert "temperature law" in words.remedy
+    assert "temperature law" in in_words(remark).remedy
     assert found(log(30.0), LAWLESS) == []
 
 
@@ -80,17 +83,7 @@ def test_a_temperature_that_nobody_stated_is_assumed() -> None:
     assert found(log(27.0), replace(UR5E, friction=silent)) == []
 
 
-@pytest.mark.parametrize(("temperature", "seen"), [(5.0, 5.0), (80.0, 80.0)])
-def test_beyond_the_law(temperature: float, seen: float) -> None:
-    (remark,) = found(log(temperature))
-    assert (remark.code, remark.level) == ("temperature-beyond-law", "warning")
-    assert remark.values["seen_C"][0] == seen
-
-
-def test_an_arm_without_friction_has_no_temperature_to_miss() -> None:
+def test_an_arm_without_friction_and_another_arm_s_log_say_nothing() -> None:
     assert found(log(None), UR5E.without_friction()) == []
     assert found(log(5.0), UR5E.without_friction()) == []
-
-
-def test_another_arms_log_says_nothing() -> None:
     assert found(log(5.0), load_robot("panda")) == []
