@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from sound_logs import LOGS, SoundLog, parts, recording_of, robot_of, unexpected
+from sound_logs import LOGS, PLAIN, SoundLog, parts, recording_of, robot_of, unexpected
 
-from vftcli.doctor import examine
+from vftcli.doctor import examine, in_words
 
 
 def name_of(log: SoundLog) -> str:
@@ -31,3 +31,32 @@ def test_nothing_false_is_said(logs: Path, log: SoundLog) -> None:
             codes = " ".join(f" {finding.code}" for finding in findings)
             assert [code for code in log.known if f" {code}" not in codes] == []
     assert false == {}
+
+
+OF_AN_ARM = [
+    log
+    for log in LOGS
+    if log.path.startswith(("ur10e/", "fr3/", "franka_bags/", "panda_exciting", "rtde/static"))
+    and log.columns != PLAIN
+    and "harm_40s" not in log.path
+    and "10harm" not in log.path
+]
+TURNED = [SoundLog(f"ur3/{name}.bag") for name in ("identification", "repeat_a", "repeat_b")]
+"""As they are, their efforts' signs turned."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "log", [*OF_AN_ARM, *TURNED, SoundLog("other_robot_yu_cobot.parquet")], ids=name_of
+)
+def test_real_logs_are_assigned_to_their_robot_or_to_none(logs: Path, log: SoundLog) -> None:
+    made = examine(recording_of(log, logs))
+    assert [fit.robot for fit in made.robots if fit.fits] == ([log.robot] if log.robot else [])
+    codes = {in_words(finding).name for finding in made.findings}
+    assert ("no-robot-fits" in codes) == (not log.robot)
+    if log.path == "panda_exciting":
+        assert "stale-rows" in codes  # the README of the logs counts 1145 repeated rows
+    if log in TURNED:
+        words = next(in_words(f) for f in made.findings if in_words(f).name == "effort-sign")
+        assert "J1, J2, J3, J4, J5, J6" in words.evidence
+        assert "--columns -tau" in words.remedy
