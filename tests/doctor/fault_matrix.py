@@ -4,11 +4,12 @@ Run by hand; it simulates two logs once and keeps them in a folder::
 
     VFT_LOGS=/path/to/logs python tests/doctor/fault_matrix.py
     python tests/doctor/fault_matrix.py --log ur5 --fault one_sign_J2 --verbose
-    python tests/doctor/fault_matrix.py --commands inspect estimate compare report
+    VFT_LOGS=/path/to/logs python tests/doctor/fault_matrix.py --variants 3 --log fr3 --fault tilt
 
 A cell holds the codes that a log has with the fault and not without it: `*` before a code that
 names the fault, `!` before one about other joints; `(h)` is behind a pair in which the fault moves
-the estimate by less than 0.1 N·m and 2 % of the effort, and which is not counted.
+the estimate by less than 0.1 N·m and 2 % of the effort, and which is not counted. Variants are
+other joints, other amounts and other logs, with contact at the same time: one in so many of a kind.
 """
 
 import argparse
@@ -19,6 +20,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+from fault_variants import base_tables, estimate, harm
 from planted_faults import (
     FAULTS,
     HARMLESS,
@@ -29,6 +32,7 @@ from planted_faults import (
     robot_named,
     simulated,
     ur10e_log,
+    variants,
 )
 
 from vftcli.doctor import examine
@@ -38,14 +42,9 @@ from vftcli.signals.remarks import Remark, fact
 
 
 class Cell(NamedTuple):
-    """What is said of one fault in one log, and not of the sound log.
+    """What is said of one fault in one log, and not of the sound log."""
 
-    Attributes:
-        findings: The findings; a refusal by the reader is one with the code "".
-        fault: The fault.
-    """
-
-    findings: tuple[Remark, ...]
+    findings: tuple[Remark, ...]  # a refusal by the reader is one with the code ""
     fault: Fault
 
     @property
@@ -82,15 +81,16 @@ def shown(finding: Remark, fault: Fault) -> str:
     return sign + (finding.code or "REFUSED") + (f"[{joints}]" if joints else "") + level
 
 
-def base_logs(folder: Path) -> Iterator[tuple[str, Table]]:
+def base_logs(folder: Path, names: Sequence[str] = ()) -> Iterator[tuple[str, Table]]:
     """The logs that faults are planted in; the real one where VFT_LOGS is set."""
-    if logs := os.environ.get("VFT_LOGS"):
+    if (logs := os.environ.get("VFT_LOGS")) and (not names or "ur10e" in names):
         yield "ur10e", ur10e_log(Path(logs) / "ur10e" / "free_14harm.csv")
     for name in ("ur5", "panda"):
-        yield name, simulated(name, folder)
+        if not names or name in names:
+            yield name, simulated(name, folder)
 
 
-def said_of(table: Table, path: Path, given: bool = True) -> tuple[Remark, ...]:
+def said_of(table: Table, path: Path) -> tuple[Remark, ...]:
     """The findings on a table once it is a file, a refusal by the reader as one of them."""
     table.write(path)
     try:
@@ -99,8 +99,7 @@ def said_of(table: Table, path: Path, given: bool = True) -> tuple[Remark, ...]:
         return (fact(READER, message=str(error)),)
     finally:
         path.unlink()
-    robot = robot_named(table.given) if given else None
-    return examine(recording, robot).findings + recording.source.remarks
+    return examine(recording, robot_named(table.given)).findings + recording.source.remarks
 
 
 def cell_of(fault: Fault, table: Table, sound: Sequence[Remark], path: Path) -> Cell:
@@ -112,15 +111,34 @@ def cell_of(fault: Fault, table: Table, sound: Sequence[Remark], path: Path) -> 
 
 
 def matrix(
-    tables: Mapping[str, Table], faults: Sequence[str], folder: Path
-) -> Iterator[tuple[str, str, Cell]]:
-    """Every fault in every log that it can be planted in: log, fault, what is said."""
+    table: Table, faults: Mapping[str, Fault], folder: Path
+) -> Iterator[tuple[str, Fault, Cell]]:
+    """Every fault that can be planted in a log, with its name and what is said."""
     path = folder / f"planted-{os.getpid()}.csv"
-    for log, table in tables.items():
-        sound = said_of(table, path)
-        for name in faults:
-            if fits_log(FAULTS[name], table):
-                yield log, name, cell_of(FAULTS[name], table, sound, path)
+    sound = said_of(table, path)
+    for name, fault in faults.items():
+        if fits_log(fault, table):
+            yield name, fault, cell_of(fault, table, sound, path)
+
+
+def drawn(table: Table, step: int) -> dict[str, Fault]:
+    """One in `step` variants of each kind, at random, the same every time for a log."""
+    draw, found = np.random.default_rng(len(table.t)), {}
+    for kind, faults in variants(table).items():
+        for k in np.sort(draw.choice(len(faults), -(-len(faults) // step), replace=False)):
+            label, fault = faults[k]
+            found[f"{kind} {label}".strip()] = fault
+    return found
+
+
+def is_harmless(log: str, name: str, fault: Fault, table: Table, path: Path) -> bool:
+    """Whether a fault hardly moves the estimate: as is known of the list, else as it is found."""
+    if name in FAULTS or fault.signal == "tau_ext":
+        return name in HARMLESS.get(log, ())
+    before = estimate(table, path)
+    assert before is not None
+    moved, share = harm(estimate(fault.plant(table), path), before, table)
+    return moved <= 0.1 and share <= 0.02
 
 
 def main(words: Sequence[str]) -> int:
@@ -129,27 +147,32 @@ def main(words: Sequence[str]) -> int:
         description="plant faults in sound logs; see what names them"
     )
     parser.add_argument("--log", action="append", help="only this log: ur10e, ur5 or panda")
-    parser.add_argument("--fault", action="append", choices=list(FAULTS), help="only this fault")
+    parser.add_argument("--fault", action="append", help="only faults with this in their name")
+    parser.add_argument("--variants", type=int, metavar="K", help="one in K variants of a kind")
     parser.add_argument(
         "--folder", type=Path, default=Path(tempfile.gettempdir()) / "vftcli-faults"
     )
     parser.add_argument("-v", "--verbose", action="store_true", help="the words of each finding")
     choice = parser.parse_args(words)
     choice.folder.mkdir(exist_ok=True)
-    tables = {k: v for k, v in base_logs(choice.folder) if not choice.log or k in choice.log}
-    for log, table in tables.items():
-        path = choice.folder / f"sound-{os.getpid()}.csv"
-        said = said_of(table, path)
-        print(f"{log:8} (sound) {' '.join(shown(f, Fault(lambda t: t, ())) for f in said)}")
     counted = named = 0
-    for log, name, cell in matrix(tables, choice.fault or list(FAULTS), choice.folder):
-        harmless = name in HARMLESS[log]
-        counted += not harmless
-        named += not harmless and cell.named
-        mark = "Y" if cell.named else "s" if cell.findings else "-"
-        print(f"{log:8} {name + (' (h)' if harmless else ''):28} {mark} {cell}")
-        if choice.verbose:
-            for finding in cell.findings:
+    bases = base_tables if choice.variants else base_logs
+    for log, table in bases(choice.folder, choice.log or ()):
+        said = said_of(table, choice.folder / f"sound-{os.getpid()}.csv")
+        print(f"{log:8} (sound) {' '.join(shown(f, Fault(lambda t: t, ())) for f in said)}")
+        every = drawn(table, choice.variants) if choice.variants else FAULTS
+        faults = {
+            name: fault
+            for name, fault in every.items()
+            if not choice.fault or any(word in name for word in choice.fault)
+        }
+        for name, fault, cell in matrix(table, faults, choice.folder):
+            harmless = is_harmless(log, name, fault, table, choice.folder / "harm.parquet")
+            counted += not harmless
+            named += not harmless and cell.named
+            mark = "Y" if cell.named else "s" if cell.findings else "-"
+            print(f"{log:8} {name + ' (h)' * harmless:28} {mark} {cell}", flush=True)
+            for finding in cell.findings if choice.verbose else ():
                 text = finding.values["message"] if finding.code == READER else str(finding)
                 print(f"{'':12}{finding.level}: {text}")
     print(f"{named} of {counted} harmful pairs are named")

@@ -1,13 +1,14 @@
 """Faults planted one at a time in sound logs, as plain tables of signals.
 
 A maker takes a `Table` and its own amounts and gives back the faulty one; it knows nothing of what
-the doctor looks for. `FAULTS` is the list of 34 that the doctor is held against, with the codes
-that name each of them and the joints that such a finding has to be about.
+the doctor looks for. `KINDS` says which codes name what it makes, and with which other amounts it
+is tried; `FAULTS` is the list of 34 that the doctor is held against.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,29 +27,17 @@ NEIGHBOURS = {"ur10e": "ur5", "ur5": "ur10e", "panda": "fr3"}
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """The columns of a log.
+    """The columns of a log."""
 
-    Attributes:
-        t: Time. (T,) [s]
-        q: Positions. (T, n) [rad]
-        dq: Velocities. (T, n) [rad/s]
-        effort: What the drives report. (T, n) [A or N·m]
-        signal: What the log calls it: "current" or "tau".
-        tau_ext: The vendor's estimate, or None. (T, n) [N·m]
-        robot: The profile of the arm that the log is from.
-        given: The profile that the user names.
-        sound_t: Each row's time in the sound log, NaN of a row that it lacks; None for `t`. (T,)
-            [s]
-    """
-
-    t: Array
-    q: Array
-    dq: Array
-    effort: Array
-    signal: str
-    tau_ext: Array | None = None
-    robot: str
-    given: str
+    t: Array  # (T,) [s]
+    q: Array  # (T, n) [rad]
+    dq: Array  # (T, n) [rad/s]
+    effort: Array  # what the drives report (T, n) [A or N·m]
+    signal: str  # what the log calls it: "current" or "tau"
+    tau_ext: Array | None = None  # the vendor's estimate (T, n) [N·m]
+    robot: str  # the profile of the arm that the log is from
+    given: str  # the profile that the user names
+    #: Each row's time in the sound log, NaN of a row that it lacks; None for `t`. (T,) [s]
     sound_t: Array | None = None
 
     @property
@@ -119,66 +108,28 @@ def edited(signal: Array, joint: int, values: Any) -> Array:
     return copy
 
 
-def swapped(signal: Array, first: int, second: int) -> Array:
-    """A copy of a signal with two joints' columns exchanged. (T, n)"""
-    order = np.arange(signal.shape[1])
-    order[[first - 1, second - 1]] = second - 1, first - 1
-    return np.asarray(signal[:, order])
-
-
 # The arm, its order and its signs
 
 
-def wrong_robot(table: Table) -> Table:
-    return replace(table, given=NEIGHBOURS[table.robot])
+def wrong_robot(table: Table, given: str = "") -> Table:
+    return replace(table, given=given or NEIGHBOURS[table.robot])
 
 
-def one_sign(table: Table, joint: int = 2) -> Table:
-    return replace(table, effort=edited(table.effort, joint, -table.effort[:, joint - 1]))
+def turned(table: Table, signals: tuple[str, ...], joint: int = 2) -> Table:
+    """Some signals of one joint with the other sign."""
+    sign = 1.0 - 2.0 * (np.arange(1, table.joints + 1) == joint)
+    return replace(table, **{name: sign * getattr(table, name) for name in signals})
 
 
-def all_signs(table: Table) -> Table:
-    return replace(table, effort=-table.effort)
-
-
-def effort_swapped(table: Table, first: int = 2, second: int = 3) -> Table:
-    return replace(table, effort=swapped(table.effort, first, second))
-
-
-def all_swapped(table: Table, first: int = 2, second: int = 3) -> Table:
-    return replace(table, **{name: swapped(v, first, second) for name, v in table.series()})
-
-
-def velocity_swapped(table: Table, first: int = 2, second: int = 3) -> Table:
-    return replace(table, dq=swapped(table.dq, first, second))
-
-
-def velocity_turned(table: Table, joints: tuple[int, ...] = (2,)) -> Table:
-    turn = np.where(np.isin(np.arange(1, table.joints + 1), joints), -1.0, 1.0)
-    return replace(table, dq=table.dq * turn)
-
-
-def position_turned(table: Table, joint: int = 2) -> Table:
-    return replace(table, q=edited(table.q, joint, -table.q[:, joint - 1]))
-
-
-def joint_turned(table: Table, joint: int = 2) -> Table:
-    """A joint that counts the other way: position and velocity, not effort."""
-    return replace(
-        position_turned(table, joint), dq=edited(table.dq, joint, -table.dq[:, joint - 1])
-    )
-
-
-def tau_ext_inverted(table: Table) -> Table:
-    assert table.tau_ext is not None
-    return replace(table, tau_ext=-table.tau_ext)
+def swapped(table: Table, signals: tuple[str, ...], pair: tuple[int, int] = (2, 3)) -> Table:
+    """Some of the signals that are there, two joints' columns exchanged."""
+    first, second = pair
+    order = np.arange(table.joints)
+    order[[first - 1, second - 1]] = second - 1, first - 1
+    return replace(table, **{n: v[:, order] for n, v in table.series() if n in signals})
 
 
 # Units
-
-
-def degrees(table: Table) -> Table:
-    return replace(table, q=np.rad2deg(table.q), dq=np.rad2deg(table.dq))
 
 
 def positions_in_degrees(table: Table) -> Table:
@@ -187,22 +138,6 @@ def positions_in_degrees(table: Table) -> Table:
 
 def velocities_in_degrees(table: Table) -> Table:
     return replace(table, dq=np.rad2deg(table.dq))
-
-
-def milliseconds(table: Table) -> Table:
-    return replace(table, t=np.round(1e3 * table.t, 3))
-
-
-def torque_called_current(table: Table) -> Table:
-    return replace(table, effort=table.torque)
-
-
-def current_called_torque(table: Table) -> Table:
-    return replace(table, signal="tau")
-
-
-def milliamperes(table: Table) -> Table:
-    return replace(table, effort=1e3 * table.effort)
 
 
 # Gravity, loads and offsets
@@ -277,13 +212,10 @@ def saturated(table: Table, joint: int = 2, share: float = 0.6) -> Table:
 # Velocities and efforts that come late, slow or not at all
 
 
-def late(signal: Array, samples: int) -> Array:
-    """A signal `samples` later; its first value stands until then. (T, n)"""
-    return np.asarray(signal[np.maximum(np.arange(len(signal)) - samples, 0)])
-
-
-def velocity_lag(table: Table, samples: int = 3) -> Table:
-    return replace(table, dq=late(table.dq, samples))
+def late(table: Table, signal: str, samples: int) -> Table:
+    """A signal `samples` later; its first value stands until then."""
+    rows = np.maximum(np.arange(len(table.t)) - samples, 0)
+    return replace(table, **{signal: getattr(table, signal)[rows]})
 
 
 def velocity_filtered(table: Table, cut_off: float = 1.0) -> Table:
@@ -296,10 +228,6 @@ def velocity_filtered(table: Table, cut_off: float = 1.0) -> Table:
 def velocity_held(table: Table, samples: int = 8) -> Table:
     rows = np.arange(len(table.t))
     return replace(table, dq=table.dq[rows - rows % samples])
-
-
-def effort_lag(table: Table, samples: int = 5) -> Table:
-    return replace(table, effort=late(table.effort, samples))
 
 
 def stuck(table: Table, signal: str, joint: int, start: float = 0.5) -> Table:
@@ -366,64 +294,165 @@ Maker = Callable[[Table], Table]
 
 
 class Fault(NamedTuple):
-    """A fault that is planted.
-
-    Attributes:
-        plant: Makes the faulty table.
-        codes: Codes of the findings that name it; "" stands for a refusal by the reader.
-        joints: Joints, from 1, that a finding which tells joints has to tell, and no others.
-        signals: The effort that a log must have for it to be planted, "" for any; or "tau_ext".
-    """
+    """A fault that is planted."""
 
     plant: Maker
+    codes: tuple[str, ...]  # of the findings that name it; "" for a refusal by the reader
+    joints: tuple[int, ...] = ()  # from 1, that a finding which tells joints has to tell
+    signal: str = ""  # the effort that a log must have, "" for any; or "tau_ext"
+
+
+class Kind(NamedTuple):
+    """A kind of fault: its maker takes amounts."""
+
+    maker: Callable[..., Table]
     codes: tuple[str, ...]
-    joints: tuple[int, ...] = ()
+    #: Amount → the values that are tried; with () every joint, some pairs of them, or every other
+    #: arm of as many joints.
+    amounts: Mapping[str, tuple[Any, ...]] = {}
     signal: str = ""
+
+    def fault(self, **amounts: Any) -> Fault:
+        """The fault of some amounts; of joints that are among them a finding must tell."""
+        one = (amounts["joint"],) if "joint" in amounts else ()
+        joints = amounts.get("pair", one)
+        return Fault(partial(self.maker, **amounts), self.codes, joints, self.signal)
 
 
 READER = ""
 """Stands among the codes for a refusal by the reader, which names the fault in words."""
 
-FAULTS: Mapping[str, Fault] = {
-    "wrong_robot": Fault(wrong_robot, ("other-robot", "no-robot-fits")),
-    "one_sign_J2": Fault(one_sign, ("joint-sign",), (2,)),
-    "all_signs": Fault(all_signs, ("effort-sign",)),
-    "degrees": Fault(degrees, ("degrees", READER)),
-    "positions_degrees_only": Fault(positions_in_degrees, ("degrees", "velocity-unit", READER)),
-    "time_ms": Fault(milliseconds, ("time-unit",)),
-    "effort_swapped_J2_J3": Fault(effort_swapped, ("effort-order",), (2, 3)),
-    # On a plane circle both orders explain the same: either says that J2 and J3 are swapped.
-    "all_swapped_J2_J3": Fault(all_swapped, ("joint-order", "effort-order"), (2, 3)),
-    "velocity_swapped_J2_J3": Fault(velocity_swapped, ("velocity-order",), (2, 3)),
-    "velocity_lag_3": Fault(velocity_lag, ("velocity-lag",)),
-    "velocity_1Hz_filtered": Fault(velocity_filtered, ("velocity-filtered",)),
-    "velocity_held_8": Fault(velocity_held, ("velocity-held",)),
-    "effort_lag_5": Fault(effort_lag, ("effort-lag",)),
-    "payload_2.8kg": Fault(payload, ("unmodelled-load",)),
-    "gravity_compensated": Fault(
-        without_gravity, ("torque-without-gravity", "current-without-gravity")
+EACH: Mapping[str, tuple[Any, ...]] = {"joint": ()}
+PAIRS: Mapping[str, tuple[Any, ...]] = {"pair": ()}
+STUCK = {"joint": (), "start": (0.3, 0.7)}
+
+KINDS: Mapping[str, Kind] = {
+    "wrong robot": Kind(wrong_robot, ("other-robot", "no-robot-fits"), {"given": ()}),
+    "one sign": Kind(partial(turned, signals=("effort",)), ("joint-sign",), EACH),
+    "all signs": Kind(lambda t: replace(t, effort=-t.effort), ("effort-sign",)),
+    "effort swapped": Kind(partial(swapped, signals=("effort",)), ("effort-order",), PAIRS),
+    # On a plane circle both orders explain the same: either says which joints are swapped.
+    "all swapped": Kind(
+        partial(swapped, signals=Signals), ("joint-order", "effort-order"), PAIRS
     ),
-    "torque_called_current": Fault(torque_called_current, ("current-as-torque",), (), "current"),
-    "current_called_torque": Fault(current_called_torque, ("torque-as-current",), (), "current"),
-    "current_mA": Fault(milliamperes, ("milliamperes",), (), "current"),
-    "clock_skew_5%": Fault(clock_skew, ("clock-rate",)),
+    "velocity swapped": Kind(partial(swapped, signals=("dq",)), ("velocity-order",), PAIRS),
+    "velocity turned": Kind(
+        partial(turned, signals=("dq",)), ("velocity-mismatch", "velocity-sign"), EACH
+    ),
+    "position turned": Kind(
+        partial(turned, signals=("q",)), ("velocity-mismatch", "velocity-sign"), EACH
+    ),
+    "position and velocity turned": Kind(
+        partial(turned, signals=("q", "dq")), ("joint-sign",), EACH
+    ),
+    "degrees": Kind(
+        lambda t: positions_in_degrees(velocities_in_degrees(t)), ("degrees", READER)
+    ),
+    "positions in degrees": Kind(positions_in_degrees, ("degrees", "velocity-unit", READER)),
+    "velocities in degrees": Kind(velocities_in_degrees, ("velocity-unit", READER)),
+    "milliseconds": Kind(lambda t: replace(t, t=np.round(1e3 * t.t, 3)), ("time-unit",)),
+    "velocity lag": Kind(
+        partial(late, signal="dq"), ("velocity-lag",), {"samples": (2, 3, 5, 10, 20)}
+    ),
+    "velocity filtered": Kind(
+        velocity_filtered, ("velocity-filtered", "velocity-lag"), {"cut_off": (0.5, 1, 2, 5)}
+    ),
+    "velocity held": Kind(velocity_held, ("velocity-held",), {"samples": (4, 8, 16)}),
+    "effort lag": Kind(
+        partial(late, signal="effort"), ("effort-lag",), {"samples": (2, 5, 10, 20)}
+    ),
+    "load": Kind(payload, ("unmodelled-load",), {"mass": (0.5, 1, 2, 4, 8)}),
+    "gravity": Kind(without_gravity, ("torque-without-gravity", "current-without-gravity")),
+    "torque as current": Kind(
+        lambda t: replace(t, effort=t.torque), ("current-as-torque",), {}, "current"
+    ),
+    "current as torque": Kind(
+        lambda t: replace(t, signal="tau"), ("torque-as-current",), {}, "current"
+    ),
+    "mA": Kind(lambda t: replace(t, effort=1e3 * t.effort), ("milliamperes",), {}, "current"),
+    "clock": Kind(clock_skew, ("clock-rate",), {"share": (-0.2, -0.05, -0.02, 0.02, 0.1, 0.2)}),
+    "time reset": Kind(time_reset, ("time-reset", READER), {"start": (0.3, 0.7)}),
+    "tilt": Kind(
+        mounted,
+        ("tilted-base",),
+        {"angle": (15.0, 30.0, 60.0, 90.0), "about": (0.0, 90.0, 225.0)},
+    ),
+    "upside down": Kind(mounted, ("upside-down",), {"angle": (180.0,)}),
+    "offset": Kind(effort_offset, ("effort-offset",), {"joint": (), "share": (-0.2, 0.1, 0.5)}),
+    "zero effort": Kind(effort_zero, ("zero-effort",), EACH),
+    "saturated": Kind(
+        saturated, ("saturation",), {"joint": (1, 2, 3, 4), "share": (0.4, 0.6, 0.8)}
+    ),
+    "tau_ext": Kind(lambda t: replace(t, tau_ext=-t.tau_ext), ("vendor-sign",), {}, "tau_ext"),
+    "stuck position": Kind(partial(stuck, signal="q"), ("stuck-position",), STUCK),
+    "stuck velocity": Kind(partial(stuck, signal="dq"), ("stuck-velocity",), STUCK),
+    "stuck effort": Kind(partial(stuck, signal="effort"), ("stuck-effort",), STUCK),
+}
+
+
+def planted(kind: str, **amounts: Any) -> Fault:
+    return KINDS[kind].fault(**amounts)
+
+
+FAULTS: Mapping[str, Fault] = {
+    "wrong_robot": planted("wrong robot"),
+    "one_sign_J2": planted("one sign", joint=2),
+    "all_signs": planted("all signs"),
+    "degrees": planted("degrees"),
+    "positions_degrees_only": planted("positions in degrees"),
+    "time_ms": planted("milliseconds"),
+    "effort_swapped_J2_J3": planted("effort swapped", pair=(2, 3)),
+    "all_swapped_J2_J3": planted("all swapped", pair=(2, 3)),
+    "velocity_swapped_J2_J3": planted("velocity swapped", pair=(2, 3)),
+    "velocity_lag_3": planted("velocity lag", samples=3),
+    "velocity_1Hz_filtered": planted("velocity filtered", cut_off=1.0)._replace(
+        codes=("velocity-filtered",)
+    ),
+    "velocity_held_8": planted("velocity held", samples=8),
+    "effort_lag_5": planted("effort lag", samples=5),
+    "payload_2.8kg": planted("load", mass=2.8),
+    "gravity_compensated": planted("gravity"),
+    "torque_called_current": planted("torque as current"),
+    "current_called_torque": planted("current as torque"),
+    "current_mA": planted("mA"),
+    "clock_skew_5%": planted("clock", share=0.05),
     "dropped_5%": Fault(dropped, ("missing-samples",)),
     "dropped_1s": Fault(dropped_span, ("gaps",)),
     "duplicate_rows_10%": Fault(duplicate_rows, ("repeated-stamps",)),
     "stale_rows_10%": Fault(stale_rows, ("stale-rows",)),
-    "time_reset": Fault(time_reset, ("time-reset", READER)),
-    "stuck_position_J4": Fault(partial(stuck, signal="q", joint=4), ("stuck-position",), (4,)),
-    "stuck_effort_J3": Fault(partial(stuck, signal="effort", joint=3), ("stuck-effort",), (3,)),
-    "saturated_J2": Fault(saturated, ("saturation",), (2,)),
+    "time_reset": planted("time reset", start=0.5),
+    "stuck_position_J4": planted("stuck position", joint=4),
+    "stuck_effort_J3": planted("stuck effort", joint=3),
+    "saturated_J2": planted("saturated", joint=2),
     "quantised_1mrad": Fault(quantised, ("coarse-positions",)),
-    "ceiling_mount": Fault(partial(mounted, angle=180.0), ("upside-down",)),
-    "wall_mount_30deg": Fault(partial(mounted, angle=-30.0), ("tilted-base",)),
+    "ceiling_mount": planted("upside down", angle=180.0),
+    "wall_mount_30deg": planted("tilt", angle=-30.0),
     "NaN_burst": Fault(nan_burst, (READER,)),
-    "effort_zero_J5": Fault(effort_zero, ("zero-effort",), (5,)),
-    "offset_J3_20pct": Fault(effort_offset, ("effort-offset",), (3,)),
-    "tau_ext_inverted": Fault(tau_ext_inverted, ("vendor-sign",), (), "tau_ext"),
+    "effort_zero_J5": planted("zero effort", joint=5),
+    "offset_J3_20pct": planted("offset", joint=3),
+    "tau_ext_inverted": planted("tau_ext"),
 }
 """Fault → how it is planted and what names it."""
+
+
+def variants(table: Table) -> dict[str, list[tuple[str, Fault]]]:
+    """Kind → its faults of all amounts in a log, each with what it is."""
+    n = table.joints
+    arms = (name for name in ("ur5", "ur5e", "ur10e", "panda", "fr3") if name != table.robot)
+    every: Mapping[str, tuple[Any, ...]] = {
+        "joint": tuple(range(1, n + 1)),
+        "pair": ((1, 2), (2, 3), (1, 3), (2, 4), (4, 5), (5, n)),
+        "given": tuple(name for name in arms if robot_named(name).joints == n),
+    }
+    found: dict[str, list[tuple[str, Fault]]] = {}
+    for name, kind in KINDS.items():
+        values = [some or every[amount] for amount, some in kind.amounts.items()]
+        found[name] = [
+            (" ".join(map(str, one)), kind.fault(**dict(zip(kind.amounts, one, strict=True))))
+            for one in product(*values)
+        ]
+    return found
+
 
 HARMLESS: Mapping[str, frozenset[str]] = {
     "ur10e": frozenset(
@@ -458,7 +487,7 @@ SEED = 3
 
 
 def simulated(log: str, folder: Path) -> Table:
-    """A simulated log, made in `folder` unless it is there; `truth_path` of it is beside it."""
+    """A simulated log, made in `folder` unless it is there."""
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate
 
@@ -472,16 +501,9 @@ def simulated(log: str, folder: Path) -> Table:
         signals = {"t": seen.t, "q": seen.q, "dq": seen.require("dq"), "effort": effort}
         if signal == "tau":
             signals["tau_ext"] = seen.require("tau_ext")
-        true = {f"tau_ext{j + 1}": column for j, column in enumerate(made.truth.tau_ext.T)}
-        pl.DataFrame({"t": made.truth.t, **true}).write_csv(truth_path(log, folder))
         np.savez(path, **signals)
     with np.load(path) as arrays:
         return Table(**dict(arrays), signal=signal, robot=log, given=log)
-
-
-def truth_path(log: str, folder: Path) -> Path:
-    """The true external torque of a simulated log, as a table."""
-    return folder / f"{log}.truth.csv"
 
 
 def ur10e_log(path: Path, start: float = 2.0, stop: float = 24.0) -> Table:

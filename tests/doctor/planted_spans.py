@@ -182,10 +182,6 @@ def rehomed(table: Table, radians: float) -> Table:
     return from_the_middle(table, partial(zero_off, degrees=np.rad2deg(radians)))
 
 
-def joint_turned(table: Table, joint: int = 5) -> Table:
-    return plant.one_sign(plant.joint_turned(table, joint), joint)
-
-
 def zero_off(table: Table, degrees: float, joint: int = 3) -> Table:
     more = np.deg2rad(degrees) * (np.arange(1, table.joints + 1) == joint)
     return replace(table, q=table.q + more)
@@ -233,11 +229,9 @@ def pushed(table: Table, count: int) -> Table:
 class SpanFault(NamedTuple):
     """A fault that is planted.
 
-    Attributes:
-        row: Its row in the list of kinds: 1 bad samples, 2 velocities, 3 effort that is no drive's,
-            4 sessions, turns and stamps, 5 lateness, 6 arm and drives, 7 slow or standing logs,
-            8 free motion that is none.
-        plant: Makes the faulty table.
+    Its row is that of the list of kinds: 1 bad samples, 2 velocities, 3 effort that is no drive's,
+    4 sessions, turns and stamps, 5 lateness, 6 arm and drives, 7 slow or standing logs, 8 free
+    motion that is none.
     """
 
     row: int
@@ -251,19 +245,12 @@ EFFORT, MEASURED = ("effort",), ("q", "dq", "effort")
 
 
 class SpanLog(NamedTuple):
-    """A sound log that faults are planted in.
-
-    Attributes:
-        table: Its signals.
-        other: The profile of another generation of its arm.
-        target: What its controller expects of the drives, where the log has it. (T, n) [A]
-        free: Whether nobody touches the arm.
-    """
+    """A sound log that faults are planted in."""
 
     table: Table
-    other: str
-    target: Array | None = None
-    free: bool = False
+    other: str  # the profile of another generation of its arm
+    target: Array | None = None  # what its controller expects of the drives (T, n) [A]
+    free: bool = False  # whether nobody touches the arm
 
 
 PATHS: Mapping[str, tuple[str, float, float, str]] = {
@@ -294,14 +281,8 @@ SIZED: tuple[Sizes, ...] = (
     (1, "effort J2 one sample", "N·m", effort_sample, "torque", (240, 1200, 12000)),
     (1, "effort J5 one sample", "N·m", partial(effort_sample, joint=5), "torque", (100, 500)),
     (1, "effort J2 ±600 N·m share", "", effort_samples, "share", (0.002, 0.01, 0.04)),
-    (
-        1,
-        "effort -9999",
-        "rows",
-        partial(rows_of, signals=EFFORT, value=-9999.0),
-        "count",
-        (1, 3, 10),
-    ),
+    (1, "effort -9999", "rows", partial(rows_of, signals=EFFORT, value=-9999.0), "count",
+     (1, 3, 10)),
     (1, "effort 0", "rows", partial(rows_of, signals=EFFORT, value=0.0), "count", (3, 10, 30)),
     (1, "all 0", "rows", partial(rows_of, signals=MEASURED, value=0.0), "count", (1, 3, 10)),
     (2, "dq in deg/s of joint", "", velocity_in_degrees, "joint", (1, 3, 5)),
@@ -325,30 +306,27 @@ SIZED: tuple[Sizes, ...] = (
     (7, "frozen", "s", frozen, "seconds", (0.3, 1, 3)),
     (7, "straight lines from", "Hz", interpolated, "rate", (5, 10, 20)),
     (8, "thresholds given pushes", "", pushed, "count", (5, 15, 40)),
-)
-"""Row, name, unit, maker, what its size is called, and the sizes."""
-
-WHOLE: Mapping[str, SpanFault] = {
-    "dq accelerations": SpanFault(2, accelerations),
-    "dq J3 acceleration": SpanFault(2, partial(accelerations, joints=(3,))),
-    "effort gravity only all": SpanFault(3, partial(gravity_only, seconds=np.inf)),
-    "J5 turned": SpanFault(6, joint_turned),
-    "J5 and J6 swapped": SpanFault(6, partial(plant.all_swapped, first=5, second=6)),
-}
-"""Faults that have no size."""
+    (2, "dq accelerations", "", accelerations, "", ()),
+    (2, "dq J3 acceleration", "", partial(accelerations, joints=(3,)), "", ()),
+    (3, "effort gravity only all", "", partial(gravity_only, seconds=np.inf), "", ()),
+    (6, "J5 turned", "", partial(plant.turned, signals=MEASURED, joint=5), "", ()),
+    (6, "J5 and J6 swapped", "", partial(plant.swapped, signals=plant.Signals, pair=(5, 6)),
+     "", ()),
+)  # fmt: skip
+"""Row, name, unit, maker, what its size is called, and the sizes, none of what has no size."""
 
 
 def span_faults(log: SpanLog) -> dict[str, SpanFault]:
     """Name → fault, of all that can be planted in a log; a name states the fault's size."""
-    found = {
-        f"{name} {size:g} {unit}".strip(): SpanFault(row, partial(maker, **{key: size}))
-        for row, name, unit, maker, key, sizes in SIZED
-        for size in sizes
-        if row != OF_THRESHOLDS or log.free
-    }
+    found = {}
+    for row, name, unit, maker, key, sizes in SIZED:
+        if row != OF_THRESHOLDS or log.free:
+            sized = {f"{name} {size:g} {unit}".strip(): {key: size} for size in sizes}
+            for full, size in (sized or {name: {}}).items():
+                found[full] = SpanFault(row, partial(maker, **size))
     of_log = {"other generation": SpanFault(6, lambda table: replace(table, given=log.other))}
     if log.target is not None:
         of_log["target current"] = SpanFault(6, lambda table: replace(table, effort=log.target))
     if log.table.joints == FRANKA_JOINTS:
         of_log["motor side torque"] = SpanFault(6, motor_side)
-    return found | WHOLE | of_log
+    return found | of_log

@@ -57,23 +57,14 @@ BARS = {"silent and harmful": 0.12, "refused": 0.45}
 
 
 class Answer(NamedTuple):
-    """What comes of a log.
+    """What comes of a log."""
 
-    Attributes:
-        t: When, in the sound log's time. (T,) [s]
-        torques: Observer → its estimate; of thresholds one row of them. (T, n) each [N·m]
-        said: Level, code and joints of every remark.
-        contacts: First and last time, size [N] and words of every contact.
-        refused: Why there is nothing else, "" where there is.
-        python: Warnings of Python that reached the user.
-    """
-
-    t: Array = np.zeros(0)
-    torques: Mapping[str, Array] = {}
-    said: frozenset[tuple[str, str, tuple[int, ...]]] = frozenset()
-    contacts: tuple[tuple[float, float, float, str], ...] = ()
-    refused: str = ""
-    python: tuple[str, ...] = ()
+    t: Array = np.zeros(0)  # in the sound log's time (T,) [s]
+    torques: Mapping[str, Array] = {}  # by observer; of thresholds one row (T, n) each [N·m]
+    said: frozenset[tuple[str, str, tuple[int, ...]]] = frozenset()  # level, code, joints
+    contacts: tuple[tuple[float, float, float, str], ...] = ()  # each a `Span`
+    refused: str = ""  # why there is nothing else
+    python: tuple[str, ...] = ()  # warnings of Python that reached the user
 
 
 def answer(table: Table, learns: bool, path: Path) -> Answer:
@@ -145,35 +136,20 @@ def kinds(remarks: Iterable[Remark]) -> frozenset[tuple[str, str, tuple[int, ...
 
 
 class Cell(NamedTuple):
-    """One fault in one log.
-
-    Attributes:
-        log: The log.
-        fault: The fault.
-        row: Its row in the list of kinds.
-        verdict: "refused", "warned", "noted" or "silent".
-        harmful: Whether an estimate moves or vanishes; False where the log is refused.
-        moved: Observer → what its estimate moves by. [N·m]
-        vanished: Joints of an observer that are nowhere known though the sound log's are.
-        codes: New warnings, else new notes; or why it is refused.
-        bad: Share of the rows that are bad.
-        contact: The hardest new contact [N], its words, and how many true ones are lost.
-        python: Warnings of Python.
-        seconds: Processor time. [s]
-    """
+    """One fault in one log."""
 
     log: str
     fault: str
-    row: int
+    row: int  # of the list of kinds
     verdict: str
-    harmful: bool
-    moved: dict[str, float]
-    vanished: list[str]
-    codes: list[str]
-    bad: float
-    contact: tuple[float, str, int]
+    harmful: bool  # an estimate moves or vanishes; False where the log is refused
+    moved: dict[str, float]  # by observer [N·m]
+    vanished: list[str]  # joints that are nowhere known though the sound log's are
+    codes: list[str]  # new warnings, else new notes; or why it is refused
+    bad: float  # share of the rows
+    contact: tuple[float, str, int]  # the hardest new one [N], its words; true ones lost
     python: tuple[str, ...]
-    seconds: float
+    seconds: float  # of the processor
 
     @property
     def counts_against(self) -> bool:

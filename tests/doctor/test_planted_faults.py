@@ -1,10 +1,9 @@
-"""Planted faults: named, about the right joints, with a remedy that heals, however the log is kept.
+"""Planted faults: named, about the right joints, however the log is kept.
 
-The faults and what names them stand in `planted_faults.py`; `fault_commands.py` runs all of them
-through the commands by hand, here the commands see some of each kind.
+The faults and what names them stand in `planted_faults.py`. That their remedies heal is tried in
+`tests/test_remedies.py`, that commands report and refuse in `tests/cli/test_health.py`.
 """
 
-import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -12,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fault_commands import mark, run, said_by
 from fault_matrix import Cell, base_logs, matrix, said_of
 from fault_variants import estimate, harm
 from planted_faults import FAULTS, HARMLESS, READER, Table, robot_named
 
-from vftcli.doctor import examine, in_words
+from vftcli.doctor import examine
 from vftcli.doctor.examination import NO_FIT, REFUSING
 from vftcli.readers.reading import read
 from vftcli.signals.remarks import Remark
@@ -31,7 +29,6 @@ PAIRS = [
     if not (log == "panda" and fault in ONE_EFFORT)
     and not (log != "panda" and fault == "tau_ext_inverted")
 ]
-HARMFUL = [(log, fault) for log, fault in PAIRS if fault not in HARMLESS[log]]
 
 SILENT: Mapping[tuple[str, str], str] = {
     ("panda", "velocity_lag_3"): "2.8 ms at 1 kHz: sound logs of a real FR3 are 2.9 ms late",
@@ -49,7 +46,7 @@ Cells = Mapping[tuple[str, str], Cell]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the simulated logs are kept, their truth beside them."""
+    """Where the simulated logs are kept."""
     return tmp_path_factory.mktemp("planted")
 
 
@@ -62,7 +59,11 @@ def tables(folder: Path) -> dict[str, Table]:
 @pytest.fixture(scope="module")
 def cells(tables: dict[str, Table], folder: Path) -> Cells:
     """What is said of every fault in every log, and not of the log without it."""
-    return {(log, fault): cell for log, fault, cell in matrix(tables, list(FAULTS), folder)}
+    return {
+        (log, name): cell
+        for log, table in tables.items()
+        for name, _, cell in matrix(table, FAULTS, folder)
+    }
 
 
 def cell_in(cells: Cells, log: str, fault: str) -> Cell:
@@ -80,18 +81,29 @@ def test_the_logs_are_sound(tables: dict[str, Table], log: str, tmp_path: Path) 
     assert [str(finding) for finding in said if finding.level == "warning"] == []
 
 
+REFUSED = {
+    "wrong_robot", "one_sign_J2", "all_signs", "time_ms", "effort_swapped_J2_J3",
+    "all_swapped_J2_J3", "gravity_compensated", "torque_called_current", "current_called_torque",
+    "current_mA", "ceiling_mount", "wall_mount_30deg", "clock_skew_5%",
+}  # fmt: skip
+"""Faults with which no result means anything, beside those that the reader refuses."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("log", "fault"), PAIRS, ids=str)
-def test_a_fault_is_named(cells: Cells, log: str, fault: str) -> None:
+def test_a_fault_is_named_by_no_other_name_and_refused_where_results_mean_nothing(
+    cells: Cells, log: str, fault: str
+) -> None:
     cell = cell_in(cells, log, fault)
-    if (log, fault) in HARMFUL:
-        assert cell.named == ((log, fault) not in SILENT), cell
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("log", "fault"), PAIRS, ids=str)
-def test_a_fault_is_called_by_no_other_name(cells: Cells, log: str, fault: str) -> None:
-    assert cell_in(cells, log, fault).wrong == ECHOES.get((log, fault), ())
+    assert cell.wrong == ECHOES.get((log, fault), ())
+    if fault in HARMLESS[log]:
+        return
+    assert cell.named == ((log, fault) not in SILENT), cell
+    codes = {finding.code for finding in cell.findings if finding.level == "warning"}
+    if READER not in {finding.code for finding in cell.findings}:
+        assert bool(codes & REFUSING) == (fault in REFUSED)
+        # Another arm's model is what identification is for.
+        assert bool(codes & (REFUSING - NO_FIT)) == (fault in REFUSED - {"wrong_robot"})
 
 
 @pytest.mark.slow
@@ -104,58 +116,6 @@ def test_pairs_without_a_name_do_little(tables: dict[str, Table], tmp_path: Path
         moved, share = harm(faulty, sound, tables[log])
         assert moved < 5.0
         assert share < 0.5
-
-
-REFUSED = {
-    "wrong_robot", "one_sign_J2", "all_signs", "time_ms", "effort_swapped_J2_J3",
-    "all_swapped_J2_J3", "gravity_compensated", "torque_called_current", "current_called_torque",
-    "current_mA", "ceiling_mount", "wall_mount_30deg", "clock_skew_5%",
-}  # fmt: skip
-"""Faults with which no result means anything, beside those that the reader refuses."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("log", "fault"), HARMFUL, ids=str)
-def test_what_makes_results_meaningless_refuses_and_no_more(
-    cells: Cells, log: str, fault: str
-) -> None:
-    cell = cell_in(cells, log, fault)
-    codes = {finding.code for finding in cell.findings if finding.level == "warning"}
-    if READER not in {finding.code for finding in cell.findings}:
-        assert bool(codes & REFUSING) == (fault in REFUSED)
-        # Another arm's model is what identification is for.
-        assert bool(codes & (REFUSING - NO_FIT)) == (fault in REFUSED - {"wrong_robot"})
-
-
-OPTION = re.compile(r"--(columns|robot|set)[ =]('[^']+'|[^\s,;]+)")
-"""An option in a remedy with its value."""
-
-ADVISED = {
-    "wrong_robot", "all_signs", "time_ms", "gravity_compensated", "torque_called_current",
-    "current_called_torque", "current_mA", "tau_ext_inverted",
-}  # fmt: skip
-"""Faults whose remedy is an option that mends the log as it is."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("log", "fault"), [pair for pair in HARMFUL if pair[1] in ADVISED], ids=str
-)
-def test_the_remedy_heals(
-    tables: dict[str, Table], cells: Cells, log: str, fault: str, tmp_path: Path
-) -> None:
-    cell = cell_in(cells, log, fault)
-    if (log, fault) in SILENT:
-        return
-    found = next(finding for finding in cell.findings if finding.code in FAULTS[fault].codes)
-    option = OPTION.search(in_words(found).remedy)
-    assert option is not None, in_words(found).remedy
-    faulty = FAULTS[fault].plant(tables[log])
-    words = ["inspect", faulty.write(tmp_path / "log.csv"), "--json", "--robot", faulty.given]
-    code, out, err = run([*words, f"--{option[1]}", option[2].strip("'")])
-    assert code == 0, err
-    warnings = [row["code"] for row in json.loads(out)["findings"] if row["level"] == "warning"]
-    assert warnings == []
 
 
 def renamed(table: Table, path: Path) -> Path:
@@ -195,12 +155,13 @@ def test_findings_do_not_depend_on_how_the_log_is_kept(
     write: Callable[[Table, Path], Path],
     tmp_path: Path,
 ) -> None:
-    table = FAULTS[fault].plant(tables["ur5"])
+    table, known = FAULTS[fault].plant(tables["ur5"]), cells["ur5", fault].findings
     found = examine(read(write(table, tmp_path / "log")), robot_named(table.given)).findings
-    assert places(found) >= places(cells["ur5", fault].findings)
-    assert {f.code for f in found if f.level == "warning"} == {
-        f.code for f in cells["ur5", fault].findings if f.level == "warning"
-    }
+    assert places(found) >= places(known)
+    warnings, expected = (
+        {f.code for f in each if f.level == "warning"} for each in (found, known)
+    )
+    assert warnings == expected
 
 
 def places(findings: Iterable[Remark]) -> set[tuple[str, tuple[int, ...]]]:
@@ -216,27 +177,3 @@ def test_half_the_rows_tell_the_same(
     half = FAULTS[fault].plant(table.selected(np.arange(0, len(table.t), 2)))
     found = examine(read(half.write(tmp_path / "log.parquet")), robot_named(half.given))
     assert set(FAULTS[fault].codes) & {finding.code for finding in found.findings}
-
-
-SEEN_BY_COMMANDS = [
-    ("ur5", "one_sign_J2", "RRR"),
-    ("ur5", "stuck_effort_J3", "YYY"),
-    ("panda", "clock_skew_5%", "RRR"),
-]
-"""Log, fault, and how estimate, compare and report judge it; inspect names every one."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("log", "fault", "judged"), SEEN_BY_COMMANDS)
-def test_commands_name_what_they_are_given(
-    tables: dict[str, Table], folder: Path, log: str, fault: str, judged: str
-) -> None:
-    # A command takes a second; 8 s of log show these faults as well as 14 or 16.
-    table = tables[log].between(0.0, 8.0)
-    faulty = FAULTS[fault].plant(table)
-    path, marks = folder / "log.csv", ""
-    for command in ("inspect", "estimate", "compare", "report"):
-        sound = said_by(command, log, table.write(path), table.given, folder)
-        said = said_by(command, log, faulty.write(path), faulty.given, folder)
-        marks += mark(FAULTS[fault], said, sound)
-    assert marks == "Y" + judged
