@@ -6,15 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sound_logs import UR10E
 
-from vftcli.free_motion.alignment import align, uniform
+from vftcli.free_motion.alignment import align
 from vftcli.readers.reading import read
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
 Make = Callable[..., Recording]
-
-UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
 def wandering(samples: int = 2000, seed: int = 3) -> Recording:
@@ -34,16 +33,11 @@ def cut(log: Recording, first: int, last: int) -> Recording:
     return replace(log, t=log.t[part] - log.t[first], q=log.q[part], dq=log.dq[part])
 
 
-def test_shift_below_the_sample_time() -> None:
+def test_shift_below_the_sample_time_and_rates_that_differ_a_little() -> None:
     log = wandering()
-    free = replace(log, t=log.t + 0.1234)
-    found = align(cut(log, 300, 1800), free)
+    found = align(cut(log, 300, 1800), replace(log, t=log.t + 0.1234))
     assert found.shift == pytest.approx(3.1234, abs=1e-6)  # linear interpolation of smooth paths
     assert found.overlap.all()
-
-
-def test_rates_that_differ_a_little_are_corrected() -> None:
-    log = wandering()
     found = align(log, replace(log, t=1.004 * log.t))
     assert found.rate == pytest.approx(1.004, rel=1e-6)
     assert found.deviation < 1e-4  # interpolation between samples 10 ms apart
@@ -132,6 +126,12 @@ def test_other_arms_are_refused() -> None:
     align(replace(log, robot_hint="ur5"), log)  # which says nothing of its arm
 
 
+def test_a_motion_that_hardly_overlaps_at_its_best_shift_is_refused(part_of, circle) -> None:
+    log = part_of(circle.recording, 4.0, 8.0)
+    with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
+        align(log, replace(log, q=log.q[:, ::-1] + 0.5))
+
+
 def test_a_shared_part() -> None:
     """The first 12 of 20 s are the same motion, then the logs part."""
     log, other = wandering(), wandering(seed=4)
@@ -179,17 +179,6 @@ def test_of_equal_fits_the_longest_overlap_counts(
     # Any whole period that leaves nothing out is right; the push pulls by its own share.
     off = (found.shift - free.t[first] + 0.5 * 3.7) % 3.7 - 0.5 * 3.7
     assert off == pytest.approx(0.0, abs=5e-3)
-
-
-def test_a_uniform_clock_ends_with_the_log() -> None:
-    """On its own step a log keeps its samples, the last one too; on half the step one between."""
-    log = wandering()
-    for begin in (0.0, 3.0):
-        shifted = replace(log, t=log.t + begin)
-        np.testing.assert_allclose(uniform(shifted, 0.01), log.q, atol=1e-12)
-    half = uniform(log, 0.005)
-    assert len(half) == 2 * log.samples - 1
-    np.testing.assert_allclose(half[1::2], 0.5 * (log.q[1:] + log.q[:-1]), atol=1e-12)
 
 
 def test_a_path_that_nearly_repeats_is_laid_where_it_is_the_same() -> None:

@@ -10,17 +10,10 @@ from vftcli.free_motion.difference import RUNGS
 from vftcli.signals.errors import ReferenceTorqueError
 
 
-def test_a_span_of_free_is_the_free_part() -> None:
-    reported = FreeChoice.parsed(free=["2:4", "run.csv", ":1"])
-    assert reported.spans == ((2.0, 4.0), (-np.inf, 1.0))
-    assert reported.logs == (Path("run.csv"),)
-
-
-def test_a_log_whose_name_holds_a_colon_is_a_log() -> None:
-    assert FreeChoice.parsed(free=["./2:4", "C:/run.csv"]).logs == (
-        Path("./2:4"),
-        Path("C:/run.csv"),
-    )
+def test_a_span_of_free_is_the_free_part_and_a_log_may_hold_a_colon() -> None:
+    choice = FreeChoice.parsed(free=["2:4", "run.csv", ":1", "./2:4", "C:/run.csv"])
+    assert choice.spans == ((2.0, 4.0), (-np.inf, 1.0))
+    assert choice.logs == tuple(map(Path, ("run.csv", "./2:4", "C:/run.csv")))
 
 
 def test_what_counts_as_given() -> None:
@@ -29,10 +22,6 @@ def test_what_counts_as_given() -> None:
     assert FreeChoice(period=4.0).is_asked
     for choice in ({"logs": (Path("a"),)}, {"spans": ((0.0, 1.0),)}, {"cycles": (1,)}):
         assert FreeChoice(**choice).is_given  # type: ignore[arg-type]
-
-
-def test_the_names_of_alignments_are_those_of_the_ladder() -> None:
-    assert tuple(RUNGS) == ALIGNMENTS
 
 
 @pytest.mark.parametrize(
@@ -54,13 +43,11 @@ def test_choices_that_exclude_each_other_or_do_not_exist(
         FreeChoice.parsed(**options)
 
 
-def test_lists_of_cycles() -> None:
+def test_lists_of_cycles_cutoffs_and_names_of_rungs() -> None:
     assert cycle_numbers("1") == (1,)
     assert cycle_numbers("1, 3-5,3") == (1, 3, 4, 5)
     for text in ("first", "", "0", "3-2", "1-999999999", "9" * 5000):
         with pytest.raises(ReferenceTorqueError, match="free-cycles"):
             cycle_numbers(text)
-
-
-def test_cutoffs() -> None:
     assert (cutoff("auto"), cutoff("none"), cutoff("12")) == ("auto", None, 12.0)
+    assert tuple(RUNGS) == ALIGNMENTS

@@ -8,7 +8,6 @@ import pytest
 from vftcli.free_motion.cycles import Cycles, FreeCycles, find_free_cycles
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.filters import low_pass
 
 T = 0.01 * np.arange(1200)
 
@@ -49,12 +48,6 @@ def test_all_cycles_without_a_push_are_free(
     found = find_free_cycles(pushed(*instants), CYCLES)
     assert found.numbers == free
     assert found.residuals is not None
-    run = pushed(*instants)
-    gap = low_pass(run.t, run.drive_torque - run.model_torque, 5.0)
-    power = [np.mean(part**2, axis=0) for part in np.split(gap, 3)]
-    np.testing.assert_allclose(
-        found.residuals, np.sqrt(power / np.min(power, axis=0)).mean(axis=1)
-    )
     # 5 N·m for half a second against noise of 0.1 N·m that is low-passed at 5 Hz: 40 times.
     assert np.all((found.residuals > 10.0) == ~np.isin(np.arange(3), free))
 
@@ -63,14 +56,12 @@ def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
     pushed: Callable[..., Run],
 ) -> None:
     assert find_free_cycles(pushed(), CYCLES._replace(end=8.0)).numbers == (0,)
+    assert find_free_cycles(pushed(), CYCLES._replace(end=6.5)).numbers == (0,)  # the only one
     # The low-pass leaves .066 of the two cycles' √2 · .1 N·m: √(.06² + .066²) is within 1.5 of it.
-    for offset, free in ((0.06, (0, 1)), (0.09, (0, 2))):
+    for offset, free in ((0.0, (0, 1)), (0.06, (0, 1)), (0.09, (0, 2))):
         assert find_free_cycles(pushed(offset=offset), CYCLES).numbers == free
-    found = find_free_cycles(pushed(), CYCLES)
-    assert found.numbers == (0, 1)
-    assert found.residuals is not None
-    np.testing.assert_allclose(found.residuals, 1.0, atol=0.5)  # noise alone
-    assert found.remarks(CYCLES.whole)[0].code == "free-cycles-found"
+    residuals = find_free_cycles(pushed(), CYCLES).residuals
+    np.testing.assert_allclose(residuals, 1.0, atol=0.5)  # noise alone
 
 
 def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., Run]) -> None:
@@ -104,8 +95,3 @@ def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_t
     for count in (3, 8):
         few = FreeCycles(tuple(range(count)), None)
         assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)
-
-
-def test_the_only_whole_cycle_is_the_free_one(pushed: Callable[..., Run]) -> None:
-    found = find_free_cycles(pushed(), CYCLES._replace(end=6.5))
-    assert found.numbers == (0,)

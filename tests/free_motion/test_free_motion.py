@@ -10,21 +10,19 @@ import pytest
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.free_motion.two_cycle import partners_in_log, partners_in_logs
-from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
-FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 ROBOT = load_robot("ur5")
 Make = Callable[[Recording, float, float], Recording]
 
 
 @pytest.fixture(scope="module")
-def circle() -> Run:
+def circle(circle) -> Run:
     """Five circles of 4 s; nothing touches the arm in the first."""
-    return Run(recording=read(FIXTURE), robot=ROBOT)
+    return Run(recording=circle.recording, robot=ROBOT)
 
 
 def motion_of(log: Run, *free: Recording, choice: FreeChoice) -> FreeMotion:
@@ -109,6 +107,13 @@ def test_each_run_is_a_piece(part_of: Make, circle: Run) -> None:
     assert [piece.run for piece in found.pieces] == [run.run for run in motion.runs]
     assert not found.own.any()
     assert all(piece.inside.all() for piece in found.pieces)
+    for _ in range(2):
+        with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
+            _ = motion.runs[1].pairing
+    # The circle takes 4 s: the log's sample at t is at the place of t + 8 s of the whole log.
+    pairing = motion.runs[0].pairing
+    off = (pairing.times[pairing.known] - log.t[pairing.known] - 8.0 + 2.0) % 4.0 - 2.0
+    np.testing.assert_allclose(off, 0.0, atol=2e-3)  # a quarter of a sample
 
 
 @pytest.mark.parametrize("rate", [1.004, 1.00005])

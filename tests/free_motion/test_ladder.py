@@ -5,21 +5,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.free_motion.difference import (
-    Difference,
-    ErrorModel,
-    difference,
-    differences,
-    most_certain,
-)
+from vftcli.free_motion.difference import Difference, ErrorModel, difference, most_certain
 from vftcli.free_motion.paired_runs import PairedRuns, pair_with_run
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 
-T = 0.008 * np.arange(1500)
-
-
 Make = Callable[..., Run]
+T = 0.008 * np.arange(1500)
+RNG = np.random.default_rng(4)
+PUSH = 5.0 * np.exp(-((T - 6.0) ** 2))[:, None]
+MODEL, FREE_MODEL = RNG.standard_normal((2, len(T), 1))
 
 
 @pytest.fixture
@@ -27,11 +22,6 @@ def drive(drive_of: Make) -> Make:
     """One joint that swings, with torques of its own."""
     q, dq = np.sin(T)[:, None], np.cos(T)[:, None]
     return lambda torque, model: drive_of(T, q, dq, drive_torque=torque, model_torque=model)
-
-
-RNG = np.random.default_rng(4)
-PUSH = 5.0 * np.exp(-((T - 6.0) ** 2))[:, None]
-MODEL, FREE_MODEL = RNG.standard_normal((2, len(T), 1))
 
 
 def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: Make) -> None:
@@ -45,20 +35,6 @@ def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: 
     assert np.all(corrected.error.floor < plain.error.floor)
 
 
-def test_rungs_without_their_clock_are_left_out(drive: Make) -> None:
-    loaded = drive(MODEL, MODEL)
-    clocks = {"found": [pair_with_run(T, loaded, 0.0)]}
-    made = list(differences(loaded, clocks, ("commanded", "period", "model"), (None, 12.0)))
-    assert [(d.rung, d.cutoff) for d in made] == [
-        ("period", None),
-        ("period", 12.0),
-        ("model", None),
-        ("model", 12.0),
-    ]
-    assert made[1].floor_remark().values["rung"] == "period + 12 Hz low-pass"
-    assert made[0].floor_remark().values["rung"] == "period"
-
-
 def test_too_few_partners_are_refused(drive: Make) -> None:
     loaded = drive(MODEL, MODEL)
     laid = PairedRuns(motion=loaded, pairings=[pair_with_run(T, loaded, T[-1] - T[14])])
@@ -67,12 +43,11 @@ def test_too_few_partners_are_refused(drive: Make) -> None:
 
 
 def test_the_simpler_of_two_alike_is_taken() -> None:
-    standing = np.zeros((4, 2), dtype=bool)
-
-    def made(rung: str, *floor: float) -> Difference:
-        return Difference(
-            rung, None, np.zeros((4, 2)), ErrorModel(np.tile(floor, (4, 1)), standing)
-        )
+    def made(rung: str, *floor: float, stands: bool = False) -> Difference:
+        """A difference of two joints' floors, of which the second may stand."""
+        standing = np.zeros((4, 2), dtype=bool) | [False, stands]
+        error = ErrorModel(np.tile(floor, (4, 1)), standing)
+        return Difference(rung, None, np.zeros((4, 2)), error)
 
     low = made("period", 1.0, 1.0)
     assert most_certain([low, made("phase", 0.98, 0.98)])[0].rung == "period"
@@ -80,11 +55,5 @@ def test_the_simpler_of_two_alike_is_taken() -> None:
     better = [low, made("phase", 0.9, 0.9), made("model", 0.9 * 0.97 + 0.01, 0.88)]
     assert most_certain(better)[0].rung == "phase"
     # A joint that stands decides nothing.
-    stands = replace_standing(made("model", 0.5, 9.0), joint=1)
-    assert most_certain([replace_standing(low, joint=1), stands])[0].rung == "model"
-
-
-def replace_standing(made: Difference, joint: int) -> Difference:
-    standing = made.error.standing.copy()
-    standing[:, joint] = True
-    return made._replace(error=made.error._replace(standing=standing))
+    stood = [made("period", 1.0, 1.0, stands=True), made("model", 0.5, 9.0, stands=True)]
+    assert most_certain(stood)[0].rung == "model"

@@ -64,6 +64,13 @@ def test_phase_finds_the_place_up_to_a_tenth_of_a_second_away(
     np.testing.assert_allclose(times[middle], T[middle] - moved, atol=1e-4)
 
 
+def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes(drive_of) -> None:
+    pairing = pair_with_run(T, drive_of(T, np.column_stack([T]), np.ones((600, 1))), 1.0, 1.1)
+    known = T[-1] >= 1.1 * T + 1.0
+    np.testing.assert_array_equal(pairing.known, known)
+    np.testing.assert_allclose(pairing.times[known], 1.1 * T[known] + 1.0)
+
+
 def test_no_partner_is_made_up_in_a_gap(drive_of) -> None:
     """Six steps without a sample are a gap, five are interpolated across."""
     keep = np.ones(len(T), bool)

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import pytest
+from sound_logs import UR10E
 
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.difference import RUNGS, Difference, ErrorModel
@@ -25,21 +25,11 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 
-
-class Circle(Protocol):
-    """The fixture `circle`: a log and its truth."""
-
-    recording: Recording
-    truth: Array
-
-
 MOVING = [0, 1, 2, 3, 5]
 """J5 of the circle rests; it is not judged."""
 
 HONEST = (0.7, 1.4)
 """Required: true over reported error."""
-
-UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +48,7 @@ def error_of(reference: ExternalTorque, truth: Array) -> Array:
     return np.asarray(np.sqrt(np.nanmean((reference.tau - truth) ** 2, axis=0)))
 
 
-def test_default_beats_the_commanded_period(circle: Circle, ur5: Robot) -> None:
+def test_default_beats_the_commanded_period(circle, ur5: Robot) -> None:
     """Required: at most 0.6 times its error, mean over J1–J4 and J6."""
     best = two_cycle_difference(circle.recording, (), ur5)
     plain = FreeChoice(period=4.0, alignment="commanded", low_pass=None)
@@ -70,7 +60,7 @@ def test_default_beats_the_commanded_period(circle: Circle, ur5: Robot) -> None:
 @pytest.mark.parametrize("low_pass", [None, 12.0, 6.0])
 @pytest.mark.parametrize("rung", RUNGS)
 def test_every_rung_knows_its_error(
-    circle: Circle, ur5: Robot, rung: str, low_pass: float | None
+    circle, ur5: Robot, rung: str, low_pass: float | None
 ) -> None:
     choice = FreeChoice(period=4.0, alignment=rung, low_pass=low_pass)
     reference = two_cycle_difference(circle.recording, (), ur5, choice)
@@ -81,7 +71,7 @@ def test_every_rung_knows_its_error(
     assert np.all((ratio >= least) & (ratio <= HONEST[1])), ratio
 
 
-def test_free_cycle_and_joint_at_rest_are_reported(circle: Circle, ur5: Robot) -> None:
+def test_free_cycle_and_joint_at_rest_are_reported(circle, ur5: Robot) -> None:
     reference = two_cycle_difference(circle.recording, (), ur5)
     t = circle.recording.t
     assert np.isnan(reference.tau[t < 3.99]).all()  # the free cycle has no reference of its own
@@ -98,7 +88,7 @@ def test_free_cycle_and_joint_at_rest_are_reported(circle: Circle, ur5: Robot) -
     assert remarks["alignment-chosen"].values["rung"].endswith(" Hz low-pass")
 
 
-def test_two_free_cycles_measure_the_floor(circle: Circle, ur5: Robot) -> None:
+def test_two_free_cycles_measure_the_floor(circle, ur5: Robot) -> None:
     """Given cycles 2 and 3, both pushed, the measured floor must say how wrong that is."""
     choice = FreeChoice(cycles=(2, 3))
     pushed = two_cycle_difference(circle.recording, (), ur5, choice)
@@ -109,7 +99,7 @@ def test_two_free_cycles_measure_the_floor(circle: Circle, ur5: Robot) -> None:
     assert "floor-measured" in {r.code for r in pushed.remarks if isinstance(r, Remark)}
 
 
-def test_missing_samples(circle: Circle, ur5: Robot) -> None:
+def test_missing_samples(circle, ur5: Robot) -> None:
     """Five per cent lost at random and a gap of 0.2 s: still honest, and the gap is left out."""
     log = circle.recording
     keep = np.random.default_rng(2).random(log.samples) > 0.05
@@ -124,12 +114,9 @@ def test_missing_samples(circle: Circle, ur5: Robot) -> None:
     assert np.isnan(reference.tau[hole]).all()
 
 
-def test_filters_that_do_not_exist(circle: Circle, ur5: Robot) -> None:
+def test_options_that_do_not_go_with_the_logs(circle, ur5: Robot) -> None:
     with pytest.raises(ReferenceTorqueError, match=r"between 0 and 62\.5 Hz"):
         two_cycle_difference(circle.recording, (), ur5, FreeChoice(low_pass=80.0))
-
-
-def test_options_of_one_log_do_not_go_with_two(circle: Circle, ur5: Robot) -> None:
     source = replace(circle.recording.source, path=Path("other.csv"), t0=1.0)  # another run
     other = replace(circle.recording, source=source)
     with pytest.raises(ReferenceTorqueError, match="leave them away with --free"):
@@ -204,7 +191,7 @@ def test_a_payload_is_seen(logs: Path) -> None:
     assert mass == pytest.approx(2.805, rel=0.1)
 
 
-def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle: Circle, ur5: Robot) -> None:
+def test_at_a_low_rate_the_low_pass_is_two_fifths_of_nyquist(circle, ur5: Robot) -> None:
     """Every fourth of 125 samples a second: .4 · 15.625 Hz."""
     log = circle.recording
     thin = Recording(t=log.t[::4], q=log.q[::4], dq=log.dq[::4], current=log.current[::4])
