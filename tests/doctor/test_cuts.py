@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sound_logs import LOGS, recording_of, robot_of
 
 from vftcli.doctor import Examiner, examine
 from vftcli.notebook import contacts
@@ -174,19 +173,6 @@ def test_no_sample_is_cut_out_of_another_unit(circle: Recording) -> None:
     sound, found = examined(large)
     assert sound.samples == circle.samples
     assert "milliamperes" in found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("log", LOGS, ids=lambda log: f"{log.path}-{log.robot or 'any'}")
-def test_nothing_is_cut_out_of_a_sound_log(logs: Path, log: Any) -> None:
-    if log.robot.startswith("..") and not (logs / log.robot).is_file():
-        pytest.skip("the folder of robots is not beside VFT_LOGS")
-    recording = recording_of(log, logs)
-    robot = robot_of(log, logs) or load_robot("panda" if recording.joints == 7 else "ur5")
-    middle = 0.5 * float(recording.t[0] + recording.t[-1])
-    halves = recording.between(0.0, middle), recording.between(middle, float(recording.t[-1]))
-    for part in (recording, *halves):
-        assert Examiner().read_as(part, robot, ReadChoice()).source.cuts == ()
 
 
 @pytest.mark.slow

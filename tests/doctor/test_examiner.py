@@ -36,16 +36,6 @@ def test_a_log_is_examined_once_for_an_arm() -> None:
     assert examiner.examinations[0] is first
 
 
-def test_a_turned_sign_is_refused_with_its_remedy_unless_it_is_wanted_anyway() -> None:
-    log = turned(excited())
-    with pytest.raises(ExaminationError, match="effort-sign") as error:
-        Examiner().examine(log, UR5E)
-    assert "-tau" in str(error.value)
-    assert "--anyway" in str(error.value)
-    found = Examiner(anyway=True).examine(log, UR5E)
-    assert "effort-sign" in {finding.code for finding in found.refusals()}
-
-
 def test_several_refusals_are_one_line() -> None:
     refuse("log", [])
     others = [warning("too-short", samples=1), warning("no-velocity"), warning("no-velocity")]

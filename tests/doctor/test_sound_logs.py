@@ -1,11 +1,15 @@
-"""Sound logs, whole and in parts, at their own rate and thinned: no warning but what is true."""
+"""Sound logs, whole and in parts, at their own rate and thinned: no warning but what is true, and
+nothing is cut out of them.
+"""
 
 from pathlib import Path
 
 import pytest
 from sound_logs import LOGS, PLAIN, SoundLog, parts, recording_of, robot_of, unexpected
 
-from vftcli.doctor import examine, in_words
+from vftcli.doctor import Examiner, examine, in_words
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots import load_robot
 
 
 def name_of(log: SoundLog) -> str:
@@ -14,7 +18,7 @@ def name_of(log: SoundLog) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("log", LOGS, ids=name_of)
-def test_nothing_false_is_said(logs: Path, log: SoundLog) -> None:
+def test_nothing_false_is_said_and_nothing_cut_out(logs: Path, log: SoundLog) -> None:
     if log.path.startswith("..") and not (logs / log.path).exists():
         pytest.skip("the samples are not beside VFT_LOGS")
     robot = robot_of(log, logs)
@@ -31,6 +35,11 @@ def test_nothing_false_is_said(logs: Path, log: SoundLog) -> None:
             codes = " ".join(f" {finding.code}" for finding in findings)
             assert [code for code in log.known if f" {code}" not in codes] == []
     assert false == {}
+    whole = recording_of(log, logs)
+    arm = robot or load_robot("panda" if whole.joints == 7 else "ur5")
+    middle = 0.5 * float(whole.t[0] + whole.t[-1])
+    for part in (whole, whole.between(0.0, middle), whole.between(middle, float(whole.t[-1]))):
+        assert Examiner().read_as(part, arm, ReadChoice()).source.cuts == ()
 
 
 OF_AN_ARM = [
