@@ -4,7 +4,6 @@ Run by hand; some five minutes for all, seconds for a few::
 
     VFT_LOGS=/path/to/logs python tests/doctor/span_faults.py
     python tests/doctor/span_faults.py --only "one sample" --only brakes --log ur10e
-    python tests/doctor/span_faults.py --json after.json
 
 A cell is one fault in one log, given to `report` without an output, with the observers gmo and
 best. It is refused, warned (a warning that the sound log does not have), noted (a caution that it
@@ -17,15 +16,12 @@ true ones are lost, and the new codes.
 """
 
 import argparse
-import json
 import os
 import sys
 import tempfile
-import time
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from planted_faults import Table
@@ -64,27 +60,21 @@ class Answer(NamedTuple):
     said: frozenset[tuple[str, str, tuple[int, ...]]] = frozenset()  # level, code, joints
     contacts: tuple[tuple[float, float, float, str], ...] = ()  # each a `Span`
     refused: str = ""  # why there is nothing else
-    python: tuple[str, ...] = ()  # warnings of Python that reached the user
 
 
 def answer(table: Table, learns: bool, path: Path) -> Answer:
     """What `report` says of a table once it is a file, `thresholds` where it learns from it."""
     table.write(path)
-    with warnings.catch_warnings(record=True) as heard:
-        warnings.simplefilter("always")
-        try:
-            made = (
-                of_thresholds(path, table)
-                if learns
-                else of_report(report(path, table.given, observer=OBSERVERS), table)
-            )
-        except VftError as error:
-            made = Answer(refused=str(error).removeprefix(f"{path.name}: "))
-        except Exception as error:  # noqa: BLE001 - a cell that breaks is a result
-            made = Answer(refused=f"{BROKEN} {type(error).__name__}: {error}")
-        finally:
-            path.unlink()
-    return made._replace(python=tuple(sorted({str(w.message) for w in heard})))
+    try:
+        if learns:
+            return of_thresholds(path, table)
+        return of_report(report(path, table.given, observer=OBSERVERS), table)
+    except VftError as error:
+        return Answer(refused=str(error).removeprefix(f"{path.name}: "))
+    except Exception as error:  # noqa: BLE001 - a cell that breaks is a result
+        return Answer(refused=f"{BROKEN} {type(error).__name__}: {error}")
+    finally:
+        path.unlink()
 
 
 def of_thresholds(path: Path, table: Table) -> Answer:
@@ -148,8 +138,6 @@ class Cell(NamedTuple):
     codes: list[str]  # new warnings, else new notes; or why it is refused
     bad: float  # share of the rows
     contact: tuple[float, str, int]  # the hardest new one [N], its words; true ones lost
-    python: tuple[str, ...]
-    seconds: float  # of the processor
 
     @property
     def counts_against(self) -> bool:
@@ -162,9 +150,7 @@ class Cell(NamedTuple):
         size, words, lost = self.contact
         new = f"new {size:.0f} N ({words}) " if words else ""
         gone = f"{lost} lost " if lost else ""
-        broken = "".join(f"{word} vanishes " for word in self.vanished) + "".join(
-            f"[{word}] " for word in self.python
-        )
+        broken = "".join(f"{word} vanishes " for word in self.vanished)
         return (
             f"{self.row} {self.fault:32} {self.log:9} {self.verdict:7}{few} {harm:4} {moved} "
             f"{100 * self.bad:5.1f} %  {new}{gone}{broken}{' '.join(self.codes)[:150]}"
@@ -173,10 +159,8 @@ class Cell(NamedTuple):
 
 def cell(log: str, name: str, fault: SpanFault, base: SpanLog, sound: Answer, path: Path) -> Cell:
     """Plant a fault and judge what comes of it."""
-    begun = time.process_time()
     table = fault.plant(base.table)
     made = answer(table, fault.row == OF_THRESHOLDS, path)
-    seconds = time.process_time() - begun
     new = sorted(made.said - sound.said)
     warned = [shown(code, joints) for level, code, joints in new if level == "warning"]
     noted = [shown(code, joints) for level, code, joints in new if level != "warning"]
@@ -191,7 +175,7 @@ def cell(log: str, name: str, fault: SpanFault, base: SpanLog, sound: Answer, pa
     return Cell(
         log, name, fault.row, verdict, harmful and not made.refused, moved, vanished,
         [made.refused] if made.refused else warned or noted, bad_share(table, base.table),
-        (hardest[2], hardest[3], 0 if made.refused else lost), made.python, seconds,
+        (hardest[2], hardest[3], 0 if made.refused else lost),
     )  # fmt: skip
 
 
@@ -261,11 +245,9 @@ def sums(cells: Sequence[Cell]) -> Iterator[str]:
     lost = sum(one.contact[2] > 0 for one in cells)
     hardest = f", the hardest {max(fresh):.0f} N" if fresh else ""
     yield f"new contacts in {len(fresh)} cells{hardest}; true ones lost in {lost}"
-    yield f"warnings of Python in {sum(bool(one.python) for one in cells)} cells"
     for row in sorted({one.row for one in cells}):
         own = [one for one in cells if one.row == row]
         yield f"row {row}: {sum(o.counts_against for o in own)} of {len(own)} silent and harmful"
-    yield f"{np.mean([one.seconds for one in cells]):.2f} s of processor time a cell"
 
 
 def main(words: Sequence[str]) -> int:
@@ -273,7 +255,6 @@ def main(words: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description="plant bad samples and spans in sound logs")
     parser.add_argument("--log", action="append", choices=list(PATHS), help="only this log")
     parser.add_argument("--only", action="append", help="only faults with this in their name")
-    parser.add_argument("--json", type=Path, help="file for the cells")
     choice = parser.parse_args(words)
     cells: list[Cell] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -294,9 +275,6 @@ def main(words: Sequence[str]) -> int:
                 cells.append(cell(log, name, fault, base, known, path))
                 print(cells[-1], flush=True)
     print(*sums(cells), sep="\n")
-    if choice.json is not None:
-        record: list[dict[str, Any]] = [one._asdict() for one in cells]
-        choice.json.write_text(json.dumps(record, indent=1, default=str), encoding="utf-8")
     return int(any(line.endswith("missed)") for line in sums(cells)))
 
 

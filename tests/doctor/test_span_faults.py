@@ -37,4 +37,3 @@ def test_what_a_fault_costs_is_measured_at_the_same_samples(logs: Path, tmp_path
     none = measure.cell("ur10e", "none", SpanFault(1, lambda t: t), base, sound, path)
     assert (none.verdict, none.harmful, none.bad) == ("silent", False, 0.0)
     assert none.moved == {"best": 0.0, "gmo": 0.0}
-    assert not none.python
