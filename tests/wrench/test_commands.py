@@ -1,6 +1,5 @@
 """The command line of the virtual sensor, on the circle of the repository's own fixture."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -23,21 +22,6 @@ def run(monkeypatch, capsys, *words: str) -> tuple[int, str, str]:
         code = int(stop.code or 0)
     out, err = capsys.readouterr()
     return code, out, err
-
-
-def test_estimate_writes_the_wrench_and_nulls_what_the_pose_cannot_tell(
-    monkeypatch, capsys, tmp_path
-) -> None:
-    words = ("--wrench", "--frame", "base", "-o", str(tmp_path))
-    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *words)
-    assert code == 0, err
-    table = pl.read_parquet(tmp_path / "estimates.parquet")
-    clear = table["sigma_min"] >= 0.05
-    assert clear.any()
-    for axis in ("fx", "fy", "fz", "mx", "my", "mz"):
-        assert (table[f"wrench/gmo/{axis}"].is_not_null() == clear).all()
-    record = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
-    assert record["wrench"]["frame"] == "base"
 
 
 @pytest.mark.parametrize(

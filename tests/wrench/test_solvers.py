@@ -79,6 +79,10 @@ def test_sigma_min_is_that_of_the_jacobian_with_angular_rows_times_0_3() -> None
     expected = np.linalg.svd(SCALE[:, None] * J, compute_uv=False)[:, -1]
     # σ² is what the decomposition knows to 1e-15 of the largest, σ hence to 3e-8 near zero
     np.testing.assert_allclose(decompose(J).sigma_min, expected, atol=1e-7)
+    # .042 and .059 m: below .05 a pose hides the wrench
+    edge = np.tile(REGULAR, (2, 1))
+    edge[:, 4] = [0.25, 0.35]
+    assert reported("ur5", edge, np.ones_like(edge)).hidden.tolist() == [True, False]
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
