@@ -9,13 +9,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 import seed_containers as seeds
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.io import savemat
 from seed_logs import ROWS, libfranka_json, motion
 
 from vftcli.readers.hdf5 import numbers_of
-from vftcli.readers.opening import natural, open_log
+from vftcli.readers.opening import open_log
 from vftcli.readers.parquet import ArrowTable, claims
 from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.readers.reading import episode_numbers, read, read_first_recording, recognise
@@ -168,12 +166,6 @@ def test_skills_are_episodes(path):
     assert said == ["episode 0, of 3 in all: --episode K|all"]
     assert third.source.remarks == ()
     np.testing.assert_allclose(third.q - first.q, 0.2, atol=1e-15)
-
-
-@given(st.lists(st.integers(0, 99), min_size=1, max_size=9, unique=True).map(sorted))
-def test_episodes_are_sorted_as_numbers_and_called_by_them(numbers):
-    groups = sorted((f"data/demo_{k}/" for k in numbers), key=natural)
-    assert list(numbers_of(groups)) == numbers
 
 
 def test_groups_without_numbers_are_counted():

@@ -201,11 +201,6 @@ def test_a_bad_cell_in_the_middle_is_refused_with_its_place(path, row, reported)
         written(path, table(lines))
 
 
-def test_a_column_without_numbers_is_refused(path):
-    with pytest.raises(LogError, match="q of joint 2 holds no numbers at all"):
-        written(path, table([f"{k / 100},0.1,nan" for k in range(30)]))
-
-
 def test_time_that_runs_backwards_is_refused(path):
     lines = rows()
     lines[10], lines[11] = lines[11], lines[10]
@@ -253,10 +248,6 @@ def test_what_is_no_text_is_refused_by_each_format_of_text(path, name):
     path.write_bytes(bytes(range(256)))
     with pytest.raises(LogError, match="not a table of text"):
         read(path, format=name)
-
-
-def test_signals_that_nobody_asked_for_stay_unread(path):
-    assert read(ur_csv(path), signals={"current"}).signals == ("q", "current")
 
 
 def test_every_format_is_described():
