@@ -310,7 +310,10 @@ def run(asked: argparse.Namespace, top: Path) -> list[Verdict]:
     for child in children:
         os.waitpid(child, 0)
     lines = (text(path).splitlines() for path in top.glob("verdicts*"))
-    return sorted(Verdict.parsed(line) for each in lines for line in each)
+    found = sorted(Verdict.parsed(line) for each in lines for line in each)
+    if len(found) != asked.inputs:
+        raise SystemExit(f"{len(found)} of {asked.inputs} inputs were tried: a job ended early")
+    return found
 
 
 def table(found: list[Verdict]) -> str:

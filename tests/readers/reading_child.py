@@ -26,7 +26,6 @@ class Reading(NamedTuple):
 
     samples: int
     said: str
-    remarks: tuple[str, ...]
     peak_mib: float
 
 
@@ -35,26 +34,23 @@ def read_apart(paths: Iterable[Path]) -> dict[str, Reading]:
     command = [sys.executable, __file__, *map(str, paths)]
     same = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}  # the package that is tested
     lines = subprocess.run(command, capture_output=True, check=True, text=True, env=same).stdout
-    found = [json.loads(line) for line in lines.splitlines()]
-    return {
-        name: Reading(samples, said, tuple(remarks), peak)
-        for name, samples, said, remarks, peak in found
-    }
+    found = map(json.loads, lines.splitlines())
+    return {name: Reading(*reading) for name, *reading in found}
 
 
-def outcome(path: str) -> tuple[int, str, list[str]]:
-    """Samples, words and codes of the remarks of a file that is read or refused in this process."""
+def outcome(path: str) -> tuple[int, str]:
+    """Samples of a file that is read in this process, and what is said of it or of its refusal."""
     from vftcli.readers.reading import read
     from vftcli.signals.errors import VftError
 
     try:
         recording = read(path)
     except VftError as error:
-        return -1, str(error), []
+        return -1, str(error)
     except BaseException as error:  # noqa: BLE001 - whatever it is, it is reported
-        return -2, f"{type(error).__name__}: {error}", []
-    reported = [r for r in recording.source.remarks if r.level == "warning"]
-    return recording.samples, "; ".join(map(str, reported)), [remark.code for remark in reported]
+        return -2, f"{type(error).__name__}: {error}"
+    reported = (str(r) for r in recording.source.remarks if r.level == "warning")
+    return recording.samples, "; ".join(reported)
 
 
 def peak_mib() -> float:
@@ -84,7 +80,7 @@ def main() -> None:
             line = pipe.read().decode()
         _, status = os.waitpid(child, 0)
         ended = f"ended by {os.waitstatus_to_exitcode(status)}"
-        sys.stdout.write((line or json.dumps([Path(path).name, -3, ended, [], 0.0])) + "\n")
+        sys.stdout.write((line or json.dumps([Path(path).name, -3, ended, 0.0])) + "\n")
 
 
 if __name__ == "__main__":
