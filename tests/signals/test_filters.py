@@ -8,7 +8,6 @@ from scipy.signal import butter, sosfiltfilt
 from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.filters import (
     band_pass,
-    butterworth,
     derivative,
     low_pass,
     noise_passed,
@@ -105,11 +104,6 @@ def test_differences_are_of_second_order_on_uneven_clocks_too() -> None:
     t = np.cumsum(RNG.uniform(0.5, 1.5, 50))
     # a parabola's slope is exact, at the ends too: rounding of numbers up to 2500
     np.testing.assert_allclose(derivative(t, t[:, None] ** 2)[:, 0], 2.0 * t, rtol=1e-10)
-
-
-def test_a_filter_that_is_designed_once_is_nobody_s_to_change() -> None:
-    with pytest.raises(ValueError, match="read-only"):
-        butterworth(0.01, 5.0)[:] = 0.0
 
 
 @pytest.mark.parametrize("samples", [200, 300, 1000])

@@ -92,22 +92,3 @@ def test_a_spike_counts_with_its_own_variance() -> None:
         assert found.spread[0, 0] == pytest.approx(5.0)
         assert found.mean[0] == pytest.approx(share * 8.0)
         assert found.covariance[0, 0] == pytest.approx(4.0 - share * 3.2)
-
-
-@pytest.mark.statistical
-def test_bands_hold_what_was_drawn_from_the_model() -> None:
-    """200 drawn models: 95 % bands hold .93 to .97 on every axis.
-
-    8000 states an axis that are correlated over some 10 blocks: ± .02 is three deviations.
-    """
-    rng = np.random.default_rng(6)
-    made = models(200, 6)
-    x, d, states = np.zeros((200, 12)), np.empty_like(made.d), np.empty((BLOCKS, 200, 12))
-    for k in range(BLOCKS):
-        x = states[k] = made.decay[k] * x + np.sqrt(made.added[k]) * rng.standard_normal(x.shape)
-        d[k] = (x[:, None] @ made.observation[k])[:, 0]
-        d[k] += np.sqrt(made.white[k]) * rng.standard_normal(d[k].shape)
-    mean, covariance = smoothed(made._replace(d=d))
-    sd = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-    held = np.mean(np.abs(mean - states) <= 1.96 * sd, axis=(0, 1))
-    assert np.all((held >= 0.93) & (held <= 0.97)), held
