@@ -451,8 +451,9 @@ def test_nothing_glides_where_motion_is_unwanted(opened: Callable, html: str) ->
     there = pytest.approx(11.344, abs=0.0041)  # half a sample
     assert page.evaluate("[vftcli.clock.way, vftcli.clock.head]") == [None, there]
     page = live(opened(html))
-    page.locator("#contact-6").click()
-    assert page.evaluate("vftcli.clock.way !== null")
+    # At once: on a busy machine the way may be over before the next question.
+    row = "document.querySelector('#contact-6')"
+    assert page.evaluate(f"{row}.click(), vftcli.clock.way !== null")
 
 
 def test_a_finger_goes_to_the_time_it_touches(opened: Callable, html: str) -> None:
