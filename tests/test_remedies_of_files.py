@@ -101,9 +101,6 @@ ROWS = [
         "--columns", PLAIN),
     Row("with holes. Name them", converted(renamed({"q3": "q9"})), "--columns",
         PLAIN.replace("q=q{i}", "q=q1|q2|q9|q4|q5|q6", 1)),
-    Row("holds no number in its first row", converted(
-        with_columns(tau_ext=pl.lit([], pl.List(pl.Float64))), name="log.parquet"), "--columns",
-        PLAIN),
     Row("could each be the clock", converted(with_columns(time=pl.col("t") + 1.0)), "--columns",
         PLAIN),
     Row("but a sample has one time", converted(with_columns(t=LISTS, tick=pl.col("t")),
@@ -111,7 +108,7 @@ ROWS = [
         PLAIN.replace("t=t", "t=tick", 1)),
     Row("--columns must name them", named_arrays, "--columns", "t=t,q=q,dq=dq"),
     Row("and no topic has one; leave it out", own_bag, "--columns", LEFT_OUT),
-    Row("Choose one with --observer.", lambda f: [
+    Row("no estimates of", lambda f: [
         "admit", estimated(f, "--observer", "kfo-fe"), "--robot", "ur5", "--observer",
         "kfo-zoh"], "--observer", "kfo-fe"),
     Row("could each be the positions", arrays({"a/q": (99, 6), "b/q": (99, 6), "a/t": (99,)}),
@@ -154,11 +151,7 @@ ROWS = [
     Row("which no robot's log is", converted(
         with_columns(t=1e9 * pl.col("t")), "--columns", PLAIN.replace("t=t", "t[s]=t", 1)),
         "--columns", PLAIN.replace("t=t", "t[ns]=t", 1)),
-    Row("the clock is coarser than the samples", converted(
-        with_columns(t=pl.col("t").round(1))), "--columns", PLAIN.replace("t=t", "t@125Hz", 1)),
     # readers: which part of a file
-    Row("no episode", lambda _: ["convert", EPISODES, "-o", "out.csv", "--episode", "9"],
-        "--episode", "1"),
     Row("a log of one arm; leave --arm out", converted(same, "--arm", "left"), "--arm", LEFT_OUT),
     Row("holds two arms", arrays({"observations/qpos": (99, 14), "observations/qvel": (99, 14),
                                   "observations/effort": (99, 14)}), "--arm"),
@@ -261,7 +254,7 @@ CLUSTER = "needs a cluster, its certificates or an installation without Dask"
 NAMED = "only names the option that is wrong, and what it may be"
 WITHOUT_ROW = {
     NAMED: (
-        "--columns is empty", "has no column name while others have one",
+        "--columns is empty", "has no column name: name every signal",
         "is given twice. Skip the other", "--columns: no q; a log needs",
         "must be one whole number, from 1", "--columns: cannot understand", "--columns: no signal",
         ": _ only skips", "it must cover at least one", "a table without a clock is given as",
