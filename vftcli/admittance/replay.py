@@ -50,7 +50,7 @@ from vftcli.wrench.solvers import VirtualSensor
 
 LONGEST = 600.0  #: Longest release that is computed. [s]
 #: A flange that stays this near to its first pose is at rest. [m]
-STILL = 0.01
+LEAST_TRAVEL = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -260,7 +260,7 @@ def trouble(found: Replay) -> Iterator[Remark]:
         yield caution(f"travel-implausible{hard}", travel_m=max(travel))
     if found.logged is not None:
         far = np.linalg.norm(found.logged[:, :3], axis=1).max()
-        if far >= STILL:
+        if far >= LEAST_TRAVEL:
             yield fact("log-arm-moved", distance_m=far)
 
 

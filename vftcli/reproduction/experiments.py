@@ -135,13 +135,13 @@ def spread(values: Sequence[float | None]) -> str:
     known = [value for value in values if value is not None and np.isfinite(value)]
     if not known:
         return DASH
-    text = signed(float(np.mean(known)))
-    if len(known) > 1 and signed(min(known)) != signed(max(known)):
-        text += f" ({signed(min(known))} … {signed(max(known))})"
+    text = short_number(float(np.mean(known)))
+    if len(known) > 1 and short_number(min(known)) != short_number(max(known)):
+        text += f" ({short_number(min(known))} … {short_number(max(known))})"
     return text if len(known) == len(values) else f"{text}, {len(known)} of {len(values)}"
 
 
-def signed(value: float) -> str:
+def short_number(value: float) -> str:
     """Three significant digits, a whole number as it is, with a true minus sign."""
     text = f"{value:.0f}" if value == round(value) else significant(value)
     return minus(text)
