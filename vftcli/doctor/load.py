@@ -153,7 +153,7 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
     """Payload mismatch at rest; drive constants of controller and robot file."""
     constants = drive_constants(recording)
     yield from payload_mismatch(recording, constants)
-    if robot is None or robot.torque_constant is None:
+    if robot is None or robot.torque_constant is None or robot.joints != recording.joints:
         return
     profile = robot.torque_constant
     ratio = constants / profile - 1

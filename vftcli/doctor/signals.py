@@ -114,10 +114,8 @@ def work_shares(recording: Recording, effort: Array) -> Array:
 
     Friction makes the drives put energy in; what gravity and inertia take they give back.
     """
-    if recording.dq is None:
-        return np.full(recording.joints, np.nan)
     rows = thinly(recording, SOME)
-    speed = recording.dq[rows]
+    speed = recording.require("dq")[rows]
     power = effort[rows] * speed * np.gradient(recording.t[rows])[:, None]
     gross = abs(power).sum(axis=0)
     share = power.sum(axis=0) / np.where(gross > 0, gross, 1.0)

@@ -185,6 +185,9 @@ PINOCCHIO_KINDS = {
 }
 
 
+MOST_MJCF = 250  #: Joints of an MJCF: Pinocchio needs .7 GB for so many, by their cube.
+
+
 def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
     """The tree that an MJCF describes: its armature is the rotor inertia."""
     if (part := root.find(".//include")) is not None:
@@ -192,6 +195,8 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
             f"{path}: includes {part.get('file')!r}, which Pinocchio would leave out; have MuJoCo "
             "write it as one file (mj_saveLastXML)"
         )
+    if (count := len([*root.iter("joint")])) > MOST_MJCF:
+        raise RobotError(f"{path}: has {count} joints, more than {MOST_MJCF}")
     for part in root.iter():
         if re.fullmatch(r"[\s0.+-]*0[\s0.+-]*", part.get("quat", "")):
             raise RobotError(f"{path}: {part.tag} quat is of zeros only, which is no rotation")
