@@ -101,6 +101,9 @@ ROWS = [
         "--columns", PLAIN),
     Row("with holes. Name them", converted(renamed({"q3": "q9"})), "--columns",
         PLAIN.replace("q=q{i}", "q=q1|q2|q9|q4|q5|q6", 1)),
+    Row("holds no number in its first row", converted(
+        with_columns(tau_ext=pl.lit([], pl.List(pl.Float64))), name="log.parquet"), "--columns",
+        PLAIN),
     Row("could each be the clock", converted(with_columns(time=pl.col("t") + 1.0)), "--columns",
         PLAIN),
     Row("but a sample has one time", converted(with_columns(t=LISTS, tick=pl.col("t")),
@@ -151,7 +154,11 @@ ROWS = [
     Row("which no robot's log is", converted(
         with_columns(t=1e9 * pl.col("t")), "--columns", PLAIN.replace("t=t", "t[s]=t", 1)),
         "--columns", PLAIN.replace("t=t", "t[ns]=t", 1)),
+    Row("the clock is coarser than the samples", converted(
+        with_columns(t=pl.col("t").round(1))), "--columns", PLAIN.replace("t=t", "t@125Hz", 1)),
     # readers: which part of a file
+    Row("no episode", lambda _: ["convert", EPISODES, "-o", "out.csv", "--episode", "9"],
+        "--episode", "1"),
     Row("a log of one arm; leave --arm out", converted(same, "--arm", "left"), "--arm", LEFT_OUT),
     Row("holds two arms", arrays({"observations/qpos": (99, 14), "observations/qvel": (99, 14),
                                   "observations/effort": (99, 14)}), "--arm"),

@@ -12,7 +12,7 @@ import typer
 from vftcli import cli
 from vftcli.cli import COMMANDS, main, make_app
 from vftcli.cli.commands import JOURNEYS
-from vftcli.cli.help import GROUPS, topics, two_columns
+from vftcli.cli.help import GROUPS, topics
 from vftcli.observers.table import OBSERVERS
 from vftcli.readers.reading import FORMATS
 from vftcli.robots import PROFILES
@@ -59,15 +59,6 @@ def test_options_stand_in_groups_in_their_order(helped) -> None:
     assert tuple(heads) == GROUPS
     wrench = text.partition("The wrench")[2].partition("What to write")[0]
     assert "--frame" in wrench
-
-
-def test_what_is_typed_is_left_of_what_it_means() -> None:
-    rows = [("--a", "short"), ("--a-very-long-option-of-more-than NAME", "what it means")]
-    assert list(two_columns(rows)) == [
-        "  --a" + " " * 32 + "short",
-        "  --a-very-long-option-of-more-than NAME",
-        " " * 37 + "what it means",
-    ]
 
 
 def test_the_commands_are_listed_by_what_one_sets_out_to_do(helped) -> None:

@@ -31,7 +31,7 @@ from vftcli.outputs.run_record import all_remarks
 from vftcli.pipeline import AnalysisChoice
 from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.arrays import NORMAL_95
+from vftcli.signals.arrays import Z_95
 from vftcli.signals.remarks import Where, caution
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
@@ -114,7 +114,7 @@ def test_the_tabs_hold_plots_with_titles_units_and_lines(touched: Analysis) -> N
     assert list(lines) == names
     np.testing.assert_array_equal(lines["|F|"], best.size)
     np.testing.assert_array_equal(tabs["Wrench"][4].series[0].values[:, 0], best.known[:, 4])
-    np.testing.assert_array_equal(lines["95 % upper"], best.size + NORMAL_95 * best.size_sd)
+    np.testing.assert_array_equal(lines["95 % upper"], best.size + Z_95 * best.size_sd)
     assert np.nanmin(lines["95 % lower"]) >= 0.0
     t, level = touched.t, -0.06 * max(64.8, np.nanmax(best.size))
     spans = {"wrist": (1.0, 1.5), "forearm": (2.2, 2.6)}

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from made_urdfs import (
     arm,
@@ -20,7 +19,6 @@ from made_urdfs import (
 )
 
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.arm import MOST, BodyTree, TreeJoint
 from vftcli.signals.errors import RobotError
 
 
@@ -137,10 +135,3 @@ def test_a_link_that_only_a_locked_branch_gives_mass_has_it(tmp_path: Path) -> N
     bare = link("link6", 0.0) + joint("joint6", "link5", "link6")
     text = robot(link("base"), arm(5), bare, fixed("hand", "link6", 0.5))
     assert load_robot(written(tmp_path, text)).chain.mass[-1] == 0.5
-
-
-def test_a_tree_of_too_many_joints_is_refused() -> None:
-    """Those of a URDF are counted before: what is left is an MJCF, of which Pinocchio is slow."""
-    many = [TreeJoint(name="j", kind="fixed", parent="a", child="b")] * (MOST + 1)
-    with pytest.raises(RobotError, match="has 1001 joints, more than 1000"):
-        BodyTree(name="t", path=Path("a.xml"), bodies={}, joints=many, gravity=np.zeros(3))

@@ -8,7 +8,7 @@ import pytest
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.arrays import NORMAL_95
+from vftcli.signals.arrays import Z_95
 from vftcli.simulation import load_scenario, simulate
 from vftcli.wrench.choice import WrenchChoice, ZeroChoice
 
@@ -64,7 +64,7 @@ def test_after_zeroing_the_bearing_weighs_what_it_weighs(log, share, request) ->
         assert wrench.force[hung, 2].mean() == pytest.approx(-WEIGHT, rel=share), wrench.name
     assert best.name == "best"
     missed = abs(best.force[hung, 2].mean() + WEIGHT)
-    assert missed <= NORMAL_95 * best.sd[hung, 2].mean()
+    assert missed <= Z_95 * best.sd[hung, 2].mean()
     assert not any(r.level == "warning" for r in analysis.virtual_sensor.remarks)
     assert all(drift.removed for drift in analysis.virtual_sensor.drifts)
 

@@ -32,7 +32,7 @@ from vftcli.signals.option import GROUPS, LOG, NUMBERS, OUTPUT, Choice, Option, 
 from vftcli.signals.parsing import did_you_mean, nearest, printable, tables_beside
 
 OWN = "This command"  #: Heading of one command's own options.
-NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and most of its left half.
+NARROWEST, WIDEST = 72, 80  #: Columns of a help text.
 
 
 class GroupedCommand(TyperCommand):
@@ -142,14 +142,11 @@ def row_of(param: Click, ctx: typer.Context) -> tuple[str, str] | None:
 
 def two_columns(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Typed words to the left, meanings to the right, wrapped."""
-    left = min(max(len(typed) for typed, _ in rows), LEFT)
+    left = max(len(typed) for typed, _ in rows)
     for typed, meaning in rows:
-        lines = textwrap.wrap(meaning, columns() - left - 4) or [""]
-        if len(typed) > left:
-            yield f"  {typed}"
-        else:
-            yield f"  {typed:<{left}}  {lines.pop(0)}".rstrip()
-        yield from (f"{'':{left + 4}}{line}" for line in lines)
+        first, *more = textwrap.wrap(meaning, columns() - left - 4) or [""]
+        yield f"  {typed:<{left}}  {first}".rstrip()
+        yield from (f"{'':{left + 4}}{line}" for line in more)
 
 
 topics = partial(tables_beside, __file__, "topics.toml")  #: Topic → its summary and its text.

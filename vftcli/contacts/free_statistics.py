@@ -15,7 +15,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import Blocks, disturbance_blocks
-from vftcli.signals.arrays import NORMAL_95, Array, Mask
+from vftcli.signals.arrays import Z_95, Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
@@ -201,7 +201,7 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
         return np.zeros(torque.shape[1])
     moving |= moving.sum(axis=0) < LEAST_MOVING
     pairs = zip(torque.T, moving.T, strict=True)
-    return np.array([np.quantile(column[some], 0.95) / NORMAL_95 for column, some in pairs])
+    return np.array([np.quantile(column[some], 0.95) / Z_95 for column, some in pairs])
 
 
 def expected_torque(run: Run, level: Array | None) -> Array:
@@ -241,7 +241,7 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
             forces.append(inside.size)
     if not forces:
         return PseudoContactTest(np.ones(6), float("nan"))
-    widening = np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / NORMAL_95, 1.0)
+    widening = np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / Z_95, 1.0)
     return PseudoContactTest(widening, np.quantile(np.concatenate(forces), 0.95))
 
 

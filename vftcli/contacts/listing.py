@@ -40,7 +40,7 @@ from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.robots.terms import disturbance_blocks
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
@@ -270,7 +270,7 @@ def felt_by(run: Run, torque: Array) -> float:
     """
     some = slice(None, None, -(-len(run.q) // POSES))
     J = abs(flange_jacobian(run.robot.loaded_chain, run.q[some])[:, :3])
-    return float(np.median(np.min(NORMAL_95 * torque / np.maximum(J, 1e-9), axis=2).min(axis=1)))
+    return float(np.median(np.min(Z_95 * torque / np.maximum(J, 1e-9), axis=2).min(axis=1)))
 
 
 def without_list(run: Run) -> ContactList:

@@ -25,7 +25,7 @@ from vftcli.contacts.windows import (
 )
 from vftcli.robots.chain import link_jacobian, link_poses, points_on
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import NORMAL_95, Array, Mask
+from vftcli.signals.arrays import Z_95, Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import covered, resample_columns
@@ -205,7 +205,7 @@ class ContactMeasurement:
         anywhere = location.sizes(size, band)
         spread = 0.0 if named == "wrist" and lead >= SURE_NATS else location.spread(size)
         remarks = list[Remark]()
-        if len(location.parts) > 1 and NORMAL_95 * spread > WIDE * size:
+        if len(location.parts) > 1 and Z_95 * spread > WIDE * size:
             # Another place means another force.
             least, most = anywhere
             remarks.append(caution("size-goes-with-place", least_N=least, most_N=most))
@@ -228,7 +228,7 @@ class ContactMeasurement:
             stop=stop,
             peak=at,
             peak_force=size,
-            peak_band=np.hypot(band, NORMAL_95 * spread),
+            peak_band=np.hypot(band, Z_95 * spread),
             place_band=band,
             wrench=wrench,
             wrench_sd=np.sqrt(np.diag(covariance)),
@@ -276,7 +276,7 @@ def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
     """|F| of a force (K, 3) [N] of covariance (K, 3, 3), band along the force."""
     size = np.linalg.norm(force, axis=1)
     u = force / np.maximum(size, 1e-12)[:, None]
-    return ForceCourse(t, size, NORMAL_95 * np.sqrt(np.einsum("ki,kij,kj->k", u, covariance, u)))
+    return ForceCourse(t, size, Z_95 * np.sqrt(np.einsum("ki,kij,kj->k", u, covariance, u)))
 
 
 def vendor_force(run: Run, J: Array, at: float) -> float | None:

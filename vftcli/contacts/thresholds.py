@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -89,7 +89,7 @@ class Tail(NamedTuple):
         """
         if rate <= self.rate:
             step = self.excess * np.log(self.rate / rate)
-            value, spread = self.start + step, NORMAL_95 / np.sqrt(self.size) * step
+            value, spread = self.start + step, Z_95 / np.sqrt(self.size) * step
             return value, (max(value - spread, self.start), value + spread)
         due = rate * self.hours
         if due > 0.5 * len(self.maxima):
@@ -98,7 +98,7 @@ class Tail(NamedTuple):
                 f"a rate of {rate:.4g} false alarms per hour of one signal is no alarm's: at most "
                 f"{most:.4g} can be found from maxima of {BLOCK:g} s"
             )
-        ranks = due + np.array([0.0, 1.0, -1.0]) * NORMAL_95 * np.sqrt(due)
+        ranks = due + np.array([0.0, 1.0, -1.0]) * Z_95 * np.sqrt(due)
         places = np.rint(ranks).astype(int).clip(1, len(self.maxima)) - 1
         value, low, high = self.maxima[places].tolist()
         return value, (low, high)

@@ -12,14 +12,7 @@ import polars as pl
 
 from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
 from vftcli.evaluation.scores import skill
-from vftcli.signals.arrays import (
-    NORMAL_95,
-    Array,
-    Mask,
-    number_array,
-    rms_of_known,
-    root_mean_square,
-)
+from vftcli.signals.arrays import Z_95, Array, Mask, number_array, rms_of_known, root_mean_square
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import lags_of_each
@@ -192,7 +185,7 @@ def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> Arra
     for torque in (estimate, reference):
         if torque.moving is not None:
             counted &= torque.moving
-    within = abs(estimate.tau - reference.tau) <= NORMAL_95 * estimate.error_sd
+    within = abs(estimate.tau - reference.tau) <= Z_95 * estimate.error_sd
     return np.array([np.count_nonzero(x, axis=0) for x in (counted & within, counted)], float)
 
 

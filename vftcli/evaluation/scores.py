@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from vftcli.free_motion.free_motion import within
-from vftcli.signals.arrays import NORMAL_95, Array, Mask
+from vftcli.signals.arrays import Z_95, Array, Mask
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import intervals, resample_columns, runs_of
 
@@ -75,7 +75,7 @@ class Score(NamedTuple):
         t, tau, sd = estimate.t, estimate.tau[inside], estimate.error_sd
         known, y = np.isfinite(tau), truth[inside]
         size = abs(np.where(known, tau, 0.0) - y)
-        band = np.full(tau.shape, np.nan) if sd is None else NORMAL_95 * sd[inside]
+        band = np.full(tau.shape, np.nan) if sd is None else Z_95 * sd[inside]
         has = np.isfinite(band)
         penalty = np.where(has, 2.0 * band + PENALTY * np.maximum(0.0, size - band), 0.0)
         values = (np.ones(tau.shape), ~known, size**2, size, y**2, has, size <= band, penalty)

@@ -9,7 +9,7 @@ import polars as pl
 from vftcli.evaluation.errors import SCHEMA, Schema, correlation, evaluate, rmse, tidy
 from vftcli.free_motion.free_motion import within
 from vftcli.readers.references import JacobianLog
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.option import interval_text
@@ -64,7 +64,7 @@ def evaluate_wrenches(
                 }
                 if wrench.sd is not None:
                     # NaN lies in no band.
-                    inside = abs(wrench.known[known, k] - y) <= NORMAL_95 * wrench.sd[known, k]
+                    inside = abs(wrench.known[known, k] - y) <= Z_95 * wrench.sd[known, k]
                     row["band_share"] = inside.mean()
             rows.append(row)
     return tidy(rows, WRENCH_SCHEMA)

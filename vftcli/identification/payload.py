@@ -29,7 +29,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import drive_torque, gain_sd, gravity_torque
 from vftcli.signals.arrays import (
-    NORMAL_95,
+    Z_95,
     Array,
     Indices,
     handed_over,
@@ -99,7 +99,7 @@ def load_at_flange(
     names, mass, mass_sd = names_of(loaded), float(x[0]), float(sd[0])
     if mass <= 0 or mass_sd > 0.5 * mass:
         raise IdentificationError(
-            f"{names}: no load found: mass {mass:.3g} ± {NORMAL_95 * mass_sd:.2g} kg; "
+            f"{names}: no load found: mass {mass:.3g} ± {Z_95 * mass_sd:.2g} kg; "
             "use poses or motions in which gravity loads several joints differently"
         )
     R = robot.chain.flange_rotation

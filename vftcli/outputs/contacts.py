@@ -24,7 +24,7 @@ from vftcli.outputs import Record
 from vftcli.outputs.files import SEAL
 from vftcli.outputs.grid import Column, Grid, csv_rows, latex
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, ranged
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import counted
 from vftcli.signals.remarks import Remark, Where, sentence
@@ -77,7 +77,7 @@ def answer(found: ContactList) -> str:
     """The arm's load and contacts in a few sentences."""
     if (load := found.load) is None:
         return list_words(found)
-    mass, (start, stop) = banded(load.mass, NORMAL_95 * load.sd, ".2f", " kg"), load.span
+    mass, (start, stop) = banded(load.mass, Z_95 * load.sd, ".2f", " kg"), load.span
     hint = f": {load.payload}? Add --payload {load.payload}" if load.payload else ""
     return (
         f"The arm carries {mass} that {load.robot} does not know of "

@@ -44,7 +44,7 @@ from vftcli.outputs.rerun_arm import (
 from vftcli.outputs.rerun_file import BAR, EDGES, LogLine, Tab, rerun_file, thinned
 from vftcli.outputs.run_record import CONVENTIONS, all_remarks
 from vftcli.robots.terms import drive_torque
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.progress import steps
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
@@ -159,7 +159,7 @@ def force_plot(analysis: Analysis, wrench: Wrench) -> Chart:
     if sensed is not None and sensed.reference is not None:
         lines.insert(0, ChartLine("reference", sensed.reference.size[:, None], REFERENCE))
     if sd is not None:
-        half = NORMAL_95 * sd[:, None]
+        half = Z_95 * sd[:, None]
         edges = zip(EDGES, (size + half, np.maximum(size - half, 0.0)), strict=True)
         lines += [ChartLine(name, edge, BAND) for name, edge in edges]
     title = "|F| on the robot"

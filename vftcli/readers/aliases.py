@@ -120,7 +120,10 @@ class NamedColumns:
                 "Name the columns with --columns."
             )
         if not group:
-            raise LogError(f"{path}: {name} holds no number in its first row. Cut such rows out.")
+            raise LogError(
+                f"{path}: {name} holds no number in its first row, so its width is unknown. "
+                "Cut the rows with empty lists out, or leave the column out with --columns."
+            )
         return tuple(group.values())
 
     def find(self, signal: str) -> Item | None:

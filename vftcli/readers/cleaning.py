@@ -326,7 +326,8 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
     if 2 * different > len(raw.stamps):
         raise ClockError(
             f"{path}: the clock is coarser than the samples: {different} of {len(fresh)} rows have "
-            "the stamp of the row before. Name a finer column as t, or state the rate: t@125Hz."
+            "the stamp of the row before. Name a finer column as t with --columns, or state the "
+            "rate, as in t@125Hz."
         )
     remarks = [fact("repeats-dropped", rows=repeats)]
     if different:

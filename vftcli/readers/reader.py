@@ -204,7 +204,8 @@ def episode_of(
     number = first if request.episode is None else request.episode
     if number not in numbers:
         raise LogError(
-            f"{path}: no episode {number}; it holds {count}, from {first} to {numbers[-1]}."
+            f"{path}: no episode {number}; it holds {count}, from {first} to {numbers[-1]} "
+            "(--episode K|all)."
         )
     part = f"episode {number}" if count > 1 else ""
     if request.episode is not None or count == 1:

@@ -18,7 +18,6 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import counted, did_you_mean
 from vftcli.signals.pose import IDENTITY, Pose, exp_matrix, rotation_onto
 
-MOST = 1000  #: Links and joints of a description: a humanoid with two hands has a fifth of it.
 TURNING = ("revolute", "continuous")  #: Kinds of joints that an arm is made of.
 
 
@@ -73,8 +72,6 @@ class BodyTree:
     gravity: Array  #: Gravity in the root's axes. (3,) [m/s²]
 
     def __post_init__(self) -> None:
-        if len(self.joints) > MOST:
-            raise RobotError(f"{self.path}: has {len(self.joints)} joints, more than {MOST}")
         if twice := first_twice(joint.name for joint in self.joints):
             raise RobotError(f"{self.path}: two joints are named {twice!r}; each needs its own")
         for joint in self.joints:

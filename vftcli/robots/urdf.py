@@ -17,7 +17,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.arm import MOST, BodyTree, TreeJoint
+from vftcli.robots.arm import BodyTree, TreeJoint
 from vftcli.robots.chain import NO_BODY, Body, symmetric
 from vftcli.robots.profile import UPRIGHT
 from vftcli.robots.robot_file import BOUNDS
@@ -185,7 +185,10 @@ PINOCCHIO_KINDS = {
 }
 
 
-MOST_MJCF = 250  #: Joints of an MJCF: Pinocchio needs .7 GB for so many, by their cube.
+#: Links or joints of a URDF: a humanoid with two hands has a fifth of it.
+MOST = 1000
+#: Joints of an MJCF: Pinocchio needs .7 GB for so many, by their cube.
+MOST_MJCF = 250
 
 
 def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import (
-    NORMAL_95,
+    Z_95,
     Array,
     Mask,
     check_clock,
@@ -142,7 +142,7 @@ class ExternalTorque(TimeSeries):
             sizes: tuple[float | None, float | None] = (None, None)
             if len(tau):
                 sizes = root_mean_square(tau), abs(tau).max()
-            band = None if sd is None or not len(sd) else NORMAL_95 * root_mean_square(sd)
+            band = None if sd is None or not len(sd) else Z_95 * root_mean_square(sd)
             yield f"J{j + 1}", *sizes, band, f"{known.mean():.0%}"
 
     def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:

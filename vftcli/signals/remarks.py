@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from vftcli.signals.arrays import NORMAL_95
+from vftcli.signals.arrays import Z_95
 from vftcli.signals.parsing import counted
 from vftcli.signals.shown import Shown
 
@@ -138,7 +138,7 @@ class ListFormatter(string.Formatter):
     def format_field(self, value: Any, format_spec: str) -> str:  # noqa: ANN401 - any value
         """A value by its format; a list's items, numbers apart by spaces, words by commas."""
         if format_spec.startswith("±"):
-            return f"± {NORMAL_95 * value:{format_spec[1:]}}"
+            return f"± {Z_95 * value:{format_spec[1:]}}"
         if isinstance(value, str) or not isinstance(value, Iterable):
             text = str(super().format_field(value, format_spec))
             return text if isinstance(value, str) else text.replace("-", "−")

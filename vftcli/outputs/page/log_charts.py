@@ -19,7 +19,7 @@ from vftcli.outputs.charts import (
     lines_of_names,
 )
 from vftcli.outputs.error_tables import blocks
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.wrench import AXES, unit_of
 
 FREQUENCIES = 120  #: Points of a frequency response.
@@ -81,7 +81,7 @@ def lines_of(
     first = BEST if BEST in names else next(iter(names), "")
     banded, lines = names if alike and first != BEST else [first], []
     for name, values, sd in found:
-        half = NORMAL_95 * sd if sd is not None and name in banded else None
+        half = Z_95 * sd if sd is not None and name in banded else None
         leads = name == first
         lines.append(ChartLine(name, values, *styles[name], half, leads, shown=leads))
     return sorted(lines, key=lambda line: line.leads)

@@ -32,7 +32,7 @@ from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, sti
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, ranged, significant, vector
 from vftcli.outputs.run_record import observer_record, run_record
 from vftcli.outputs.shapes import link_surfaces
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.parsing import counted, printable
 from vftcli.signals.remarks import fact, sentence
 from vftcli.wrench.frames import FRAMES
@@ -181,13 +181,13 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     torques: Rows = []
     for c in contacts:
         vectors = (
-            None if x is None else vector(np.multiply(NORMAL_95 if "_sd_" in key else 1.0, x))
+            None if x is None else vector(np.multiply(Z_95 if "_sd_" in key else 1.0, x))
             for key, x in zip(VECTORS, map(c.record().get, VECTORS), strict=True)
         )
         ends = DASH if c.anywhere is None else ranged(*c.anywhere, unit="")
         row = str(c.number), f"{c.start:.2f} – {c.stop:.2f}", ends, *vectors, c.evidence
         wrenches.append((*row, c.lead, c.vendor_force, c.sensor_force))
-        bands = NORMAL_95 * c.joint_torque_sd
+        bands = Z_95 * c.joint_torque_sd
         each = map(banded, c.joint_torque, bands, repeat(".2f"), repeat(""))
         torques.append((str(c.number), *each, c.at_rest))
     columns = Column("#"), *joint_columns(len(contacts[0].joint_torque)), Column("at rest")

@@ -19,7 +19,7 @@ from vftcli.outputs.page.shell import polyline
 from vftcli.outputs.quantity import at_least_shown
 from vftcli.outputs.shapes import Surface, capsules, spot_of, touched_point
 from vftcli.robots.chain import link_poses
-from vftcli.signals.arrays import NORMAL_95, Array
+from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.errors import VftError
 from vftcli.signals.pose import Pose
 from vftcli.signals.series import resample_columns, runs_of
@@ -128,7 +128,7 @@ def cone_of(contact: Contact) -> float:
         return 0.0
     # Mean variance of the two directions across the force.
     across = np.sum(contact.wrench_sd[:3] ** 2 * (1.0 - along(contact) ** 2)) / 2.0
-    return float(np.arctan(NORMAL_95 * np.sqrt(across) / contact.peak_force))
+    return float(np.arctan(Z_95 * np.sqrt(across) / contact.peak_force))
 
 
 def still_arm(analysis: Analysis, view: View, contact: Contact | None) -> StillArm:
