@@ -469,7 +469,7 @@ WITHOUT_ROW = {
     "print-noise-floor": PRINT,
     "sign-turned": NAMED,
     "signal-by-name": NAMED,
-    "simulator-friction-left": "tried in tests/robots/test_mjcf.py",
+    "simulator-friction-left": "tried in tests/robots/test_urdf.py",
     "wrench-left-out": "needs a data set with a wrench of unknown origin",
     "zero-wrench": "says what not to do",
     "zero-wrench-beside-tau-ext": "says what not to do",

@@ -107,9 +107,11 @@ def test_a_folder_of_logs_says_how_to_run_all(tmp_path):
     with pytest.raises(UnknownFormatError, match=r"a folder \(empty\)"):
         read(tmp_path)
     (tmp_path / "a.csv").write_text("t,q1\n", "utf-8")
-    with pytest.raises(UnknownFormatError, match=r"a folder \(a.csv\), no bag") as e:
+    with pytest.raises(
+        UnknownFormatError, match=r"a folder \(a.csv\); batch runs all logs in it"
+    ) as e:
         read(tmp_path)
-    assert f"vftcli batch {shlex.quote(str(tmp_path))} -o OUT" in str(e.value)
+    assert f"vftcli batch {shlex.quote(str(tmp_path))} --do report -o OUT" in str(e.value)
     assert "\n" not in str(e.value)
 
 

@@ -240,9 +240,9 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
 def description(file: LogFile) -> str:
     """The kind of a path and the remedy, to follow its name."""
     if file.is_folder:
-        at, what = shlex.quote(printable(str(file.path))), listed(file.entries, 4) or "empty"
+        run = f"vftcli batch {shlex.quote(printable(str(file.path)))} --do report -o OUT"
         return (
-            f"a folder ({what}), no bag and no data set; vftcli batch {at} -o OUT reads its logs"
+            f"a folder ({listed(file.entries, 4) or 'empty'}); batch runs all logs in it ({run})"
         )
     if kind := known_kind(file):
         return kind
