@@ -274,7 +274,7 @@ MOST = {
     "files": 239,
     "functions": 2776,
     "functions over 60 lines": 10,
-    "names, operators, numbers": 368_765,
+    "names, operators, numbers": 368_739,
     "characters a line that is not blank": 50.42,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7392,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from known_errors import drawn_error, shortened, ur10e, wrong_run
 
+from vftcli.bias import model_error
 from vftcli.bias.model_error import (
     column_numbers,
     error_columns,
@@ -83,3 +84,35 @@ def test_an_error_is_the_raw_disturbance_with_its_sign_turned():
     # what is left is the sign's turn within a sample, some tenths of the dry friction's error of
     # 2 N·m in a sample of fifty
     assert np.all(left < 0.1 * np.sqrt(np.mean(middle**2, axis=0)))
+
+
+def test_the_expected_errors_are_shares_of_the_robot_s_own_numbers():
+    """Joint 2 of the UR10e by hand, from the specified shares."""
+    robot = ur10e()
+    found, chain = expected_error(robot), robot.chain
+    m, c = chain.mass[1], chain.com[1]
+    size = np.trace(chain.inertia[1]) + m * c @ c
+    np.testing.assert_allclose(found.inertial[10], 0.05 * m)
+    np.testing.assert_allclose(found.inertial[11:14], 0.01 * m + 0.05 * m * np.abs(c))
+    tensor = 0.2 * size + 0.02 * m * np.linalg.norm(c) + 1e-4
+    np.testing.assert_allclose(found.inertial[14:20], tensor)
+    np.testing.assert_allclose(found.rotor, 0.2 * chain.rotor_inertia)
+    np.testing.assert_allclose(found.drive, 0.02)
+    friction = usual_friction(robot)
+    np.testing.assert_allclose(found.friction[0], 0.2 * friction[0] + 0.05)
+    np.testing.assert_allclose(found.friction[1], 0.7 * friction[0] + 0.05)
+    np.testing.assert_allclose(found.friction[2], 0.03)
+    np.testing.assert_allclose(found.friction[3], 0.4 * friction[1] + 0.1)
+    np.testing.assert_allclose(found.friction[4], 0.4 * np.abs(friction[2]) + 0.05)
+    np.testing.assert_allclose(found.offset, 0.15 * friction[0] + 0.02)
+
+
+def test_chunks_make_no_difference(monkeypatch):
+    robot = shortened(ur10e(), 3)
+    run = wrong_run(robot, seconds=12.0)
+    motion, expected = smooth_motion(run), expected_error(robot)
+    whole = error_columns(run, motion, expected, 2)
+    monkeypatch.setattr(model_error, "CHUNK", 37)
+    for one, other in zip(error_columns(run, motion, expected, 2), whole, strict=True):
+        # blocked sums of the same products: rounding alone
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)

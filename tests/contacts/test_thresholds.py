@@ -180,3 +180,8 @@ def test_a_joint_that_never_moved_alarms_at_whatever_it_reads() -> None:
     assert found.joints[0].value == 0.0
     assert np.all(found.level("joints", still) == 0.0)
     assert np.all(found.level("joints", log) > 1.0)
+
+
+def test_an_arm_of_few_joints_has_no_axes() -> None:
+    found = find_thresholds([free_log("a", 600.0, joints=4, axes=0)], 1.0)
+    assert (len(found.joints), found.axes, found.force) == (4, (), ())

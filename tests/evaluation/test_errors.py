@@ -146,3 +146,9 @@ def test_rmse_skips_unknown_samples_joint_by_joint() -> None:
     reference = np.array([[0.0, 0.0], [0.0, np.nan], [0.0, 0.0]])
     assert rmse(estimate, reference) == pytest.approx([np.sqrt(12.5), 1.0])
     assert np.isnan(rmse(np.full((3, 1), np.nan), np.zeros((3, 1))))[0]
+
+
+def test_a_reference_of_zero_tells_no_lag() -> None:
+    noise = np.random.default_rng(0).standard_normal(len(T))
+    row = row_of(torque("gmo", noise), torque("zero", np.zeros_like(T)))
+    assert (row["lag_s"], row["correlation"]) == (None, None)

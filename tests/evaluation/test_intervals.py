@@ -192,3 +192,23 @@ def test_a_correlation_time_by_blocks_is_that_of_the_whole(memory: float, count:
 def test_students_quantile_is_scipys(p: float, freedom: int) -> None:
     # 1e-10: Newton's steps end at the rounding of the quadrature, 1e-12 here.
     assert student_quantile(p, freedom) == pytest.approx(stdtrit(freedom, p), rel=1e-10)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.9, 0.98])
+def test_correlation_time_of_a_known_process(decay: float) -> None:
+    """(1 + a)/(1 − a) of a first-order process, 1 of white noise; cut where ρ falls below 0.05."""
+    x = autoregressive(np.random.default_rng(0), 200_000, decay)[:, None]
+    cut = 1.0 - 2.0 * 0.05 / (1.0 + decay) if decay else 1.0
+    # 200 000 samples of correlation time 100 tell it to some per cent.
+    assert correlation_time(x)[0] == pytest.approx(cut * (1 + decay) / (1 - decay), rel=0.15)
+
+
+def test_a_resampled_series_closes_to_a_ring() -> None:
+    """Each sample is in as many blocks as any other: one large last square counts like a first."""
+    rng = np.random.default_rng(8)
+    noise = rng.standard_normal((2000, 1)) ** 2
+    last, first = noise.copy(), np.roll(noise, 1, axis=0)
+    last[-1], first[0] = 500.0, 500.0
+    # 1000 draws of a mean of ~1.25 with a scatter of .25: known to .008, four times that allowed.
+    assert drawn_from(last).draws.mean() == pytest.approx(last.mean(), abs=0.035)
+    assert drawn_from(first).draws.mean() == pytest.approx(first.mean(), abs=0.035)
