@@ -43,6 +43,13 @@ def test_a_joints_name_beside_the_signals_gives_its_place(path, pattern, word, e
         np.testing.assert_allclose(log.require(signal)[0], k + 0.1 * np.arange(6))
 
 
+def test_plotjuggler_names_the_topic_then_the_joint(path):
+    columns = {f"/joint_states/{joint}/position": 0.1 * k for k, joint in enumerate(UR_NAMES)}
+    log = read(write(path, {"__time": CLOCK["t"]} | dict(reversed(columns.items()))))
+    assert log.joint_names == UR_NAMES
+    np.testing.assert_allclose(log.q[0], 0.1 * np.arange(6))
+
+
 @pytest.mark.parametrize("pattern", ["{signal}_{k}", "{signal}_joint{k}", "joint{k}_{signal}"])
 def test_numbered_joints_are_ordered_by_number(path, pattern):
     columns = dict(CLOCK)

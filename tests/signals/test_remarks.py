@@ -47,7 +47,9 @@ def test_an_unknown_code_is_an_error() -> None:
         words("no-such-remark")
 
 
-def test_templates_can_be_parsed() -> None:
+def test_every_code_stands_once_and_its_templates_can_be_parsed() -> None:
+    codes = [code for text in remarks.catalogue() for code in remarks.parsed(text)]
+    assert len(codes) == len(set(codes))
     for text in remarks.catalogue():
         for entry in remarks.parsed(text).values():
             assert set(entry) <= {"short", "long", "name", "consequence", "remedy"}
