@@ -38,6 +38,16 @@ def test_what_a_low_pass_leaves_of_white_noise(cutoff: float) -> None:
     assert noise_of(T, x, MOVING, STEP, cutoff) == pytest.approx(left, rel=0.1)
 
 
+def test_noise_is_measured_beside_the_cutoff() -> None:
+    """Above contacts, at least .2 of the rate, up to .45; pink, so that each band differs."""
+    x = np.cumsum(np.random.default_rng(3).standard_normal((6000, 1)), axis=0)
+    faster = (0.008, 6.0, 8.4, 15.6), (0.008, 20.0, 14.0, 26.0)
+    for step, cutoff, *limits in (*faster, (0.02, 20.0, 14.0, 22.5), (0.04, 4.0, 3.5, 6.5)):
+        t = step * np.arange(6000)
+        expected = noise_below(t, x, MOVING, step, tuple(limits), cutoff)
+        np.testing.assert_allclose(noise_of(t, x, MOVING, step, cutoff), expected, rtol=1e-9)
+
+
 def coloured(memory: float, seed: int) -> np.ndarray:
     """Noise of one newton-metre whose correlation falls to 1/e within a time. (6000, 1)"""
     keep = np.exp(-STEP / memory)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.free_motion.cycles import Cycles, FreeCycles, find_free_cycles
+from vftcli.free_motion.cycles import Cycles, FreeCycles, find_free_cycles, pair_with_cycle
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 
@@ -95,3 +95,26 @@ def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_t
     for count in (3, 8):
         few = FreeCycles(tuple(range(count)), None)
         assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)
+
+
+@pytest.mark.parametrize("free", [0, 1, 2])
+def test_a_cycle_is_laid_under_all_others_and_not_under_itself(
+    pushed: Callable[..., Run], free: int
+) -> None:
+    # By 4.1 s an instant 2 to 2.05 s from the middle of a cycle has no partner in it.
+    for period in (4.0, 4.1):
+        pairing = pair_with_cycle(pushed(), CYCLES, free, period)
+        own = CYCLES.number(T) == free
+        assert not pairing.known[own].any()
+        assert pairing.known[~own].mean() > 0.96
+        away = (T[pairing.known] - pairing.times[pairing.known]) / period
+        np.testing.assert_allclose(away, np.rint(away), atol=1e-9)
+        first, last = CYCLES.span(free)
+        partners = pairing.times[pairing.known]
+        assert np.all((partners >= first) & (partners <= last))
+
+
+def test_an_instant_behind_the_last_cycle_or_before_the_first_is_in_none() -> None:
+    cycles = CYCLES._replace(begin=1.0, end=11.0)
+    number = cycles.number(np.array([0.99, 1.0, 4.99, 5.0, 10.99, 11.01]))
+    assert number.tolist() == [-1, 0, 0, 1, 2, -1]

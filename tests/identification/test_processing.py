@@ -68,3 +68,14 @@ def test_long_stops_and_gaps_tell_nothing():
     gap = list(range(493, 507))
     assert lost.tolist() == [*range(200, 232), *gap]
     assert np.flatnonzero(~usable[:, 1]).tolist() == gap
+
+
+def test_chunks_cover_every_sample_once_and_of_a_log_at_rest_none():
+    recording, _ = log(seconds=60.0)
+    motion = prepare(recording, PANDA)
+    rows = np.concatenate([np.arange(motion.samples)[span] for span in motion.chunks()])
+    assert motion.samples > 2 * 1024
+    np.testing.assert_array_equal(rows, np.arange(motion.samples))
+    still = prepare(Recording(t=recording.t, q=0 * recording.q, dq=0 * recording.q,
+                              torque=0 * recording.q), PANDA)  # fmt: skip
+    assert (still.samples, list(still.chunks())) == (0, [])

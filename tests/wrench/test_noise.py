@@ -1,5 +1,7 @@
 """White noise and model error from the free part: against drawn processes and another optimiser."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_runs import samples_of
@@ -150,3 +152,10 @@ def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
     for near, expected in ((2.5 * SECONDS, range(18, 27)), (0.0, range(20, 25))):
         variance = assumed._replace(near=near).stationary(log)[0][:, 2]
         assert np.flatnonzero(variance > variance[0]).tolist() == list(expected)
+
+
+def test_a_sigmoids_dry_torque_is_its_amplitude() -> None:
+    panda = load_robot("panda")
+    amplitudes = [joint.parameters["amplitude"] for joint in panda.friction]
+    np.testing.assert_allclose(dry_torques(panda), np.abs(amplitudes))
+    assert not dry_torques(replace(UR5, friction=())).any()
