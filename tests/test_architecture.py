@@ -270,7 +270,7 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 51_549,
+    "lines of Python": 51_548,
     "files": 239,
     "functions": 2776,
     "functions over 60 lines": 10,

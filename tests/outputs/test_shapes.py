@@ -5,9 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contact_rows import contact
 
 from vftcli.outputs.page.packing import Blob
-from vftcli.outputs.shapes import MOST_TRIANGLES, Surface, capsules, fewer, link_surfaces
+from vftcli.outputs.shapes import (
+    MOST_TRIANGLES,
+    Surface,
+    capsules,
+    fewer,
+    link_surfaces,
+    touched_point,
+)
 from vftcli.robots import load_robot
 from vftcli.robots.robot import Mesh
 from vftcli.signals.pose import IDENTITY, rpy_matrix
@@ -169,3 +177,10 @@ def test_a_makers_arm_has_few_triangles_that_fill_its_meshes(name: str) -> None:
         whole = np.vstack([read_mesh(mesh) for mesh in robot.meshes if mesh.link == link])
         ends = [[c.min(axis=0), c.max(axis=0)] for c in (surface.corners, whole.reshape(-1, 3))]
         np.testing.assert_allclose(*ends, atol=0.01)
+
+
+@pytest.mark.parametrize(("places", "point"), [((0, 6), 6.0), ((2, 3), 2.5), ((), 6.0)])
+def test_the_arrow_is_at_the_place(places: tuple[int, ...], point: float) -> None:
+    """Link k lies between the origins k − 1 and k; here each origin has its own number as x."""
+    origins = np.tile(np.arange(7.0)[None, :, None], (1, 1, 3))
+    assert touched_point(contact(places=places), origins)[0, 0] == point

@@ -38,7 +38,6 @@ CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
 #: and a measured effort (1.3–12 %).
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
 #: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the
-#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the
 #: next: UR10e logs fit theirs to .1–.26 %, the next 30 times worse; FR3 and Panda 2.
 GUESSED, APART = 0.012, 5.0
 HEAVY = 5.0  #: A load from which a measured effort is another arm's. [kg]
