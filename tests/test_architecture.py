@@ -270,11 +270,11 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 51_548,
+    "lines of Python": 51_546,
     "files": 239,
     "functions": 2776,
     "functions over 60 lines": 10,
-    "names, operators, numbers": 368_739,
+    "names, operators, numbers": 368_728,
     "characters a line that is not blank": 50.42,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7392,

@@ -17,7 +17,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Runs, paired, unwound
-from vftcli.robots.terms import check_effort, check_joints, effort_name
+from vftcli.robots.terms import check_effort, effort_name
 from vftcli.signals.errors import ExaminationError, UnsettledRobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks, as_record, fact, filled, sentence, words
@@ -199,11 +199,9 @@ class Examiner:
         Joints are matched by name, endless ones unwound, impossible samples cut out.
 
         Raises:
-            RobotError: If its joints are not the robot's, by number or name.
+            RobotError: If the names of its joints are not the robot's.
         """
-        recording = paired(recording, robot)
-        check_joints(recording, robot)
-        recording = unwound(recording, robot)
+        recording = unwound(paired(recording, robot), robot)
         # Blocks of a long log show whether to clean all of it at once.
         blocks = recording.blocks(BLOCK) if in_stretches else ()
         if not in_stretches or any(without_bad_samples(b, robot) is not b for b in blocks):

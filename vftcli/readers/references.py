@@ -174,7 +174,7 @@ def estimates_columns(path: Path, observer: str) -> str | None:
         return None
     if observer not in held:
         raise LogError(
-            f"{path}: no estimates of {observer!r}; it holds {', '.join(held)} (--observer)."
+            f"{path}: holds no estimates of {observer!r}; it holds {', '.join(held)} (--observer)."
         )
     return f"t=t,q=q/{{i}},tau_ext={PREFIX}{observer}/{{i}}"
 

@@ -298,7 +298,7 @@ def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
     query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND rootpage > 0"
     found = {name for name in TABLES if db.execute(query, (name,)).fetchone() is not None}
     if not found >= {"topics", "messages"}:
-        raise budget.error("an SQLite database without the tables of a ROS 2 bag.")
+        raise budget.error("an SQLite database without plain tables of a ROS 2 bag.")
     for name in sorted(found):
         # The last of a column's traits says whether it is hidden or computed.
         traits = db.execute(f"PRAGMA table_xinfo({name})").fetchall()
