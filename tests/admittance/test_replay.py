@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance.joints import follow, largest_speed
 from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings
+from vftcli.admittance.motion import follow, largest_speed
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import Admittance, controllers, from_table
-from vftcli.admittance.motion import AxisMotion, Drag
+from vftcli.admittance.motion import AxisMotion, Drag, JointPath
 from vftcli.admittance.replay import Replay, drag_remarks, trouble
 from vftcli.robots import load_robot
 

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.admittance.choice import ControlChoice
-from vftcli.admittance.joints import check_start
 from vftcli.admittance.law import Controller, check_stable
-from vftcli.admittance.motion import Recursion, phases
+from vftcli.admittance.motion import Recursion, check_start, phases
 from vftcli.admittance.replay import Replay, deviation_of
 from vftcli.doctor.examination import Examination
 from vftcli.observers.choice import ObserverChoice

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.admittance.joints import JointPath, check_start, follow
 from vftcli.admittance.law import (
     AXES,
     Admittance,
@@ -23,8 +22,11 @@ from vftcli.admittance.law import (
 from vftcli.admittance.motion import (
     AxisMotion,
     Drag,
+    JointPath,
     Phases,
+    check_start,
     drags_of,
+    follow,
     phases,
     release,
     releases_of,
