@@ -1,6 +1,8 @@
 """Long logs through `vftcli estimate`: the same numbers, the same record, nothing half done."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +19,7 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
+from vftcli.readers.reading import read
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.errors import VftError
 from vftcli.signals.external_torque import DynamicsTerms
@@ -167,3 +170,41 @@ def test_a_log_that_is_examined_in_stretches_says_so(tmp_path: Path, monkeypatch
     made, record = estimated(tmp_path / "o", "--causal")
     found = {each["code"]: each for each in record["examination"][0]["findings"]}
     assert found["examined-in-stretches"]["values"] == {"examined": 1000, "samples": len(made)}
+
+
+#: A command, then the most memory that its process had, in kB.
+MEASURED = """
+import sys
+from vftcli.cli import make_app
+make_app()(sys.argv[1:], standalone_mode=False)
+with open("/proc/self/status") as status:
+    print(next(line.split()[1] for line in status if line.startswith("VmHWM")))
+"""
+
+
+def peak_memory(samples: int, folder: Path) -> int:
+    """Peak memory of `estimate --causal` of the fixture's motion over and over. [B]"""
+    short = read(FIXTURE)
+    rows = np.arange(samples) % short.samples
+    columns = {"timestamp": np.arange(samples) * 0.008}
+    for field, values in (("q", short.q), ("qd", short.dq), ("current", short.current)):
+        columns |= {f"actual_{field}_{j}": values[rows, j] for j in range(short.joints)}
+    log = folder / f"{samples}.parquet"
+    pl.DataFrame(columns).write_parquet(log, row_group_size=50_000)
+    words = ("estimate", log, "--causal", "--robot", "ur5", "-o", folder / f"of_{samples}")
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURED, *map(str, words)], capture_output=True, check=True
+    )
+    return int(done.stdout.split()[-1]) * 1024
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is Linux's")
+def test_memory_grows_with_the_clock_alone(tmp_path: Path) -> None:
+    """A clock, its steps and copies to judge them are five numbers a sample, 40 B.
+
+    Positions, velocities and currents, 144 B, stay in files. Twice that for the allocator.
+    """
+    few, many = 200_000, 1_200_000
+    grown = peak_memory(many, tmp_path) - peak_memory(few, tmp_path)
+    assert grown < 80 * (many - few)

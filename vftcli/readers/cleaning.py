@@ -348,10 +348,11 @@ def _refuse_degrees(raw: RawLog, path: Path) -> None:
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS
     beyond = np.concatenate([np.any(np.abs(rows) > limit, axis=1) for rows in pieces(q)])
     # A few bad samples are no unit; the doctor cuts them out.
-    own = (~beyond | (np.mean(beyond) >= BAD_SHARE))[:, None]
-    low = q.min(axis=0, where=own, initial=np.inf)
-    high = q.max(axis=0, where=own, initial=-np.inf)
-    largest, travel = np.max([-low, high]), np.max(high - low)
+    own = ~beyond | (np.mean(beyond) >= BAD_SHARE)
+    good = (rows[keep] for rows, keep in zip(pieces(q), pieces(own), strict=True))
+    # Of each joint how far it goes below zero, then how far above.
+    ends = np.max([np.hstack([-x, x]).max(axis=0, initial=-np.inf) for x in good], axis=0)
+    largest, travel = ends.max(), ends.reshape(2, -1).sum(axis=0).max()
     if largest > limit or travel > TWO_TURNS:
         raise LogError(
             f"{path}: positions reach {largest:.4g} and travel {travel:.4g}, which looks like "

@@ -116,10 +116,10 @@ def check_shape(value: ArrayLike, shape: tuple[int | str, ...], name: str, owner
 def median(values: Array) -> float:
     """Median of a (T,) array; NumPy's own imports its masked arrays."""
     middle = len(values) // 2
-    if len(values) % 2:
-        return float(np.partition(values, middle)[middle])
-    lower, upper = np.partition(values, (middle - 1, middle))[middle - 1 : middle + 1]
-    return 0.5 * float(lower + upper)
+    # Parting at one place takes NumPy sixty times as long where many values are equal.
+    parted = np.partition(values, (middle - 1, middle))
+    upper = float(parted[middle])
+    return upper if len(values) % 2 else 0.5 * (float(parted[middle - 1]) + upper)
 
 
 def root_mean_square(x: Array) -> float:
