@@ -64,14 +64,14 @@ def braked(
 def test_a_brief_row_where_the_arm_comes_to_rest_is_a_stop(
     speed: Array, start: float, lasts: float, stops: bool
 ) -> None:
-    assert follows_stop(log(speed), start, start + lasts, 0.05) is stops
+    assert follows_stop(log(speed), (start, start + lasts), 0.05) is stops
 
 
 def test_a_joint_that_moves_on_is_no_stop() -> None:
     stopped = log(braked())
     both = np.column_stack([stopped.require("dq")[:, 0], np.full(400, 0.3), 0.0 * T])
     moving = Recording(t=T, q=stopped.q, dq=both, torque=stopped.torque)
-    assert not follows_stop(moving, 1.98, 2.15, 0.05)
+    assert not follows_stop(moving, (1.98, 2.15), 0.05)
 
 
 @pytest.mark.parametrize(

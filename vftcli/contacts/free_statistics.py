@@ -148,29 +148,30 @@ def free_part(motion: FreeMotion) -> FreePart | None:
         if motion.choice.is_given:
             raise
         return None
-    few = part.doubted and (motion.cycles.whole < LEAST_CYCLES or not motion.free_cycles.numbers)
-    if few or (part.doubted and is_touched(motion.log, part.own)):
-        return None
+    log, own = motion.log, part.own
+    if part.doubted:
+        if motion.cycles.whole < LEAST_CYCLES or not motion.free_cycles.numbers:
+            return None
+        # Touched: beyond friction, and no quieter than the rest.
+        if (beyond_threshold(log, None) & own).any():
+            with suppress(ParameterError):  # too short for a spectrum
+                if not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)])):
+                    return None
     runs = (fact("free-log", Where(about=run.recording.name)) for run in motion.runs)
     return part._replace(remarks=(*part.remarks, *runs))
-
-
-def is_touched(log: Run, own: Mask) -> bool:
-    """Whether a free part is touched: no quieter than the rest, beyond friction."""
-    if (beyond_threshold(log, None) & own).any():
-        with suppress(ParameterError):  # too short for a spectrum
-            return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
-    return False
 
 
 def beyond_threshold(run: Run, level: Array | None) -> Mask:
     """Samples with a joint's torque beyond `LEVEL` standard deviations for a while.
 
     (T,) The standard deviation is that of the observer's torque in free motion, the level
-    (n,) [N·m], None if unknown.
+    (n,) [N·m], None if unknown; at rest and around it stiction adds to it.
     """
-    t = run.t
-    above = np.any(abs(observed(run)) > LEVEL * expected_torque(run, level), axis=1)
+    t, dry = run.t, dry_torques(run.robot)
+    sd = np.maximum(LEAST_ERROR if level is None else level, DRY_SHARE * dry)
+    close = near(slower(run.dq), max(round(NEAR_REST / median_step(t)), 1))
+    sd = np.where(close, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
+    above = np.any(abs(observed(run)) > LEVEL * sd, axis=1)
     settled: Mask = t >= t[0] + SETTLED
     return covered(intervals(t, above, least=LASTING, gap=NEAR), len(t)) & settled
 
@@ -202,14 +203,6 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
     moving |= moving.sum(axis=0) < LEAST_MOVING
     pairs = zip(torque.T, moving.T, strict=True)
     return np.array([np.quantile(column[some], 0.95) / Z_95 for column, some in pairs])
-
-
-def expected_torque(run: Run, level: Array | None) -> Array:
-    """Standard deviation of the observer's torque where nothing touches. (T, n) [N·m]"""
-    dry = dry_torques(run.robot)
-    sd = np.maximum(LEAST_ERROR if level is None else level, DRY_SHARE * dry)
-    close = near(slower(run.dq), max(round(NEAR_REST / median_step(run.t)), 1))
-    return np.where(close, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
 
 
 class PseudoContactTest(NamedTuple):

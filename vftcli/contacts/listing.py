@@ -127,11 +127,11 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     if not named:
         passed |= at_rest & np.array(found.beyond, bool)
     seen = np.flatnonzero(passed | (found.best > LEAST_EVIDENCE)).tolist()
-    halted = [k for k in seen if is_stop(run, found, k, seconds)]
+    spans = {k: times_of(found.log.blocks, found.runs[k]) for k in seen}
+    halted = [k for k in seen if follows_stop(run.recording, spans[k], seconds)]
     stops = tuple(t[found.runs[k][0]] for k in halted if passed[k])
-    kept, others = (
-        [k for k in seen if passed[k] == wanted and k not in halted] for wanted in (True, False)
-    )
+    going = [k for k in seen if k not in halted]
+    kept, others = ([k for k in going if passed[k] == wanted] for wanted in (True, False))
     measurement = ContactMeasurement.of(found.kept(kept), free)
     rows = measured_rows(free, measurement)
     groups = adjoining(measurement.found.runs, rows)
@@ -228,22 +228,16 @@ def fine_rows(
     return ContactMeasurement.of(some, fine_free, measurement, BENT_SHORT).rows(locations)
 
 
-def is_stop(run: Run, found: Candidates, number: int, seconds: float) -> bool:
-    """Whether a candidate follows an abrupt stop of the arm."""
-    start, stop = times_of(found.log.blocks, found.runs[number])
-    return follows_stop(run.recording, start, stop, seconds)
-
-
 def false_rows(free: FreeStatistics) -> int:
     """Rows that the same search lists in free runs of other logs."""
-    seconds = free.seconds
-    others = [run for run, _ in free.free if run.recording is not free.log.recording]
-    each = [(run, search(run, free.noise, free.level, seconds)) for run in others]
-    return sum(
-        not is_stop(run, found, k, seconds)
-        for run, found in each
-        for k in np.flatnonzero(found.best > LEAST_EVIDENCE).tolist()
-    )
+    seconds, count = free.seconds, 0
+    for run, _ in free.free:
+        if run.recording is not free.log.recording:
+            found = search(run, free.noise, free.level, seconds)
+            listed = np.flatnonzero(found.best > LEAST_EVIDENCE)
+            spans = [times_of(found.log.blocks, found.runs[k]) for k in listed]
+            count += sum(not follows_stop(run.recording, span, seconds) for span in spans)
+    return count
 
 
 def limits(
@@ -365,8 +359,9 @@ def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
     )
 
 
-def follows_stop(recording: Recording, start: float, stop: float, block: float) -> bool:
+def follows_stop(recording: Recording, span: Sequence[float] | Array, block: float) -> bool:
     """Whether a row [s] begins where all joints come to rest at once, and is brief."""
+    start, stop = span
     if stop - start > BRIEF + block:
         return False
     t, speed = recording.t - start, abs(recording.require("dq"))

@@ -1,7 +1,6 @@
 """Search along one log: candidates of two kinds, split, each with evidence.
 
 The first kind is found by an interacting two-state filter (IMM) in joint space, for any
-arm and any place of contact. Its mode "free" says d = b + n, its mode "contact"
 arm and place. Its mode "free" is d = b + n, its mode "contact" d = b + x + n with x of
 every joint an Ornstein–Uhlenbeck process, as large as a push of 30 N and 3 N·m at the
 flange makes. The mode is shared by all joints, the states are each joint's own. It runs
@@ -178,7 +177,10 @@ def two_state_odds(
     back = np.concatenate([step[:1], step[:0:-1]])
     ahead = (blocks.d, *processes[0], size**2, step[:, None])
     turned = (blocks.d[::-1], *processes[1], size[::-1] ** 2, back[:, None])
-    begins, warm, length = stretches_of(len(step), usual)
+    warm, own = max(round(WARM_UP / usual), 1), max(round(STRETCH / usual), 2)
+    begins, length = [0, *range(own, len(step) - warm, own)], warm + own
+    if len(step) <= warm + 2 * own:
+        begins, warm, length = [0], 0, len(step)
     # The last block is repeated beyond the end.
     at = np.minimum(np.add.outer(begins, np.arange(length)), len(step) - 1)
     pairs = (np.concatenate([x[at], y[at]]) for x, y in zip(ahead, turned, strict=True))
@@ -187,14 +189,6 @@ def two_state_odds(
     joined = np.concatenate([table[(warm if k else 0) :, :, i] for i, k in enumerate(begins)])
     odds = joined[: len(step)]
     return [(odds[:, 0, s], odds[::-1, 1, s]) for s in range(many)]
-
-
-def stretches_of(count: int, step: float) -> tuple[list[int], int, int]:
-    """First blocks of the searched stretches, warm-up and length. [blocks]"""
-    warm, own = max(round(WARM_UP / step), 1), max(round(STRETCH / step), 2)
-    if count <= warm + 2 * own:
-        return [0], 0, count
-    return [0, *range(own, count - warm, own)], warm, warm + own
 
 
 class ImmState(NamedTuple):
@@ -298,8 +292,10 @@ def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -
     torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
     sd = np.sqrt(np.trace(inside.covariance[:, :3, :3], axis1=1, axis2=2))
     low, at, force = size < RELEASED * sd, t[slice(*run)], inside.values[:, :3]
-    pieces, begin = [], 0
-    for k, end in quiet_pauses(low, at):
+    pieces, begin, usual = [], 0, np.median(np.diff(at)) if len(at) > 1 else 0.0
+    for k, end in runs_of(low):
+        if k == 0 or end == len(at) or at[end - 1] - at[k] + usual < RELEASE_TIME:
+            continue
         if is_valley((size[begin:], torque[begin:]), k - begin, end - begin, RELEASE_SHARE):
             pieces += split_at_turns(at, force, torque, (begin, k))
             begin = end
@@ -327,13 +323,3 @@ def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> l
 def is_valley(series: Sequence[Array], start: int, stop: int, share: float) -> bool:
     """Whether all series fall below a share of their peaks on both sides."""
     return all(x[start:stop].min() < share * min(x[:start].max(), x[stop:].max()) for x in series)
-
-
-def quiet_pauses(low: Mask, t: Array) -> list[tuple[int, int]]:
-    """Runs of low blocks within a contact that last at least `RELEASE_TIME`."""
-    usual = np.median(np.diff(t)) if len(t) > 1 else 0.0
-    return [
-        (start, stop)
-        for start, stop in runs_of(low)
-        if start > 0 and stop < len(low) and t[stop - 1] - t[start] + usual >= RELEASE_TIME
-    ]

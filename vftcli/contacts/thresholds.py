@@ -15,15 +15,14 @@ from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown, joined, record
 from vftcli.signals.wrench import AXES, unit_of
+from vftcli.wrench.detection import ContactInterval, contact_intervals
 
 if TYPE_CHECKING:
     import polars as pl
 
-
-from vftcli.signals.series import median_step
-from vftcli.wrench.detection import ContactInterval, contact_intervals
 
 SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero. [s]
 BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]
@@ -188,8 +187,8 @@ class SignalThreshold(NamedTuple):
 
     @property
     def more_share(self) -> float:
-        """Share of more motion that narrows the interval to the value."""
-        if self.tail is None or not self.is_wide:
+        """Share of more motion that narrows a wide interval to the value."""
+        if self.tail is None:
             return 0.0
         width = (self.interval[1] - self.interval[0]) / max(self.value, LEAST)
         count = self.tail.size * width**2

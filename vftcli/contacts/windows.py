@@ -8,8 +8,7 @@ contacts are hidden. The prior of the wrench is learned from the contacts.
 Evidence is the log likelihood of a stretch with a contact less that without, in nats:
 around every candidate the disturbance's likelihood under "nothing", a wrench at the
 flange, and a force and moment on each link, by the smoother's forward pass with the
-Jacobian of the place. The best place counts; a part of the arm leads by its best
-place's evidence less the best of every other part.
+Jacobian of the place. The best place counts.
 """
 
 from collections.abc import Iterator, Sequence
