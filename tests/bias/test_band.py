@@ -29,7 +29,7 @@ def found() -> Baseline:
 
 def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Baseline:
     """The baseline with a correction off that changes nothing but says this of the log."""
-    shape = found.log.terms.p.shape
+    shape = found.of(found.motion.log).terms.p.shape
     off = WholeLogBias(
         weight=np.zeros(6),
         bias=np.zeros(shape),
@@ -42,7 +42,7 @@ def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Base
 
 
 def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
+    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
     known = found.part.own
     plain, wider = (with_band(corrected(found, known, sd), reading).error_sd for sd in (0.0, 0.7))
     # Bands are kept in single precision.
@@ -50,7 +50,7 @@ def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
 
 
 def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
+    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
     assert with_band(replace(found, spectra=None), reading).error_sd is None
     nothing = reading._replace(samples=reading.samples[:0], resting=reading.resting[:0])
     assert with_band(found, nothing).error_sd is None
@@ -59,8 +59,8 @@ def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
 
 
 def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
-    quiet = np.arange(found.log.terms.samples) % 7 == 0
+    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
+    quiet = np.arange(found.of(found.motion.log).terms.samples) % 7 == 0
     rests = found.motion.log.rests
     tau = reading.estimate.tau[quiet]
     fitted = with_band(found, reading._replace(samples=tau, resting=rests[quiet])).error_sd
@@ -71,12 +71,12 @@ def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Ba
     alone = with_band(replace(corrected(found, quiet), by_fit=True), reading).error_sd
     np.testing.assert_array_equal(alone, fitted)
     # too few to speak for anything
-    few = np.arange(found.log.terms.samples) < 20
+    few = np.arange(found.of(found.motion.log).terms.samples) < 20
     np.testing.assert_array_equal(with_band(corrected(found, few), reading).error_sd, stated)
 
 
 def test_a_slow_load_that_the_fit_believes_in_is_no_error(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
+    reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
     pushed = reading._replace(estimate=replace(reading.estimate, tau=reading.estimate.tau + 5.0))
     known, alone = found.part.own, replace(found, by_fit=True)
     np.testing.assert_allclose(
@@ -100,7 +100,9 @@ def test_the_band_holds_on_a_real_arm_with_planted_pushes(
     base = baseline_of(FreeMotion(log=run, choice=FreeChoice(spans=((0.0, 8.0),))))
     assert base.load is None
     observer = tune_to_spectra("rts-auto", base.spectra)
-    estimate = with_band(base, free_reading(base, observer, observer.estimate(base.log.terms)))
+    estimate = with_band(
+        base, free_reading(base, observer, observer.estimate(base.of(base.motion.log).terms))
+    )
     error, half = estimate.tau - pushed.torque, 1.96 * estimate.error_sd
     assert np.all(np.mean(np.abs(error) <= half, axis=0) >= 0.88)
     assert half.mean() <= 2.6 * np.sqrt(np.mean(error**2, axis=0)).mean()

@@ -60,8 +60,8 @@ def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
     best = found.of("best")
     assert found.of("gmo").correction is None
     assert not best.by_fit  # the free cycles are known
-    plain, off = automatic.motion.log.terms, best.log.terms
-    assert best.of(automatic.motion.log) is best.log  # made once
+    plain, off = automatic.motion.log.terms, best.of(best.motion.log).terms
+    assert best.of(automatic.motion.log) is best.of(best.motion.log)  # made once
     np.testing.assert_allclose(plain.mu - off.mu, best.correction.bias, atol=1e-9)
     np.testing.assert_array_equal(plain.p, off.p)
     assert rmse(automatic, "best") < 0.6 * rmse(automatic, "rts-auto")

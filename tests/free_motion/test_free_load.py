@@ -14,6 +14,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import gain_sd
+from vftcli.signals.arrays import rms_of_known
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 
@@ -89,8 +90,10 @@ def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
     rms, weight = {}, load_regressor(ROBOT.chain, log.q) @ PAYLOAD
     for name, found in (("plain", plain), ("loaded", loaded), ("blind", blind)):
         observer = tune_to_spectra("rts-auto", found.spectra)
-        reading = free_reading(found, observer, observer.estimate(found.log.terms))
-        rms[name] = reading.rms[moving]
+        reading = free_reading(
+            found, observer, observer.estimate(found.of(found.motion.log).terms)
+        )
+        rms[name] = rms_of_known(reading.samples)[moving]
         if found is loaded:
             # what the arm carries is in the estimate, free part and all
             mean = reading.estimate.tau.mean(axis=0)

@@ -19,7 +19,7 @@ from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
 from vftcli.observers.tuning import Goal, tune_all
 from vftcli.robots.run import LONG, Run, RunSamples
-from vftcli.signals.arrays import Array, Mask, rms_of_known
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
@@ -68,11 +68,6 @@ class Baseline:
             self._made.clear()
 
     @property
-    def log(self) -> Run:
-        """The log, as the observers have it."""
-        return self.of(self.motion.log)
-
-    @property
     def tunable(self) -> Spectra | None:
         """The spectra if gains may come from them, else None.
 
@@ -96,7 +91,7 @@ class Baseline:
 
     def measured(self, part: FreePart) -> Spectra:
         """The spectra of the log outside of the free part, and of the free samples."""
-        return spectra_of(RunSamples(self.log, ~part.own), self.samples)
+        return spectra_of(RunSamples(self.of(self.motion.log), ~part.own), self.samples)
 
     @property
     def pieces(self) -> tuple[RunSamples, ...]:
@@ -178,11 +173,6 @@ class FreeReading(NamedTuple):
     samples: Array
     resting: Mask  #: Whether a joint rests in them. (S, n)
 
-    @property
-    def rms(self) -> Array:
-        """Root mean square of free samples, with bias; NaN without any. (n,)"""
-        return rms_of_known(self.samples)
-
 
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
     """An observer's run along the free pieces; on the log it is its estimate."""
@@ -212,10 +202,12 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
         return Baselines(plain=found, best=found)
     if found.spectra is None and bias.fitted:
         found = on_quiet_samples(found, bias.free)
-    made = corrected(found, bias)
-    if motion.log is not as_read:
-        evened = motion.log.recording.source.remarks[-1:]
-        made = replace(made, on_correction=(*evened, *made.on_correction))
+    evened = () if motion.log is as_read else motion.log.recording.source.remarks[-1:]
+    fitted = bias if bias.fitted else None
+    made = replace(found, on_correction=(*evened, *bias.remarks), correction=fitted)
+    # Off where the guards of the fit apply any of it.
+    if bias.applied.any() and made.part is not None and made.spectra is not None:
+        made = replace(made, spectra=made.measured(made.part))
     return Baselines(plain=made if choice.corrects_all else found, best=made)
 
 
@@ -233,12 +225,3 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
         return replace(made, spectra=made.measured(part))
     except ParameterError:  # all of it or nothing is assumed free, or never long enough
         return found
-
-
-def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
-    """A baseline with the bias of the whole log off, where its guards apply any of it."""
-    fitted = bias if bias.fitted else None
-    made = replace(found, on_correction=bias.remarks, correction=fitted)
-    if not bias.applied.any() or made.part is None or made.spectra is None:
-        return made
-    return replace(made, spectra=made.measured(made.part))

@@ -1,8 +1,6 @@
 """From a log's baseline to finished estimates: bands, and what limits them.
 
-Bands come from the log's own free samples and spectra, without a reference. They say the
-expected error of an estimate: the rms of their standard deviation over the log, averaged
-over the joints.
+Bands come from the log's own free samples and spectra, without a reference.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +18,7 @@ from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, Spectra, error_b
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
 from vftcli.robots.friction import HELD, ONE_STOP
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over, rms_of_known
 from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
@@ -33,23 +31,29 @@ SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
 
 
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
-    """The estimate with its band, marked in motion; itself if nothing is known.
-
-    The band is `vftcli.observers.spectra`'s: a filter's own covariance, `sd`, knows no lag.
-    """
+    """The estimate with its band, marked in motion; itself if nothing is known."""
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
+    called = fitted_error(found, reading)
     if spectra is not None and len(reading.samples):
         f, step, n = spectra.frequency, spectra.step, spectra.joints
         missed = spectra.missed(reading.observer.frequency_response(f, step, n))
-        sd = error_band(known_error(found, reading), missed, run.rests, found.correction_sd)
+        error = free_error(reading.samples, reading.resting, run.dry_friction)
+        if called is not None and found.by_fit:
+            error = called  # the free part is these samples, and loads in them are no error
+        elif called is not None:
+            # They count too, as a stated part is short and often at rest: the larger of both.
+            moving = np.maximum(error.moving, called.moving)
+            resting = np.maximum(error.resting, called.resting)
+            error = FreeError(moving, resting, unseen=error.unseen & called.unseen)
+        sd = error_band(error, missed, run.rests, found.correction_sd)
     elif estimate.name == BEST:
-        sd = stated_band(found, reading)
+        sd = stated_band(found, called)
     else:
         return estimate
     return replace(estimate, error_sd=handed_over(sd), moving=run.moving)
 
 
-def stated_band(found: Baseline, reading: FreeReading) -> Array:
+def stated_band(found: Baseline, called: FreeError | None) -> Array:
     """Band of `best` without spectra, by the robot's own numbers. (T, n) [N·m]
 
     Friction is wrong by a fifth, as is usual (`model_error.expected_error`); with a
@@ -59,7 +63,6 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
     """
     run = found.motion.log
     friction, nothing = run.dry_friction, np.zeros_like(run.dry_friction)
-    called = fitted_error(found, reading)
     if called is not None:
         return error_band(called, nothing, run.rests, found.correction_sd)
     held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
@@ -72,23 +75,6 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
     columns = error_columns(run, motion, friction_alone(run.robot), stride)
     spread = np.column_stack([np.sqrt(np.sum(column**2, axis=1)) for column in columns])
     return error_band(held, nothing, run.rests, resample_columns(t, t[::stride], spread))
-
-
-def known_error(found: Baseline, reading: FreeReading) -> FreeError:
-    """An estimator's reading without contact, as far as the log shows it.
-
-    Samples that a fitted bias calls free count too, as a stated part is short and often
-    at rest: the larger of both.
-    """
-    stated = free_error(reading.samples, reading.resting, found.motion.log.dry_friction)
-    called = fitted_error(found, reading)
-    if called is None:
-        return stated
-    if found.by_fit:  # the free part is these samples, and the loads in them are no error
-        return called
-    moving = np.maximum(stated.moving, called.moving)
-    resting = np.maximum(stated.resting, called.resting)
-    return FreeError(moving, resting, unseen=stated.unseen & called.unseen)
 
 
 def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
@@ -137,7 +123,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     """
     f, step, n = spectra.frequency, spectra.step, spectra.joints
     response = reading.observer.frequency_response(f, step, n)
-    read = reading.rms**2
+    read = rms_of_known(reading.samples) ** 2
     share = abs(response) ** 2
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
     velocity = np.concatenate([piece.run.dq[piece.inside] for piece in found.pieces])

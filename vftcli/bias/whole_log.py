@@ -122,7 +122,14 @@ def whole_log_bias(run: Run) -> WholeLogBias:
             fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot)[0])
             tried = guarded(fit, motion.dq[::stride])
             if span < LEAST_MOTION:
-                tried = tried._replace(weight=weight_of_friction(fit, tried))
+                if tried.solution is not None:
+                    # A hand that leads the arm looks like less friction: they differ in size
+                    # and in foresight.
+                    torque = np.mean(fit.rows.modelled(tried.solution.model) ** 2, axis=0)
+                    usual = np.array([np.sum(c**2, axis=1).mean() for c in columns])
+                    worst = np.sqrt(torque / np.maximum(usual, np.finfo(float).tiny)).max()
+                    clear = faded(tried.share, CLEAR, UNCLEAR)
+                    tried = tried._replace(weight=faded(worst, USUAL, LED) * clear)
                 if not tried.weight.any():
                     return untouched(terms, caution("whole-log-friction-unclear", motion_s=span))
             found = bias_of(run, motion, expected, fit, tried, stride)
@@ -134,19 +141,6 @@ def whole_log_bias(run: Run) -> WholeLogBias:
         return found
     shorter = fact("whole-log-friction-alone", motion_s=span, least_s=LEAST_MOTION)
     return replace(found, remarks=(shorter, *found.remarks))
-
-
-def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
-    """Share of a fit of friction alone that each joint of a short log gets. (n,)
-
-    A hand that leads the arm looks like less friction: they differ in size and in foresight.
-    """
-    if tried.solution is None:
-        return tried.weight
-    found = np.mean(fit.rows.modelled(tried.solution.model) ** 2, axis=0)
-    usual = np.array([np.sum(column**2, axis=1).mean() for column in fit.rows.columns])
-    worst = np.sqrt(found / np.maximum(usual, np.finfo(float).tiny)).max()
-    return faded(worst, USUAL, LED) * faded(tried.share, CLEAR, UNCLEAR)
 
 
 def motion_of(run: Run) -> tuple[float, Remark | None]:
