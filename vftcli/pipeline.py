@@ -79,8 +79,8 @@ class AnalysisChoice:
     @property
     def looks_back(self) -> bool:
         """Whether anything needs the complete log and its free part."""
-        asked = self.refinement.corrects_all or self.free.is_asked
-        return asked or self.observers.from_spectra
+        asked = self.free.is_given or self.free.period is not None
+        return asked or self.refinement.corrects_all or self.observers.from_spectra
 
     @property
     def lists_contacts(self) -> bool:

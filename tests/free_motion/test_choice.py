@@ -19,7 +19,7 @@ def test_a_span_of_free_is_the_free_part_and_a_log_may_hold_a_colon() -> None:
 def test_what_counts_as_given() -> None:
     assert not FreeChoice().is_given
     assert not FreeChoice(period=4.0).is_given
-    assert FreeChoice(period=4.0).is_asked
+    assert FreeChoice(period=4.0).period == 4.0
     for choice in ({"logs": (Path("a"),)}, {"spans": ((0.0, 1.0),)}, {"cycles": (1,)}):
         assert FreeChoice(**choice).is_given  # type: ignore[arg-type]
 

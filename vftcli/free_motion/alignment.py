@@ -53,7 +53,16 @@ def align(recording: Recording, free: Recording) -> Alignment:
     contacts, refines shift and ratio of rates on the logs' clocks. Of a motion's whole
     periods the shift with most overlap wins.
     """
-    check_same_arm(recording, free)
+    problem, hints = "", (free.robot_hint, recording.robot_hint)
+    if free.joints != recording.joints:
+        problem = f"has {free.joints} joints, {recording.name} has {recording.joints}"
+    elif None not in hints and hints[0] != hints[1]:
+        problem = f"is a log of {hints[0]}, {recording.name} of {hints[1]}"
+    if problem:
+        raise ReferenceTorqueError(
+            f"{free.name} {problem}: a free run must be of the same arm; give another log with "
+            "--free"
+        )
     closest = aligned_at(recording, free, *best_fit(recording, free))
     fits = closest.deviation <= SAME_TRAJECTORY
     found = closest if fits else shared_part(recording, free)
@@ -123,20 +132,6 @@ def pace(recording: Recording) -> float | None:
     power = np.sum(by_position**2)
     along = np.sum(by_position * by_velocity)
     return along / power if power > 0.0 and along > 0.0 else None
-
-
-def check_same_arm(recording: Recording, free: Recording) -> None:
-    """Raise a ReferenceTorqueError if two logs cannot be of one arm."""
-    problem, hints = "", (free.robot_hint, recording.robot_hint)
-    if free.joints != recording.joints:
-        problem = f"has {free.joints} joints, {recording.name} has {recording.joints}"
-    elif None not in hints and hints[0] != hints[1]:
-        problem = f"is a log of {hints[0]}, {recording.name} of {hints[1]}"
-    if problem:
-        raise ReferenceTorqueError(
-            f"{free.name} {problem}: a free run must be of the same arm; give another log with "
-            "--free"
-        )
 
 
 def shared_part(recording: Recording, free: Recording) -> Alignment | None:

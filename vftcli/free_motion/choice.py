@@ -117,11 +117,6 @@ class FreeChoice(Choice):
         """Whether the user stated the free part; then it is not doubted."""
         return bool(self.logs or self.spans or self.cycles)
 
-    @property
-    def is_asked(self) -> bool:
-        """Whether any free motion, or the period of one, is named."""
-        return self.is_given or self.period is not None
-
     @classmethod
     def parsed(
         cls,

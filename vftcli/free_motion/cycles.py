@@ -63,7 +63,17 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     """
     t, q = moving_part(recording)
     step, duration = recording.median_step, t[-1] - t[0]
-    check_stated(recording, stated, duration)
+    if stated is not None and stated > (1.0 - LEAST_REPEATED) * duration:
+        raise ReferenceTorqueError(
+            f"{recording.name}: a period of {stated:g} s does not fit into the {duration:.4g} s "
+            "the arm moves, which must hold more than one cycle; give a shorter "
+            "two-cycle.period, or in its place a free run in another log with --free"
+        )
+    if stated is not None and stated < 4.0 * step:
+        raise ReferenceTorqueError(
+            f"{recording.name}: a period of {stated:g} s is shorter than four samples "
+            f"({step:g} s each); two-cycle.period is in seconds"
+        )
     if duration > SPARSE * step * len(t):
         raise ReferenceTorqueError(
             f"{recording.name}: {len(t)} samples over {duration:.4g} s: nearly all of that is "
@@ -93,23 +103,6 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
         f"the log{near if np.isfinite(deviation) else ''}; give a free run of the same motion "
         "with --free"
     )
-
-
-def check_stated(recording: Recording, stated: float | None, duration: float) -> None:
-    """Raise unless a stated period fits into the moving part of the log."""
-    if stated is None:
-        return
-    if stated > (1.0 - LEAST_REPEATED) * duration:
-        raise ReferenceTorqueError(
-            f"{recording.name}: a period of {stated:g} s does not fit into the {duration:.4g} s "
-            "the arm moves, which must hold more than one cycle; give a shorter "
-            "two-cycle.period, or in its place a free run in another log with --free"
-        )
-    if stated < 4.0 * recording.median_step:
-        raise ReferenceTorqueError(
-            f"{recording.name}: a period of {stated:g} s is shorter than four samples "
-            f"({recording.median_step:g} s each); two-cycle.period is in seconds"
-        )
 
 
 def moving_part(recording: Recording) -> tuple[Array, Array]:
@@ -225,8 +218,9 @@ def segment(recording: Recording, period: Period) -> Cycles:
     """
     t, q = moving_part(recording)
     seconds = period.seconds
-    alone = (t + seconds > t[-1]) & (t - seconds < t[0])
-    on_path = alone | comes_back(t, q, seconds) | comes_back(t, q, -seconds)
+    on_path = (t + seconds > t[-1]) & (t - seconds < t[0])
+    for shift in (seconds, -seconds):
+        on_path |= abs(resample_columns(t + shift, t, q, np.nan) - q).max(axis=1) <= ON_PATH
     begin = settled(t, on_path, seconds)
     end = -settled(-t[::-1], on_path[::-1], seconds)
     cycles = Cycles(seconds, begin, end)
@@ -236,12 +230,6 @@ def segment(recording: Recording, period: Period) -> Cycles:
             f"the period of {seconds:.4g} s; give a free run of the same motion with --free"
         )
     return cycles
-
-
-def comes_back(t: Array, q: Array, shift: float) -> Mask:
-    """Whether the arm is at this place `shift` seconds away. (T,)"""
-    distance = abs(resample_columns(t + shift, t, q, np.nan) - q).max(axis=1)
-    return np.asarray(distance <= ON_PATH)
 
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:

@@ -111,10 +111,6 @@ class Difference(NamedTuple):
         low_pass = "" if self.cutoff is None else f" + {self.cutoff:g} Hz low-pass"
         return fact(code, rung=f"{self.rung}{low_pass}", **values)
 
-    def floor_remark(self) -> Remark:
-        """The floor on this rung."""
-        return self.remark("alignment-floor", floor_Nm=self.error.floor)
-
 
 def differences(
     motion: Run,
@@ -175,9 +171,9 @@ def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
     steps = iter(made)
     chosen = next(steps)
     lowest, trusted, least = chosen.error.floor_moving, chosen.error.trusted_joints, 1.0
-    floors = [chosen.floor_remark()]
+    floors = [chosen.remark("alignment-floor", floor_Nm=chosen.error.floor)]
     for candidate in steps:
-        floors.append(candidate.floor_remark())
+        floors.append(candidate.remark("alignment-floor", floor_Nm=candidate.error.floor))
         share = (candidate.error.floor_moving / lowest)[trusted].mean()
         if share < WORTH * least:
             chosen, least = candidate, share
