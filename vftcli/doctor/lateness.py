@@ -6,7 +6,7 @@ numbers a joint: the model's own torque, dry and viscous friction, and rotor ine
     ∫φ τ(t + lag) = c₁ ∫(−φ' p − φ (Cᵀq̇ − g)) + c₂ ∫φ tanh(q̇/ε) + c₃ ∫φ q̇ − c₄ ∫φ' q̇.
 
 Differences of neighbouring windows are fitted at every lag, joint by joint: slow changes,
-such as a load's, drop out. Turns of the motion show the lag.
+such as a load's, drop out.
 """
 
 from collections.abc import Iterator
@@ -22,7 +22,6 @@ from vftcli.signals.arrays import Array, Indices, Mask, root_mean_squares
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, on_joints, warning
 from vftcli.signals.rest import MOVES
-from vftcli.signals.series import median_step
 
 WINDOW = 0.15  #: Length of a window; the next begins in its middle. [s]
 #: Most windows; neighbours in a block; a joint's least.
@@ -149,7 +148,12 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
         return None
     length = max(8, round(WINDOW / step))
     lags = np.unique(np.round(np.arange(EARLIEST, LATEST + STEP / 2, STEP) / step).astype(int))
-    starts = window_starts(t, length, lags[0], lags[-1])
+    # On an even clock at every lag; the first lag is negative.
+    starts = np.arange(-lags[0], len(t) - length - lags[-1], max(1, length // 2))
+    starts = starts[spread(len(starts), WINDOWS, BLOCK)]
+    whole = t[starts + length + lags[-1]] - t[starts + lags[0]]
+    usual = (length + lags[-1] - lags[0]) * step
+    starts = starts[(whole > 0.8 * usual) & (whole < 1.2 * usual)]
     if len(starts) < LEAST:
         return None
     rows = starts[:, None] + np.linspace(0, length, min(length, INSIDE) + 1).round().astype(int)
@@ -178,18 +182,6 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
         moves=(np.maximum(speed[1:], speed[:-1]) > MOVES)[pairs],
         effort=np.stack([np.convolve(column, hann, "valid") for column in effort[1].T], axis=1),
     )
-
-
-def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
-    """First samples of windows on an even clock at every lag. (W,)
-
-    The clock is t (T,) [s]; lags are in samples, the first negative.
-    """
-    starts = np.arange(-earliest, len(t) - length - latest, max(1, length // 2))
-    starts = starts[spread(len(starts), WINDOWS, BLOCK)]
-    whole = t[starts + length + latest] - t[starts + earliest]
-    usual = (length + latest - earliest) * median_step(t)
-    return starts[(whole > 0.8 * usual) & (whole < 1.2 * usual)]
 
 
 def rest_of(model: Array, effort: Array) -> Array:

@@ -4,8 +4,7 @@ Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, sin
 ṗ = Cᵀq̇ − g + τ: no acceleration is differentiated. Gravity is a matrix times the
 direction "up", which can be fitted.
 
-Least squares set contact aside, with terms that cannot be negative. A round of trimming
-only sums the normal equations of the kept windows.
+Least squares set contact aside, with terms that cannot be negative.
 """
 
 from collections.abc import Sequence
@@ -17,7 +16,7 @@ import numpy as np
 
 from vftcli.doctor.signals import TRAVEL
 from vftcli.robots import Robot
-from vftcli.robots.chain import Chain, link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.robots.kernels import load_regressor, momentum_terms, usual_errors
 from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_mean_squares
 from vftcli.signals.least_squares import inverse_of
@@ -148,10 +147,15 @@ class Windows:
     def gravity(self) -> Array:
         """Torque that holds the arm, by the components of "up". (W, n, 3) [N·m]
 
-        The third axis of "up" is the robot file's own.
+        It is linear in "up", with the robot file's own direction as third axis.
         """
-        few = self.q[:, GRAVITY]
-        held = gravity_by_up(self.robot.loaded_chain, few.reshape(-1, few.shape[2]))
+        few, chain = self.q[:, GRAVITY], self.robot.loaded_chain
+        R, origins = (x[:, :-1] for x in link_poses(chain, few.reshape(-1, few.shape[2])))
+        mass = chain.mass[:, None]
+        moments = mass * (origins + np.einsum("tjab,jb->tja", R, chain.com))
+        # A joint carries every link from its own to the last.
+        carried, masses = (np.flip(np.flip(x, -2).cumsum(axis=-2), -2) for x in (moments, mass))
+        held = np.cross(R[..., 2], carried - masses * origins) @ up_axes(chain.gravity)
         return np.asarray(np.einsum("k,wk...->w...", SIMPSON, held.reshape(*few.shape, 3)))
 
     @cached_property
@@ -217,19 +221,6 @@ def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
     rise = (value[1:] + value[:-1]) / 2 * np.diff(t)[:, None]
     area = np.vstack([np.zeros(value.shape[1]), rise.cumsum(axis=0)])
     return np.asarray((area[last] - area[first]) / (t[last] - t[first])[:, None])
-
-
-def gravity_by_up(chain: Chain, q: Array) -> Array:
-    """Holding torque at poses q (N, n) [rad] by components of "up". (N, n, 3) [N·m]
-
-    It is linear in "up"; its third axis is the chain's own, −gravity.
-    """
-    R, origins = (each[:, :-1] for each in link_poses(chain, q))
-    mass = chain.mass[:, None]
-    moments = mass * (origins + np.einsum("tjab,jb->tja", R, chain.com))
-    # A joint carries every link from its own to the last.
-    carried, masses = (np.flip(np.flip(x, -2).cumsum(axis=-2), -2) for x in (moments, mass))
-    return np.cross(R[..., 2], carried - masses * origins) @ up_axes(chain.gravity)
 
 
 def up_axes(gravity: Array) -> Array:

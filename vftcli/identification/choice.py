@@ -11,11 +11,7 @@ METHODS = ("friction", "base", "targets", "payload", "gains")
 
 
 class Task(Choice):
-    """Method and settings of an identification.
-
-    Raises:
-        ParameterError: If the method is unknown, or has no use for a setting.
-    """
+    """Method and settings of an identification."""
 
     #: Of `METHODS`; None: friction, or base without the arm's own links.
     method: Annotated[

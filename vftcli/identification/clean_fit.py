@@ -131,8 +131,7 @@ def fitted_dry_friction(log: PreparedLog, fits: Mapping[int, JointFit]) -> Array
 def links_explain(data: Training, fits: Mapping[int, JointFit]) -> Array:
     """Rest of the profile's links over free ones', heavy joints. (h,) [1]
 
-    All inertial parameters are free, physical or not; the friction's structure is fixed. The
-    rest is this log's noise.
+    All inertial parameters are free, physical or not; the friction's structure is fixed.
     """
     joints = range(data.robot.joints)
     shapes = tuple(fits[j].shape if j in fits else Shape(()) for j in joints)

@@ -1,7 +1,7 @@
 r"""The links' parameters by least squares, and the nearest physical links.
 
-Only the R factor of the stacked equations' QR decomposition is kept, chunk by chunk: memory
-does not grow with the log. Motion shows only base parameters, combinations of the inertial.
+Of the stacked equations only the R factor is kept, chunk by chunk. Motion shows only base
+parameters, combinations of the inertial.
 
 A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
 

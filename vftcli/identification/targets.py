@@ -180,7 +180,8 @@ def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
     for recording in (motion.recording for motion in log.logs):
         names, t = ("target_current", "target_torque"), recording.t
         current, moment = (recording.require(name)[:, j] for name in names)
-        step = resolution(current)
+        steps = np.diff(np.unique(current.round(9)))
+        step = steps.min() if steps.size else 0.0  # its digits
         for start, stop in runs_of(~np.any(faster(recording.require("dq"), NONZERO), axis=1)):
             first, last = t[start] + SETTLE, t[stop - 1] - SETTLE
             inside = slice(t.searchsorted(first, side="right"), t.searchsorted(last))
@@ -196,12 +197,6 @@ def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
     rounding = abs(value) * steps.max() / np.sqrt(12.0)
     sd = np.hypot(rounding, np.std(m - value * i)) / np.sqrt(i @ i)
     return Estimate(value, sd, value > 0 and sd <= CONSTANT_KNOWN * value)
-
-
-def resolution(values: Array) -> float:
-    """Smallest step between two values of a signal: its digits."""
-    steps = np.diff(np.unique(values.round(9)))
-    return steps.min() if steps.size else 0.0
 
 
 def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:

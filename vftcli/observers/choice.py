@@ -48,11 +48,7 @@ def source_of(source: str | Path) -> "str | Path | Goal":
 
 
 class ObserverChoice(Choice):
-    """Observers to run, and their gains.
-
-    Raises:
-        ParameterError: If there is no such observer, or none of those named could run online.
-    """
+    """Observers to run, and their gains."""
 
     GROUP = ESTIMATE
 

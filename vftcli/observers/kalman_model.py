@@ -221,9 +221,17 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
     starts = np.stack(guess)[..., None].repeat(blocks, axis=2)
     starts[..., 0] = entering
     if blocks > 1:
-        guessed = starts.copy()
-        end, phi, information = block_response(model, Covariance(*guessed))
-        (o11, o12), (_, o22) = information
+        guessed, P = starts.copy(), Covariance(*starts)
+        information, phi = np.zeros((2, 2, 2, *P.p11.shape))
+        phi[0, 0] = phi[1, 1] = 1.0
+        for step in map(Discrete._make, zip(*model, strict=True)):
+            gains = update(predict(P, step), step.r)
+            P = gains.posterior
+            u = phi[0] + step.a12 * phi[1]
+            information += u[:, None] * u / gains.S
+            phi[0] = step.r / gains.S * u
+            phi[1] = step.a22 * phi[1] - gains.l2 * u
+        end, ((o11, o12), (_, o22)) = np.stack(P), information
         # After k rounds the first k blocks are exact; it mostly ends long before.
         for _ in range(blocks):
             # A start changed by Δ: X = Δ(I + OΔ)⁻¹ in full.
@@ -243,20 +251,6 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
         each.append(update(predict(P, step), step.r))
         P = each[-1].posterior
     return Gains(*map(np.stack, zip(*each, strict=True)))
-
-
-def block_response(model: Discrete, P: Covariance) -> tuple[Array, Array, Array]:
-    """Posterior at blocks' ends, Φ, O. (3, n, blocks), (2, 2, n, blocks) × 2"""
-    information, phi = np.zeros((2, 2, 2, *P.p11.shape))
-    phi[0, 0] = phi[1, 1] = 1.0
-    for step in map(Discrete._make, zip(*model, strict=True)):
-        gains = update(predict(P, step), step.r)
-        P = gains.posterior
-        u = phi[0] + step.a12 * phi[1]
-        information += u[:, None] * u / gains.S
-        phi[0] = step.r / gains.S * u
-        phi[1] = step.a22 * phi[1] - gains.l2 * u
-    return np.stack(P), phi, information
 
 
 def kalman_steps(

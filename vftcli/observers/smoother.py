@@ -102,7 +102,7 @@ class KalmanSmoother(Shown):
     def tuning(self, step: float, joints: int) -> Tuning:
         """Meaning of the parameters: no delay, −3 dB at |H_KFO|² = 1/√2.
 
-        Q_τ/(Q_τ + Q_pω² + Rω⁴) = 1/√2 at the effective densities, with the filter's ω_n and ζ.
+        Q_τ/(Q_τ + Q_pω² + Rω⁴) = 1/√2 at the effective densities.
         """
         causal = self.filter.tuning(step, joints)
         # In units of ω_n: x⁴ + c x² + 1 = √2 with c = Q_p/√(Q_τR) = 4ζ² − 2.

@@ -82,7 +82,7 @@ class Spectra:
     def excess(self) -> Array:
         """(S_d − S_n)₊, the excess of the loaded part. (F, n) [(N·m)²/Hz]
 
-        The difference is averaged over neighbouring frequencies first: chance has both signs.
+        Averaged over neighbouring frequencies first: chance has both signs.
         """
         return handed_over(np.maximum(neighbour_mean(self.loaded - self.free), 0.0))
 

@@ -134,10 +134,6 @@ class LogSpectra(NamedTuple):
     #: The gains from `plain`, in the form of a gains file.
     gains: Gains | None = None
 
-    def under(self, name: str) -> "Spectra | None":
-        """The spectra of the terms that the observer of this name uses."""
-        return self.best if name == BEST else self.plain
-
 
 class Setup(NamedTuple):
     """Parts of an observer before its build."""
@@ -241,7 +237,8 @@ def build_auto(setup: Setup, name: str) -> Built:
     """An observer with the log's gains, else those set by hand, as densities."""
     from vftcli.observers.tuning import AutoTuned, tune_to_spectra
 
-    if (spectra := setup.shown.under(name)) is not None:
+    spectra = setup.shown.best if name == BEST else setup.shown.plain
+    if spectra is not None:
         return tune_to_spectra(name, spectra), ()
     by_hand = build_kfo if name == "kfo-auto" else build_rts
     observer, remarks = by_hand(read_as("density", setup), "kfo-zoh")

@@ -122,7 +122,7 @@ def refuse_mostly_gap(t: Array, step: float) -> None:
 def butterworth(step: float, cutoff: float | tuple[float, float], order: int = ORDER) -> Array:
     """Second-order sections of a Butterworth filter of even order. (S, 6)
 
-    A low pass has one cutoff, a band pass two edges [Hz]; the order is that of either side.
+    A low pass has one cutoff, a band pass two edges [Hz].
     """
     if not (np.all(np.asarray(cutoff) > 0) and np.all(np.asarray(cutoff) < 0.5 / step)):
         raise ParameterError(
@@ -168,7 +168,7 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
 
     Nothing is detrended. Each unbroken stretch (N, n) is mirrored at its ends by half a
     segment of `size` samples (even), so that its first and last samples count like all
-    others: a free part is often no longer. It counts by its length, one shorter than a
+    others. It counts by its length, one shorter than a
     segment also by its share that is no mirror image. The density at
     ``numpy.fft.rfftfreq(size, step)`` is by Hz. (size/2 + 1, n)
     """

@@ -1,6 +1,6 @@
 """Lag of one series behind another: the shift of their best fit.
 
-The late series comes first, the early one second; at a positive lag the first runs behind.
+The late series comes first; at a positive lag it runs behind.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,6 @@
 """Optional packages: loaded when needed; an error names a missing one.
 
-They are dependencies or extras. Estimation, errors, contacts and pages need none of them;
-docs/outputs.md says what each is for.
+Estimation, errors, contacts and pages need none of them.
 """
 
 import sys

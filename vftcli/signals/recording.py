@@ -273,7 +273,7 @@ class Recording(TimeSeries):
     ) -> "Recording":
         """The recording with its effort as a `kind` of `EFFORTS`, and no other.
 
-        `source` is the log's effort to use; None for the one of that name, or the only one.
+        `source` is the log's effort to use, None for that kind or the only one.
         """
         there = [name for name in EFFORTS if getattr(self, name) is not None]
         source = source or (kind if kind in there else None)
@@ -308,10 +308,7 @@ class Recording(TimeSeries):
 
 
 def trim() -> None:
-    """Give free memory back to the system, where the C library has a call for it.
-
-    Otherwise it keeps what lies between arrays in use: a long log's report held a tenth more.
-    """
+    """Give free memory back to the system, where the C library has a call for it."""
     import ctypes
 
     with suppress(AttributeError, OSError, TypeError):

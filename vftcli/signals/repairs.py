@@ -135,10 +135,7 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
 
 
 def at_an_end(x: Array, limit: Array) -> Array:
-    """The first samples, drawn to a line through those of the log's end.
-
-    Slope and places are medians: one bad sample moves them by less than the others' spread.
-    """
+    """The first samples, drawn to a line of median slope and place through the log's end."""
     slope = np.median(np.diff(x, axis=0), axis=0)
     level = x - np.arange(len(x))[:, None] * slope
     line = [np.median(np.delete(level, k, axis=0), axis=0) + k * slope for k in range(NEAR)]

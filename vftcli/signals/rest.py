@@ -57,7 +57,7 @@ def standing(t: Array, dq: Array) -> Mask:
 def resting(t: Array, dq: Array) -> Mask:
     """Where a joint is slower than `REST` in most of the time around. (T, n)
 
-    Unlike `standing` it has no shortest stop: it parts friction at rest from that in motion.
+    Unlike `standing` it has no shortest stop.
     """
     first = t.searchsorted(t - AROUND, side="left")
     last = t.searchsorted(t + AROUND, side="right")

@@ -46,7 +46,7 @@ def gaps_of(t: Array, steps: float) -> Indices:
 def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None) -> Array:
     """Columns of `x`, known at `t`, interpolated linearly to the times `at`. (S, n)
 
-    Before the first and after the last known time they are `outside`; None holds the ends.
+    Beyond the known times they are `outside`; None holds the ends.
     """
     out = empty_series(len(at), x.shape[1])
     for column, known in zip(out.T, x.T, strict=True):

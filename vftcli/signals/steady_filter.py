@@ -59,7 +59,14 @@ def steady_filter(
         x = np.empty((n, count + 1, state.shape[1]))
         x[:, 0] = state
         np.matmul(inputs, ends, out=x[:, 1:])
-        sum_by_doubling(x, powers[:, BLOCK])
+        # x_b ← x_b + R x_{b−1} over all blocks in place.
+        reach, apart = powers[:, BLOCK].transpose(0, 2, 1), 1
+        while apart < x.shape[1] and abs(reach).max() > FORGOTTEN:
+            # numpy.matmul is slow at states of one number.
+            one = reach.shape[1] == 1
+            x[:, apart:] += x[:, :-apart] * reach if one else x[:, :-apart] @ reach
+            reach = reach @ reach
+            apart *= 2
         for j in range(n):
             rows = answer[j, :covered].reshape(count, BLOCK)
             np.matmul(inputs[j], toeplitz[j], out=rows)
@@ -94,16 +101,6 @@ def blocks_of(F: Array, g: Array, wanted: Array) -> tuple[Array, Array, Array, A
     toeplitz = impulse[:, BLOCK - 1 + at[None, :] - at[:, None]]
     carry = (wanted[:, None, None] @ powers[:, 1:])[:, :, 0].transpose(0, 2, 1).copy()
     return toeplitz, np.ascontiguousarray(response[:, ::-1]), carry, powers
-
-
-def sum_by_doubling(x: Array, R: Array) -> None:
-    """Run x_b ← x_b + R x_{b−1} over all blocks in place: x (n, B, m), R (n, m, m)."""
-    reach, apart = R.transpose(0, 2, 1), 1
-    while apart < x.shape[1] and abs(reach).max() > FORGOTTEN:
-        # numpy.matmul is slow at states of one number.
-        x[:, apart:] += x[:, :-apart] * reach if len(R[0]) == 1 else x[:, :-apart] @ reach
-        reach = reach @ reach
-        apart *= 2
 
 
 class Fold(NamedTuple):

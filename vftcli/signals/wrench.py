@@ -173,7 +173,7 @@ class Wrench(TimeSeries):
     def size_sd(self) -> Array | None:
         """Standard deviation of |F|, the axes independent. (T,) [N]
 
-        Where there is no force it is the largest of the axes', since F may point anywhere.
+        Without a force it is the largest of the axes', since F may point anywhere.
         """
         if self.sd is None:
             return None

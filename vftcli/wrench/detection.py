@@ -135,8 +135,7 @@ def match_contacts(
 ) -> Detection:
     """Found contacts, one to one with the true ones of a log of `duration` [s].
 
-    Beginning within `LATE` of a true contact's end is no false alarm, but gives credit only
-    with overlap; beginning too early is one, credited or not.
+    Beginning within `LATE` of a true contact's end is no false alarm, too early is one.
     """
     given, meant = assignment(found, true), [(c.start - EARLY, c.stop + LATE) for c in true]
     false = sum(not any(a <= f.start <= b for a, b in meant) for f in found)

@@ -96,10 +96,9 @@ def sense(
 ) -> SensorReading:
     """Wrenches of the estimates, in their order, less their zero, with remarks.
 
-    Questions to the log (its unloaded start, its sensor's pose, its vendor's convention) are
-    answered by the mean disturbance, hence independent of the observers. The smoother needs
-    the log with its free samples, by the robot's model alone (`plain`, found if not given)
-    or as an observer has its own, and a gate if there is one.
+    The unloaded start, the sensor's pose and the vendor's convention come from the mean
+    disturbance, whatever observers run. The smoother needs the log with its free samples, by
+    the robot's model alone (`plain`) or as an observer has its own.
     """
     log, q, t, chain = motion.log, motion.log.q, motion.log.t, motion.log.robot.chain
     disturbance = mean_disturbance(log.terms)
@@ -220,8 +219,8 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
 def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     """The raw disturbance, averaged over `HALF` around each sample. (T, n) [N·m]
 
-    No option changes it and no filter delays it. As a difference of its integral it weighs
-    an uneven clock by time; it is shorter at the log's ends, 0 for one sample.
+    As a difference of its integral it weighs an uneven clock by time. It is shorter at the
+    log's ends, 0 for one sample.
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
