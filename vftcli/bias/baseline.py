@@ -2,8 +2,7 @@
 
 The bias of the whole log (`vftcli.bias.whole_log`) comes off μ before an observer runs:
 for `best`, tuned on the spectra of the rest, and for the others if
-``bias.method=whole-log``. No log is refused: remarks say what is missing, and `best` is
-made of the rest.
+``bias.method=whole-log``.
 """
 
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,4 @@
-"""Methods: "friction" holds the maker's links, "base" frees them, "auto" chooses.
-
-Friction by method "targets" is made here too.
-"""
+"""Methods: "friction" holds the maker's links, "base" frees them, "auto" chooses."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress

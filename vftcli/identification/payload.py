@@ -246,9 +246,8 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from poses at rest, by torque beyond the robot's own gravity.
 
-    Stiction acts in every pose: the residual shows its size, many poses average it. The
-    model's errors and the drives' day are alike in all poses of a log: the difference of several
-    logs is part of the standard deviations, of one log what the links may be wrong by.
+    The model's errors and the drives' day are alike in all poses of a log: the difference of
+    several logs is part of the standard deviations, of one what the links may be wrong by.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))

@@ -91,7 +91,7 @@ class PreparedLog:
         return zero_phase(self.recording.t, signals, self.cutoff)[self.kept]
 
     def chunks(self) -> Iterator[slice]:
-        """Spans of 1024 samples: a whole log's regressor would not fit into memory."""
+        """Spans of 1024 samples, as a regressor needs much memory."""
         for start in range(0, self.samples, 1024):
             yield slice(start, start + 1024)
 

@@ -9,8 +9,7 @@ All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and
     KFO        νᵗ = eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹,  eᵗ = (1−L₁)νᵗ,  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
 
 from zero at the log's first sample. `kalman_model` holds A, Q, R and L, also on a clock
-that jitters, `as_printed` the printed variants. An observer runs over a block, as which
-it sees a whole log, and returns its state.
+that jitters, `as_printed` the printed variants.
 """
 
 from abc import abstractmethod

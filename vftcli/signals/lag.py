@@ -189,9 +189,6 @@ def overlapping(late: Array, early: Array, at: Indices) -> tuple[Array, Array, A
 
 
 def overlap_energy(series: Array, lags: Indices, other: int) -> Array:
-    """Sum of squares of what a series shares with one that it lags. (L,)
-
-    Without it a fit would favour small lags, which overlap longer.
-    """
+    """Sum of squares of what a series shares with one that it lags. (L,)"""
     total = summed(np.sum(series**2, axis=1))
     return total[np.minimum(len(series), other + lags)] - total[np.maximum(0, lags)]

@@ -10,7 +10,7 @@ and the free part's periodogram P fixes the three by Whittle's likelihood, Σ ln
 The smoother of a whole log uses b as it is (`torque_noise`). A list of contacts models it
 closer (`learn_noise`, `error_process`): learned without reversals, inflated by the tails,
 stiction drawn anew where a joint comes to rest. In both n has a share of the dry friction
-where a moving joint turns round, which may be of either sign there.
+where a moving joint turns round.
 
 References:
     P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.

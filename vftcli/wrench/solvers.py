@@ -75,10 +75,7 @@ Solver = Callable[[Array], tuple[Array, Array]]
 
 
 def pinv(parts: Decomposition, X: Array) -> Solver:
-    """Least squares (46), the pseudo-inverse of Jᵀ: unbounded as σ_min → 0.
-
-    It is unbiased; its covariance is the torque's, mapped by it.
-    """
+    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, unbounded as σ_min → 0."""
     gain = X @ least_squares_gain(parts)
     return lambda sd: (gain, gain * sd[:, None, :])
 
