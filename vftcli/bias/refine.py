@@ -104,7 +104,7 @@ class Budget(NamedTuple):
     """Sources of one observer's error, estimated on the log itself."""
 
     name: str  #: The observer.
-    parts: dict[str, Array]  #: Cause → root mean square. (n,) [N·m]
+    parts: dict[str, Array]  #: Cause → RMS. (n,) [N·m]
 
     @property
     def total(self) -> Array:

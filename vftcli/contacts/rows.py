@@ -86,7 +86,7 @@ class ContactLocation(NamedTuple):
     def spread(self, size: float) -> float:
         """Error of the size for the place, 0 of a contact at the wrist alone. [N]
 
-        Root mean square over the points that fit, weighted by likelihood.
+        RMS over the points that fit, weighted by likelihood.
         """
         if self.parts == ["wrist"] or not self.is_force:
             return 0.0

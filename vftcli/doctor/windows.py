@@ -59,12 +59,12 @@ class RobustFit(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Root mean square of the torque left over in the kept windows. [N·m]"""
+        """RMS of the torque left over in the kept windows. [N·m]"""
         return root_mean_square(self.rest[self.kept])
 
     @property
     def by_joint(self) -> Array:
-        """Root mean square of each joint's rest. (n,) [N·m]"""
+        """RMS of each joint's rest. (n,) [N·m]"""
         return root_mean_squares(self.rest[self.kept])
 
 
@@ -252,7 +252,7 @@ class Case:
 
     windows: Windows  #: The log's windows with the arm's model.
     given: Array  #: Mean of the effort, as torque, over each window. (W, n) [N·m]
-    size: float  #: Root mean square of the logged column. [N·m]
+    size: float  #: RMS of the logged column. [N·m]
     constant: Array  #: Torque per unit of the logged column. (n,)
     #: Direction "up" in axes with the robot file's own third. (3,)
     up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
@@ -316,7 +316,7 @@ class Case:
 
     @cached_property
     def effort_sizes(self) -> Array:
-        """Root mean square of each joint's effort, contact set aside. (n,) [N·m]"""
+        """RMS of each joint's effort, contact set aside. (n,) [N·m]"""
         return np.maximum(root_mean_squares(self.given[self.bare.kept]), 1e-9 * self.size)
 
     @cached_property

@@ -40,7 +40,7 @@ class Alignment(NamedTuple):
 
     shift: float  #: The other clock at this place is rate·t + shift. [s]
     rate: float  #: The other log's clock rate over this one's.
-    #: Root mean square of the position difference left, all joints. [rad]
+    #: RMS of the position difference left, all joints. [rad]
     deviation: float
     overlap: Mask  #: Samples with a partner in the other log. (T,)
 

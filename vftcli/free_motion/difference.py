@@ -57,23 +57,23 @@ class ErrorModel(NamedTuple):
 
     @property
     def floor(self) -> Array:
-        """Root mean square of `sd` over samples with a reference. (n,) [N·m]"""
+        """RMS of `sd` over samples with a reference. (n,) [N·m]"""
         return rms(self.sd, np.isfinite(self.sd))
 
     @property
     def floor_moving(self) -> Array:
-        """Root mean square of `sd` in motion; of all samples if mostly at rest. (n,) [N·m]"""
+        """RMS of `sd` in motion; of all samples if mostly at rest. (n,) [N·m]"""
         return self.rms_moving(self.sd)
 
     def rms_moving(self, x: Array) -> Array:
-        """Root mean square of a signal over `floor_moving`'s samples. (n,)"""
+        """RMS of a signal over `floor_moving`'s samples. (n,)"""
         moving = ~self.standing[self.known]
         used = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, moving, True)
         return rms(x[self.known], used)
 
     @property
     def floor_standing(self) -> Array:
-        """Root mean square of `sd` at rest, NaN if never at rest. (n,) [N·m]"""
+        """RMS of `sd` at rest, NaN if never at rest. (n,) [N·m]"""
         standing = self.standing & self.known[:, None]
         return np.where(standing.any(axis=0), rms(self.sd, standing), np.nan)
 
@@ -305,14 +305,14 @@ def at(chosen: Mask, x: Array) -> Array:
 
 
 def rms(x: Array, where: Mask) -> Array:
-    """Root mean square per column over chosen samples, over all if none. (n,)"""
+    """RMS per column over chosen samples, over all if none. (n,)"""
     # Column by column: copies of a long log take longer.
     chosen = (c[w] if w.any() else c for c, w in zip(x.T, where.T, strict=True))
     return np.sqrt([np.dot(column, column) / len(column) for column in chosen])
 
 
 def local_rms(x: Array, step: float) -> Array:
-    """Root mean square over a tenth of a second around each sample. (T, n)"""
+    """RMS over a tenth of a second around each sample. (T, n)"""
     width = max(1, round(0.05 / step))
     here = np.arange(len(x))
     first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))

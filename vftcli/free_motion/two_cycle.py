@@ -176,7 +176,7 @@ def measured_scale(
 
 
 def error_ratio(found: Difference, where: Mask) -> Array:
-    """Root mean square of a zero difference over its expected error. (n,)
+    """RMS of a zero difference over its expected error. (n,)
 
     Held between 0.3 and 3: beyond, the error model is not the cause.
     """

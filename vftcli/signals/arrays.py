@@ -128,12 +128,12 @@ def root_mean_square(x: Array) -> float:
 
 
 def root_mean_squares(x: Array) -> Array:
-    """Root mean square of each column of x (T, n), in its unit. (n,)"""
+    """RMS of each column of x (T, n), in its unit. (n,)"""
     return np.asarray(np.sqrt(np.mean(x**2, axis=0)))
 
 
 def rms_of_known(x: Array) -> Array:
-    """Root mean square of each column's finite samples (T, n), NaN without any. (n,)"""
+    """RMS of each column's finite samples (T, n), NaN without any. (n,)"""
     known = np.isfinite(x)
     count = np.count_nonzero(known, axis=0)
     total = np.sum(np.where(known, x, 0.0) ** 2, axis=0)
