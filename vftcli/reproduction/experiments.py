@@ -7,7 +7,6 @@ and figures show them.
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
 from functools import partial
 from html import escape
 from itertools import chain, product
@@ -17,6 +16,7 @@ import numpy as np
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import perform, run_tasks
+from vftcli.outputs.charts import Chart
 from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.page.shell import page
@@ -29,9 +29,7 @@ from vftcli.reproduction.paper import (
     FLOOR,
     Given,
     Paper,
-    RunResult,
     ShownItem,
-    gathered,
     paper_of,
 )
 from vftcli.reproduction.timing import computing_time
@@ -66,6 +64,8 @@ class Job(NamedTuple):
     seed: int  #: Of everything drawn.
 
 
+#: A job's results by variant and key.
+RunResult = dict[tuple[str, str], float | Chart | None]
 Result = RunResult | str  #: A job's results, or the one line of its failure.
 
 
@@ -82,9 +82,13 @@ def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
 
 def run_job(job: Job) -> RunResult:
     """A job's results; traces of the first seed alone."""
-    experiment = paper_of(job.paper).experiments[job.experiment]
-    made = gathered(RUNS[experiment.run](job.seed, **experiment.given))
-    return made if job.seed == experiment.seeds[0] else replace(made, charts={})
+    experiment, found = paper_of(job.paper).experiments[job.experiment], RunResult()
+    for variant, key, value in RUNS[experiment.run](job.seed, **experiment.given):
+        if not isinstance(value, Chart):
+            found[variant, key] = None if value is None else float(value)
+        elif job.seed == experiment.seeds[0]:
+            found[variant, key] = value
+    return found
 
 
 def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> dict[Job, Result]:
@@ -113,11 +117,12 @@ def gather(
     for name in names:
         item, values = paper.items[name], defaultdict[str, Any](lambda: defaultdict(list))
         own = [result for job, result in results.items() if job.experiment in item.experiments]
-        made = [result for result in own if isinstance(result, RunResult)]
+        made = [result for result in own if not isinstance(result, str)]
         for one, line in product(made, item.lines):
-            for variant, value in one.values.get(line.key, {}).items():
-                values[line.key][variant].append(value)
-        charts = [one.charts[name] for one in made if name in one.charts]
+            for (variant, key), value in one.items():
+                if key == line.key:
+                    values[key][variant].append(value)
+        charts = [x for x in (one.get(("", name)) for one in made) if isinstance(x, Chart)]
         chart = charts[0]._replace(key=name, title=item.traces) if charts else None
         failures = tuple(result for result in own if isinstance(result, str))
         found[name] = ShownItem(item, values, chart, failures)

@@ -4,7 +4,7 @@ A paper is a TOML file beside this one; all run and are shown alike.
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,32 +17,9 @@ from vftcli.signals.parsing import check_known
 #: Variants of a value: printed formulas; corrected ones; these with R and Q as densities;
 #: the reference's own error.
 AS_PRINTED, CORRECTED, DENSITY, FLOOR = "as printed", "corrected", "R density", "floor"
-#: Key of a line → variant → value, None where it did not happen.
-Values = dict[str, dict[str, float | None]]
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """Results of one run of an experiment."""
-
-    values: Values = field(default_factory=dict)  #: Its numbers.
-    charts: dict[str, Chart] = field(default_factory=dict)  #: Name of an item → its traces.
-
-
-#: One result: a variant, a line's key and its value; or "", an item's name, its traces.
+#: One result: a variant, a line's key and its value, None where it did not happen; or "",
+#: an item's name, its traces.
 Given = tuple[str, str, float | Chart | None]
-
-
-def gathered(given: Iterable[Given]) -> RunResult:
-    """The results of an experiment, collected."""
-    result = RunResult()
-    for variant, key, value in given:
-        if isinstance(value, Chart):
-            result.charts[key] = value
-        else:
-            number = None if value is None else float(value)
-            result.values.setdefault(key, {})[variant] = number
-    return result
 
 
 @dataclass(frozen=True, kw_only=True)
