@@ -1,6 +1,5 @@
 """A copy of a dataset with forces: first its episodes, then its files."""
 
-import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
@@ -32,6 +31,7 @@ from vftcli.batch.datasets.copying import (
 )
 from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of
+from vftcli.batch.keys import key_of, options_digest
 from vftcli.outputs.files import digest, put_text
 from vftcli.outputs.run_record import envelope, to_json
 from vftcli.readers.opening import open_log
@@ -74,11 +74,7 @@ def annotate(
     check_copy(path, copy, force=force)
     for _ in files_within(path):
         pass  # a link that leaves it is refused before anything is computed
-    beside = [
-        Path(str(n)) for n in (choice.robot.name, choice.observers.gains_file) if n is not None
-    ]
-    files_beside = " ".join(digest(file) for file in beside if file.is_file())
-    key = hashlib.sha256(f"{path.resolve()} {choice.key(files_beside)}".encode()).hexdigest()
+    key = key_of(str(path.resolve()), options_digest(choice))
     with unfinished(copy, key) as folder:
         work = folder / WORK
         rows, sources = dict[DataFile, list[Path]](), dict[str, str]()
@@ -153,8 +149,7 @@ def planned(
         source = sources[file.place.as_posix()] = digest(dataset.folder / file.place)
         for first in range(0, len(file.episodes), TOGETHER):
             some = file._replace(episodes=file.episodes[first : first + TOGETHER])
-            name = hashlib.sha256(f"{key} {source} {some}".encode()).hexdigest()
-            task = EpisodesTask(some, work / f"{name}.npz")
+            task = EpisodesTask(some, work / f"{key_of(source, key, some)}.npz")
             rows.setdefault(file, []).append(task.rows)
             group.append(task)
             if sum(len(each.file.episodes) for each in group) >= TOGETHER:

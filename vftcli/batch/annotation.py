@@ -81,10 +81,6 @@ class ForceChoice:
         """Suffix of the columns' names: the arm, of a dataset of two."""
         return f"_{self.read.arm}" if self.read.arm is not None else ""
 
-    def key(self, robot_file: str) -> str:
-        """Sources of the columns beside the episode: this, robot file, program."""
-        return f"{self!r} {robot_file} {VERSION}"
-
 
 class EpisodesTask(NamedTuple):
     """Some episodes of one data file."""
