@@ -103,8 +103,9 @@ MOST_NAMED = 10  #: Failures that are printed.
 
 def say_passed(names: list[str]) -> None:
     """Name the files of the folders that are no logs."""
+    from vftcli.readers.table import listed
+
     if not names:
         return
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     what = "1 file is not a log" if len(names) == 1 else f"{len(names)} files are not logs"
-    say(f"note: {what}: {', '.join(sorted(names)[:3])}{more}")
+    say(f"note: {what}: {listed(sorted(names), 3)}")

@@ -6,12 +6,13 @@ carries it: a chain.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
 
+from vftcli.readers.table import listed
 from vftcli.robots.chain import NO_BODY, Body, Chain, merge_bodies, nearest_tensor, unphysical
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
@@ -152,6 +153,7 @@ class BodyTree:
 BEFORE_A_HAND = 4
 HAND = 0.25  #: Share of the arm's mass that a finger stays below, with all that it carries.
 LISTED = 12  #: Names that a message lists.
+shortened = partial(listed, most=LISTED)
 #: What a flange is called, with or without a robot's prefix; the first that is there.
 FLANGE_NAMES = (
     "flange", "tool0", "link8", "ee_link", "tcp", "hand_tcp", "attachment_site", "ee",
@@ -350,9 +352,3 @@ class LumpedArm:
             rotor_inertia=np.array([joint.rotor_inertia for joint in self.joints]),
             gravity=self.tree.gravity,
         )
-
-
-def shortened(words: Sequence[str]) -> str:
-    """Some words, and how many more there are than a message lists."""
-    more = f" and {len(words) - LISTED} more" if len(words) > LISTED else ""
-    return ", ".join(words[:LISTED]) + more

@@ -17,6 +17,7 @@ from vftcli.readers.bags.ros_messages import (
 )
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import OutputError
+from vftcli.signals.pose import matrix_quaternion
 from vftcli.simulation.experiment import FlangeMotion, Simulation
 from vftcli.wrench.solvers import wrench_of
 
@@ -29,7 +30,7 @@ ROBOT_STATE = "franka_msgs/FrankaRobotState"
 
 #: Names of a message's two vectors.
 WRENCH, TWIST = ("force", "torque"), ("linear", "angular")
-UPRIGHT = np.array([[0.0, 0.0, 0.0, 1.0]])  #: The quaternion of no rotation, x, y, z, w.
+SAME = np.zeros((1, 3)), np.eye(3)[None]  #: Position and rotation of one frame in itself.
 
 #: Text, names, a number, or numbers: one row a message, or one row for all.
 Value = str | Sequence[str] | float | NDArray[Any]
@@ -120,11 +121,11 @@ def robot_states(simulation: Simulation, rows: Indices, stamps: Indices) -> Topi
         "dtau_j": np.gradient(seen["torque"], samples.time, axis=0)[rows],
         **six("k_f_ext_hat_k.wrench", WRENCH, np.hstack(in_flange)),
         **six("o_f_ext_hat_k.wrench", WRENCH, np.hstack([force[:, :3], about_base])),
-        **pose("o_t_ee", actual.position, quaternions(actual.rotation)),
-        **pose("o_t_ee_d", target.position, quaternions(target.rotation)),
-        **pose("o_t_ee_c", target.position, quaternions(target.rotation)),
-        **pose("f_t_ee", np.zeros((1, 3)), UPRIGHT),
-        **pose("ee_t_k", np.zeros((1, 3)), UPRIGHT),
+        **pose("o_t_ee", actual.position, actual.rotation),
+        **pose("o_t_ee_d", target.position, target.rotation),
+        **pose("o_t_ee_c", target.position, target.rotation),
+        **pose("f_t_ee", *SAME),
+        **pose("ee_t_k", *SAME),
         **six("o_dp_ee_d.twist", TWIST, target.twist),
         **six("o_dp_ee_c.twist", TWIST, target.twist),
         "time": (simulation.measured.stamp + simulation.scenario.sensing.start)[rows, None],
@@ -186,20 +187,13 @@ def schema_text(kind: str) -> str:
     return text
 
 
-def quaternions(rotation: Array) -> Array:
-    """Rotations (M, 3, 3) as x, y, z, w. (M, 4)"""
-    import pinocchio as pin
-
-    return np.array([pin.Quaternion(R).coeffs() for R in rotation])
-
-
 def six(path: str, names: tuple[str, str], columns: Array) -> dict[str, Value]:
     """Six numbers as two vectors: force and torque, or linear and angular velocity."""
     first, second = (f"{path}.{name}" for name in names)
     return {**in_parts(first, "xyz", columns[:, :3]), **in_parts(second, "xyz", columns[:, 3:])}
 
 
-def pose(path: str, position: Array, quaternion: Array) -> dict[str, Value]:
-    """A PoseStamped: position (M, 3) [m] and orientation (M, 4) as x, y, z, w."""
-    turn = in_parts(f"{path}.pose.orientation", "xyzw", quaternion)
+def pose(path: str, position: Array, rotation: Array) -> dict[str, Value]:
+    """A PoseStamped: position (M, 3) [m] and orientation (M, 3, 3)."""
+    turn = in_parts(f"{path}.pose.orientation", "wxyz", matrix_quaternion(rotation))
     return {**in_parts(f"{path}.pose.position", "xyz", position), **turn}
