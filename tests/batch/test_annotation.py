@@ -46,7 +46,7 @@ def test_what_looks_ahead_is_not_causal(asked: ForceChoice) -> None:
 
 
 def test_the_columns_and_what_they_say_of_themselves() -> None:
-    asked = ForceChoice(wrench=WrenchChoice(frame="base"), sd=True, contact=True)
+    asked = ForceChoice(wrench=WrenchChoice(frame="base"), sd=True, contacts=True)
     found = force_columns(asked, ["j1", "j2"], derived=False, valid=True)
     assert [(c.name, c.width) for c in found] == [
         ("external_torque", 2), ("external_torque_sd", 2), ("external_torque_valid", 1),

@@ -19,14 +19,11 @@ from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.run_record import observer_record, robot_record, to_json
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.library import Library
-from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, VftError
 from vftcli.signals.recording import Recording
 from vftcli.signals.version import VERSION
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.choice import WrenchChoice
 from vftcli.wrench.frames import FRAMES
 
 USUAL = "kfo-zoh"  #: The observer if none is named: it needs no later sample.
@@ -35,21 +32,17 @@ SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForceChoice:
-    """Request for every episode."""
+class ForceChoice(AnalysisChoice):
+    """Request for every episode, of one observer."""
 
-    read: ReadChoice = field(default_factory=ReadChoice)  #: Options for reading.
-    robot: RobotChoice = field(default_factory=RobotChoice)  #: The arm.
-    #: The one observer, and its gains.
     observers: ObserverChoice = field(default_factory=lambda: ObserverChoice(names=(USUAL,)))
-    #: Choices for the virtual sensor, None for joint torques alone.
-    wrench: WrenchChoice | None = None
+    contacts: bool = False  #: Whether it is wanted which frames lie in a contact of the list.
     sd: bool = False  #: Whether the observer's own standard deviation is wanted.
-    contact: bool = False  #: Whether it is wanted which frames lie in a contact of the list.
     #: Whether to go on after a finding, and without results.
     anyway: bool = False
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if len(self.observers.names) != 1:
             raise ParameterError(
                 "annotate writes the torques of one observer; give --observer once"
@@ -94,6 +87,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
     if task.rows.is_file():
         return dict(json.loads(str(stored_rows(task.rows)["record"])))
     library, examiner = Library([task.file.log]), Examiner(anyway=choice.anyway)
+    asked = replace(choice, library=library, examiner=examiner)
     arrays: dict[str, Single] = {}
     records: list[Record] = []
     found: Record = {"episodes": records, "robot": None, "observer": None}
@@ -101,19 +95,10 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
         begin(f"episode {number}")
         record: Record = {"episode": number, "file": task.file.place.as_posix()}
         try:
-            asked = AnalysisChoice(
-                read=replace(choice.read, episode=number),
-                robot=choice.robot,
-                observers=choice.observers,
-                wrench=choice.wrench,
-                contacts=choice.contact,
-                library=library,
-                examiner=examiner,
-            )
-            recording = library.open(task.file.log, asked.read)
+            recording = library.open(task.file.log, replace(choice.read, episode=number))
             check_signals(recording, anyway=choice.anyway)
             analysis = analyse(prepared(recording, asked), asked)
-            if choice.contact and analysis.contacts is None:
+            if choice.contacts and analysis.contacts is None:
                 reason = next(str(r) for r in analysis.remarks if r.code == "contacts-not-listed")
                 raise LogError(f"{recording.name}: {reason}")
             columns = columns_of(analysis, choice)
@@ -172,7 +157,7 @@ def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
         found["external_torque_sd"] = estimate.sd
     if choice.wrench is not None:
         found["wrench"] = analysis.wrenches[0].known
-    if choice.contact and analysis.contacts is not None:
+    if choice.contacts and analysis.contacts is not None:
         inside = [(t >= c.start) & (t <= c.stop) for c in analysis.contacts.contacts]
         touched = np.any(inside, axis=0) if inside else np.zeros(len(t), dtype=bool)
         found["contact"] = touched[:, None].astype(np.float64)
@@ -228,7 +213,7 @@ def force_columns(
         found.append(("wrench", AXES, {**joint, "units": "N, N·m", "frame": frame}))
         if valid:
             found.append(("wrench_valid", (), flag))
-    if choice.contact:
+    if choice.contacts:
         listed = {**flag, "sign": "1 in a contact of the list, else 0", "causal": False}
         found.append(("contact", (), listed))
     return [

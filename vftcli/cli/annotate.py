@@ -62,7 +62,7 @@ def annotate_dataset(
         if "wrench" in added or asked.states(WrenchChoice)
         else None,
         sd="sd" in added,
-        contact="contact" in added,
+        contacts="contact" in added,
         anyway=anyway,
     )
     engine = asked.of(WorkersChoice)
