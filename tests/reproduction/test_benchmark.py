@@ -1,18 +1,21 @@
 """The benchmark: what it measures, and the keys that scripts read."""
 
+from functools import partial
 from importlib.util import find_spec
 from itertools import count
 
 import pytest
 
-from vftcli.reproduction.timing import Timings, benchmark, simd
+from vftcli.reproduction.timing import benchmark, median_times, simd
 
 
-def test_a_shortened_run_counts_in_full() -> None:
-    timings = Timings({"work": [1.0, 2.0, 30.0]})
-    assert timings.row("work", 1000) == {"total_s": 2.0, "per_sample_us": 2000.0}
-    timings.measure("short", lambda: None, scale=0.0)
-    assert timings.median("short") == 0.0
+def test_the_median_of_interleaved_rounds_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 30.0, 0.0, 4.0, 0.0, 1.0, 0.0, 5.0, 0.0, 2.0, 0.0, 6.0])
+    monkeypatch.setattr("time.perf_counter", lambda: next(clock))
+    called: list[str] = []
+    work = {name: partial(called.append, name) for name in "ab"}
+    assert median_times(work, rounds=3) == {"a": 2.0, "b": 5.0}
+    assert called == list("ababab")
 
 
 @pytest.mark.slow

@@ -88,16 +88,16 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         late = made.observers[0].estimate(ideal)
         missed = replace(late, tau=late.tau - tau)
         lag = VirtualSensor().wrench(missed, q, made.robot.chain).known
-        yield variant, "fy/untouched", rms_of_known(error[~touched])
-        yield variant, "fy/touched", rms_of_known(error[touched])
+        yield variant, "fy/untouched", float(rms_of_known(error[~touched]))
+        yield variant, "fy/touched", float(rms_of_known(error[touched]))
         for axis in ("mx", "my"):
-            yield variant, f"{axis}/lag", rms_of_known(lag[:, AXES.index(axis)])
+            yield variant, f"{axis}/lag", float(rms_of_known(lag[:, AXES.index(axis)]))
         if variant == CORRECTED:
             # The real sensor's own error against the simulated truth.
             turn = link_poses(made.robot.chain, q).rotation[:, -1]
             true = np.einsum("tji,tkj->tki", turn, true.reshape(-1, 2, 3)).reshape(-1, 6)
             for axis, off in zip(AXES, (real.known - true).T, strict=True):
-                yield FLOOR, axis, rms_of_known(off)
+                yield FLOOR, axis, float(rms_of_known(off))
             yield "", "fig4", wrench_chart(made)
 
 
@@ -253,7 +253,11 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]
         # Free rms and lag are means of joints 1 to 3.
         for estimate in made.estimates:
             free = (estimate.t > 1.0) & (estimate.t < period)
-            yield variant, f"free/{estimate.name}", rms_of_known(estimate.tau[free, :3].ravel())
+            yield (
+                variant,
+                f"free/{estimate.name}",
+                float(rms_of_known(estimate.tau[free, :3].ravel())),
+            )
             own = (r["lag_s"] for r in rows if r["observer"] == estimate.name and r["joint"] <= 3)
             if lags := [lag for lag in own if lag is not None]:
                 yield variant, f"lag/{estimate.name}", np.mean(lags)

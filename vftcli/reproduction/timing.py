@@ -6,11 +6,11 @@ over the rounds are reported.
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -46,26 +46,18 @@ SCRIPT_SAMPLES = 1_500
 ROUNDS = 3  #: Interleaved repetitions for Table II; the median counts.
 
 
-@dataclass
-class Timings:
-    """Seconds by name, one value a round."""
+Name = TypeVar("Name")
 
-    seconds: dict[str, list[float]] = field(default_factory=dict)
 
-    def measure(self, name: str, work: Callable[[], object], scale: float = 1.0) -> None:
-        """Time one call; `scale` extrapolates a shortened one."""
-        begin = time.perf_counter()
-        work()
-        self.seconds.setdefault(name, []).append((time.perf_counter() - begin) * scale)
-
-    def median(self, name: str) -> float:
-        """Median over the rounds. [s]"""
-        return float(np.median(self.seconds[name]))
-
-    def row(self, name: str, samples: int) -> dict[str, float]:
-        """The time of one name, in all and for each of so many samples."""
-        total = self.median(name)
-        return {"total_s": total, "per_sample_us": total / samples * 1e6}
+def median_times(work: Mapping[Name, Callable[[], object]], rounds: int) -> dict[Name, float]:
+    """Name → median time of its call over the rounds. [s]"""
+    seconds = np.zeros((rounds, len(work)))
+    for own in seconds:
+        for k, call in enumerate(work.values()):
+            begin = time.perf_counter()
+            call()
+            own[k] = time.perf_counter() - begin
+    return dict(zip(work, np.median(seconds, axis=0).tolist(), strict=True))
 
 
 @contextmanager
@@ -117,16 +109,12 @@ def simd() -> str:
 
 
 def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
-    """Time the observers.
+    """Times of dynamics and observers, each alone, and what was run.
 
-    Returns:
-        ``observers``: rows (name, total_s, per_sample_us, paper_s), dynamics included in none;
-        ``dynamics``: the batched terms; ``complete_log``: the spectra and the observers that need
-        a complete log, with their tuning but for ``best``; ``ratios``: dynamics and four observers
-        over a loop of `pin.rnea`, on an even and a jittering clock, where Pinocchio is installed;
-        and what was run.
+    ``complete_log`` has observers with their tuning, but for ``best``; ``ratios`` are over a loop
+    of `pin.rnea`, where Pinocchio is installed.
     """
-    robot, timings = load_robot(robot_name), Timings()
+    robot = load_robot(robot_name)
     recording = circle(robot, samples)
     observers, _ = ObserverChoice(names=(*PAPER, "kfo-rts")).build(robot, recording.median_step)
     run = Run(recording=recording, robot=robot)
@@ -154,27 +142,27 @@ def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
         }
         if cores:
             work[RNEA] = partial(rnea_loop, robot.model, recording.q, recording.require("dq"))
-        for call in work.values():  # once unmeasured
-            call()
-        for _ in range(rounds):
-            for name, call in work.items():
-                timings.measure(name, call)
+        median_times(work, 1)  # of their first calls
+        total = median_times(work, rounds)
+
+    def row(name: str) -> dict[str, float]:
+        return {"total_s": total[name], "per_sample_us": total[name] / samples * 1e6}
+
     return {
         "simd": simd(),
         "robot": robot.name,
         "samples": samples,
         "rounds": rounds,
         "observers": [
-            {"name": name, **timings.row(name, samples), "paper_s": PRINTED[f"seconds/{name}"]}
-            for name in PAPER
+            {"name": name, **row(name), "paper_s": PRINTED[f"seconds/{name}"]} for name in PAPER
         ],
         "complete_log": [
-            {"name": name, **timings.row(name, samples)}
+            {"name": name, **row(name)}
             for name in ("spectra", *LOOKING_BACK, SMOOTHER)
-            if name in timings.seconds
+            if name in total
         ],
-        "dynamics": timings.row("dynamics", samples),
-        "ratios": {name: timings.median(name) / timings.median(RNEA) for name in cores},
+        "dynamics": row("dynamics"),
+        "ratios": {name: total[name] / total[RNEA] for name in cores},
     }
 
 
@@ -185,8 +173,7 @@ def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
 
 def computing_time(_seed: int) -> Iterator[Given]:
     """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
-    robot, timings = load_robot("ur5"), Timings()
-    log = circle(robot, SAMPLES)
+    log = circle(robot := load_robot("ur5"), SAMPLES)
     # The printed way runs over fewer samples and is scaled.
     few = log.between(0.0, float(log.t[SCRIPT_SAMPLES - 1]))
     q, dq, step, scale = few.q, few.require("dq"), few.median_step, SAMPLES / few.samples
@@ -196,24 +183,22 @@ def computing_time(_seed: int) -> Iterator[Given]:
         dense = partial(dense_kalman_loop, short.p, short.mu, step, kalman)
         # Both first-order observers run in one loop: each is half of it.
         both = partial(first_order_loops, short.p, short.mu, step)
-        printed: dict[str, tuple[Callable[[], object], float]] = {
-            "dynamics": (partial(literal_momentum_terms, robot.model, q, dq), scale),
-            "fdo": (both, 0.5 * scale),
-            "gmo": (both, 0.5 * scale),
-            "kfo-fe": (dense, scale),
-            "kfo-zoh": (partial(dense, rebuild=True), scale),
-        }
         built, _ = ObserverChoice(names=PAPER).build(robot, step)
         own: dict[str, Callable[[], object]] = {"dynamics": partial(dynamics_terms, log, robot)}
         own |= {observer.name: partial(observer.estimate, terms) for observer in built}
-        for _ in range(ROUNDS):
-            for name, call in own.items():
-                timings.measure(f"{CORRECTED} {name}", call)
-            for name, (call, share) in printed.items():
-                timings.measure(f"{AS_PRINTED} {name}", call, share)
+        printed: dict[str, Callable[[], object]] = {
+            "dynamics": partial(literal_momentum_terms, robot.model, q, dq),
+            **dict.fromkeys(("fdo", "gmo"), both),
+            "kfo-fe": dense,
+            "kfo-zoh": partial(dense, rebuild=True),
+        }
+        variants = {CORRECTED: own, AS_PRINTED: printed}
+        work = {(v, name): call for v, calls in variants.items() for name, call in calls.items()}
+        total = median_times(work, ROUNDS)
+    for name in printed:
+        total[AS_PRINTED, name] *= 0.5 * scale if name in {"fdo", "gmo"} else scale
     for variant in (AS_PRINTED, CORRECTED):
-        dynamics = timings.median(f"{variant} dynamics")
-        cost = {name: dynamics + timings.median(f"{variant} {name}") for name in PAPER}
+        cost = {name: total[variant, "dynamics"] + total[variant, name] for name in PAPER}
         for name, seconds in cost.items():
             yield variant, f"seconds/{name}", seconds
             yield variant, f"cost/{name}", 1e6 * seconds / SAMPLES
