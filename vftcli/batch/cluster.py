@@ -180,7 +180,6 @@ def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
 
     from vftcli.batch.nodes import closed_cluster
 
-    # As many as this machine has cores and memory for.
     most = max(1, min(int(CPU_COUNT), int(MEMORY_LIMIT / MEMORY), MOST_WORKERS))
     workers = choice.jobs or most
     memory = int(1e9 * (choice.memory_gb or 0.0)) or int(MEMORY_LIMIT / workers)

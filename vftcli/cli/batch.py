@@ -69,7 +69,7 @@ def batch(
     engine = asked.of(WorkersChoice)
     engine.check_closed(anyway=anyway)
     collection = LogCollection(choice.read, output)
-    free = {*map(absolute, choice.free.logs)}  # what is free motion is no log of its own
+    free = {*map(absolute, choice.free.logs)}
     found = [entry for entry in collection.find(logs) if entry.path not in free]
     say_passed([path.name for path in collection.passed])
     if not found:

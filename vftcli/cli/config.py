@@ -25,7 +25,7 @@ NONE = "none"  #: Value of ``--config`` for no file.
 TYPED = frozenset({"config", "force", "help", "set"})
 #: Command → options that only its own table gives.
 OTHERWISE = {
-    "identify": {"free", "gains"},  # the motion without the load, what gains are found for
+    "identify": {"free", "gains"},
     "thresholds": {"reference", "reference-columns"},  # of --check alone
     "convert": {"log.derive"},  # it writes what was logged
 }

@@ -36,7 +36,6 @@ def convert_log(
         )
     recording = Library().open(log, replace(choice, derive="none"))
     convert(recording, output, force=force)
-    # Any log may become a table, even one without a sound estimate.
     say(health_line(examine(recording)))
     say_left_out([output])
     if json:

@@ -99,8 +99,6 @@ def identify_robot(
         find_gains(logs[0], output, asked, figures)
         return
     library = Library([*logs, *(check or ()), *free.logs])
-    # This command changes a profile that is not the arm's; but the friction method keeps the
-    # profile's links, and the default begins with it.
     examiner = health_of(library, anyway=asked.anyway, fitting=task.keeps_links)
     choice = replace(choice_for(asked, library), examiner=examiner)
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)

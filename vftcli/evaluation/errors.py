@@ -149,7 +149,6 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
         x[~answered] = 0.0
         squares = x - y[:, None]
         squares *= squares
-        # In the longest blocks, and in each observer's own.
         lengths = block_lengths(squares).tolist() if len(squares) else []
         paired = Resampled(np.ones((1, len(names))), 0)
         own = tuple(resample(x[:, None], n) for x, n in zip(squares.T, lengths, strict=False))

@@ -290,7 +290,6 @@ def reference_wrench(
     A sensor's or a file's stays; any other reference is a torque, solved by least squares.
     """
     torque = reference.torque
-    # Plain least squares: a reference is not smoothed.
     solved = replace(sensor, solver="pinv").wrench(torque, recording.q, robot.chain)
     if reference.wrench is None:
         return replace(solved, name=torque.name, sd=None, remarks=())

@@ -222,7 +222,7 @@ def kinematics(
             continue
         R, turned = rotation_about("x", joint["alpha"]), rotation_about("z", joint["theta"])
         a, d = np.array([joint["a"], 0.0, 0.0]), np.array([0.0, 0.0, joint["d"]])
-        distal = convention == "standard-dh"  # the table's frame is at the far end of its link
+        distal = convention == "standard-dh"
         before.append(Pose(turned) if distal else Pose(R, a) @ Pose(turned, d))
         after.append(Pose(R, a + d) if distal else IDENTITY)
     return [end @ start for end, start in zip(after, [*before, tip], strict=True)], after[1:]

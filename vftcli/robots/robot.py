@@ -200,7 +200,6 @@ class Robot(Shown):
         Raises:
             OutputError: If the file exists, unless it may be overwritten.
         """
-        # The writers are several floors up; the robot itself knows nothing of them.
         write = import_module("vftcli.outputs.files").write_text
         write(Path(file), import_module("vftcli.robots.profile").robot_toml(self), force)
 

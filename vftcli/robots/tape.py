@@ -141,7 +141,6 @@ class Program:
 
     def __init__(self, tape: Tape, outputs: Sequence[Value]) -> None:
         """Plan the operations."""
-        # The row of each output, None for constants.
         rows = []
         for sign, row in outputs:
             if row is None or (sign > 0.0 and row >= tape.inputs and row not in rows):

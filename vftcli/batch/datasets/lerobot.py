@@ -75,7 +75,6 @@ class LeRobotDataset:
         import pyarrow.parquet as pq
 
         path, source, numbers = self._opened(file)
-        # Every column over all rows, whichever episode each row is of. (rows, k) each
         rows, done = source.metadata.num_rows, 0
         whole = [np.zeros((rows, column.width), np.float32) for column in columns]
         for number, own in forces.items():
