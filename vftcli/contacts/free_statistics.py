@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vftcli.bias.whole_log import WholeLogBias
-from vftcli.contacts.windows import smooth_lanes, window_of
+from vftcli.contacts.windows import contact_lanes, smooth_lanes
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
 from vftcli.observers import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
@@ -29,7 +29,7 @@ from vftcli.wrench.model_error import (
     infer_noise,
     learn_noise,
 )
-from vftcli.wrench.smoother import BlockLog, Lane, WrenchPrior, contact_block
+from vftcli.wrench.smoother import BlockLog, WrenchPrior, contact_block
 
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
@@ -220,13 +220,11 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
     for blocks in blocks_of(free.free, free.seconds):
         if not (made_up := pseudo_contacts(blocks, each)):
             continue
-        count = len(blocks.t)
-        log = BlockLog(blocks, error_process(free.noise, blocks, covered(made_up, count, 1)))
-        J, nowhere = flange_jacobian(free.log.robot.loaded_chain, blocks.q), np.zeros(count, bool)
-        lanes = [
-            Lane(window_of(blocks.t, run), covered([run], count, 1), nowhere, J, prior)
-            for run in made_up
-        ]
+        process = error_process(free.noise, blocks, covered(made_up, len(blocks.t), 1))
+        log = BlockLog(blocks, process)
+        J = [flange_jacobian(free.log.robot.loaded_chain, blocks.q)]
+        # Each alone: nobody touches the others.
+        lanes = [contact_lanes(log, J, [run], [prior])[0] for run in made_up]
         for run, wrench in zip(made_up, smooth_lanes(log, lanes), strict=True):
             inside = wrench.within(run)
             sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))

@@ -241,7 +241,7 @@ class ContactMeasurement:
             evidence=self.found.best[number],
             joint_torque=J.T @ values,
             joint_torque_sd=np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J)),
-            at_rest=bool(blocks.rests[peak].all()),
+            at_rest=bool(blocks.part(slice(peak, peak + 1)).rests.all()),
             vendor_force=vendor_force(self.run, self.found.places[0].jacobian[peak], at),
             sensor_force=sensor_force(self.run, at),
             course=forces,

@@ -173,8 +173,9 @@ def contact_lanes(
     t, own = log.blocks.t, {}
     every = covered(runs, len(t), 1)
     for run in set(runs):
-        gate = covered([run], len(t), 1)
-        own[run] = window_of(t, run, margin), gate, every & ~gate
+        first, last = window = window_of(t, run, margin)
+        gate = covered([(run[0] - first, run[1] - first)], last - first, 1)
+        own[run] = window, gate, every[first:last] & ~gate
     lanes = zip(runs, jacobians, priors, strict=True)
     return [Lane(*own[run], jacobian, prior) for run, jacobian, prior in lanes]
 
@@ -224,7 +225,7 @@ def untouched_likelihood(log: BlockLog, lanes: Sequence[Lane], model: LinearMode
     often = np.zeros_like(model.d)
     for place, lane in enumerate(lanes):
         span = slice(*lane.window)
-        inside = lane.gate[span, None] & log.blocks.known[span, None]
+        inside = lane.gate[:, None] & log.blocks.known[span, None]
         often[: span.stop - span.start, place] = inside * log.process.spikes[span]
     process = ErrorProcess(model.decay[..., 6:], model.added[..., 6:], model.white, often)
     square, S = innovations(error_model(model.d, process), often)

@@ -64,7 +64,7 @@ class Run(Shown):
         """Joint velocities. (T, n) [rad/s]"""
         return self.recording.require("dq")
 
-    @property
+    @cached_property
     def step(self) -> float:
         """Median sample time. [s]"""
         return median_step(self.t)

@@ -112,8 +112,8 @@ class Lane(NamedTuple):
     """One hypothesis on one window."""
 
     window: BlockSpan  #: Its blocks.
-    gate: Mask  #: Blocks of the log in which the wrench may differ from zero. (K,)
-    hidden: Mask  #: Blocks of the log that say nothing. (K,)
+    gate: Mask  #: Its blocks in which a wrench may act. (k,)
+    hidden: Mask  #: Its blocks that say nothing. (k,)
     jacobian: Array  #: J along the log. (K, 6, n)
     prior: WrenchPrior | None  #: Prior of the wrench; None without contact.
 
@@ -138,10 +138,10 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
         own = slice(span.stop - span.start), i
         decay[*own, 6:], added[*own, 6:] = process.decay[span], process.added[span]
         if prior is not None:
-            decay[*own, :6], added[*own, :6] = prior.process(lane.gate[span], step[span])
+            decay[*own, :6], added[*own, :6] = prior.process(lane.gate, step[span])
         if i < each:
             d[own] = log.blocks.d[span]
-            white[own] = np.where(lane.hidden[span, None], UNKNOWN, process.white[span])
+            white[own] = np.where(lane.hidden[:, None], UNKNOWN, process.white[span])
             if prior is not None:
                 jacobian[own] = lane.jacobian[span]
     # A window begins with the stationary b.
