@@ -57,11 +57,6 @@ def test_smooth_series_end_below_half_the_rate(step: float, edge: float, path: f
     run = Run(recording=log, robot=UR)
     assert (signal_edge(step), signal_edge(step, 4.0)) == pytest.approx((edge, 4.0))
     np.testing.assert_allclose(run.smooth_dq, low_pass(log.t, log.dq, path), atol=1e-9)
-    np.testing.assert_allclose(
-        run.smooth_model, low_pass(log.t, run.model_torque, edge), atol=1e-9
-    )
-    gap = run.drive_torque - run.model_torque
-    np.testing.assert_allclose(run.smooth_gap, low_pass(log.t, gap, edge), atol=1e-9)
 
 
 def test_a_part_of_a_run_keeps_what_belongs_to_joints() -> None:

@@ -153,7 +153,7 @@ def column_numbers(joint: int, joints: int) -> Indices:
 
 
 def expected_error(robot: Robot) -> ModelError:
-    """Standard deviation of the model's error in each column, by the robot's numbers."""
+    """SD of the model's error in each column, by the robot's numbers."""
     chain, (dry, viscous, quadratic) = robot.loaded_chain, usual_friction(robot)
     inertial = np.empty((chain.joints, LINK))
     for j, (m, c) in enumerate(zip(chain.mass, chain.com, strict=True)):

@@ -27,8 +27,8 @@ from vftcli.signals.least_squares import FOLDS, SD_PER_MEDIAN, NormalEquations, 
 from vftcli.signals.rest import faster
 from vftcli.signals.series import covered, runs_of, summed
 
-FORCE = 50.0  #: Standard deviation of an external force. [N]
-MOMENT = 10.0  #: Standard deviation of an external moment. [N·m]
+FORCE = 50.0  #: SD of an external force. [N]
+MOMENT = 10.0  #: SD of an external moment. [N·m]
 KNOTS = 10.0  #: Time between two knots of a load, straight between. [s]
 CONSTANT = 15.0  #: In a shorter log a load is constant. [s]
 MOST_KNOTS = 61  #: Knots of ten minutes; a longer log spreads them.
@@ -38,7 +38,7 @@ WRENCH = 6  #: Components of the flange's wrench, the first loads.
 class SlowLoads(NamedTuple):
     """Columns of slow external loads along the samples of a fit."""
 
-    #: External torque of one standard deviation of each component, sign reversed: the
+    #: External torque of one SD of each component, sign reversed: the
     #: flange's wrench, then forces along the arm. (S, n, m) [N·m]
     torque: Array
     knot: Indices  #: The knot before each sample. (S,)
@@ -96,14 +96,14 @@ PENALTY = 2.0  #: Least gain of a load's column (Akaike's criterion).
 class FittedError(NamedTuple):
     """Solution of the rows."""
 
-    model: Array  #: The model's error, in standard deviations. (P,)
-    loads: Array  #: Slow loads in use, in standard deviations. (L,)
-    scale: float  #: Factor on the model's standard deviations.
+    model: Array  #: The model's error, in SDs. (P,)
+    loads: Array  #: Slow loads in use, in SDs. (L,)
+    scale: float  #: Factor on the model's SDs.
     factor: Array  #: Lower Cholesky factor of both's matrix. (P + L, P + L)
 
     @property
     def covariance(self) -> Array:
-        """Covariance of the model's error, in squared standard deviations. (P, P)"""
+        """Covariance of the model's error, in squared SDs. (P, P)"""
         half = forward_solved(self.factor, np.eye(len(self.factor), len(self.model)))
         return self.scale**2 * (half.T @ half)
 
@@ -134,7 +134,7 @@ class Rows:
         return np.column_stack(torque)
 
     def spread(self, covariance: Array) -> Array:
-        """Standard deviation of A u. (S, n) [N·m]"""
+        """SD of A u. (S, n) [N·m]"""
         variance = []
         for j, column in enumerate(self.columns):
             numbers = column_numbers(j, self.joints)
@@ -294,7 +294,7 @@ def largest_around(values: Array, reach: int) -> Array:
 
 
 MARGIN = 0.5  #: Cut at both ends of a fold: neighbours know each other. [s]
-SCALES = (0.0, 0.1, 0.3, 1.0)  #: Freedom of the model: factors on its standard deviations.
+SCALES = (0.0, 0.1, 0.3, 1.0)  #: Freedom of the model: factors on its SDs.
 LARGEST = 6.0  #: Most scales of a residual.
 #: A joint with less motion than this share is judged by all free samples.
 SELDOM = 0.2
@@ -311,7 +311,7 @@ class Guarded(NamedTuple):
     share: Array  #: Unseen error with over without it, in motion. (n,)
     #: Each joint's part: 0 if not worth having, 1 if clearly worth it. (n,)
     weight: Array
-    loads: Array  #: Slow loads that are believed too, in standard deviations. (L,)
+    loads: Array  #: Slow loads that are believed too, in SDs. (L,)
 
 
 def guarded(fit: WholeLogFit, dq: Array) -> Guarded:

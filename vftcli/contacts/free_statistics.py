@@ -29,11 +29,11 @@ from vftcli.wrench.model_error import (
     infer_noise,
     learn_noise,
 )
-from vftcli.wrench.smoother import BlockLog, WrenchPrior, contact_block
+from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior, contact_block
 
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
-LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
+LEVEL = 4.0  #: SDs of a joint's torque beyond which it is touched.
 #: Least length of a touch, and the pause that joins two. [s]
 LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
@@ -52,7 +52,7 @@ class FreeStatistics(NamedTuple):
     """Noise and level of motion that nobody touched, as a list of contacts needs them."""
 
     noise: TorqueNoise  #: Noise and model error.
-    level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
+    level: Array  #: SD of the momentum observer's torque in it. (n,) [N·m]
     own: Mask  #: Samples of the log itself that are known to be free. (T,)
     #: The log, less its load, and less the model error if known.
     log: Run
@@ -162,7 +162,7 @@ def free_part(motion: FreeMotion) -> FreePart | None:
 
 
 def beyond_threshold(run: Run, level: Array | None) -> Mask:
-    """Samples with a joint's torque beyond `LEVEL` standard deviations for a while.
+    """Samples with a joint's torque beyond `LEVEL` SDs for a while.
 
     (T,) The standard deviation is that of the observer's torque in free motion, the level
     (n,) [N·m], None if unknown; at rest and around it stiction adds to it.
@@ -182,7 +182,7 @@ def observed(run: Run) -> Array:
 
 
 def observer_noise(run: Run) -> Array:
-    """Standard deviation of the observer torque's noise, touched or not. (n,) [N·m]
+    """SD of the observer torque's noise, touched or not. (n,) [N·m]
 
     From second differences over twice the observer's time, of six times the variance of
     white noise: pushes last longer, and the median ignores their ends.
@@ -208,7 +208,7 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
 class PseudoContactTest(NamedTuple):
     """Smoothed wrench in made-up contacts of free motion; it should be zero."""
 
-    #: Factor on each axis' standard deviation that would hold 95 %, at least 1. (6,)
+    #: Factor on each axis' SD that would hold 95 %, at least 1. (6,)
     widening: Array
     smallest_force: float  #: |F| that 95 % of the blocks stay below. [N]
 
@@ -218,7 +218,13 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
     shares, forces = [], []
     each = max(MOST_PSEUDO // max(len(free.free), 1), 4)
     for blocks in blocks_of(free.free, free.seconds):
-        if not (made_up := pseudo_contacts(blocks, each)):
+        # Runs of known blocks, half as much around each.
+        long = max(round(PSEUDO / np.median(blocks.length)), 1)
+        half, made_up = (long + 1) // 2, list[BlockSpan]()
+        for start, stop in runs_of(blocks.known):
+            starts = range(start + half, stop - long - half + 1, long)
+            made_up += [(k, k + long) for k in starts]
+        if not (made_up := made_up[:: max(len(made_up) // each, 1)][:each]):
             continue
         process = error_process(free.noise, blocks, covered(made_up, len(blocks.t), 1))
         log = BlockLog(blocks, process)
@@ -234,15 +240,3 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
         return PseudoContactTest(np.ones(6), float("nan"))
     widening = np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / Z_95, 1.0)
     return PseudoContactTest(widening, np.quantile(np.concatenate(forces), 0.95))
-
-
-def pseudo_contacts(blocks: Blocks, most: int) -> list[tuple[int, int]]:
-    """At most `most` runs of `PSEUDO` s of known blocks, half as much around each."""
-    count = max(round(PSEUDO / np.median(blocks.length)), 1)
-    half = (count + 1) // 2
-    runs = [
-        (k, k + count)
-        for start, stop in runs_of(blocks.known)
-        for k in range(start + half, stop - count - half + 1, count)
-    ]
-    return runs[:: max(len(runs) // most, 1)][:most]

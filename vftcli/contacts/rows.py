@@ -46,7 +46,7 @@ SHORT, SLOW = 0.25, 95.0
 #: A contact's place comes from the blocks with a force above this share of the peak,
 #: within so long [s] of it.
 CORE, CORE_TIME = 0.5, 0.1
-#: Standard deviation of the moment about the point of a point force. [N·m]
+#: SD of the moment about the point of a point force. [N·m]
 POINT_MOMENT = 1e-3
 
 

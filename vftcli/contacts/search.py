@@ -47,7 +47,7 @@ from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior
 #: A torque beyond the threshold for longer than this beside a contact is part of it: no
 #: lag of the observer, no turn of friction. [s]
 LASTING = 1.0
-#: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]
+#: A push as it may be: SD of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
 #: Correlation time and length, for taps and for leans. [s]
 SEARCHES = (0.3, 0.5), (2.0, 3.0)
@@ -59,7 +59,7 @@ AT_FIRST = 0.1  #: Probability that a log begins in contact.
 SURE, LIKELY = 0.99, 0.5
 GAP = 0.12  #: Contacts closer than this are one. [s]
 MOST_ODDS = 300.0  #: Log odds are kept within ± this many nats.
-#: A contact is split where the force is below so many standard deviations for so long
+#: A contact is split where the force is below so many SDs for so long
 #: [s], and below this share of the peaks on both sides.
 RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
 #: Also split where the force falls below this share of both peaks,

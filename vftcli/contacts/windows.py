@@ -30,7 +30,7 @@ POINTS = 10  #: Points along each link that a force is tried at.
 FIRST_LINK = 2
 #: Lever of a force about the flange or a link's middle. [m]
 LEAST_LEVER = 0.1
-FORCE_PRIOR = 100.0  #: Standard deviation that a force is given beforehand. [N]
+FORCE_PRIOR = 100.0  #: SD that a force is given beforehand. [N]
 ALIKE = 4.0  #: Points with a score within this of the best one's fit as well.
 #: χ² of the best point beyond which a contact is more than a force at a point.
 MORE_THAN_A_FORCE = 20.0
@@ -40,7 +40,7 @@ class ContactPlace(NamedTuple):
     """A place at which a contact is weighed."""
 
     link: int  #: Number of the link; 0 for the flange.
-    lever: float  #: Standard deviation of the moment over that of the force. [m]
+    lever: float  #: SD of the moment over that of the force. [m]
     #: J of its point, zero for joints that do not move it. (K, 6, n)
     jacobian: Array
 
@@ -116,7 +116,7 @@ NEAR = 0.4  #: That length where only the prior is learned. [s]
 MOST_LANES = 96  #: Lanes that are worked on at once.
 START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
-#: Smallest and largest standard deviation. [N], [N·m]
+#: Smallest and largest SD. [N], [N·m]
 FORCES, MOMENTS = ((3.0, 300.0), (0.1, 50.0))
 #: Evidence over nothing, which may spike. [nats] In 299 s of real free motion one
 #: reversal had 15, all else but abrupt stops below 6.
@@ -124,9 +124,9 @@ LEAST_EVIDENCE = 12.0
 #: The same in motion without known free motion. [nats] Model errors reach 82 on six
 #: arms; 75 to 200 find the same contacts.
 LEAST_IN_MOTION = 120.0
-LEAST_FORCE = 10.0  #: Smallest standard deviation of a force that is tried. [N]
+LEAST_FORCE = 10.0  #: Smallest SD of a force that is tried. [N]
 LONGEST_TIME = 1.0  #: Longest correlation time of a wrench that comes and goes. [s]
-SIZES = 1.0, 3.0  #: Multiples of the standard deviation that are tried.
+SIZES = 1.0, 3.0  #: Multiples of the SD that are tried.
 #: Longer candidates may also be a steady wrench, as a load's, of this correlation time:
 #: one that wanders pays for each block. [s]
 LASTING, STEADY_TIME = 1.5, 100.0

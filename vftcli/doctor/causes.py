@@ -58,8 +58,8 @@ TILTED, WEIGHT = np.deg2rad(10.0), (0.6, 1.7)
 OFF, ALONE = 0.08, 0.1
 OTHERS = 0.05  #: Largest error of the other joints' factors beside one wrong one.
 LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
-SURE = 4.0  #: Least standard deviations of an offset, a factor or missing friction.
-KNOWN = 0.05  #: Largest standard deviation of a factor from motion.
+SURE = 4.0  #: Least SDs of an offset, a factor or missing friction.
+KNOWN = 0.05  #: Largest SD of a factor from motion.
 CLEARER = 1.5  #: Ratio of misfits by which a factor beats a load.
 #: Misfit of one model to another; real efforts leave 1.3 % or more.
 MODELLED = 0.02

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.signals import WAY, edges_of, repeated_rows, stuck_stretches, travel_of
+from vftcli.doctor.signals import WAY, repeated_rows, stuck_stretches, travel_of
 from vftcli.doctor.velocity import GAP_STEPS
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name, gravity_torque
@@ -183,7 +183,7 @@ def frozen_rows(recording: Recording) -> Mask:
     t, dq = recording.t, recording.require("dq")
     same = np.zeros(recording.samples - 1, bool)
     same[repeated_rows(recording, ("q", "dq", *EFFORTS))] = True
-    first, last = edges_of(same)
+    first, last = np.array(runs_of(same), int).reshape(-1, 2).T
     lengths, long = last - first, t[last] - t[first] >= FROZEN
     usual = np.median(lengths[~long]) if not long.all() else 1.0
     moves = abs(dq[first]).max(axis=1) > REST

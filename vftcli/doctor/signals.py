@@ -109,23 +109,6 @@ def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
     return np.mean(~bent[moves]) if enough else 0.0, (bent & moves).any(axis=1)
 
 
-def work_shares(recording: Recording, effort: Array) -> Array:
-    """Net over gross work of each joint's effort; NaN with little motion. (n,)
-
-    Friction makes the drives put energy in; what gravity and inertia take they give back.
-    """
-    rows = thinly(recording, SOME)
-    speed = recording.require("dq")[rows]
-    power = effort[rows] * speed * np.gradient(recording.t[rows])[:, None]
-    gross = abs(power).sum(axis=0)
-    share = power.sum(axis=0) / np.where(gross > 0, gross, 1.0)
-    travel = abs(np.diff(recording.q[rows], axis=0)).sum(axis=0)
-    # In one direction gravity alone can take or give work.
-    reversing = (speed.max(axis=0) > NONZERO) & (speed.min(axis=0) < -NONZERO)
-    share[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
-    return np.asarray(share)
-
-
 def effort_of(recording: Recording) -> tuple[str, Array] | None:
     """Name and values of the log's effort: torque before current."""
     efforts = dict(efforts_of(recording))
@@ -134,12 +117,22 @@ def effort_of(recording: Recording) -> tuple[str, Array] | None:
 
 
 def inverted_effort(recording: Recording) -> Iterator[Remark]:
-    """Effort of a turned sign: like friction it takes energy from a moving arm."""
+    """Effort of a turned sign: like friction it takes energy from a moving arm.
+
+    Friction makes the drives put energy in; what gravity and inertia take they give back.
+    """
     effort = effort_of(recording)
     if effort is None or recording.dq is None:
         return
-    name, value = effort
-    shares = work_shares(recording, value)
+    (name, value), rows = effort, thinly(recording, SOME)
+    speed = recording.dq[rows]
+    power = value[rows] * speed * np.gradient(recording.t[rows])[:, None]
+    gross = abs(power).sum(axis=0)
+    shares = power.sum(axis=0) / np.where(gross > 0, gross, 1.0)  # net over gross work
+    travel = abs(np.diff(recording.q[rows], axis=0)).sum(axis=0)
+    # In one direction gravity alone can take or give work.
+    reversing = (speed.max(axis=0) > NONZERO) & (speed.min(axis=0) < -NONZERO)
+    shares[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
     turned = shares < STRONG
     most = turned.sum() >= max(2, round(0.6 * np.isfinite(shares).sum()))
     if not most:  # a few joints only: nearly all their work
@@ -180,7 +173,8 @@ def stuck_findings(recording: Recording) -> Iterator[Remark]:
     for name, value in efforts_of(recording):
         joints, q = range(recording.joints), recording.q
         clipped = {j for j in joints if is_clipped(value[:, j], q[:, j], least)}
-        if clipped and (clipped := clipped.difference(stuck_joints(recording, name))):
+        clipped -= {j for j, *_ in stuck_stretches(recording, name)} if clipped else set()
+        if clipped:
             yield warning("saturation", on_joints(sorted(clipped)), signal=name)
     yield from coarse_positions(recording)
 
@@ -203,17 +197,6 @@ def repeated_rows(recording: Recording, names: Iterable[str]) -> Indices:
         if (value := getattr(recording, name)) is not None:
             rows = rows[(value[rows + 1] == value[rows]).all(axis=1)]
     return rows
-
-
-def edges_of(mask: Mask) -> tuple[Indices, Indices]:
-    """First sample of each run of a mask, and the one behind its last. (R,) each"""
-    first, last = np.array(runs_of(mask), int).reshape(-1, 2).T
-    return first, last
-
-
-def stuck_joints(recording: Recording, name: str) -> list[int]:
-    """Joints of which a signal is stuck somewhere."""
-    return sorted({joint for joint, _, _ in stuck_stretches(recording, name)})
 
 
 def stuck_stretches(recording: Recording, name: str) -> Iterator[tuple[int, int, int]]:
@@ -252,7 +235,7 @@ def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, in
     others = [x for x in signals if x is not None]
     for j in range(recording.joints):
         # A run of unchanged steps ends with the sample behind it.
-        first, last = edges_of(same[:, j])
+        first, last = np.array(runs_of(same[:, j]), int).reshape(-1, 2).T
         lengths = last - first
         long = (t[last] - t[first] >= LONG) & (lengths >= MANY)
         # Repeats of a coarse signal vary in length.

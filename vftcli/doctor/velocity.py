@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.signals import TRAVEL, repeated_rows, stuck_joints, travel_of
+from vftcli.doctor.signals import TRAVEL, repeated_rows, stuck_stretches, travel_of
 from vftcli.doctor.windows import spread
 from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
@@ -173,7 +173,8 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
     if held := held_shares(recording):
         yield warning("velocity-held", on_joints(held), shares_percent=list(held.values()))
     judged = fit.known
-    judged[[*swapped, *held, *stuck_joints(recording, "dq")]] = False
+    stuck = [j for j, *_ in stuck_stretches(recording, "dq")]
+    judged[[*swapped, *held, *stuck]] = False
     gain, sure = fit.gain, SURE * fit.gain_error
     surely = abs(fit.lag) - SURE * fit.lag_error
     late = judged & (surely > max(LATE, recording.median_step)) & (gain > DAMPED_MOST)

@@ -136,7 +136,7 @@ def judge_jacobian(
             "--columns, as in wrench=fx|fy|fz|mx|my|mz"
         )
     sigma = decompose(log.jacobian).sigma_min
-    values = unloaded(log, wrench_of(log.tau_ext, log.jacobian).values, zero)
+    values = unloaded(log, wrench_of(log.tau_ext, log.jacobian)[0], zero)
     ours = Wrench(name="vendor", t=log.t, values=values, frame="jacobian", sigma_min=sigma)
     least = sigma.min()
     remarks = [caution("logged-jacobian", sigma_min_m=least)]

@@ -213,7 +213,7 @@ class FreeMotion(Shown):
 LEAST = (
     0.4  #: A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]
 )
-SURE = 4.0  #: Standard deviations that it has to be.
+SURE = 4.0  #: SDs that it has to be.
 PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
 CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
 #: Farther away the filter passes e^(−2π 6 Hz · sin(π/8) · 2 s). [s]
@@ -223,7 +223,7 @@ RATE = 30.0  #: RunSamples a second that are weighed.
 MEMORY = 0.3
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
 PASSES = 4  #: Fits, each with the joints' errors that the last one left.
-#: Standard deviations of a load's mass and first moment. [kg, kg·m]
+#: SDs of a load's mass and first moment. [kg, kg·m]
 WIDE = (20.0, 5.0, 5.0, 5.0)
 
 
@@ -233,7 +233,7 @@ class FreeLoad:
 
     mass: float  #: Its mass. [kg]
     moment: Array  #: Mass times its centre, in flange axes. (3,) [kg·m]
-    sd: float  #: Standard deviation of the mass. [kg]
+    sd: float  #: SD of the mass. [kg]
     moment_sd: Array  #: That of the moment. (3,) [kg·m]
     share: float  #: What is left of the free part's disturbance with it.
 
@@ -327,7 +327,7 @@ def columns(piece: RunSamples) -> tuple[Indices, Array, Array] | None:
 
 
 def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
-    """Weights of columns (m,), their standard deviations, and the rms left (n,) [N·m].
+    """Weights of columns (m,), their SDs, and the rms left (n,) [N·m].
 
     Regularised least squares of the disturbance d (S, n) [N·m] on A (S, n, m), each joint
     weighed by its residual; the prior (m,) is the weights' deviation about zero.

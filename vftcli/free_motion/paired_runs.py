@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.run import Run
+from vftcli.robots.run import Run, signal_edge
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import low_pass
 from vftcli.signals.series import resample_columns
@@ -161,6 +161,8 @@ class PairedRuns:
             pad = round(HEARD / p.free.step)
             first = max(0, int(used[0]) - pad)
             free, used = p.free.part(slice(first, int(used[-1]) + pad + 1)), used - first
-            missed = missed + free.smooth_gap[used].var(axis=0)
-            total = total + free.smooth_model[used].var(axis=0)
+            # Below the band of the noise.
+            gap, edge = free.drive_torque - free.model_torque, signal_edge(free.step)
+            missed = missed + low_pass(free.t, gap, edge)[used].var(axis=0)
+            total = total + low_pass(free.t, free.model_torque, edge)[used].var(axis=0)
         return np.sqrt(np.minimum(missed / np.maximum(total, 1e-12), 1.0))

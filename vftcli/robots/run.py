@@ -29,7 +29,7 @@ LONG = 1 << 17
 #: What has a value for each sample, and stays in a part of a run.
 SERIES = ("standing", "standstill", "drive_torque", "model_torque", "momentum")
 #: What is made again in less than an observer's pass.
-BULKY = (*SERIES[1:], "smooth_gap", "smooth_model", "smooth_dq")
+BULKY = (*SERIES[1:], "smooth_dq")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -92,16 +92,6 @@ class Run(Shown):
         """
         change = np.gradient(self.terms.p, self.t, axis=0)
         return change - self.terms.mu + self.drive_torque
-
-    @cached_property
-    def smooth_gap(self) -> Array:
-        """Torque missed by the model, below the band of the noise. (T, n) [N·m]"""
-        return low_pass(self.t, self.drive_torque - self.model_torque, signal_edge(self.step))
-
-    @cached_property
-    def smooth_model(self) -> Array:
-        """The model's torque, below the band of the noise. (T, n) [N·m]"""
-        return low_pass(self.t, self.model_torque, signal_edge(self.step))
 
     @cached_property
     def smooth_dq(self) -> Array:

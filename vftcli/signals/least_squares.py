@@ -17,7 +17,7 @@ NULL = 1e-12
 NULL_OF_INVERSE = (
     1e-10  #: `NULL` of an inverse, in which a single such value outweighs all others.
 )
-SD_PER_MEDIAN = 1.4826  #: Standard deviation of normal noise over the median of its size.
+SD_PER_MEDIAN = 1.4826  #: SD of normal noise over the median of its size.
 FOLDS = 5  #: Contiguous stretches of the log for cross-validation.
 
 
@@ -25,7 +25,7 @@ class ColumnFit(NamedTuple):
     """A fitted column."""
 
     values: Array  #: Coefficients. (k,)
-    #: Their standard deviations, the residual's correlation along time counted. (k,)
+    #: Their SDs, the residual's correlation along time counted. (k,)
     sd: Array
     residual: Array  #: What is not explained. (M,)
     weights: Array  #: Final weights, 0 … 1. (M,)
@@ -103,12 +103,12 @@ def solve(A: Array, y: Array) -> Array:
 
 
 def huber(z: Array) -> Array:
-    """Weights of residuals in standard deviations: 1 up to `HUBER`."""
+    """Weights of residuals in SDs: 1 up to `HUBER`."""
     return HUBER / np.maximum(abs(z), HUBER)
 
 
 def robust_sd(residual: Array) -> Array:
-    """Standard deviation of each column by the median of its size. (n,)"""
+    """SD of each column by the median of its size. (n,)"""
     if not len(residual):
         return np.zeros(residual.shape[1:])
     return SD_PER_MEDIAN * np.median(abs(residual), axis=0)
@@ -128,7 +128,7 @@ def correlation_time(residual: Array) -> float:
 
 
 def deviations(A: Array, residual: Array, weights: Array) -> Array:
-    """Standard deviations of a fit, the residual correlated along time. (k,)"""
+    """SDs of a fit, the residual correlated along time. (k,)"""
     used = weights > 0
     freedom = max(1, np.count_nonzero(used) - A.shape[1])
     variance = np.sum(weights * residual**2) / freedom

@@ -60,7 +60,7 @@ QUANTILES = (0.9, 2.706), (0.97, 4.709)
 #: [N·m]; and its least correlation time there. [s]
 DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
 #: Without learned noise the quietest 60 % of the blocks in motion count as free; 60 % of
-#: a normal variable lie within so many standard deviations.
+#: a normal variable lie within so many SDs.
 QUIET, QUIET_SD = 0.6, 0.8416
 #: Share of b that is left when a joint comes to rest.
 STOP_DECAY = np.exp(-5.0)

@@ -33,7 +33,7 @@ class PoseFit(NamedTuple):
     pose: Pose  #: Orientation and origin of the sensor in the flange frame.
     force_rms: float  #: Force that the pose leaves unexplained, rms over axes and samples. [N]
     moment_rms: float  #: The same of the moment. [N·m]
-    position_sd: Array  #: Standard deviation of the origin. (3,) [m]
+    position_sd: Array  #: SD of the origin. (3,) [m]
 
 
 def fit_pose(flange: Array, sensor: Array) -> PoseFit:

@@ -31,7 +31,7 @@ LEAST_SPAN = 0.5  #: Shortest unloaded start. [s]
 STEPS = np.repeat([3.0, 0.6], 3)
 #: An unloaded start ends this long before a load shows: it began earlier. [s]
 BACK = 0.3
-SPREADS = 6.0  #: A departure of so many robust standard deviations counts as load.
+SPREADS = 6.0  #: A departure of so many robust SDs counts as load.
 
 
 class Drift(NamedTuple):
@@ -40,7 +40,7 @@ class Drift(NamedTuple):
     name: str  #: The observer.
     span: Span  #: First and last time. [s]
     mean: Array  #: Mean wrench, the zero drift. (6,) [N, N·m]
-    sd: Array  #: Standard deviation about it. (6,) [N, N·m]
+    sd: Array  #: SD about it. (6,) [N, N·m]
     samples: int  #: Known samples in the span.
     frame: str  #: Frame of the numbers.
     removed: bool = False  #: Whether it was subtracted.

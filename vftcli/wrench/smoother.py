@@ -36,7 +36,7 @@ COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the p
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 #: Longer logs have longer blocks: each needs some 6 kB and .1 ms.
 MOST_BLOCKS = 30_000
-#: Factors on the model's own standard deviations of force and moment: friction's error is not
+#: Factors on the model's own SDs of force and moment: friction's error is not
 #: Gaussian. Chosen once on six simulated seeds, for all logs.
 WIDENED = np.repeat([1.5, 2.0], 3)
 DRIVES = 0.03  #: Error of the drives' constants, as a share of a reading.
@@ -46,15 +46,15 @@ BENT = 0.25
 #: Outside the listed contacts the band is that of a contact of this length, that of the
 #: made-up contacts in free motion that give the smallest force. [s]
 UNLISTED = 0.6
-#: Factor on the force's standard deviation to measure a size: peaks exceed the mean behind
+#: Factor on the force's SD to measure a size: peaks exceed the mean behind
 #: it, and would shrink.
 LOOSER = 1.5
-LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]
+LEVER = 0.1  #: SD of a moment over that of the force. [m]
 #: Correlation times of a wrench that are tried. [s]
 TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-FORCES = (10.0, 30.0, 60.0)  #: Standard deviations of a force that are tried. [N]
+FORCES = (10.0, 30.0, 60.0)  #: SDs of a force that are tried. [N]
 STEADY = 30.0  #: A wrench of at least this correlation time is a load, … [s]
-#: … if its change in a second is no more than this (one standard deviation). [N]
+#: … if its change in a second is no more than this (one SD). [N]
 LOAD_CHANGE = 5.0
 
 
@@ -62,7 +62,7 @@ class WrenchPrior(NamedTuple):
     """An Ornstein–Uhlenbeck prior of the wrench in base axes."""
 
     time: float  #: Correlation time τ_w. [s]
-    force: float  #: Standard deviation σ_f of each component of the force. [N]
+    force: float  #: SD σ_f of each component of the force. [N]
     #: That of the moment; None for `LEVER` times the force. [N·m]
     moment: float | None = None
 
@@ -203,7 +203,7 @@ def block_length(t: Array, *, fine: bool) -> float:
 
 
 def deviations(covariance: Array) -> Array:
-    """Standard deviations of covariances. (T, k)"""
+    """SDs of covariances. (T, k)"""
     # A known model error has no variance, within rounding.
     return np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
 
@@ -229,7 +229,7 @@ class SmoothedWrench(NamedTuple):
 
     @property
     def sd(self) -> Array:
-        """Standard deviation in base axes. (K, 6) [N, N·m]"""
+        """SD in base axes. (K, 6) [N, N·m]"""
         return deviations(self.covariance)
 
     def unlisted(self, t: Array) -> Mask:

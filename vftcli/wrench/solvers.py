@@ -69,7 +69,7 @@ def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
     return SCALE[:, None] * ((U * inverse[:, None, :]) @ (U.swapaxes(1, 2) @ parts.scaled))
 
 
-#: Standard deviations of joint torques (T, n) [N·m] → A (T, 6, n) of the estimate w = Aτ for
+#: SDs of joint torques (T, n) [N·m] → A (T, 6, n) of the estimate w = Aτ for
 #: them, and B (T, 6, k) of its covariance BBᵀ.
 Solver = Callable[[Array], tuple[Array, Array]]
 
@@ -119,19 +119,14 @@ def null_space(parts: Decomposition, tau: Array) -> Array:
     return tau - tall @ (share[:, :, None] * (tall.swapaxes(1, 2) @ tau))
 
 
-class FlangeWrench(NamedTuple):
-    """A wrench at the flange."""
+def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> tuple[Array, Mask]:
+    """Least squares (46) from torques and given Jacobians, and whether the pose shows it.
 
-    #: Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m]
-    values: Array
-    known: Mask  #: Whether the pose shows it: σ_min ≥ `LEAST_SIGMA`. (T,)
-
-
-def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:
-    """Least squares (46) from torques and given Jacobians."""
+    Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m], (T,)
+    """
     parts = decompose(jacobian)
     values = np.squeeze(least_squares_gain(parts, left_out) @ tau[:, :, None], axis=2)
-    return FlangeWrench(values, parts.sigma_min >= LEAST_SIGMA)
+    return values, parts.sigma_min >= LEAST_SIGMA
 
 
 CHUNK = 4096  #: Samples that are solved at once: about 10 MB of 6×6 matrices.

@@ -115,7 +115,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
     matrix = np.zeros((len(time), 4, 4))
     matrix[:, :3, :3], matrix[:, :3, 3], matrix[:, 3, 3] = target.rotation, target.position, 1.0
     # Bounded, as a controller's: blind directions read nothing.
-    force = wrench_of(signals["tau_ext"], actual.jacobian, left_out=LEAST_SIGMA).values
+    force, _ = wrench_of(signals["tau_ext"], actual.jacobian, left_out=LEAST_SIGMA)
     return {
         **signals,
         "time": time,
