@@ -11,9 +11,9 @@ import pytest
 from made_runs import command
 
 import vftcli as vft
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 
 ROOT = Path(__file__).parents[1]
 TAPS = ROOT / "fixtures" / "ur5_taps_ur_rtde.csv"

@@ -20,16 +20,15 @@ from scipy.signal import butter, sosfiltfilt
 
 import vftcli as vft
 from vftcli import pipeline
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion import free_motion
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice, free_motion
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers import reading
 from vftcli.readers.reader import ReadChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots import run as modelled
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.progress import heard_by
 from vftcli.signals.remarks import Remark

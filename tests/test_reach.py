@@ -15,13 +15,12 @@ from made_runs import analyse_log
 
 from vftcli.doctor.causes import readings
 from vftcli.doctor.windows import windows_of
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.run import paired
 from vftcli.robots.terms import gravity_torque

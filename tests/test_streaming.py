@@ -15,9 +15,9 @@ from made_runs import command
 
 from vftcli import streaming
 from vftcli.doctor import examination
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reading import read
 from vftcli.robots.terms import RunningTerms
@@ -25,7 +25,7 @@ from vftcli.signals.errors import VftError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 from vftcli.streaming import comes_in_blocks
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from vftcli.admittance.choice import FILE, ControlChoice, released_robot
+from vftcli.admittance import FILE, ControlChoice, released_robot
 from vftcli.analysis import Analysis
-from vftcli.identification.choice import Task
-from vftcli.observers.choice import LOG_GAINS, GoalChoice, ObserverChoice
+from vftcli.identification import Task
+from vftcli.observers import LOG_GAINS, GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, check_logged, examine, model, prepared, read
 from vftcli.readers.references import estimates_columns
 from vftcli.robots.robot import Robot
@@ -17,7 +17,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Asked
 from vftcli.signals.recording import EFFORTS, Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench import WrenchChoice
 
 if TYPE_CHECKING:
     import polars as pl

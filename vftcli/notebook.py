@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import polars as pl
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance import ControlChoice
 from vftcli.analysis import Analysis
 from vftcli.answering import (
     TUNED,
@@ -29,23 +29,23 @@ from vftcli.answering import (
     replayed,
 )
 from vftcli.batch.log_work import for_comparison, for_estimates
-from vftcli.bias.choice import RefinementChoice
+from vftcli.bias import RefinementChoice
 from vftcli.doctor.examination import Examination, Examiner, examine
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.identification.choice import Task
-from vftcli.observers.choice import GoalChoice, ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.identification import Task
+from vftcli.observers import GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, choice_of, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Anyway, Asked, Choice, settings_as_typed
 from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remarks
-from vftcli.wrench.choice import AlsoWrench, WrenchChoice
+from vftcli.wrench import AlsoWrench, WrenchChoice
 
 if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.bias.choice import RefinementChoice
+from vftcli.bias import RefinementChoice
 from vftcli.doctor.examination import Examiner
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.observers.table import BEST, LogSpectra
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.references import refuse_estimates
-from vftcli.robots import Robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import Robot, RobotChoice
 from vftcli.robots.run import Run
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.option import Asked
@@ -30,8 +29,8 @@ if TYPE_CHECKING:
     from vftcli.bias.baseline import Baselines
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
-    from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.wrench.choice import WrenchChoice
+    from vftcli.evaluation import ReferenceChoice
+    from vftcli.wrench import WrenchChoice
     from vftcli.wrench.detection import KnownContacts
 
 WRITING = 0.7  # share of a log's work before its files are written
@@ -95,8 +94,8 @@ def choice_of(
     observers: ObserverChoice | None = None,
 ) -> AnalysisChoice:
     """The choice of a command or a call, with `observers` instead if given."""
-    from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.wrench.choice import WrenchChoice
+    from vftcli.evaluation import ReferenceChoice
+    from vftcli.wrench import WrenchChoice
 
     wrench = asked.words.get("wrench") or asked.states(WrenchChoice)
     reference, refinement = None, asked.of(RefinementChoice)
@@ -312,8 +311,7 @@ def sense(analysis: Analysis, choice: AnalysisChoice, *, unasked: bool = True) -
         if analysis.contacts is None or BEST not in names or analysis.robot.joints < 6:
             return analysis
         names = (BEST,)
-    from vftcli.wrench import sensing
-    from vftcli.wrench.choice import WrenchChoice
+    from vftcli.wrench import WrenchChoice, sensing
 
     listed, gate = analysis.contacts, None
     # Outside the contacts nothing touches, unless the whole log may be one.

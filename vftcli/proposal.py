@@ -9,9 +9,9 @@ from typing import NamedTuple
 from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.examination import examine, in_words
 from vftcli.doctor.fit import guess_robot
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
 from vftcli.robots.robot import Robot
 from vftcli.robots.robot_file import lines_of

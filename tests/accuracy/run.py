@@ -25,8 +25,7 @@ import scenarios  # noqa: E402
 
 from vftcli.bias.whole_log import whole_log_bias  # noqa: E402
 from vftcli.free_motion.free_motion import FreeMotion  # noqa: E402
-from vftcli.observers import spectra  # noqa: E402
-from vftcli.observers.choice import ObserverChoice  # noqa: E402
+from vftcli.observers import ObserverChoice, spectra  # noqa: E402
 from vftcli.observers.table import Setup, build_observers  # noqa: E402
 from vftcli.observers.tuning import tune_to_spectra  # noqa: E402
 from vftcli.robots.run import Run, RunSamples  # noqa: E402

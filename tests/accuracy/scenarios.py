@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from planted_pushes import joint_torque, moving_window, planted, pushes, with_torque
 
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot

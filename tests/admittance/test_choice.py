@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.admittance.choice import ControlChoice, released_robot
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.admittance import ControlChoice, released_robot
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.signals.errors import ParameterError, RobotError
 
 UR5 = load_robot("ur5")

@@ -12,7 +12,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 
 UR5 = load_robot("ur5")
 T = np.arange(0.0, 4.0, 0.01)

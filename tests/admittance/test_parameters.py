@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance import ControlChoice
 from vftcli.admittance.law import AXES, controllers, from_table, parse_settings
 from vftcli.admittance.replay import release_deviation
 from vftcli.robots import load_robot

@@ -12,19 +12,18 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.batch import annotated_copy
+from vftcli.batch import WorkersChoice, annotated_copy
 from vftcli.batch.annotated_copy import annotate, gathered, joint_names
 from vftcli.batch.annotation import ForceChoice
-from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import Outcome
 from vftcli.batch.datasets.copying import partial_of
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import recognise
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError, VftError
 from vftcli.signals.progress import heard_by
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench import WrenchChoice
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "panda_episodes"
 FILES = [f"data/chunk-000/file-{k:03d}.parquet" for k in (0, 1)]

@@ -8,13 +8,13 @@ import pytest
 
 from vftcli.batch.annotation import ForceChoice, by_row, check_signals, force_columns
 from vftcli.batch.keys import options_digest
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.readers.reading import read, read_chosen
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.recording import Recording
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 
 T = np.arange(40) / 25
 Q = 0.3 * np.sin(T)[:, None] * np.ones(6)

@@ -13,7 +13,7 @@ import psutil
 import pytest
 from distributed import LocalCluster
 
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import (
     EngineError,
     Failure,

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 
 
 def test_the_content_of_one_file_is_its_own_digest(tmp_path: Path) -> None:

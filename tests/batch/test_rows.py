@@ -10,13 +10,13 @@ from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.batch.log_work import SCHEMA, rows_of, size_of
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.remarks import warning
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench import WrenchChoice
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 

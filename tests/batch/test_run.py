@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import Effort, Failure, Outcome
 from vftcli.batch.log_work import LogJob
 from vftcli.batch.run import BatchCount, BatchRun, LogEntry

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.batch import choice
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice, choice
 from vftcli.signals.errors import ParameterError
 
 KEY = Path("key.pem")

@@ -23,8 +23,7 @@ import pinocchio as pin
 import polars as pl
 
 from vftcli.doctor import Examiner, examine
-from vftcli.observers import KalmanObserver
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import KalmanObserver, ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.observers.tuning import tune_to_spectra

@@ -6,10 +6,10 @@ import pytest
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 OBSERVERS = ObserverChoice(

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from vftcli.doctor.examination import Examiner
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots.run import Run
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"

@@ -9,7 +9,7 @@ import pytest
 from vftcli.bias.baseline import Baseline, baseline_of, free_reading
 from vftcli.bias.refine import band_remarks, with_band
 from vftcli.bias.whole_log import WholeLogBias
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers import MomentumObserver
 from vftcli.observers.tuning import tune_to_spectra

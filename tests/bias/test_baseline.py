@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from vftcli.bias.baseline import Baselines, baseline_of
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vftcli.bias.choice import AUTOMATIC, REMOVALS, RefinementChoice
+from vftcli.bias import AUTOMATIC, REMOVALS, RefinementChoice
 from vftcli.signals.errors import ParameterError
 
 

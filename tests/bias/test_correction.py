@@ -8,14 +8,13 @@ import pytest
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.bias import baseline
-from vftcli.bias.choice import RefinementChoice
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.bias import RefinementChoice, baseline
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.errors import MissingSignalError
 

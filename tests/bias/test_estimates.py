@@ -9,12 +9,12 @@ import pytest
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark

@@ -10,7 +10,7 @@ import pytest
 from known_errors import drawn_error, wrong_run
 
 from vftcli.doctor.examination import Examiner
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.tuning import noise_level
 from vftcli.pipeline import AnalysisChoice, analyse, run_of

@@ -12,12 +12,12 @@ from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.bias.refine import refine
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, model, read, run_of
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
 

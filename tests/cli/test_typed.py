@@ -5,19 +5,19 @@ from typing import Any
 
 import pytest
 
-from vftcli.admittance.choice import ControlChoice
-from vftcli.batch.choice import WorkersChoice
-from vftcli.bias.choice import RefinementChoice
+from vftcli.admittance import ControlChoice
+from vftcli.batch import WorkersChoice
+from vftcli.bias import RefinementChoice
 from vftcli.doctor.examination import Examiner
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.outputs import OutputChoice
 from vftcli.pipeline import choice_of
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.option import Asked, Choice
-from vftcli.wrench.choice import FIT, WrenchChoice
+from vftcli.wrench import FIT, WrenchChoice
 
 EVERY = (
     ReadChoice, RobotChoice, ObserverChoice, FreeChoice, RefinementChoice, WrenchChoice,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run

@@ -9,15 +9,14 @@ from contact_logs import FIXTURES, true_wrench
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of, sense
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.kernels import load_regressor, load_wrench
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench import WrenchChoice
 
 NAMES = "ur5_circle.csv", "ur5_table1.csv"
 

@@ -17,7 +17,7 @@ from vftcli.contacts.free_statistics import (
     observer_noise,
     torque_level,
 )
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot

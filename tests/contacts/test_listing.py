@@ -13,7 +13,7 @@ from known_errors import shortened
 
 from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.listing import adjoining, list_contacts
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.reading import read
 from vftcli.robots import Robot, load_robot

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from contact_scores import Score, angle, score, touched, true_contacts
 
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Mask

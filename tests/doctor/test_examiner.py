@@ -9,8 +9,7 @@ from moving_arms import FRICTION, moving
 from vftcli.doctor import Examiner, in_words
 from vftcli.doctor.examination import refuse
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.signals.errors import ExaminationError, MissingSignalError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning

@@ -20,7 +20,7 @@ from vftcli.signals.errors import (
     ParameterError,
     ReferenceTorqueError,
 )
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 
 TURNED = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 """The sensor's axes in those of the Jacobian."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation import ReferenceChoice
 from vftcli.evaluation.references import make_reference, touched_remarks, touches
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers import reading

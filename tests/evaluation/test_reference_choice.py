@@ -7,8 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import references
-from vftcli.evaluation.reference_choice import NAMES, ReferenceChoice
+from vftcli.evaluation import NAMES, ReferenceChoice, references
 from vftcli.evaluation.references import judge, make_reference, reference_wrench
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.references import read_reference

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.free_motion.choice import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
+from vftcli.free_motion import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
 from vftcli.free_motion.difference import RUNGS
 from vftcli.signals.errors import ReferenceTorqueError
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.bias.baseline import Baseline, baseline_of, free_reading
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, columns, free_load
 from vftcli.observers.tuning import tune_to_spectra
 from vftcli.robots import load_robot

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.free_motion.two_cycle import partners_in_log, partners_in_logs
 from vftcli.robots import load_robot

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.cycles import find_period
 from vftcli.free_motion.difference import RUNGS
 from vftcli.free_motion.two_cycle import two_cycle_difference

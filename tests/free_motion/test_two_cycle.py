@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sound_logs import UR10E
 
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.difference import RUNGS, Difference, ErrorModel
 from vftcli.free_motion.two_cycle import (
     error_ratio,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.observers.choice import (
+from vftcli.observers import (
     LEAD,
     LONGEST,
     ObserverChoice,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.observers.observer import Observer
 from vftcli.observers.table import PAPER, Setup, build_observers
 from vftcli.observers.tuning import match_observers, parse_goal

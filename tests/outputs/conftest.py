@@ -13,17 +13,16 @@ from contact_rows import contact, contact_list
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
+from vftcli.evaluation import ReferenceChoice
 from vftcli.evaluation.errors import evaluate
-from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import caution, fact
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench import WrenchChoice
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'
 

@@ -13,7 +13,7 @@ from rerun_rows import rows_of, times_of
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Unexplained
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import PLACES
 from vftcli.outputs.contacts import answer
@@ -29,12 +29,12 @@ from vftcli.outputs.rerun_recording import (
 )
 from vftcli.outputs.run_record import all_remarks
 from vftcli.pipeline import AnalysisChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots.chain import link_poses
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.arrays import Z_95
 from vftcli.signals.remarks import Where, caution
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.frames import frame_pose
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance import ControlChoice
 from vftcli.admittance.replay import Replay, replay
 from vftcli.reproduction.control import (
     deviation_chart,

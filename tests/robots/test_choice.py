@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_urdfs import two_armed, written
 
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.recording import Recording
 

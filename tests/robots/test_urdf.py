@@ -18,8 +18,7 @@ from made_urdfs import (
     written,
 )
 
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import Recording
 

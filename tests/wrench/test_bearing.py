@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.arrays import Z_95
 from vftcli.simulation import load_scenario, simulate
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 
 pytestmark = pytest.mark.slow
 

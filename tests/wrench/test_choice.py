@@ -5,7 +5,7 @@ import pytest
 
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
-from vftcli.wrench.choice import FIT, WrenchChoice, ZeroChoice
+from vftcli.wrench import FIT, WrenchChoice, ZeroChoice
 
 
 def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for_others() -> None:

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 from rosbags.highlevel import AnyReader
 
-from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation import ReferenceChoice
 from vftcli.evaluation.references import make_reference
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.reading import read

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from made_runs import analyse_log
 
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
-from vftcli.observers import MomentumObserver
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import MomentumObserver, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, prepared, read
 from vftcli.readers.reader import ReadChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import RunSamples
 from vftcli.signals.series import resample_columns
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.sensing import (
     FreeLog,
     Gate,

@@ -7,13 +7,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.evaluation import ReferenceChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.robots import RobotChoice
+from vftcli.wrench import WrenchChoice
 from vftcli.wrench.sensor import fit_axes
 from vftcli.wrench.solvers import wrench_of
 

@@ -7,14 +7,13 @@ import pytest
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read
-from vftcli.robots import load_robot
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.chain import link_poses
-from vftcli.robots.choice import RobotChoice
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.sensing import mask_remark
 from vftcli.wrench.sensor_reading import SensorReading, null_space_limit
 

@@ -10,7 +10,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.wrench.choice import FIT, WrenchChoice
+from vftcli.wrench import FIT, WrenchChoice
 from vftcli.wrench.sensor import find_mounting, fit_pose
 
 POSE = Pose(rpy_matrix((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from made_runs import analyse_log, run_of
 
-from vftcli.observers import MomentumObserver
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import MomentumObserver, ObserverChoice
 from vftcli.pipeline import AnalysisChoice
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.sensing import (
     from_free_part,
     given_error,

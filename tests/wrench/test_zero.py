@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.choice import ZeroChoice
+from vftcli.wrench import ZeroChoice
 from vftcli.wrench.sensor_reading import (
     unloaded_start,
     without_drift,

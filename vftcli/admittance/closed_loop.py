@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance import ControlChoice
 from vftcli.admittance.law import Controller, check_stable
 from vftcli.admittance.motion import Recursion, check_start, phases
 from vftcli.admittance.replay import Replay, deviation_of
 from vftcli.doctor.examination import Examination
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.observers.paper import KalmanObserver
 from vftcli.robots import load_robot
 from vftcli.robots.robot import FlangeSolver, Robot

@@ -45,7 +45,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.choice import SMOOTHER, WrenchChoice
+from vftcli.wrench import SMOOTHER, WrenchChoice
 from vftcli.wrench.frames import logged_wrench
 from vftcli.wrench.sensor_reading import SensorReading, without_zero
 from vftcli.wrench.solvers import VirtualSensor

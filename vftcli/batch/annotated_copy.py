@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.batch import WorkersChoice
 from vftcli.batch.annotation import (
     SIGN,
     EpisodesTask,
@@ -16,7 +17,6 @@ from vftcli.batch.annotation import (
     estimate_episodes,
     force_columns,
 )
-from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import Outcome, Tell, begin, run_tasks
 from vftcli.batch.datasets import DataFile, ForceColumn, Single, Statistics
 from vftcli.batch.datasets.copying import (

@@ -14,7 +14,7 @@ from vftcli.batch.datasets import DataFile, ForceColumn, Single
 from vftcli.batch.datasets.copying import put_rows, stored_rows
 from vftcli.doctor.examination import Examiner
 from vftcli.doctor.signals import efforts_of
-from vftcli.observers.choice import ObserverChoice, settling_samples
+from vftcli.observers import ObserverChoice, settling_samples
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.run_record import observer_record, robot_record, to_json
 from vftcli.pipeline import AnalysisChoice, analyse, prepared

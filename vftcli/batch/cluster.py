@@ -20,7 +20,7 @@ from itertools import chain, count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
-from vftcli.batch.choice import EXTRA, MEMORY, MOST_WORKERS, WorkersChoice
+from vftcli.batch import EXTRA, MEMORY, MOST_WORKERS, WorkersChoice
 from vftcli.signals.errors import VftError
 from vftcli.signals.parsing import counted
 from vftcli.signals.progress import heard_by, nobody

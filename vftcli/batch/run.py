@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import polars as pl
 
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import Effort, Failure, Outcome, Tell, run_tasks
 from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
 from vftcli.batch.log_work import SCHEMA, LogJob, LogTask, work_on_log

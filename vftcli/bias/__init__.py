@@ -1,1 +1,41 @@
-"""Estimates of a complete log: its free part gives noise, bias, bands, gains."""
+"""Estimates of a complete log: its free part gives noise, bias, bands, gains.
+
+Here is the user's choice: bias subtracted, contacts listed or not.
+"""
+
+from typing import Annotated
+
+from vftcli.signals.option import ESTIMATE, Choice, Option, is_yes
+from vftcli.signals.parsing import check_known
+
+#: What the log allows: a bias for `best`, none for others.
+AUTOMATIC = "auto"
+#: The word for the bias fitted to the whole log and subtracted before observers run.
+WHOLE_LOG = "whole-log"
+REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``bias.method`` takes.
+
+
+class RefinementChoice(Choice):
+    """A user's choice for the estimates of a whole log."""
+
+    GROUP = ESTIMATE
+
+    bias: Annotated[
+        str,
+        Option(
+            "bias.method",
+            "|".join(REMOVALS),
+            "Whether the bias fitted to the whole log comes off; auto: for best alone.",
+        ),
+    ] = AUTOMATIC
+    contacts: Annotated[
+        bool, Option("contacts.list", "yes|no", "Whether contacts are listed.", is_yes)
+    ] = True
+
+    def __post_init__(self) -> None:
+        check_known(self.bias, REMOVALS, f"--set bias.method={self.bias}")
+
+    @property
+    def corrects_all(self) -> bool:
+        """Whether every observer runs on what is left without the whole log's bias."""
+        return self.bias == WHOLE_LOG

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.bias.choice import RefinementChoice
+from vftcli.bias import RefinementChoice
 from vftcli.bias.whole_log import WholeLogBias, whole_log_bias
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
 from vftcli.observers.observer import Observer

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.bias import AUTOMATIC
 from vftcli.bias.baseline import Baseline, Baselines, FreeReading, free_reading
-from vftcli.bias.choice import AUTOMATIC
 from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.bias.whole_log import stride_of
 from vftcli.observers.observer import Observer

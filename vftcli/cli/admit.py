@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance import ControlChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_ANALYSIS, choice_for
 from vftcli.cli.console import (

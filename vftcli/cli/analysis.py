@@ -4,16 +4,16 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from vftcli.bias.choice import RefinementChoice
+from vftcli.bias import RefinementChoice
 from vftcli.cli.console import health_of
 from vftcli.cli.options import Talk
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.outputs import OutputChoice
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.option import Anyway, Asked
-from vftcli.wrench.choice import AlsoWrench, WrenchChoice
+from vftcli.wrench import AlsoWrench, WrenchChoice
 
 if TYPE_CHECKING:
     from vftcli.pipeline import AnalysisChoice

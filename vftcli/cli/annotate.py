@@ -4,16 +4,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_LOG
 from vftcli.cli.console import detail, echo_data, say
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.option import WRITE, Anyway, Asked, Option
 from vftcli.signals.parsing import check_known
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench import WrenchChoice
 
 ADDED = ("wrench", "sd", "contact")  #: Values of ``--add``.
 

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import say
 from vftcli.cli.progress import STAGES
-from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
 from vftcli.signals.option import Asked, Option, names_at
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.batch import SOME_FAILED
 from vftcli.cli.console import echo, echo_data, open_made, say, say_json, show
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import LOG, Anyway, Asked, Choice, Option
 from vftcli.signals.parsing import printable

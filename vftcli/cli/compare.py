@@ -8,7 +8,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_ANALYSIS, choice_for
 from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
-from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation import ReferenceChoice
 from vftcli.signals.errors import VftError
 from vftcli.signals.option import COMPARE, WRITE, Asked, Option
 

@@ -8,7 +8,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.signals.option import OUTPUT, Anyway, Asked, Choice, Option
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from vftcli.cli.config import (
     kept_words,
 )
 from vftcli.cli.progress import echo
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
 from vftcli.signals.option import GROUPS, LOG, NUMBERS, OUTPUT, Choice, Option, settings_by_name
 from vftcli.signals.parsing import did_you_mean, nearest, printable, tables_beside

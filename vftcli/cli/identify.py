@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from vftcli.bias.choice import RefinementChoice
+from vftcli.bias import RefinementChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import (
@@ -19,9 +19,9 @@ from vftcli.cli.console import (
     say_recording,
     say_robots,
 )
-from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion import FreeChoice
 from vftcli.identification import Task
-from vftcli.observers.choice import GoalChoice
+from vftcli.observers import GoalChoice
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Anyway, Asked
 

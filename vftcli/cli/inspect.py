@@ -12,7 +12,7 @@ from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.config import NAME
 from vftcli.cli.console import echo, say, say_json, say_robots
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.robots import RobotChoice
 from vftcli.signals.option import Asked, Option
 from vftcli.signals.parsing import counted
 

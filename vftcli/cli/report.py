@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_written, show
-from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
 from vftcli.signals.option import WRITE, Asked, Choice, Option
 from vftcli.signals.progress import stage

@@ -13,8 +13,7 @@ from vftcli.doctor.signals import efforts_of, signal_findings, stuck_findings, u
 from vftcli.doctor.velocity import clock_findings, velocity_findings, velocity_fit
 from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
-from vftcli.robots import load_robot
-from vftcli.robots.choice import RobotChoice, choices_for
+from vftcli.robots import RobotChoice, choices_for, load_robot
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Runs, paired, unwound
 from vftcli.robots.terms import check_effort, effort_name

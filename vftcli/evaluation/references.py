@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
+from vftcli.evaluation import ReferenceChoice
 from vftcli.evaluation.errors import evaluate, joint_means
-from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.wrenches import evaluate_wrenches, with_contacts
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.free_motion.two_cycle import two_cycle_reference

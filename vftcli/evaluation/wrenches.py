@@ -15,7 +15,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, Wrench
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.detection import ContactScore
 from vftcli.wrench.sensor import RESEMBLES, fit_axes
 from vftcli.wrench.solvers import LEAST_SIGMA, decompose, wrench_of

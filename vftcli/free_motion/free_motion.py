@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.alignment import Alignment, align
-from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.cycles import (
     Cycles,
     FreeCycles,

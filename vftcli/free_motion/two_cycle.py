@@ -5,7 +5,7 @@ from itertools import permutations
 
 import numpy as np
 
-from vftcli.free_motion.choice import AUTOMATIC, FreeChoice
+from vftcli.free_motion import AUTOMATIC, FreeChoice
 from vftcli.free_motion.cycles import pair_with_cycle
 from vftcli.free_motion.difference import (
     LOW_PASS,

@@ -14,11 +14,11 @@ import polars as pl
 from polars import String
 
 from vftcli.answering import identified
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import Failure, Outcome, Tell, perform, run_tasks
 from vftcli.batch.keys import content_digest, digest_of, key_of, options_digest
 from vftcli.doctor.examination import Examiner
-from vftcli.identification.choice import Task
+from vftcli.identification import Task
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.benchmark import Results, render_benchmark
 from vftcli.outputs.conversion import companions, convert, save

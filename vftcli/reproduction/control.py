@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance import ControlChoice
 from vftcli.admittance.closed_loop import ClosedLoop, Latency, latencies, loop_of
 from vftcli.admittance.law import AXES, UnstableError
 from vftcli.admittance.motion import release, releases_of, rows_of
 from vftcli.admittance.motion import run as follow_force
 from vftcli.admittance.replay import Replay, replay, settling
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import ObserverChoice
 from vftcli.outputs.admittance import charts as replay_charts
 from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, Given

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance import ControlChoice
 from vftcli.admittance.motion import SHARES, Drag, return_time
 from vftcli.admittance.replay import Replay, replay, stored_force
 from vftcli.analysis import Analysis
 from vftcli.doctor.examination import Examiner
+from vftcli.evaluation import ReferenceChoice
 from vftcli.evaluation.errors import correlation, joint_means
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion.choice import FreeChoice
-from vftcli.observers.choice import ObserverChoice
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
 from vftcli.observers.observer import Observer
 from vftcli.observers.table import PAPER
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
@@ -30,7 +30,7 @@ from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.simulation import load_scenario, simulate
-from vftcli.wrench.choice import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.solvers import VirtualSensor
 
 #: Variant → its observers; the last has all at FDO's 10 rad/s.

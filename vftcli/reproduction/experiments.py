@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.batch.choice import WorkersChoice
+from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import perform, run_tasks
 from vftcli.outputs.charts import Chart
 from vftcli.outputs.files import SEAL, OutputFolder

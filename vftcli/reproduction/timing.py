@@ -14,8 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vftcli.observers import KalmanObserver
-from vftcli.observers.choice import ObserverChoice
+from vftcli.observers import KalmanObserver, ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.observers.tuning import tune_to_spectra

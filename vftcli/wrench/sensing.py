@@ -28,7 +28,7 @@ from vftcli.signals.option import numbers
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.choice import WrenchChoice
+from vftcli.wrench import WrenchChoice
 from vftcli.wrench.frames import from_base
 from vftcli.wrench.sensor import find_mounting, vendor_remarks
 from vftcli.wrench.sensor_reading import (

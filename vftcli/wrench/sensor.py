@@ -16,7 +16,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.choice import FIT, WrenchChoice
+from vftcli.wrench import FIT, WrenchChoice
 from vftcli.wrench.frames import UNSTATED, Mounting
 from vftcli.wrench.solvers import VirtualSensor
 

@@ -15,7 +15,7 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import covered, runs_of
 from vftcli.signals.shown import Shown, record
 from vftcli.signals.wrench import AXES, Wrench, unit_of
-from vftcli.wrench.choice import SMOOTHER, ZeroChoice
+from vftcli.wrench import SMOOTHER, ZeroChoice
 from vftcli.wrench.smoother import SmoothedWrench
 from vftcli.wrench.solvers import SCALE, VirtualSensor
 

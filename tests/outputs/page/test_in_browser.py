@@ -21,8 +21,8 @@ from vftcli.outputs.page.shell import HERE, part
 from vftcli.outputs.page.stage import HEIGHT, WIDTH, arrow_of, pose_at, view_of
 from vftcli.outputs.shapes import capsules
 from vftcli.pipeline import AnalysisChoice
+from vftcli.robots import RobotChoice
 from vftcli.robots.chain import link_poses
-from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Mesh
 from vftcli.signals.pose import IDENTITY
 
