@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.batch import WorkersChoice, choice
+import vftcli.batch
+from vftcli.batch import WorkersChoice
 from vftcli.signals.errors import ParameterError
 
 KEY = Path("key.pem")
@@ -12,7 +13,7 @@ OF_TLS = {"cluster.ca": KEY, "cluster.cert": KEY, "cluster.key": KEY}
 
 
 def test_without_dask_work_is_done_here_unless_workers_are_asked_for(monkeypatch) -> None:
-    monkeypatch.setattr(choice, "is_installed", lambda: False)
+    monkeypatch.setattr(vftcli.batch, "is_installed", lambda: False)
     assert WorkersChoice().in_process
     assert WorkersChoice(jobs=0).in_process
     with pytest.raises(ParameterError, match=r"vftcli\[cluster\]"):
@@ -56,7 +57,7 @@ def test_a_cluster_that_asks_nobody_for_a_certificate_is_refused_unless_accepted
 
 def test_workers_without_what_makes_certificates_are_refused(monkeypatch) -> None:
     there = {"distributed"}
-    monkeypatch.setattr(choice, "find_spec", lambda name: name if name in there else None)
+    monkeypatch.setattr(vftcli.batch, "find_spec", lambda name: name if name in there else None)
     assert WorkersChoice().in_process
     with pytest.raises(ParameterError, match=r"cryptography: pip install 'vftcli\[cluster\]'"):
         WorkersChoice(jobs=2)
