@@ -5,16 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from vftcli.admittance import FILE, ControlChoice, released_robot
+from vftcli.admittance import ControlChoice, released_robot
 from vftcli.analysis import Analysis
 from vftcli.identification import Task
 from vftcli.observers import LOG_GAINS, GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, check_logged, examine, model, prepared, read
 from vftcli.readers.references import estimates_columns
-from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Asked
+from vftcli.signals.option import FILE, Asked
 from vftcli.signals.recording import EFFORTS, Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.wrench import WrenchChoice
@@ -146,8 +145,7 @@ TUNED = ObserverChoice(gains=LOG_GAINS, causal=True)
 class FoundGains(NamedTuple):
     """Gains for a goal, and their basis."""
 
-    robot: Robot  #: The arm.
-    recording: Recording  #: The log.
+    run: Run  #: The log and its arm.
     goal: "Goal"  #: Their goal.
     tuned: "Sequence[Tuned]"  #: The gains of every observer.
     spectra: "Spectra"  #: Spectra that show every gain's error.
@@ -169,7 +167,7 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
         raise ParameterError(f"nothing to find gains from: {why}")
     tuned = tune_all(spectra, goal)
     remarks = (*found.remarks, *bounds_reached(tuned, spectra, goal))
-    return FoundGains(run.robot, run.recording, goal, tuned, spectra, remarks, examinations)
+    return FoundGains(run, goal, tuned, spectra, remarks, examinations)
 
 
 #: Default observer of the force: the paper's controller's.

@@ -218,9 +218,10 @@ def identify(logs: Opened | OpenedLogs, asked: Asked, *, check: OpenedLogs = ())
     paths, task, goal = several(logs), asked.of(Task), asked.of(GoalChoice)
     if task.method == "gains":
         found = gains_of(paths[0], choice_for(asked, paths, TUNED), goal)
+        robot = found.run.robot
         gains = {line.section: dict(line.gains) for line in found.tuned}
-        document = {**found.robot.document, "observers": gains}
-        return replace(found.robot, gains=gains, document=document)
+        document = {**robot.document, "observers": gains}
+        return replace(robot, gains=gains, document=document)
     choice = choice_for(asked, [*paths, *check])
     examiner = Examiner(anyway=asked.anyway, fitting=task.keeps_links)
     return identified(paths, check, replace(choice, examiner=examiner), task).robot

@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.robots import PROFILES, RobotChoice, load_robot
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.option import NUMBERS, Choice, Option, names_at, numbers
+from vftcli.signals.option import FILE, NUMBERS, Choice, Option, names_at, numbers
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.admittance.law import Controller
     from vftcli.robots.robot import Robot
     from vftcli.signals.arrays import Array
-
-
-FILE = "file:"  #: Head of a force with a path in its name.
 
 
 def listed(text: str, option: str) -> tuple[float, ...]:

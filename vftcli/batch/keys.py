@@ -14,9 +14,8 @@ from typing import Any
 
 from vftcli.outputs.files import digest
 from vftcli.readers.opening import files_of
+from vftcli.signals.option import FILE
 from vftcli.signals.version import VERSION
-
-FILE = "file:"  #: Prefix of a path in a reference's name.
 
 
 @cache

@@ -16,7 +16,7 @@ import typer
 from vftcli.cli.commands import now_of
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, interval, settings_as_typed, settings_by_name
+from vftcli.signals.option import FILE, Choice, interval, settings_as_typed, settings_by_name
 from vftcli.signals.parsing import did_you_mean, printable, shown, toml_file
 
 NAME = "vftcli.toml"  #: The file that is read if it is in the working folder.
@@ -31,7 +31,6 @@ OTHERWISE = {
 }
 Table = dict[str, Any]  #: A table of TOML.
 Click = Any  #: A type of typer's own click, which has none.
-FILE = "file:"  #: Head of a reference's file.
 
 
 #: The words of this call, with those of a file of options.

@@ -139,16 +139,16 @@ def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None
     check_file(output, force)
     found = gains_of(log, choice, goal)
     notes, health = list(map(str, found.remarks)), found.examinations
-    said = [asked.line, f"goal: {goal.gains}", f"robot: {found.robot.name}", *notes]
+    said = [asked.line, f"goal: {goal.gains}", f"robot: {found.run.robot.name}", *notes]
     heading = [*overridden_lines(health), *said]
     write_tuned(output, heading, found.spectra, found.tuned, force=force, form=figures)
     if asked.words["json"]:
         rows = [line.record for line in found.tuned]
         about = {"goal": goal.gains, "examination": health_record(health), "observers": rows}
-        say_json([found.recording], found.remarks, **about)
+        say_json([found.run.recording], found.remarks, **about)
         return
-    say_recording(found.recording)
-    for note in (*found.robot.remarks, *notes):
+    say_recording(found.run.recording)
+    for note in (*found.run.robot.remarks, *notes):
         detail(f"note: {note}")
     echo(terminal(tuned_grid(found.tuned, found.goal.threshold is not None)).rstrip("\n"))
     say(f"wrote {output}: use it with --gains {output}")

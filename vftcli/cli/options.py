@@ -21,6 +21,7 @@ from vftcli.cli.console import command_line, speaking
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
     ESTIMATE,
+    FILE,
     NUMBERS,
     OUTPUT,
     WRITE,
@@ -226,7 +227,7 @@ def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
     """Every file and folder in the options but the output: protected inputs."""
     for name, value in values.items():
         for word in value if isinstance(value, list | tuple) else (value,):
-            path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
+            path = Path(word.removeprefix(FILE)) if isinstance(word, str) else word
             # A word without an ending is a robot, unless a log is due.
             named = path is word or (isinstance(path, Path) and path.suffix) or name == "free"
             if name != "output" and isinstance(path, Path) and named:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import echo, say, say_json, say_recording, say_robots
-from vftcli.evaluation import FILE, ReferenceChoice
-from vftcli.signals.option import Anyway, Asked, Option
+from vftcli.evaluation import ReferenceChoice
+from vftcli.signals.option import FILE, Anyway, Asked, Option
 
 if TYPE_CHECKING:
     from vftcli.signals.recording import Recording

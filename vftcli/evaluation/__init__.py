@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.option import COMPARE, Choice, Option
+from vftcli.signals.option import COMPARE, FILE, Choice, Option
 
-FILE = "file:"  #: Head of the one reference with a path in its name.
 #: The references that are made from the log.
 NAMES = ("zero", "vendor", "two-cycle", "sensor")
 

@@ -24,7 +24,6 @@ LEAST_BLOCKS = 10
 MEMORY = 5.0  #: Length of a block in correlation times of the squared error.
 #: Largest share subtracted: the upper end of an interval is at most five times the RMSE.
 WIDEST = 0.96
-LEVEL = 0.95  #: Coverage of the intervals.
 #: Of Student's quantile: 1e-12 of it from 1 to 1000 degrees.
 QUADRATURE, NEWTON_STEPS = 48, 12
 FIRST_LAGS = 1024  #: First lags of an autocorrelation. [samples]
@@ -107,7 +106,7 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     """
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")
-    quantile = student_quantile(0.5 + 0.5 * LEVEL, blocks - 1) * np.sqrt(blocks / (blocks - 1.0))
+    quantile = student_quantile(0.975, blocks - 1) * np.sqrt(blocks / (blocks - 1.0))
     half = min(quantile * draws.std() / mean_square, WIDEST)
     return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
 
@@ -149,7 +148,7 @@ def paired_significance(
         observed = root_mean_squares(errors)
         for a, b in combinations(range(len(estimates)), 2):
             difference = draws[:, a] - draws[:, b]
-            low, high = np.quantile(difference, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+            low, high = np.quantile(difference, [0.025, 0.975])
             pair = estimates[a].name, estimates[b].name
             sizes = float(observed[a] - observed[b]), float(low), float(high)
             rows.append((recording, j + 1, *pair, *sizes, p_value(draws[:, a], draws[:, b])))

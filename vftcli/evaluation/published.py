@@ -9,6 +9,7 @@ import polars as pl
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, fact, on_joints
 
 #: Errors within this share are one filter's, computed in two ways.
@@ -104,8 +105,7 @@ class Comparison(NamedTuple):
 
 def check_published(name: str, reference: str | None) -> None:
     """Raise unless the table exists and a reference is chosen."""
-    if name not in TABLES:
-        raise ParameterError(f"no published table {name!r}; there is {', '.join(TABLES)}")
+    check_known(name, TABLES, f"no published table {name!r}")
     if reference is None:
         raise ParameterError(
             f"report.published={name} sets errors beside the paper's; add --reference two-cycle"

@@ -26,6 +26,7 @@ LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
 )  # fmt: skip
 
 
+FILE = "file:"  #: Head of a value with a path, where others are names.
 #: A value in a metavar, as `svg`; numbers and paths are none.
 WORD = re.compile("[a-z][a-z-]+")
 
