@@ -48,6 +48,17 @@ def asked(
     return AnalysisChoice(robot=RobotChoice(name=str(robot)), **more)  # type: ignore[arg-type]
 
 
+def test_a_run_is_made_once_for_a_recording_and_a_robot() -> None:
+    circle, arm, choice = vft.read(FIXTURE), vft.load_robot("ur5"), AnalysisChoice()
+    first = pipeline.run_of(circle, arm, choice)
+    assert pipeline.run_of(circle, arm, choice) is first
+    assert first.terms is first.terms
+    literal = replace(choice, observers=ObserverChoice(as_printed=True))
+    assert pipeline.run_of(circle, arm, literal) is not first
+    assert pipeline.run_of(circle, replace(arm), choice) is not first
+    assert pipeline.run_of(replace(circle), arm, choice) is not first
+
+
 def rmse_of(analysis: vft.Analysis, observer: str = "gmo") -> np.ndarray:
     return analysis.errors.filter(pl.col("observer") == observer)["rmse_Nm"].to_numpy()
 

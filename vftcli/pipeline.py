@@ -19,6 +19,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.readers.references import refuse_estimates
 from vftcli.robots import Robot, RobotChoice
 from vftcli.robots.run import Run
+from vftcli.robots.terms import check_joints
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.option import Asked
 from vftcli.signals.progress import stage
@@ -137,8 +138,10 @@ def prepared(recording: Recording, choice: AnalysisChoice) -> Run:
 
 
 def run_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Run:
-    """A log with a robot, as the chosen observers have it."""
-    return choice.examiner.runs.of(recording, robot, literal=choice.observers.as_printed)
+    """A log with a robot, as the chosen observers have it; made once."""
+    check_joints(recording, robot)
+    run = Run(recording=recording, robot=robot, literal=choice.observers.as_printed)
+    return choice.examiner.runs.setdefault((id(recording), id(robot), run.literal), run)
 
 
 def check_logged(recording: Recording, why: str) -> None:

@@ -10,9 +10,8 @@ from made_urdfs import arm, link, robot, written
 from vftcli.doctor.examination import Examiner
 from vftcli.readers.aliases import UR_NAMES, UR_WORDS
 from vftcli.readers.reader import ReadChoice
-from vftcli.readers.reading import read
 from vftcli.robots import load_robot
-from vftcli.robots.run import SERIES, Run, Runs, paired, places, signal_edge, unwound
+from vftcli.robots.run import SERIES, Run, paired, places, signal_edge, unwound
 from vftcli.signals.errors import RobotError
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
@@ -76,16 +75,6 @@ def test_a_run_less_a_torque_is_a_run_whose_disturbance_is_less_by_it() -> None:
     np.testing.assert_array_equal(less.terms.p, run.terms.p)
     assert less.recording is run.recording
     assert less is not run
-
-
-def test_a_run_is_made_once_for_a_recording_and_a_robot() -> None:
-    circle, runs = read(FIXTURE), Runs()
-    first = runs.of(circle, UR)
-    assert runs.of(circle, UR) is first
-    assert first.terms is first.terms
-    assert runs.of(circle, UR, literal=True) is not first
-    assert runs.of(circle, replace(UR)) is not first
-    assert runs.of(replace(circle), UR) is not first
 
 
 NAMES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_a", "wrist_b", "wrist_c")

@@ -15,7 +15,7 @@ from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice, choices_for, load_robot
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Runs, paired, unwound
+from vftcli.robots.run import Run, paired, unwound
 from vftcli.robots.terms import check_effort, effort_name
 from vftcli.signals.errors import ExaminationError, UnsettledRobotError
 from vftcli.signals.recording import Recording
@@ -158,7 +158,8 @@ class Examiner:
         tell: Callable[[Examination], None] | None = None,
     ) -> None:
         self.anyway, self._fitting, self._tell = anyway, fitting, tell
-        self.runs = Runs()  # of the command
+        #: The runs of the command, by their recording's and robot's identities, and `literal`.
+        self.runs: dict[tuple[int, int, bool], Run] = {}
         self._made: list[tuple[Recording, Robot, Examination]] = []
         self._robots: dict[tuple[str, RobotChoice, float | None, bool], Robot] = {}
 

@@ -12,7 +12,7 @@ from vftcli.readers.aliases import UR_NAMES, UR_WORDS, kinematic_order
 from vftcli.readers.table import listed
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import check_joints, drive_torque, dynamics_terms
+from vftcli.robots.terms import drive_torque, dynamics_terms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
@@ -166,22 +166,6 @@ class RunSamples(NamedTuple):
 
     run: Run  #: The run.
     inside: Mask  #: Which of its samples they are. (T,)
-
-
-class Runs:
-    """The runs of a command, each made once."""
-
-    def __init__(self) -> None:
-        self._runs: list[Run] = []
-
-    def of(self, recording: Recording, robot: Robot, *, literal: bool = False) -> Run:
-        """The run of a recording with this robot, an existing one if any."""
-        check_joints(recording, robot)
-        for run in self._runs:
-            if run.recording is recording and run.robot is robot and run.literal == literal:
-                return run
-        self._runs.append(Run(recording=recording, robot=robot, literal=literal))
-        return self._runs[-1]
 
 
 def signal_edge(step: float, cutoff: float = 12.0) -> float:
