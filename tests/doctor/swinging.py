@@ -1,5 +1,8 @@
 """Joints that swing by 1 rad, and what is said of them by their signals alone."""
 
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from vftcli.doctor import examine
@@ -38,7 +41,7 @@ def log_of(**changes: Array | None) -> Recording:
 
 
 def said_of(log: Recording) -> dict[str, Remark]:
-    """Findings by code, each once; an arm of seven joints has no say in a log of fewer."""
+    """dict[str, Remark] by code, each once; an arm of seven joints has no say in a log of fewer."""
     findings = examine(log, load_robot("panda")).findings
     assert len({finding.code for finding in findings}) == len(findings)
     return {finding.code: finding for finding in findings}
@@ -53,3 +56,56 @@ def scaled(x: Array, factor: float, *joints: int) -> Array:
     scale = np.ones(x.shape[1])
     scale[[j - 1 for j in joints]] = factor
     return x * scale
+
+
+class Said(NamedTuple):
+    """What is to be said of a log; an empty level and empty joints are not compared."""
+
+    code: str
+    joints: tuple[int, ...]
+    level: str
+    values: dict[str, Any]
+    beside: frozenset[str] | None = None  # all other codes; None for any
+
+    def check(self, findings: dict[str, Remark]) -> None:
+        if self.beside is not None:
+            assert set(findings) == {self.code, *self.beside} - {""}
+        if self.code:
+            finding = findings[self.code]
+            assert self.joints in ((), finding.where.joints)
+            assert self.level in ("", finding.level)
+            assert {name: finding.values[name] for name in self.values} == self.values
+
+
+class Unsaid(NamedTuple):
+    """What is not to be said: no code begins so."""
+
+    code: str
+
+    def check(self, findings: dict[str, Remark]) -> None:
+        assert [code for code in findings if code.startswith(self.code)] == []
+
+
+def only(code: str = "", *joints: int, level: str = "", beside: str = "", **values: Any) -> Said:
+    return Said(code, joints, level, values, frozenset(beside.split()))
+
+
+def has(code: str, *joints: int, level: str = "", **values: Any) -> Said:
+    return Said(code, joints, level, values)
+
+
+class Case(NamedTuple):
+    """A log and what is to be said of it."""
+
+    name: str
+    find: Callable[[], dict[str, Remark]]
+    said: Said | Unsaid
+
+
+def only_if(there: bool, code: str, *joints: int, **values: Any) -> Said:
+    """The one finding, or none."""
+    return only(code, *joints, **values) if there else only()
+
+
+def has_if(there: bool, code: str, *joints: int, **values: Any) -> Said | Unsaid:
+    return has(code, *joints, **values) if there else Unsaid(code)

@@ -1,109 +1,55 @@
-"""Findings about the signals: each with a known amount of its fault, inside and outside."""
+"""The velocity's fit, and what an effort's work says: each with a known amount, to its error."""
 
 import numpy as np
 import pytest
-from swinging import DQ, TORQUE, Q, T, found, log_of, scaled
+from swinging import DQ, RATES, TORQUE, Q, T, found, log_of, scaled, speed_at
+from test_swinging import ALL, FRICTION, filtered
 
 from vftcli.doctor import examine
 from vftcli.doctor.signals import inverted_effort
+from vftcli.doctor.velocity import velocity_fit
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 
-FRICTION = np.sign(DQ) * (1 + 1e-3 * np.sin(np.arange(len(T)))[:, None])
-"""Dry friction of 1 N·m, with a ripple of a thousandth lest it stays at its extreme. (T, 6)"""
+
+def test_uneven_steps_shift_nothing() -> None:
+    """Steps of 4 to 16 ms, stamps as exact as the signals: the lag stays below 0.1 ms."""
+    t = np.cumsum(np.random.default_rng(0).uniform(0.004, 0.016, 4001))
+    t -= t[0]
+    fit = velocity_fit(log_of(t=t, q=np.sin(np.outer(t, RATES)), dq=speed_at(t)))
+    np.testing.assert_allclose(fit.gain, 1.0, atol=1e-3)
+    np.testing.assert_allclose(fit.lag, 0.0, atol=1e-4)
 
 
-def test_a_sound_log_has_no_finding() -> None:
-    for effort in ("torque", "current", "torque_without_gravity"):
-        assert found(**{"torque": None, effort: TORQUE}) == {}
-        assert found(**{"torque": None, effort: FRICTION}) == {}
+def test_noise_of_the_positions_hides_no_lag() -> None:
+    """Noise of 1 mrad makes the derivative of the slope ten times as large as the motion's own."""
+    q = Q + np.random.default_rng(0).normal(0, 1e-3, Q.shape)
+    fit = velocity_fit(log_of(q=q, dq=speed_at(T - 0.03)))
+    np.testing.assert_allclose(fit.lag, 0.03, atol=4 * np.max(fit.lag_error))
+    assert np.max(fit.lag_error) < 2e-3
 
 
-def test_a_log_without_velocity_or_effort() -> None:
-    assert set(found(dq=None)) == {"no-velocity"}
-    assert set(found(torque=None)) == {"no-effort"}
-    assert {finding.level for finding in found(dq=None, torque=None).values()} == {"warning"}
+def test_the_standard_errors_are_the_scatter() -> None:
+    """Of 200 noises on a quarter turn to one and a half: 1/√400 = 5 % (one sigma)."""
+    chance, short = np.random.default_rng(0), {"t": T[:250], "q": Q[:250]}
+    fits = [
+        velocity_fit(log_of(**short, dq=2 * DQ[:250] + chance.normal(0, 0.02, (250, 6))))
+        for _ in range(200)
+    ]
+    for values, errors in (("gain", "gain_error"), ("lag", "lag_error")):
+        scatter = np.std([getattr(fit, values) for fit in fits], axis=0)
+        stated = np.mean([getattr(fit, errors) for fit in fits], axis=0)
+        np.testing.assert_allclose(stated, scatter, rtol=0.2)
 
 
-@pytest.mark.parametrize(("peak", "reported"), [(12.9, False), (13.1, True), (-13.1, True)])
-def test_positions_beyond_two_turns_may_be_degrees(peak: float, reported: bool) -> None:
-    q = Q.copy()
-    q[7, 2] = peak
-    findings = found(q=q)
-    assert ("degrees" in findings) == reported
-    if reported:
-        assert findings["degrees"].values["largest_rad"] == pytest.approx(13.1)
-
-
-@pytest.mark.parametrize(("joint", "reported"), [(6, False), (5, True)])
-def test_the_last_joint_of_an_arm_may_turn_without_end(joint: int, reported: bool) -> None:
-    """Wrist 3 of a UR3 has no limit: ten turns of it are 63 rad."""
-    q = Q.copy()
-    q[:, joint - 1] += 63.0
-    assert ("degrees" in found(q=q)) == reported
-
-
-@pytest.mark.parametrize(("size", "reported"), [(59.0, False), (61.0, True)])
-def test_currents_beyond_sixty_ampere_may_be_milliamperes(size: float, reported: bool) -> None:
-    findings = found(current=size * FRICTION, torque=None)
-    assert set(findings) == ({"milliamperes"} if reported else set())
-    if reported:
-        assert findings["milliamperes"].values["typical_A"] == pytest.approx(61.0, rel=2e-3)
-
-
-@pytest.mark.parametrize(("per_thousand", "reported"), [(9, False), (11, True)])
-def test_a_few_currents_of_any_size_are_outliers(per_thousand: int, reported: bool) -> None:
-    current = FRICTION.copy()
-    current.flat[: current.size * per_thousand // 1000] = 500.0
-    assert ("milliamperes" in found(current=current, torque=None)) == reported
-
-
-def straight(x: Array, every: int, bend: float = 0.0) -> Array:
-    """A signal of every such sample, joined by lines whose slope changes by a share within."""
-    knots = np.arange(0, len(T), every)
-    lines = np.column_stack([np.interp(T, T[knots], column[knots]) for column in x.T])
-    rise = np.repeat(np.diff(x[knots], axis=0), every, axis=0)
-    odd = np.arange(len(rise)) % every == every // 2
-    lines[:-1] += 0.5 * bend * rise / every * odd[:, None]
-    return lines
-
-
-RISING = (0.2 * T + 0.05 * np.sin(3.0 * T))[:, None] * np.ones(6)
-
-
-@pytest.mark.parametrize(
-    ("q", "torque", "rate"),
-    [
-        (straight(Q, 4), straight(20 * Q, 4), 25.0),
-        (straight(Q, 10), straight(20 * Q, 10), 10.0),
-        (straight(Q, 2), straight(20 * Q, 2), None),  # half of it runs straight, less than .6
-        (straight(Q, 4), 20 * Q, None),
-        (Q, straight(20 * Q, 4), None),
-        # what only rises or only falls
-        (straight(RISING, 10), straight(-RISING, 10), 10.0),
-        (RISING, -RISING, None),
-        # a slope that changes by less than a thousandth of both sides' is the same
-        (straight(Q, 4), straight(20 * Q, 4, bend=0.5e-3), 25.0),
-        (straight(Q, 4), straight(20 * Q, 4, bend=8e-3), None),
-        # what holds does not run straight, and is no motion: lines for 16 s, then steps
-        (
-            straight(Q, 4),
-            np.where(T[:, None] < 16.0, straight(20 * Q, 4), 20 * Q[np.arange(len(T)) // 4 * 4]),
-            25.0,
-        ),
-        # a tenth of the values has to change
-        (straight(Q, 4), straight(20 * Q, 4) * (T[:, None] < 2.0), None),
-        (straight(Q, 4), straight(20 * Q, 4) * (T[:, None] < 6.0), 25.0),
-    ],
-)
-def test_signals_that_run_from_corner_to_corner_are_interpolated(
-    q: Array, torque: Array, rate: float | None
-) -> None:
-    finding = found(q=q, torque=torque).get("interpolated")
-    assert (finding is not None) == (rate is not None)
-    if finding is not None:
-        assert finding.values == pytest.approx({"rate_Hz": rate, "logged_Hz": 100.0})
+@pytest.mark.parametrize("cut_off", [0.5, 1.0, 2.0])
+def test_a_filter_is_distinct_from_a_delay(cut_off: float) -> None:
+    """A first-order low-pass takes 1/(2π f_c) and a part of the size, neither clock nor unit."""
+    findings = found(dq=filtered(DQ, cut_off))
+    assert set(findings) == {"velocity-filtered"}
+    lags = findings["velocity-filtered"].values["lags_ms"]
+    # Twice a sample of the recursion, and (ωτ)² of the linear fit on the slowest joint.
+    assert lags[0] == pytest.approx(1e3 / (2 * np.pi * cut_off), rel=0.12)
 
 
 @pytest.mark.parametrize(
@@ -131,14 +77,6 @@ def test_numbers_that_no_clock_and_no_robot_gives(
         assert findings[0].values == {"least_s": T[0], "largest_s": 1.1e18}
 
 
-@pytest.mark.parametrize(("samples", "reported"), [(1, True), (2, True), (3, False)])
-def test_two_samples_are_too_short(samples: int, reported: bool) -> None:
-    findings = examine(Recording(t=T[:samples], q=Q[:samples], dq=DQ[:samples])).findings
-    assert ([(f.code, f.level) for f in findings] == [("too-short", "warning")]) == reported
-    if reported:
-        assert findings[0].values["samples"] == samples
-
-
 def effort_of_share(share: float, *joints: int) -> Array:
     """Effort whose net work over its gross work is as given on some joints, 1 on the others.
 
@@ -154,9 +92,6 @@ def by_work(**changes: Array | None) -> list[tuple[str, tuple[int, ...], Remark]
     """Findings on the sign of an effort of which nobody knows the arm, with code and joints."""
     findings = inverted_effort(log_of(**changes))
     return [(finding.code, finding.where.joints, finding) for finding in findings]
-
-
-ALL = (1, 2, 3, 4, 5, 6)
 
 
 @pytest.mark.parametrize(
