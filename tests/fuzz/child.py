@@ -12,19 +12,22 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from array_mutants import archive_mutant, parquet_mutant, record_mutant
 from container_mutants import (
+    archive_mutant,
     arrow_mutant,
     dataset_mutant,
     hdf5_mutant,
     json_mutant,
     matlab_mutant,
+    parquet_mutant,
+    pickle_mutant,
+    record_mutant,
 )
 from long_mutants import long_mutant, long_words
 from message_mutants import bag_mutant, folder_mutant, mcap_mutant
 from option_mutants import option_words
-from robot_mutants import toml_mutant, urdf_mutant
-from text_mutants import lines_mutant, table_mutant
+from robot_mutants import urdf_mutant
+from text_mutants import lines_mutant, settings_mutant, table_mutant
 from tokens import Mutant, Rng, Seed, pick
 
 CPU_SECONDS, LONG_CPU_SECONDS = 5, 15
@@ -42,10 +45,10 @@ BROKEN = 70
 MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
     "table": table_mutant, "lines": lines_mutant, "parquet": parquet_mutant, "arrow": arrow_mutant,
     "json": json_mutant, "mat": matlab_mutant, "hdf5": hdf5_mutant, "npz": archive_mutant,
-    "npy": archive_mutant, "pickle": archive_mutant, "records": record_mutant,
+    "npy": archive_mutant, "pickle": pickle_mutant, "records": record_mutant,
     "mcap": mcap_mutant, "bag": bag_mutant, "folder": folder_mutant, "dataset": dataset_mutant,
-    "robot": toml_mutant, "gains": toml_mutant, "scenario": toml_mutant, "urdf": urdf_mutant,
-    "mjcf": urdf_mutant, "long": long_mutant,
+    "robot": settings_mutant, "gains": settings_mutant, "scenario": settings_mutant,
+    "urdf": urdf_mutant, "mjcf": urdf_mutant, "long": long_mutant,
 }  # fmt: skip
 WEIGHTS = {
     "table": 15, "lines": 5, "parquet": 8, "npz": 6, "npy": 2, "pickle": 5, "records": 4,

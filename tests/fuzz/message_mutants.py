@@ -1,6 +1,5 @@
 """Mutations of logs that hold messages: MCAP, ROS 1 bags, ROS 2 databases and folders."""
 
-import io
 import json
 import shutil
 import sqlite3
@@ -9,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bytes_mutants import cut, flip, huge_count, mutate_bytes, token
-from text_mutants import odd_value
-from tokens import NUMBERS, WORDS, Mutant, Rng, Seed, pick, some
+from changes import bytes_changed, cut, flip, list_changed, odd_bytes, tree_changed
+from text_mutants import bytes_mutant, settings_changed
+from tokens import WORDS, Mutant, Rng, Seed, pick
 
 TIMES = (0, 1, -1, 2**31, 2**63 - 1, 2**64 - 1, 10**9)
 
@@ -69,30 +68,27 @@ def write_mcap(path: Path, messages: list[Message], rng: Rng | None = None) -> N
 
 
 def mcap_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """An MCAP with its bytes, a record or a message changed."""
+    """An MCAP with its bytes, a record or messages changed."""
     data = seed.path.read_bytes()
     kind = rng.random()
-    if kind < 0.15:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
-    if kind < 0.2:
+    if kind < 0.05:
         path.write_bytes(cut(data, rng))
         return Mutant("cut", seed.samples)
-    if kind < 0.45:
-        records = list(mcap_records(data))
-        how = records_changed(records, rng)
+    if kind < 0.4:
+        records: list[Any] = [list(record) for record in mcap_records(data)]
+        how = list_changed(records, rng, mcap_record_changed)
         body = b"".join(struct.pack("<BQ", op, len(content)) + content for op, content in records)
         path.write_bytes(data[:8] + body + data[-8:])
-        return Mutant(how)
-    messages = list(seed.model)
-    how = messages_changed(messages, rng)
-    try:
-        write_mcap(path, messages, rng)
-    except (ValueError, struct.error, OverflowError, TypeError):
-        path.write_bytes(flip(data, rng))
-        return Mutant("flip")
-    return Mutant(how)
+        return Mutant(f"records {how}")
+    if kind < 0.85:
+        messages = list(seed.model)
+        how = messages_changed(messages, rng)
+        try:
+            write_mcap(path, messages, rng)
+            return Mutant(how)
+        except (ValueError, struct.error, OverflowError, TypeError):
+            pass
+    return bytes_mutant(seed, rng, path)
 
 
 def mcap_records(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -104,109 +100,69 @@ def mcap_records(data: bytes) -> Iterator[tuple[int, bytes]]:
         place += 9 + size
 
 
-def records_changed(records: list[tuple[int, bytes]], rng: Rng) -> str:
-    """Change one record: drop it, repeat it, move it, or change its content."""
-    k = int(rng.integers(len(records)))
-    op, content = records[k]
-    kind = int(rng.integers(7))
-    if kind == 0:
-        del records[k]
-    elif kind == 1:
-        records.insert(int(rng.integers(len(records))), records[k])
-    elif kind == 2:
-        records[k] = (int(rng.integers(1, 20)), content)
-    elif content:
-        change = pick(rng, (flip, flip, huge_count, token, cut))
-        records[k] = (op, change(content, rng))
-    return f"record {op} {kind}"
+def mcap_record_changed(record: list[Any], rng: Rng) -> list[Any]:
+    op, content = record
+    return (
+        [int(rng.integers(1, 20)), content]
+        if rng.random() < 0.15
+        else [op, odd_bytes(content, rng)]
+    )
 
 
 def messages_changed(messages: list[Message], rng: Rng) -> str:
-    """Change messages: lose some, move them, or change what some or a topic's all have."""
-    chosen = some(rng, len(messages))
-    kind = int(rng.integers(9))
-    if kind == 0:
-        messages[:] = [message for k, message in enumerate(messages) if k not in chosen]
-        return "messages lost"
-    if kind == 1:
-        messages[:] = messages[: int(rng.integers(0, 4))]
-        return "few messages"
-    if kind == 2:
-        messages[:] = [messages[k] for k in rng.permutation(len(messages))]
-        return "messages moved"
-    change = pick(rng, (flip, flip, flip, huge_count, cut, token))
-    if kind <= 4:
-        put = pick(rng, TIMES)
-        for k in chosen:
-            data = data_changed(messages[k], change, rng)
-            messages[k] = messages[k]._replace(**{"data": data} if kind == 3 else {"time": put})
-        return f"data {change.__name__}" if kind == 3 else "times"
-    first = messages[chosen[0]]
-    about = described_otherwise(first, kind, change, rng)
+    """Change messages, or what all of one topic have in common."""
+    if rng.random() < 0.6:
+        return f"messages {list_changed(messages, rng, message_changed)}"
+    first = messages[int(rng.integers(len(messages)))]
+    name, encoding, definition = first.schema
+    word = pick(rng, WORDS)[:200]
+    field, value = pick(rng, (
+        ("topic", word),
+        ("schema", (word, encoding, definition)),
+        ("schema", (name, pick(rng, ("ros1msg", "x", "")), definition)),
+        ("schema", (name, encoding, odd_bytes(definition, rng) or b"x")),
+    ))  # fmt: skip
     for k, message in enumerate(messages):
         if message.topic == first.topic:
-            messages[k] = message._replace(**about)
-    return f"topic {kind}"
+            messages[k] = message._replace(**{field: value})
+    return f"{field} of {first.topic}"
 
 
-def described_otherwise(message: Message, kind: int, change: Any, rng: Rng) -> dict[str, Any]:
-    """Another topic's name, or another name, encoding or definition of its type."""
-    name, encoding, definition = message.schema
-    word = pick(rng, WORDS)[:200]
-    if kind == 5:
-        return {"topic": word}
-    if kind == 6:
-        return {"schema": (word, encoding, definition)}
-    if kind == 7:
-        return {"schema": (name, pick(rng, ("ros1msg", "x", "")), definition)}
-    return {"schema": (name, encoding, change(definition, rng) if definition else b"x")}
-
-
-def data_changed(message: Message, change: Any, rng: Rng) -> bytes:
-    """A message's data changed: its bytes, or one value of a JSON document."""
+def message_changed(message: Message, rng: Rng) -> Message:
+    """A message at another time, or of other data: its bytes, or a value of a JSON document."""
+    if rng.random() < 0.3:
+        return message._replace(time=pick(rng, TIMES))
     if message.encoding == "json" and rng.random() < 0.8:
-        document = json.loads(message.data)
-        key = pick(rng, list(document))
-        document[key] = odd_value(rng)
-        return json.dumps(document).encode("utf-8", "replace")
-    if rng.random() < 0.3 and len(message.data) > 16:
-        place = 4 + 8 * int(rng.integers((len(message.data) - 8) // 8))
-        value = struct.pack("<d", float(min(pick(rng, NUMBERS), 1.7e308)))
-        return message.data[:place] + value + message.data[place + 8 :]
-    return change(message.data, rng) if message.data else b"\0"
+        document = tree_changed(json.loads(message.data), rng)
+        return message._replace(data=json.dumps(document).encode("utf-8", "replace"))
+    return message._replace(data=odd_bytes(message.data, rng) or b"\0")
+
+
+BagRecord = tuple[dict[bytes, bytes], bytes]
 
 
 def bag_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """A ROS 1 bag with its bytes, or a field of one of its records, changed."""
+    """A ROS 1 bag with its bytes, or its records, changed."""
     data = seed.path.read_bytes()
     kind = rng.random()
     if kind < 0.25:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how)
+        return bytes_mutant(seed, rng, path)
     if kind < 0.35:
         path.write_bytes(cut(data, rng))
         return Mutant("cut", seed.samples)
     line = data.index(b"\n") + 1
-    records = list(bag_records(data[line:]))
-    k = int(rng.integers(len(records)))
-    if rng.random() < 0.5:  # among the records of a chunk there are most
-        chunks = [i for i, (fields, _) in enumerate(records) if fields.get(b"op") == b"\x05"]
-        k = int(pick(rng, chunks)) if chunks else k
-    fields, content = records[k]
-    inner = fields.get(b"op") == b"\x05" and fields.get(b"compression") == b"none"
-    if inner and content:
-        nested = list(bag_records(content))
-        how = bag_record_changed(nested, int(rng.integers(len(nested))), rng)
+    records: list[Any] = list(bag_records(data[line:]))
+    chunks = [k for k, (fields, _) in enumerate(records) if fields.get(b"compression") == b"none"]
+    if chunks and rng.random() < 0.5:  # among the records of a chunk there are most
+        fields, content = records[k := int(pick(rng, chunks))]
+        nested: list[Any] = list(bag_records(content))
+        how = list_changed(nested, rng, bag_record_changed)
         content = b"".join(bag_bytes(*record) for record in nested)
         records[k] = ({**fields, b"size": struct.pack("<I", len(content))}, content)
     else:
-        how = bag_record_changed(records, k, rng)
+        how = list_changed(records, rng, bag_record_changed)
     path.write_bytes(data[:line] + b"".join(bag_bytes(*record) for record in records))
     return Mutant(f"bag {how}")
-
-
-BagRecord = tuple[dict[bytes, bytes], bytes]
 
 
 def bag_records(data: bytes) -> Iterator[BagRecord]:
@@ -233,26 +189,15 @@ def bag_bytes(fields: dict[bytes, bytes], body: bytes) -> bytes:
     return struct.pack("<I", len(head)) + head + struct.pack("<I", len(body)) + body
 
 
-def bag_record_changed(records: list[BagRecord], k: int, rng: Rng) -> str:
-    """Change one record: a field of its header, its data, or whether it is there."""
-    fields, body = records[k]
-    op = fields.get(b"op", b"?").hex()
-    kind = int(rng.integers(8))
-    name = pick(rng, list(fields)) if fields else b"op"
-    change = pick(rng, (flip, flip, huge_count, token, cut))
-    if kind == 0:
-        del records[k]
-    elif kind == 1:
-        records.insert(int(rng.integers(len(records))), records[k])
-    elif kind == 2:
-        records[k] = ({n: v for n, v in fields.items() if n != name}, body)
-    elif kind <= 4 and fields.get(name):
-        records[k] = ({**fields, name: flip(fields[name], rng)}, body)
-    elif kind == 5 and fields.get(name):
-        records[k] = ({**fields, name: change(fields[name], rng)}, body)
-    elif body:
-        records[k] = (fields, change(body, rng))
-    return f"{op} {kind} {name.decode(errors='replace')}"
+def bag_record_changed(record: BagRecord, rng: Rng) -> BagRecord:
+    """A record with a field of its header changed or gone, or other data."""
+    fields, body = record
+    kind = rng.random()
+    if kind < 0.4 or not fields:
+        return fields, odd_bytes(body, rng)
+    name = pick(rng, list(fields))
+    left = {n: v for n, v in fields.items() if n != name}
+    return (left if kind < 0.5 else {**left, name: odd_bytes(fields[name], rng)}), body
 
 
 STATEMENTS = (
@@ -289,15 +234,11 @@ STATEMENTS = (
     "PRAGMA encoding = 'UTF-16'",
 )
 
-VALUES = (
-    "", "x", "-1", "0", "{}", "[]", "null", "1e20", "[1, 2]", "2026-01-02", "*a", "!!python/x", "'",
-)  # fmt: skip
-
 
 def folder_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     """A ROS 2 bag: its database, or the metadata.yaml beside it, changed."""
+    target = path
     if seed.path.is_file():
-        target = path
         shutil.copyfile(seed.path, path)
     else:
         shutil.copytree(seed.path, path)
@@ -305,56 +246,36 @@ def folder_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
         if rng.random() < 0.5:
             return Mutant(yaml_changed(path / "metadata.yaml", rng), path=path)
     data = target.read_bytes()
-    if rng.random() < 0.4 or target.suffix == ".mcap" or not data.startswith(b"SQLite"):
-        data, how = mutate_bytes(data, rng)
+    if rng.random() < 0.4 or not data.startswith(b"SQLite"):
+        data, how = bytes_changed(data, rng)
         target.write_bytes(data)
         return Mutant(how, path=path)
-    how = []
+    said = [pick(rng, STATEMENTS) for _ in range(int(rng.integers(1, 3)))]
     with sqlite3.connect(target) as database:
-        for _ in range(int(rng.integers(1, 3))):
-            statement = pick(rng, STATEMENTS)
-            how.append(statement)
+        database.create_function("changed", 1, lambda blob: flip(blob, rng) if blob else blob)
+        if rng.random() < 0.4:
+            said.append("UPDATE messages SET data = changed(data) WHERE id < 20")
+        for statement in said:
             try:
                 database.execute(statement)
             except sqlite3.Error:
                 continue
-        there = "DROP" not in "".join(how) and "RENAME" not in "".join(how)
-        if rng.random() < 0.4 and there:
-            rows = database.execute("SELECT id, data FROM messages LIMIT 20").fetchall()
-            for number, blob in rows:
-                if isinstance(blob, bytes) and blob:
-                    changed = (flip(blob, rng), number)
-                    database.execute("UPDATE messages SET data = ? WHERE id = ?", changed)
     database.close()
-    return Mutant("; ".join(how), path=path)
+    return Mutant("; ".join(said), path=path)
 
 
 def yaml_changed(path: Path, rng: Rng) -> str:
-    """Change one line of a bag's metadata."""
-    if rng.random() < 0.1:
+    """Change a bag's metadata: a line, its bytes, or whether it is there."""
+    text, kind = path.read_bytes(), rng.random()
+    if kind < 0.1:
         path.unlink()
         return "no yaml"
-    lines = path.read_text(encoding="utf-8").split("\n")
-    k = int(rng.integers(len(lines)))
-    key, colon, _ = lines[k].partition(":")
-    kind = int(rng.integers(5))
-    if kind <= 1 and colon:
-        lines[k] = f"{key}: {pick(rng, VALUES)}"
-    elif kind == 2:
-        del lines[k]
-    elif kind == 3:
-        lines[k] = " " + lines[k]
-    else:
-        data, _ = mutate_bytes("\n".join(lines).encode(), rng)
-        path.write_bytes(data)
+    if kind < 0.3:
+        path.write_bytes(bytes_changed(text, rng)[0])
         return "yaml bytes"
-    path.write_text("\n".join(lines), encoding="utf-8")
-    return f"yaml {key.strip()}"
-
-
-def shrunk_mcap(source: Path, target: Path, most: int) -> None:
-    """The first messages of an MCAP as a file of their own."""
-    write_mcap(target, mcap_messages(source)[:most])
+    changed, how = settings_changed(text.decode(), rng)
+    path.write_text(changed, encoding="utf-8")
+    return f"yaml {how}"
 
 
 def shrunk_database(source: Path, target: Path, most: int) -> None:
@@ -366,12 +287,3 @@ def shrunk_database(source: Path, target: Path, most: int) -> None:
     database.commit()
     database.execute("VACUUM")
     database.close()
-
-
-def shrunk_archive(data: bytes, most: int) -> bytes:
-    """The first rows of every array of an .npz."""
-    import numpy as np
-
-    arrays = {key: value[:most] for key, value in np.load(io.BytesIO(data)).items()}
-    np.savez(file := io.BytesIO(), **arrays)
-    return file.getvalue()

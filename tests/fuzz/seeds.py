@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 from long_mutants import long_seeds
-from message_mutants import mcap_messages, shrunk_archive, shrunk_database, shrunk_mcap
+from message_mutants import mcap_messages, shrunk_database, write_mcap
 from tokens import Seed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "readers"))
@@ -119,8 +120,6 @@ def seeds_in_code(folder: Path) -> Iterator[Seed]:
 
 def jacobian_table(path: Path) -> Path:
     """Torques beside a Jacobian and a sensor's wrench, without positions."""
-    import numpy as np
-
     rng = np.random.default_rng(17)
     J = rng.standard_normal((MOST, 6, 7))
     J[:, 3:] /= np.linalg.norm(J[:, 3:], axis=1)[:, None]
@@ -173,7 +172,7 @@ def sample_seeds(samples: Path, folder: Path) -> Iterator[Seed]:
             target.write_bytes(b"".join(lines[:most]))
             yield Seed(name, family, target)
         elif path.suffix == ".npz":
-            target.write_bytes(shrunk_archive(path.read_bytes(), MOST))
+            np.savez(target, **{key: value[:MOST] for key, value in np.load(path).items()})
             yield Seed(name, "npz", target)
         elif path.suffix == ".pkl":
             log = pickle.loads(path.read_bytes())
@@ -205,7 +204,7 @@ def bag_seeds(path: Path, name: str, target: Path) -> Iterator[Seed]:
         yield Seed(name, "folder", target)
     elif path.suffix == ".mcap":
         try:
-            shrunk_mcap(path, target, MOST)
+            write_mcap(target, mcap_messages(path)[:MOST])
         except Exception:  # noqa: BLE001 - one cut on purpose is none to start from
             return
         yield Seed(name, "mcap", target)

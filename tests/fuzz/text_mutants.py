@@ -1,224 +1,99 @@
-"""Mutations of logs that are text: delimited tables and JSON lines."""
+"""Mutations of texts: delimited tables, JSON lines, and files of settings line by line."""
 
 import gzip
 import json
+import re
 from pathlib import Path
-from typing import Any
 
-from bytes_mutants import bytes_mutant, mutate_bytes
+import numpy as np
+from changes import SAME_LENGTH, bytes_changed, list_changed, numbers_changed, tree_changed
 from tokens import NUMBERS, WORDS, Mutant, Rng, Seed, pick, some
 
-Cells = list[list[str]]
+
+def bytes_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
+    """The file with some of its bytes changed."""
+    data, how = bytes_changed(seed.path.read_bytes(), rng)
+    path.write_bytes(data)
+    return Mutant(how)
 
 
 def table_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """A delimited table with one thing changed."""
-    data = seed.path.read_bytes()
-    if data[:2] == b"\x1f\x8b":
-        data = gzip.decompress(data)
+    """A delimited table with one thing changed: in its rows, in its columns, or its dress."""
     if rng.random() < 0.15:
-        data, how = mutate_bytes(data, rng)
-        path.write_bytes(data)
-        return Mutant(how, None)
-    text = data.decode(errors="replace")
+        return bytes_mutant(seed, rng, path)
+    data = seed.path.read_bytes()
+    text = (gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data).decode(errors="replace")
     end = "\r\n" if "\r\n" in text else "\n"
     separator = max(", ;\t", key=text.split(end, 1)[0].count)
     cells = [line.split(separator) for line in text.split(end) if line]
     headed = 0 if seed.columns else 1
-    change = pick(rng, CHANGES)
-    cells = change(cells, rng, headed) or [[""]]
-    rows = max(0, sum(any(c.strip() for c in row) for row in cells) - headed)
-    text = end.join(separator.join(row) for row in cells) + end
-    how = change.__name__
+    rows: int | None = len(cells) - headed
+    if rng.random() < 0.65 and len(set(map(len, cells))) == 1:
+        columns = [list(column) for column in zip(*cells, strict=True)]
+        # The clock goes first, and has the most ways to be wrong.
+        if rng.random() < 0.3:
+            columns[0], kind = column_changed(columns[0], rng, headed), "changed"
+        else:
+            kind = list_changed(columns, rng, lambda c, rng: column_changed(c, rng, headed))
+        cells, how = [list(row) for row in zip(*columns, strict=True)], f"columns {kind}"
+    else:
+        head, body = cells[:headed], cells[headed:]
+        foreign = rng.random() < 0.2
+        kind = "foreign" if foreign else list_changed(body, rng, row_changed)
+        if foreign:
+            odd = ([""], ["#", "comment"], [pick(rng, WORDS)], [" "] * len(body[0]), *head)
+            body.insert(int(rng.integers(len(body))), pick(rng, odd))
+        cells, how = [*head, *body], f"rows {kind}"
+    clear = how.startswith("columns") and kind in SAME_LENGTH
+    text = end.join(separator.join(row) for row in cells or [[""]]) + end
     if rng.random() < 0.25:
-        dress = pick(rng, DRESSES)
-        text, how = dress(text, separator), f"{how}+{dress.__name__}"
-        rows = rows if dress in KEEP_ROWS else None
+        name = pick(rng, list(DRESSES))
+        text, how, clear = DRESSES[name](text, separator), f"{how} {name}", clear and name in KEPT
     data = text.encode("utf-8", "surrogatepass")
     path.write_bytes(gzip.compress(data, mtime=0) if rng.random() < 0.05 else data)
-    clear = change in {cell, time_column, column_constant, swap_columns, rename}
     return Mutant(how, rows if clear else None)
 
 
-def width(cells: Cells) -> int:
-    return max(1, len(cells[-1]))
+def column_changed(column: list[str], rng: Rng, headed: int) -> list[str]:
+    """A column under another name, with other numbers, or with odd cells."""
+    head, cells, kind = column[:headed], column[headed:], rng.random()
+    if head and kind < 0.2:
+        return [pick(rng, WORDS).replace("\n", " "), *cells]
+    try:
+        if kind < 0.6:
+            return head + [repr(float(x)) for x in numbers_changed(np.array(cells, float), rng)]
+    except ValueError:
+        pass
+    odd = cell_changed("", rng)
+    for k in some(rng, len(cells)):
+        cells[k] = odd
+    return head + cells
 
 
-def value(rng: Rng) -> str:
+def cell_changed(_cell: str, rng: Rng) -> str:
     return pick(rng, WORDS) if rng.random() < 0.4 else str(pick(rng, NUMBERS))
 
 
-def cell(cells: Cells, rng: Rng, headed: int) -> Cells:
-    """One cell, or some of a column."""
-    k, put = int(rng.integers(width(cells))), value(rng)
-    for row in some(rng, max(1, len(cells) - headed)):
-        if row + headed < len(cells) and k < len(cells[row + headed]):
-            cells[row + headed][k] = put
-    return cells
+def row_changed(row: list[str], rng: Rng) -> list[str]:
+    """A row with a cell changed, too few or too many."""
+    row = list(row)
+    list_changed(row, rng, cell_changed)
+    return row
 
 
-CLOCKS = ("constant", "whole", "back", "repeat", "jump", "huge", "scale", "reset", "tiny")
-
-
-def time_column(cells: Cells, rng: Rng, headed: int) -> Cells:
-    """The first column as other clocks would have it."""
-    kind = pick(rng, CLOCKS)
-    rows = cells[headed:]
-    for i, row in enumerate(rows):
-        try:
-            t = float(row[0])
-        except ValueError:
-            continue
-        row[0] = repr({
-            "constant": 5.0, "whole": float(int(t)), "back": -t,
-            "repeat": float(rows[i // 2 * 2][0]),
-            "jump": t + (1e6 if i > len(rows) // 2 else 0), "huge": t + 1e18, "scale": t * 1e9,
-            "reset": t if i < len(rows) // 2 else t - float(rows[len(rows) // 2][0] or 0),
-            "tiny": 5e-324 * i,
-        }[kind])  # fmt: skip
-    return cells
-
-
-def column_constant(cells: Cells, rng: Rng, headed: int) -> Cells:
-    k, put = int(rng.integers(width(cells))), str(pick(rng, NUMBERS))
-    for row in cells[headed:]:
-        if k < len(row):
-            row[k] = put
-    return cells
-
-
-def columns_scaled(cells: Cells, rng: Rng, headed: int) -> Cells:
-    """Several columns by a factor: degrees, milliamperes, turned, tiny, huge."""
-    factor = pick(rng, (57.29577951308232, 1000.0, -1.0, 1e-12, 1e12, 0.0, 1e-310, 1e300))
-    first = int(rng.integers(width(cells)))
-    last = first + int(rng.integers(1, 8))
-    for row in cells[headed:]:
-        for k in range(first, min(last, len(row))):
-            try:
-                row[k] = repr(float(row[k]) * factor)
-            except ValueError:
-                continue
-    return cells
-
-
-def swap_columns(cells: Cells, rng: Rng, headed: int) -> Cells:
-    a, b = rng.integers(0, width(cells), 2)
-    for row in cells[headed:]:
-        if max(a, b) < len(row):
-            row[a], row[b] = row[b], row[a]
-    return cells
-
-
-def rename(cells: Cells, rng: Rng, headed: int) -> Cells:
-    """Another name, or the name of another column."""
-    names = cells[0]
-    if headed and names:
-        other = pick(rng, names) if rng.random() < 0.4 else pick(rng, WORDS)
-        names[int(rng.integers(len(names)))] = other.replace("\n", " ")
-    return cells
-
-
-def drop_column(cells: Cells, rng: Rng, _headed: int) -> Cells:
-    k = int(rng.integers(width(cells)))
-    return [row[:k] + row[k + 1 :] for row in cells]
-
-
-def drop_columns(cells: Cells, rng: Rng, _headed: int) -> Cells:
-    k = int(rng.integers(width(cells)))
-    return [row[:k] for row in cells] if rng.random() < 0.5 else [row[k:] for row in cells]
-
-
-def repeat_column(cells: Cells, rng: Rng, _headed: int) -> Cells:
-    k = int(rng.integers(width(cells)))
-    return [row[:k] + row[k : k + 1] + row[k:] for row in cells]
-
-
-def ragged(cells: Cells, rng: Rng, headed: int) -> Cells:
-    """Rows with a cell too few or too many."""
-    more = rng.random() < 0.5
-    for k in some(rng, len(cells)):
-        if k >= headed:
-            cells[k] = [*cells[k], value(rng)] if more else cells[k][:-1]
-    return cells
-
-
-def few_rows(cells: Cells, rng: Rng, headed: int) -> Cells:
-    return cells[: headed + int(rng.integers(0, 4))]
-
-
-def move_rows(cells: Cells, rng: Rng, headed: int) -> Cells:
-    """Rows lost, repeated, turned round or out of order."""
-    head, rows = cells[:headed], cells[headed:]
-    kind = int(rng.integers(4))
-    if kind == 0:
-        gone = set(some(rng, len(rows)))
-        return head + [row for k, row in enumerate(rows) if k not in gone]
-    if kind == 1:
-        twice = set(some(rng, len(rows)))
-        return head + [row for k, row in enumerate(rows) for _ in range(1 + (k in twice))]
-    if kind == 2:
-        return head + rows[::-1]
-    return head + [rows[k] for k in rng.permutation(len(rows))]
-
-
-def header_again(cells: Cells, rng: Rng, headed: int) -> Cells:
-    place = int(rng.integers(headed, len(cells)))
-    return [*cells[:place], list(cells[0]), *cells[place:]]
-
-
-def foreign_rows(cells: Cells, rng: Rng, headed: int) -> Cells:
-    place = int(rng.integers(headed, len(cells)))
-    row = pick(rng, ([""], ["#", "comment"], [pick(rng, WORDS)], [" "] * width(cells)))
-    return [*cells[:place], row, *cells[place:]]
-
-
-CHANGES = (
-    cell, cell, cell, time_column, time_column, column_constant, columns_scaled, swap_columns,
-    rename,
-    rename, drop_column, drop_columns, repeat_column, ragged, few_rows, move_rows, header_again,
-    foreign_rows,
-)  # fmt: skip
-
-
-def other_separator(text: str, separator: str) -> str:
-    return text.replace(separator, ";")
-
-
-def decimal_comma(text: str, _separator: str) -> str:
-    return text.replace(".", ",")
-
-
-def carriage_returns(text: str, _separator: str) -> str:
-    return text.replace("\r\n", "\n").replace("\n", "\r")
-
-
-def byte_order_mark(text: str, _separator: str) -> str:
-    return "\ufeff" + text
-
-
-def quoted(text: str, separator: str) -> str:
-    lines = text.split("\n")
-    return "\n".join(separator.join(f'"{c}"' for c in line.split(separator)) for line in lines)
-
-
-def headless(text: str, _separator: str) -> str:
-    return text.split("\n", 1)[-1]
-
-
-def no_last_end(text: str, _separator: str) -> str:
-    return text.rstrip("\r\n")
-
-
-def trailing_separator(text: str, separator: str) -> str:
-    return text.replace("\n", separator + "\n")
-
-
-DRESSES = (
-    other_separator, decimal_comma, carriage_returns, byte_order_mark, quoted, headless,
-    no_last_end,
-    trailing_separator,
-)  # fmt: skip
-KEEP_ROWS = {byte_order_mark, no_last_end}
+DRESSES = {
+    "semicolons": lambda text, separator: text.replace(separator, ";"),
+    "decimal comma": lambda text, _: text.replace(".", ","),
+    "carriage returns": lambda text, _: text.replace("\r\n", "\n").replace("\n", "\r"),
+    "byte order mark": lambda text, _: "\ufeff" + text,
+    "quoted": lambda text, separator: re.sub(rf"[^{separator}\r\n]+", r'"\g<0>"', text),
+    "headless": lambda text, _: text.split("\n", 1)[-1],
+    "no last end": lambda text, _: text.rstrip("\r\n"),
+    "trailing separator": lambda text, separator: text.replace("\n", separator + "\n"),
+}
+"""Name → another dress of the same table: text and separator to text."""
+KEPT = {"byte order mark", "no last end"}
+"""Those in which all rows are there."""
 
 
 def lines_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
@@ -226,63 +101,65 @@ def lines_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     if rng.random() < 0.15:
         return bytes_mutant(seed, rng, path)
     lines = seed.path.read_bytes().decode(errors="replace").splitlines()
-    records: list[State] = [json.loads(line) for line in lines if line.startswith("{")]
-    change = pick(rng, STATE_CHANGES)
-    key = pick(rng, list(records[0]))
-    chosen = some(rng, len(records))
-    for k, record in enumerate(records):
-        if k in chosen or change in EVERY:
-            change(record, key, rng)
+    records = [json.loads(line) for line in lines if line.startswith("{")]
     rows: int | None = len(records)
-    if rng.random() < 0.1:
-        records, rows = records[: int(rng.integers(0, 3))], None
+    kind = list_changed(records, rng, tree_changed)
     lines = [json.dumps(record) for record in records]
-    if rng.random() < 0.2:
-        place = int(rng.integers(len(lines) + 1))
-        lines.insert(place, pick(rng, ("", "{", "[]", "3", "Done.", "{}")))
-        rows = None
+    if foreign := rng.random() < 0.2:
+        lines.insert(int(rng.integers(len(lines) + 1)), pick(rng, ("", "{", "[]", "3", "Done.")))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="replace")
-    return Mutant(f"{change.__name__} {key}", rows)
+    odd = foreign or any(not isinstance(record, dict) for record in records)
+    return Mutant(f"lines {kind}", rows if kind == "changed" and not odd else None)
 
 
-State = dict[str, Any]
+VALUES = (
+    "true", "[]", "{}", "[[]]", "{a = 1}", '""', '"x"', '"1.0"', "nan", "inf", "-inf", "1e308",
+    "1e20", "-1", "0", "1e-320", "99999999999999999999", "9" * 5000, "2026-01-02", "03:04:05",
+    "[1, 2]", '["a", "b"]', "[nan, nan, nan]", "[0, 0, 0, 0, 0, 0]", "[1e20, 0, 0]", "[" * 3000,
+    "[true, 1]", '"\\u0000"', '"<b>"', "0x10", "1_000", "[{a = 1}]", "[[1, 2], [3]]",
+    "180.0", "-0.0", "1e5", "", "x", "null", "*a", "!!python/x", "'",
+)  # fmt: skip
+"""What TOML or YAML may hold behind a key."""
+
+HEADERS = ("[joints]", "[[payload]]", "[payload]", "[observers.gmo]", "[a.b]")
 
 
-def value_odd(state: State, key: str, rng: Rng) -> None:
-    state[key] = odd_value(rng)
-
-
-def value_gone(state: State, key: str, _rng: Rng) -> None:
-    state.pop(key, None)
-
-
-def item_odd(state: State, key: str, rng: Rng) -> None:
-    """One item of a list, or the value as a list."""
-    old = state.get(key)
-    if isinstance(old, list) and old:
-        old[int(rng.integers(len(old)))] = odd_value(rng)
+def settings_changed(text: str, rng: Rng) -> tuple[str, str]:
+    """TOML or YAML with a value, a key, a line or a table changed; and the line that was."""
+    lines = text.split("\n")
+    keyed = [k for k, line in enumerate(lines) if re.match(r"[-\s]*[-\w\"'.]+\s*[=:]", line)]
+    k = int(pick(rng, keyed or [0]))
+    was, kind = lines[k], rng.random()
+    key, sign, old = re.match(r"([-\s]*[-\w\"'.]*)(\s*[=:]\s*|)(.*)", was).groups()  # type: ignore[union-attr]
+    headers = [k for k, line in enumerate(lines) if line.startswith("[")]
+    if kind < 0.55:
+        lines[k] = f"{key}{sign}{new_value(old, rng)}"
+    elif kind < 0.65:
+        other = lines[int(pick(rng, keyed or [0]))].partition("=")[0].strip()
+        lines[k] = was.replace(key.strip(), other, 1)
+    elif kind < 0.8 and headers:
+        lines[int(pick(rng, headers))] = pick(rng, ("", *HEADERS))
     else:
-        state[key] = [old]
+        list_changed(lines, rng, lambda line, _: " " + line)
+    return "\n".join(lines), was.strip()[:40]
 
 
-def length_odd(state: State, key: str, _rng: Rng) -> None:
-    old = state.get(key)
-    state[key] = old[:-1] if isinstance(old, list) else [old, old]
+def new_value(old: str, rng: Rng) -> str:
+    """Another value: of another type, or one of its numbers changed."""
+    numbers = list(re.finditer(r"-?\d+\.?\d*(e-?\d+)?", old))
+    if not numbers or rng.random() < 0.4:
+        return pick(rng, VALUES)
+    spot = pick(rng, numbers)
+    scaled = float(spot[0]) * pick(rng, (-1.0, 57.3, 1e3, 1e-3, 0.0, 1e9))
+    return old[: spot.start()] + repr(pick(rng, (pick(rng, NUMBERS), scaled))) + old[spot.end() :]
 
 
-def key_odd(state: State, key: str, rng: Rng) -> None:
-    state[pick(rng, WORDS)] = state.pop(key, None)
-
-
-STATE_CHANGES = (value_odd, value_gone, item_odd, length_odd, key_odd)
-EVERY = {value_gone, key_odd}
-
-
-def odd_value(rng: Rng) -> Any:
-    """A value of another type or size."""
-    deep: Any = []
-    for _ in range(50):
-        deep = [deep]
-    odd = (None, True, {}, [], [[]], {"a": 1}, [1] * 9, ["a"], [None], deep, "x")
-    kind = rng.random()
-    return pick(rng, odd) if kind < 0.5 else pick(rng, NUMBERS if kind < 0.8 else WORDS)
+def settings_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
+    """A TOML file with one or two things changed."""
+    if rng.random() < 0.1:
+        return bytes_mutant(seed, rng, path)
+    text, how = settings_changed(seed.path.read_text("utf-8"), rng)
+    if rng.random() < 0.25:
+        text, _ = settings_changed(text, rng)
+    path.write_text(text, encoding="utf-8")
+    return Mutant(how)
