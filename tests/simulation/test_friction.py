@@ -94,20 +94,6 @@ def test_presliding_is_the_models_and_a_share_of_the_coulomb_torque():
     np.testing.assert_array_equal(part.presliding_length, 3e-4)
 
 
-@pytest.mark.parametrize(
-    ("spec", "words"),
-    [
-        (FrictionSpec(presliding=1.2), "friction.presliding is 1.2; it is a share, 0 to 1"),
-        (FrictionSpec(presliding=-0.1), "friction.presliding is -0.1"),
-        (FrictionSpec(presliding_length=0.0), "friction.presliding_length is 0 rad"),
-        (FrictionSpec(stribeck_velocity=1e-300), "friction.stribeck_velocity is 1e-300 rad/s"),
-    ],
-)
-def test_what_no_joint_has_is_refused(spec, words):
-    with pytest.raises(ParameterError, match=words):
-        true_friction(load_robot("ur5"), spec)
-
-
 def test_a_frictionless_arm_has_none():
     friction = true_friction(load_robot("panda"), FrictionSpec(enabled=False))
     torque, slope = friction.smooth(np.ones(7))

@@ -100,9 +100,3 @@ def test_sizes_beyond_what_leaves_all_positive_are_refused(name):
         words = f"mismatch.{name} is {size:g}; it is within 0 to {most:g}"
         with pytest.raises(ParameterError, match=re.escape(words)):
             arm(f"mismatch.{name}={size}")
-
-
-@pytest.mark.parametrize("name", ["mass", "tool_mass"])
-def test_a_sensor_heavier_than_sensors_are_is_refused(name):
-    with pytest.raises(ParameterError, match=r"force_sensor\.mass is -1 kg"):
-        arm(f"force_sensor={{{name}=-1.0}}")

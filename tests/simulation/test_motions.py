@@ -192,25 +192,6 @@ def test_excitation_is_well_conditioned_inside_the_limits(name, rank, condition)
     assert np.linalg.cond(Y / np.linalg.norm(Y, axis=0)) == pytest.approx(condition, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ("trajectory.radius=0.6", r"the flange of 'ur5' cannot reach .* \(point \d+ of"),
-        ("trajectory.period=1.0", "its limit is 3.14"),
-        ("trajectory.radius=0", "must be positive"),
-        ("trajectory.period=0", "must be positive"),
-        ("trajectory.cycles=0", "must be positive"),
-        ("trajectory.start=[0,0,0]", "has 3 angles"),
-        ("robot=panda trajectory.start=[] trajectory.period=4", "joint 1 .* would move at"),
-        ("trajectory.start=[6.2,-1.35,1.9,-2.1,-1.57,0]", "joint 1 of .ur5. would move over"),
-    ],
-)
-def test_impossible_circles_are_refused(settings: str, words: str) -> None:
-    scenario = load_scenario("ur5-circle", settings.split())
-    with pytest.raises(ParameterError, match=words):
-        plan(scenario.trajectory, load_robot(scenario.robot), np.linspace(0, 4, 50))
-
-
 def test_a_circle_about_the_base_winds_its_joint_up() -> None:
     robot = load_robot("ur5")
     x, y, _ = FlangeSolver(robot).pose(check_start(robot, ())).translation

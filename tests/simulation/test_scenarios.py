@@ -108,6 +108,29 @@ RUNAWAY = "duration=1 servo.damping=200 servo.torque_limits=false friction.enabl
         ("contacts.hand.link=9", "0 .flange. to 6"),
         ("contacts.hand.link=-1", "0 .flange. to 6"),
         ("robot=panda trajectory={kind='excitation',mean=[0],cosine=[],sine=[]}", "have 7 numb"),
+        ("trajectory.radius=0.6", r"the flange of 'ur5' cannot reach .* \(point \d+ of"),
+        ("trajectory.period=1.0", "its limit is 3.14"),
+        ("trajectory.radius=0", "must be positive"),
+        ("trajectory.period=0", "must be positive"),
+        ("trajectory.cycles=0", "must be positive"),
+        ("trajectory.start=[0,0,0]", "has 3 angles"),
+        ("robot=panda trajectory.start=[] trajectory.period=4", "joint 1 .* would move at"),
+        ("trajectory.start=[6.2,-1.35,1.9,-2.1,-1.57,0]", "joint 1 of .ur5. would move over"),
+        ("sensing.dropped=1.0", "share from 0 to 1"),
+        ("sensing.repeated=-0.1", "share from 0 to 1"),
+        *(
+            (f"sensing.{name}=-0.1", f"{name} is -0.1; it must not be negative")
+            for name in ("rate", "noise", "current_noise", "position_step", "jitter")
+        ),
+        ("sensing.torque=peak", "average or instant"),
+        ("sensing.clock_drift=-0.5", "below 0.5"),
+        ("sensing.vendor_cutoff=0.0", "vendor_cutoff positive"),
+        ("friction.presliding=1.2", "friction.presliding is 1.2; it is a share, 0 to 1"),
+        ("friction.presliding=-0.1", "friction.presliding is -0.1"),
+        ("friction.presliding_length=0.0", "friction.presliding_length is 0 rad"),
+        ("friction.stribeck_velocity=1e-300", "friction.stribeck_velocity is 1e-300 rad/s"),
+        ("force_sensor={mass=-1.0}", r"force_sensor\.mass is -1 kg"),
+        ("force_sensor={tool_mass=-1.0}", r"force_sensor\.mass is -1 kg"),
     ],
 )
 def test_impossible_experiments_are_refused(overrides: str, words: str) -> None:

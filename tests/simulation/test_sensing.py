@@ -12,7 +12,7 @@ from vftcli.robots.terms import gravity_torque
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.simulation.scenario import SensingSpec
-from vftcli.simulation.sensing import check_sensing, log_rate
+from vftcli.simulation.sensing import log_rate
 
 SHORT = ["duration=0.4", "contacts.hand.begin=0.0"]
 CLEAN = ["sensing.noise=0", "sensing.position_step=0"]
@@ -199,22 +199,3 @@ def test_a_log_has_the_rate_stated_the_robots_or_the_usual_one(source: str, rate
     assert log_rate(SensingSpec(), robot) == rate
     assert log_rate(SensingSpec(), replace(robot, sample_rate_hz=320.0)) == 320.0
     assert log_rate(SensingSpec(rate=50.0), replace(robot, sample_rate_hz=320.0)) == 50.0
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ("sensing.dropped=1.0", "share from 0 to 1"),
-        ("sensing.repeated=-0.1", "share from 0 to 1"),
-        *(
-            (f"sensing.{name}=-0.1", f"{name} is -0.1; it must not be negative")
-            for name in ("rate", "noise", "current_noise", "position_step", "jitter")
-        ),
-        ("sensing.torque=peak", "average or instant"),
-        ("sensing.clock_drift=-0.5", "below 0.5"),
-        ("sensing.vendor_cutoff=0.0", "vendor_cutoff positive"),
-    ],
-)
-def test_impossible_sensing_is_refused(setting: str, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        check_sensing(load_scenario("ur5-circle", [setting]).sensing)
