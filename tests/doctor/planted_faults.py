@@ -454,18 +454,13 @@ def variants(table: Table) -> dict[str, list[tuple[str, Fault]]]:
     return found
 
 
+OF_ROWS = frozenset(
+    {"dropped_5%", "dropped_1s", "duplicate_rows_10%", "stale_rows_10%", "quantised_1mrad"}
+)
 HARMLESS: Mapping[str, frozenset[str]] = {
-    "ur10e": frozenset(
-        {"dropped_5%", "dropped_1s", "duplicate_rows_10%", "stale_rows_10%", "quantised_1mrad"}
-    ),
-    "ur5": frozenset(
-        {"dropped_5%", "dropped_1s", "duplicate_rows_10%", "stale_rows_10%", "quantised_1mrad"}
-        | {"stuck_position_J4"}
-    ),
-    "panda": frozenset(
-        {"dropped_5%", "dropped_1s", "duplicate_rows_10%", "stale_rows_10%", "quantised_1mrad"}
-        | {"stuck_position_J4", "time_ms", "effort_lag_5", "effort_zero_J5"}
-    ),
+    "ur10e": OF_ROWS,
+    "ur5": OF_ROWS | {"stuck_position_J4"},
+    "panda": OF_ROWS | {"stuck_position_J4", "time_ms", "effort_lag_5", "effort_zero_J5"},
 }
 """Log → faults that move its estimate by less than 0.1 N·m and 2 % of the effort."""
 

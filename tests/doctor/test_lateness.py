@@ -1,9 +1,12 @@
 """An effort that is late by a known time is found by that alone, not by what else may be odd."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from swinging import Said, only
 
 from vftcli.doctor import examine
 from vftcli.doctor.lateness import effort_lag
@@ -51,104 +54,84 @@ def log_of(
     return Recording(t=clock, q=q, dq=dq, torque=scale * torque)
 
 
-def reported(log: Recording) -> Remark | None:
-    """The finding, None without one."""
-    found = list(effort_lag(log, ARM))
+def reported(log: Recording) -> dict[str, Remark]:
+    """The finding by its code, none or one."""
+    found = {finding.code: finding for finding in effort_lag(log, ARM)}
     assert len(found) <= 1
-    return found[0] if found else None
+    return found
 
 
-@pytest.mark.parametrize(
-    ("late", "push"), [(0.05, 0.0), (0.1, 0.0), (0.2, 0.0), (-0.06, 0.0), (0.06, 5.0)]
-)
-def test_the_lag_is_reported(late: float, push: float) -> None:
-    """To a hundredth of a second: lags are tried that far apart. Pushes hide none."""
-    finding = reported(log_of(late, push))
-    assert finding is not None
-    assert (finding.code, finding.level) == ("effort-lag", "warning")
-    assert finding.values["lag_ms"] == pytest.approx(1e3 * abs(late), abs=10.1)
-    assert finding.values["order"] == ("later" if late > 0 else "earlier")
-    assert finding.values["ratio"] > 1.45
-    assert set(finding.where.joints) <= {1, 2, 3, 4, 5, 6}
+def lag(late: float, order: str) -> Said:
+    """To a hundredth of a second: lags are tried that far apart."""
+    lag_ms = pytest.approx(1e3 * late, abs=10.1)
+    return only("effort-lag", level="warning", lag_ms=lag_ms, order=order)
 
 
-@pytest.mark.parametrize(
-    "log",
-    [
-        # as real friction and drivers have it
-        *({"late": late} for late in (0.0, 0.01, 0.03, -0.03)),
-        {"rate": 0.001},
-        *({"scale": scale} for scale in (-1.0, 0.1, 100.0)),
-        {"push": 5.0},
-    ],
-    ids=str,
-)
-def test_what_is_no_lag_is_not_reported(log: dict[str, float]) -> None:
-    """A small lag, a wrong unit or sign, pushes of 5 N·m on every joint for a fifth of the time."""
-    assert reported(log_of(**log)) is None
-
-
-@pytest.mark.parametrize("push", [0.0, 5.0])
-@pytest.mark.parametrize(("rate", "pace"), [(0.005, "slow"), (-0.01, "fast")])
-def test_a_clock_of_the_effort_is_reported_by_its_rate(
-    rate: float, pace: str, push: float
-) -> None:
+def drift(rate: float, pace: str) -> Said:
     """To half of the .05 s by which tried growths of the lag lie apart within 19.5 s: .13 %."""
-    finding = reported(log_of(rate=rate, push=push))
-    assert finding is not None
-    assert (finding.code, finding.level) == ("effort-drift", "warning")
-    assert finding.values["drift_percent"] == pytest.approx(100 * abs(rate), abs=0.13)
-    assert finding.values["pace"] == pace
+    percent = pytest.approx(100 * rate, abs=0.13)
+    return only("effort-drift", level="warning", drift_percent=percent, pace=pace)
 
 
-def test_the_first_minute_shows_a_drift_in_a_long_log() -> None:
-    """.5 % of 200 s is a second, more than any lag that is tried."""
-    finding = reported(log_of(rate=0.005, clock=STEP * np.arange(20000)))
-    assert finding is not None
-    assert finding.code == "effort-drift"
-    assert finding.values["drift_percent"] == pytest.approx(0.5, abs=0.05)
-
-
-def test_gaps_hide_no_lag() -> None:
-    """A second without samples every two: no window reaches across."""
-    finding = reported(log_of(0.1, clock=T + np.arange(2000) // 200))
-    assert finding is not None
-    assert finding.values["lag_ms"] == pytest.approx(100.0, abs=10.1)
-
-
-def test_an_offset_is_no_lag() -> None:
-    log = log_of()
-    assert reported(replace(log, torque=log.require("torque") + 10.0)) is None
-
-
-def test_a_current_is_judged_as_a_torque_is() -> None:
-    log = log_of(0.06, scale=0.1)
-    assert reported(replace(log, torque=None, current=log.torque)) is not None
-    assert reported(replace(log, torque=None)) is None
-
-
-@pytest.mark.parametrize(("joints", "agreed"), [(2, False), (3, True)])
-def test_two_joints_tell_no_lag(joints: int, agreed: bool) -> None:
-    """Three have to agree: noise and contact on two may look like a lag."""
+def moving_on(joints: int) -> Recording:
     log = log_of(0.06)
-    moving = np.arange(6) < joints
-    finding = reported(replace(log, dq=log.require("dq") * moving))
-    assert (finding is not None) == agreed
+    return replace(log, dq=log.require("dq") * (np.arange(6) < joints))
 
 
-@pytest.mark.parametrize(("thinned", "reported_by"), [(3, True), (4, False)])
-def test_below_thirty_samples_a_second_no_lag_is_reported(
-    thinned: int, reported_by: bool
-) -> None:
+def thinned(every: int) -> Recording:
     log = log_of(0.12)
-    rows = slice(None, None, thinned)
-    signals = {name: getattr(log, name)[rows] for name in ("t", *log.signals)}
-    assert (reported(replace(log, **signals)) is not None) == reported_by
+    return replace(log, **{name: getattr(log, name)[::every] for name in ("t", *log.signals)})
+
+
+def as_current(log: Recording) -> Recording:
+    return replace(log, torque=None, current=log.torque)
+
+
+def with_offset(log: Recording) -> Recording:
+    return replace(log, torque=log.require("torque") + 10.0)
+
+
+CASES = [
+    *((partial(log_of, late), lag(late, "later")) for late in (0.05, 0.1, 0.2)),
+    (partial(log_of, -0.06), lag(0.06, "earlier")),
+    (partial(log_of, 0.06, 5.0), lag(0.06, "later")),  # pushes hide none
+    # as real friction and drivers have it
+    *((partial(log_of, late), only()) for late in (0.0, 0.01, 0.03, -0.03)),
+    (partial(log_of, rate=0.001), only()),
+    # a wrong unit or sign, pushes of 5 N·m on every joint for a fifth of the time
+    *((partial(log_of, scale=scale), only()) for scale in (-1.0, 0.1, 100.0)),
+    (partial(log_of, push=5.0), only()),
+    *((partial(log_of, rate=0.005, push=push), drift(0.005, "slow")) for push in (0.0, 5.0)),
+    *((partial(log_of, rate=-0.01, push=push), drift(0.01, "fast")) for push in (0.0, 5.0)),
+    # .5 % of 200 s is a second, more than any lag that is tried: the first minute shows it
+    (partial(log_of, rate=0.005, clock=STEP * np.arange(20000)), drift(0.005, "slow")),
+    # a second without samples every two: no window reaches across
+    (partial(log_of, 0.1, clock=T + np.arange(2000) // 200), lag(0.1, "later")),
+    (lambda: with_offset(log_of()), only()),
+    (lambda: as_current(log_of(0.06, scale=0.1)), lag(0.06, "later")),
+    (lambda: replace(log_of(0.06), torque=None), only()),
+    # three joints have to agree: noise and contact on two may look like a lag
+    (partial(moving_on, 2), only()),
+    (partial(moving_on, 3), lag(0.06, "later")),
+    # below thirty samples a second none is reported
+    (partial(thinned, 3), lag(0.12, "later")),
+    (partial(thinned, 4), only()),
+    (partial(log_of, 0.06, clock=STEP * np.arange(30)), only()),  # nor of a short log
+]
+
+
+@pytest.mark.parametrize(("log", "said"), CASES)
+def test_a_late_effort_is_reported_with_its_lag_or_drift(
+    log: Callable[[], Recording], said: Said
+) -> None:
+    found = reported(log())
+    said.check(found)
+    if "effort-lag" in found:
+        assert found["effort-lag"].values["ratio"] > 1.45
 
 
 def test_an_arm_of_other_joints_tells_nothing() -> None:
     assert not list(effort_lag(log_of(0.06), load_robot("panda")))
-    assert reported(log_of(0.06, clock=STEP * np.arange(30))) is None  # nor does a short log
 
 
 def test_an_effort_beside_late_velocities_is_not_called_early() -> None:
