@@ -73,10 +73,10 @@ def one_core() -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
+def circle(robot: Robot, samples: int) -> Recording:
     """A smooth periodic motion of an arm with plausible currents, seed 0."""
     rng = np.random.default_rng(0)
-    t = np.arange(samples) / rate
+    t = np.arange(samples) / 125.0
     phase = rng.uniform(0.0, 2.0 * np.pi, robot.joints)
     omega = 2.0 * np.pi / 4.0
     angle = omega * t[:, None] + phase
