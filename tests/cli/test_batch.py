@@ -6,9 +6,8 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from example_logs import CIRCLE, FIXTURES
 
-FIXTURES = Path(__file__).parents[2] / "fixtures"
-CIRCLE = FIXTURES / "ur5_circle.csv"
 ONE = ("--robot", "ur5", "--observer", "gmo", "--set", "contacts.list=no")
 HERE = ("--do", "estimate", *ONE, "--jobs", "0")
 
@@ -132,20 +131,6 @@ def test_an_episode_is_a_log(run, samples: Path, tmp_path: Path) -> None:
     table = pl.read_parquet(tmp_path / "batch.parquet").unique("log", maintain_order=True)
     # Lengths of the sample's episodes, by its table.
     assert table.select("episode", "samples").rows() == [(0, 700), (1, 600), (2, 650)]
-
-
-@pytest.mark.parametrize(
-    ("words", "reported"),
-    [
-        (("nothing/*.csv", "--do", "estimate"), "no log"),
-        ((CIRCLE, "--do", "dance"), "estimate, compare, report, contacts"),
-        ((CIRCLE, "--do", "estimate", "--robot", "ur55"), "ur55"),
-        ((CIRCLE, "--do", "estimate", "--robot", "ur5", "--payload", "cup"), "cup"),
-    ],
-)
-def test_what_cannot_be_done_is_one_line(refused, tmp_path: Path, words, reported: str) -> None:
-    assert reported in refused("batch", *words, "-o", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 def test_free_motion_among_the_logs_is_none_of_them(run, folder: Path, tmp_path: Path) -> None:

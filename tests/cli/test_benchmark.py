@@ -1,4 +1,4 @@
-"""`vftcli benchmark` as a user sees it: rivals as rows, resume, tables, what is refused."""
+"""`vftcli benchmark`, `reproduce` and `simulate` as a user calls them."""
 
 import json
 import re
@@ -8,12 +8,17 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from example_logs import CIRCLE, FIXTURES
 
 from vftcli.evaluation.references import since_start
 from vftcli.readers.library import Library
+from vftcli.readers.reading import read
+from vftcli.reproduction import experiments, paper
+from vftcli.reproduction.paper import Experiment, Paper, PaperItem, PrintedLine
+from vftcli.signals.errors import ParameterError
 
-FIXTURES = Path(__file__).parents[2] / "fixtures"
-CIRCLE = FIXTURES / "ur5_circle.csv"
+# `vftcli benchmark` as a user sees it: rivals as rows, resume, tables, what is refused.
+
 MANIFEST = """
 [[log]]
 name = "circle"
@@ -222,8 +227,6 @@ robot = "ur5"
 truth = "contacts"
 contacts = [[0.9, 2]]
 """
-
-
 PARTS = ("q", "dq", "current")
 
 
@@ -371,3 +374,81 @@ def test_times_are_printed_in_the_form_that_is_asked_for(run, monkeypatch) -> No
         out = run("benchmark", "speed", form)[1]
         assert begins in out
         assert title in out.replace("\\_", "_")
+
+
+# `vftcli reproduce` as a user calls it.
+
+
+@pytest.mark.slow
+def test_one_table_alone(run, refused, tmp_path: Path) -> None:
+    words = ("reproduce", "huang2025", "--only", "table4,fig11", "-o", tmp_path / "out")
+    code, out, err = run(*words)
+    assert code == 0, err
+    assert "Table IV" in out
+    assert "a picture" in out
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"index.html", "reproduction.md", "run.json"}
+    assert "--force" in refused(*words)
+
+
+def test_an_experiment_that_fails_is_a_row_and_exit_code_one(
+    run, monkeypatch, tmp_path: Path
+) -> None:
+    def fail(seed: int):
+        raise ParameterError(f"nothing moved with {seed}")
+
+    shared = {"title": "t", "why": "w."}
+    item = PaperItem(label="Table I", verdict="no", experiments=("e",),
+                     lines=(PrintedLine("k", "l"),), **shared)  # fmt: skip
+    drawn = PaperItem(label="Fig. 1", verdict="a picture", **shared)
+    failing = Experiment(title="the experiment", run="fail", seeds=(1,))
+    declared = Paper(name="p", title="t", doi="d", experiments={"e": failing},
+                     items={"table1": item, "fig1": drawn}, setting=())  # fmt: skip
+    monkeypatch.setitem(paper.PAPERS, "p", declared)
+    monkeypatch.setitem(experiments.RUNS, "fail", fail)
+    code, out, err = run("reproduce", "p", "-o", tmp_path / "out")
+    assert code == 1
+    assert "the experiment, seed 1: nothing moved with 1" in out + err
+    text = (tmp_path / "out" / "reproduction.md").read_text("utf-8")
+    assert "## Fig. 1: t" in text
+
+
+# `vftcli simulate` as a user calls it.
+
+AS_CIRCLE = ("simulate", "ur5-circle", "-o")
+pytestmark = pytest.mark.usefixtures("here")
+
+
+def test_writes_log_truth_and_a_scenario_that_makes_the_same_log(run) -> None:
+    code, out, _ = run(*AS_CIRCLE, "a.csv", "--set", "duration=0.5", "--seed", "3", "--json")
+    about = json.loads(out)
+    assert (code, about["seed"]) == (0, 3)
+    assert about["samples"] == read(Path("a.csv")).samples == 63
+    endings = ("", ".truth.parquet", ".scenario.toml", ".run.json")
+    assert [Path(f).name for f in about["files"]] == [f"a.csv{ending}" for ending in endings]
+    assert run("simulate", "a.csv.scenario.toml", "-o", "b.csv")[0] == 0
+    assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
+
+
+def test_pair_writes_two_logs(run, here: Path) -> None:
+    lossy = ("--set", "duration=0.3", "--set", "sensing.dropped=0.5")
+    _, out, _ = run("simulate", "payload-pair", "-o", "p.csv", *lossy, "--json")
+    rows = {p.name: p.read_text().count("\n") - 1 for p in here.glob("*.csv")}
+    assert rows.keys() == {"p.csv", "p.free.csv"}
+    assert json.loads(out)["samples"] == rows["p.csv"] != rows["p.free.csv"]
+
+
+def test_lists_the_scenarios(run) -> None:
+    text = run("simulate", "list")[1]
+    assert re.search(r"^ur5-circle +UR5 on a horizontal circle", text, re.MULTILINE)
+
+
+def test_nothing_is_overwritten_without_force_or_simulated_without_a_place(run, refused) -> None:
+    path = Path("log.csv")
+    path.write_text("mine")
+    assert "--force" in refused(*AS_CIRCLE, path, "--set", "duration=0.3")
+    assert path.read_text() == "mine"
+    code, _, err = run("simulate", "ur5-circle")
+    assert (code, "-o PATH says where" in err) == (2, True)
+    code, _, err = run(*AS_CIRCLE, "x.csv", "--seed", "-1")
+    assert (code, "'--seed': -1 is not in the range x>=0" in err) == (2, True)

@@ -1,15 +1,28 @@
-"""Options kept in a file do what the same options typed do, are said, and are checked alike."""
+"""Options kept in a file, and help on one screen."""
 
 import json
 import os
+import re
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
+from example_logs import CIRCLE, FIXTURES
 
-from vftcli.cli import config
+from vftcli import cli
+from vftcli.cli import COMMANDS, config, main, make_app
+from vftcli.cli.commands import JOURNEYS
+from vftcli.cli.help import GROUPS, topics
+from vftcli.observers.table import OBSERVERS
+from vftcli.readers.reading import FORMATS
+from vftcli.robots import PROFILES
 from vftcli.signals.option import settings_by_name
 
-LOG = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+# Options kept in a file do what the same options typed do, are said, and are checked alike.
+
 KEPT = """
 robot = "ur5"
 observer = ["fdo", "gmo"]
@@ -28,9 +41,9 @@ def keep(folder: Path, text: str, name: str = config.NAME) -> Path:
 
 def test_kept_options_give_the_numbers_of_typed_ones(run, here: Path) -> None:
     typed = ("--robot", "ur5", "--observer", "fdo", "--observer", "gmo", "--interval", "0:4")
-    _, expected, _ = run("compare", LOG, *typed, "--reference", "zero", "--json")
+    _, expected, _ = run("compare", CIRCLE, *typed, "--reference", "zero", "--json")
     keep(here, KEPT)
-    code, out, err = run("compare", LOG, "--json", "--quiet")
+    code, out, err = run("compare", CIRCLE, "--json", "--quiet")
     assert code == 0
     assert json.loads(out)["rows"] == json.loads(expected)["rows"]
     # Said even where little else is: a file nobody thinks of changes the results.
@@ -41,10 +54,10 @@ def test_kept_options_give_the_numbers_of_typed_ones(run, here: Path) -> None:
 
 def test_what_is_typed_goes_before_what_is_kept(run, here: Path) -> None:
     keep(here, KEPT)
-    _, out, err = run("compare", LOG, "--observer", "gmo", "--json")
+    _, out, err = run("compare", CIRCLE, "--observer", "gmo", "--json")
     assert {row["observer"] for row in json.loads(out)["rows"]} == {"gmo"}
     assert "--observer" not in err
-    code, _, err = run("compare", LOG, "--config", "none")
+    code, _, err = run("compare", CIRCLE, "--config", "none")
     assert (code, "note: " in err) == (2, False)
     assert "Missing option '--reference'" in err
 
@@ -52,17 +65,17 @@ def test_what_is_typed_goes_before_what_is_kept(run, here: Path) -> None:
 def test_a_named_file_is_read_in_place_of_the_folder_s(run, here: Path) -> None:
     keep(here, "no TOML")
     keep(here, 'robot = "ur5"', "other.toml")
-    code, _, err = run("inspect", LOG, "--config", "other.toml")
+    code, _, err = run("inspect", CIRCLE, "--config", "other.toml")
     said = "note: other.toml gives --robot ur5 (--config none: without it)"
     assert (code, err.splitlines()[0]) == (0, said)
 
 
 def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
     keep(here, 'robot = "ur5"\nobserver = ["gmo"]\nwrench = false\n[contacts]\nlist = false\n')
-    assert run("estimate", LOG, "-o", "out")[0] == 0
+    assert run("estimate", CIRCLE, "-o", "out")[0] == 0
     command = json.loads((here / "out/run.json").read_text("utf-8"))["command"]
     kept = "--observer gmo --robot ur5 --set contacts.list=no --config none"
-    assert sorted(command.split()) == sorted(f"vftcli estimate {LOG} -o out {kept}".split())
+    assert sorted(command.split()) == sorted(f"vftcli estimate {CIRCLE} -o out {kept}".split())
     (here / config.NAME).unlink()
     assert run(*command.split()[1:], "-o", "again")[0] == 0
     files = [here / folder / "estimates.parquet" for folder in ("out", "again")]
@@ -73,16 +86,16 @@ def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
 def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
     kept = 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\n[contacts]\nlist = false\n'
     keep(here, kept)
-    code, _, err = run("estimate", LOG, "-o", "out")
+    code, _, err = run("estimate", CIRCLE, "-o", "out")
     assert (code, "--columns=-t,q:6" in err) == (1, True)
-    assert run("estimate", LOG, "-o", "out", "--config", "none", "--robot", "ur5")[0] == 0
+    assert run("estimate", CIRCLE, "-o", "out", "--config", "none", "--robot", "ur5")[0] == 0
     code, _, err = run("contacts", here / "out/estimates.parquet")
     assert (code, "--columns" in err) == (0, False)
 
 
 def test_logs_behind_two_dashes_stay_behind_them(run, here: Path) -> None:
     keep(here, 'robot = "ur5"\n')
-    (here / "-log.csv").symlink_to(LOG)
+    (here / "-log.csv").symlink_to(CIRCLE)
     code, out, err = run("inspect", "--json", "--", "-log.csv")
     assert (code, "note: vftcli.toml gives --robot ur5" in err) == (0, True)
     command = "vftcli inspect --json --robot ur5 --config none -- -log.csv"
@@ -113,20 +126,20 @@ def test_logs_behind_two_dashes_stay_behind_them(run, here: Path) -> None:
 def test_what_is_wrong_with_a_file_is_said_in_one_line(refused, here, text, said) -> None:
     (here / "sub").mkdir()
     file = keep(here / "sub", text, "kept.toml").relative_to(here)
-    assert said in refused("report", LOG, "-o", "out", "--config", file)
+    assert said in refused("report", CIRCLE, "-o", "out", "--config", file)
     assert not (here / "out").exists()
 
 
 @pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("name", ["nowhere.toml", ".", os.devnull, str(LOG)])
+@pytest.mark.parametrize("name", ["nowhere.toml", ".", os.devnull, str(CIRCLE)])
 def test_what_is_no_such_file_is_refused(refused, name: str) -> None:
-    assert f"{name}: " in refused("inspect", LOG, "--config", name)
+    assert f"{name}: " in refused("inspect", CIRCLE, "--config", name)
 
 
 @pytest.mark.parametrize("content", [b"robot = '\xff'", "robot = 'ur5'".encode("utf-16")])
 def test_a_file_in_another_encoding_is_refused_in_words(run, refused, here, content) -> None:
     (here / config.NAME).write_bytes(content)
-    error = refused("inspect", LOG)
+    error = refused("inspect", CIRCLE)
     assert error.endswith("cannot be read as a file of options (not a text in UTF-8)")
     # Help needs no such file.
     assert run("inspect", "--help")[0] == 0
@@ -135,10 +148,10 @@ def test_a_file_in_another_encoding_is_refused_in_words(run, refused, here, cont
 
 def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
     (here / "sub").mkdir()
-    (here / "sub/free.csv").write_bytes(LOG.read_bytes())
+    (here / "sub/free.csv").write_bytes(CIRCLE.read_bytes())
     keep(here / "sub", 'robot = "ur5"\nfree = ["free.csv", "0.3:4"]\n')
     kept = ("--config", Path("sub") / config.NAME)
-    code, _, err = run("contacts", LOG, *kept)
+    code, _, err = run("contacts", CIRCLE, *kept)
     assert f"--free {Path('sub/free.csv')} --free 0.3:4" in err
     assert (code, "are the same run" in err) == (1, True)
     # A log is no free run of itself.
@@ -149,7 +162,7 @@ def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
 def test_switches_and_numbers_are_kept_as_they_are_typed(run, here: Path) -> None:
     """Of one log too, whose own name alone is left out of what is free."""
     keep(here, 'robot = "ur5"\nanyway = true\ndetails = true\n[contacts]\nall = true\n')
-    _, _, err = run("contacts", LOG, "--interval", "0:2")
+    _, _, err = run("contacts", CIRCLE, "--interval", "0:2")
     gives = err.splitlines()[0]
     for word in ("--robot ur5", "--anyway", "--details", "--all"):
         assert word in gives
@@ -158,16 +171,16 @@ def test_switches_and_numbers_are_kept_as_they_are_typed(run, here: Path) -> Non
 def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: Path) -> None:
     """`identify --free` is the motion without a load; `thresholds --reference` is of --check."""
     keep(here, 'robot = "ur5"\nreference = "two-cycle"\n')
-    _, _, err = run("thresholds", LOG, "--interval", "0:1")
+    _, _, err = run("thresholds", CIRCLE, "--interval", "0:1")
     assert err.startswith("note: vftcli.toml gives --robot ur5 (")
     assert "--check" not in err
     keep(here, 'robot = "ur5"\n[thresholds]\nreference = "two-cycle"\n')
-    assert "--check" in run("thresholds", LOG)[2]
+    assert "--check" in run("thresholds", CIRCLE)[2]
 
 
 def test_the_file_is_an_input_that_nothing_writes_over(refused, here: Path) -> None:
     kept = keep(here, 'robot = "ur5"\n')
-    error = refused("identify", LOG, "--method", "gains", "-o", kept, "--force")
+    error = refused("identify", CIRCLE, "--method", "gains", "-o", kept, "--force")
     assert "what this command reads" in error
     assert kept.read_text("utf-8") == 'robot = "ur5"\n'
 
@@ -182,17 +195,166 @@ def test_every_option_kept_otherwise_exists() -> None:
 def test_settings_of_a_group_that_is_called_as_a_command_stand_in_its_table(run, here) -> None:
     of_identify = '[identify]\ncutoff = 5\nmethod = "guess"\n'
     keep(here, f'robot = "ur5"\n{of_identify}[two-cycle]\nperiod = 4\n')
-    code, _, err = run("identify", LOG)
+    code, _, err = run("identify", CIRCLE)
     assert (code, "there is friction, base" in err) == (1, True)
     for word in ("--set identify.cutoff=5", "--set two-cycle.period=4", "--method guess"):
         assert word in err
-    assert "--method" not in run("compare", LOG, "--reference", "zero", "--interval", "0:1")[2]
+    assert "--method" not in run("compare", CIRCLE, "--reference", "zero", "--interval", "0:1")[2]
 
 
 def test_a_typed_setting_goes_before_a_kept_one(run, here: Path) -> None:
     keep(here, 'robot = "ur5"\n[gmo]\ngain = [5, 5, 5, 5, 5, 5]\n[fdo]\nomega = 8\n')
     words = ("--observer", "gmo", "--observer", "fdo", "--reference", "zero", "--json")
-    _, kept, err = run("compare", LOG, *words, "--set", "gmo.gain=9")
+    _, kept, err = run("compare", CIRCLE, *words, "--set", "gmo.gain=9")
     assert "gives --set fdo.omega=8 --robot ur5 (" in err
     typed = ("--set", "gmo.gain=9", "--set", "fdo.omega=8", "--robot", "ur5", "--config", "none")
-    assert kept == run("compare", LOG, *words, *typed)[1]
+    assert kept == run("compare", CIRCLE, *words, *typed)[1]
+
+
+# Help on one screen: options in groups, commands by what one sets out to do, topics, lists.
+
+MOST_LINES, WIDEST = 45, 80
+LISTS = ("robots", "observers", "formats", "settings")
+
+
+@pytest.fixture
+def helped(run, monkeypatch):
+    """What the program prints on a terminal of 80 columns."""
+    monkeypatch.setenv("COLUMNS", str(WIDEST))
+
+    def call(*words: object) -> str:
+        code, out, err = run(*words)
+        assert (code, err) == (0, "")
+        return out
+
+    return call
+
+
+def commands() -> dict[str, Any]:
+    """Name → command."""
+    return vars(typer.main.get_command(make_app()))["commands"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_a_command_is_one_screen_and_shows_every_option(command: str, helped) -> None:
+    text = helped(command, "--help")
+    assert len(text.splitlines()) <= MOST_LINES
+    assert max(map(len, text.splitlines())) <= WIDEST
+    assert text == helped(command, "-h")
+    assert COMMANDS[command].summary in " ".join(text.split())
+    assert f"Example: vftcli {command}" in " ".join(text.split())
+    params = commands()[command].params
+    names = [name for p in params for name in p.opts if name.startswith("--") and not p.hidden]
+    assert [name for name in names if not re.search(rf"(?<![\w-]){name}(?![\w-])", text)] == []
+
+
+def test_options_stand_in_groups_in_their_order(helped) -> None:
+    text = helped("report", "--help")
+    heads = [line.rstrip(":") for line in text.splitlines() if line.rstrip(":") in GROUPS]
+    assert tuple(heads) == GROUPS
+    wrench = text.partition("The wrench")[2].partition("What to write")[0]
+    assert "--frame" in wrench
+
+
+def test_the_commands_are_listed_by_what_one_sets_out_to_do(helped) -> None:
+    text = helped("--help")
+    assert len(text.splitlines()) <= MOST_LINES
+    for name, command in COMMANDS.items():
+        # On one line, not cut.
+        assert re.search(rf"^  {name} +{re.escape(command.summary)}$", text, re.MULTILINE)
+    order = [text.index(head) for head in JOURNEYS]
+    assert order == sorted(order)
+    assert "--install-completion" in text
+
+
+@pytest.mark.parametrize("topic", topics())
+def test_a_topic_is_one_screen_and_its_options_exist(topic: str, helped) -> None:
+    assert topic not in COMMANDS
+    text = helped("help", topic)
+    assert len(text.splitlines()) <= MOST_LINES
+    assert max(map(len, text.splitlines())) <= WIDEST
+    there = {name for c in commands().values() for p in c.params for name in p.opts}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) <= there
+
+
+def test_help_lists_topics_lists_and_commands_and_explains_each(helped) -> None:
+    text = helped("help")
+    there = {line.split()[0] for line in text.splitlines() if line.startswith("  ")}
+    assert there == {*topics(), *LISTS, *COMMANDS}
+    for shown in (text, *(helped("help", name) for name in LISTS[1:])):
+        assert max(map(len, shown.splitlines())) <= WIDEST
+    assert helped("help", "frames").startswith("FRAMES")
+    assert "Usage: vftcli compare" in helped("help", "compare")
+
+
+def test_what_there_is_is_listed_with_the_sources_of_one(helped) -> None:
+    for name, known in (("observers", OBSERVERS), ("formats", FORMATS), ("robots", PROFILES)):
+        text = helped("help", name)
+        assert [each for each in known if f"{each} " not in text] == []
+    assert "source huang2025: " in helped("help", "robots", "ur5")
+    assert "record:" in helped("help", "formats", "mcap")
+
+
+def test_a_description_is_shown_up_to_its_tip(helped) -> None:
+    whole = helped("help", "robots", FIXTURES / "arm.urdf")
+    joints = [line.split()[0] for line in whole.splitlines()[3:] if line][:3]
+    part = helped("help", "robots", FIXTURES / "arm.urdf", "--tip", joints[1])
+    assert ": 2 joints" in part.splitlines()[0]
+
+
+def test_every_setting_of_a_command_is_listed_once(helped) -> None:
+    text = helped("help", "settings")
+    choices = {kind for c in commands().values() for kind in vars(c.callback)["choices"]}
+    options = {o.name for kind in choices for *_, o in kind.options().values() if o.is_setting}
+    dotted = [name for name in options if "." in name]
+    assert len(dotted) > 20
+    listed = [line.split()[0] for line in text.splitlines() if line[:2] == "  " != line[2:4]]
+    assert sorted(listed) == sorted([*dotted, "OBSERVER.NUMBER", "AXIS.NUMBER"])
+    assert "(S)" in text.partition("two-cycle.period")[2].partition("virtual-sensor")[0]
+    assert "default yes" in text.partition("contacts.list")[2].partition("log.derive")[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("help", "colums"), "Did you mean columns?"),
+        (("help", "weather"), "there is columns, reference, gains, frames, config, robots,"),
+        (("help", "formats", "headerles"), "Did you mean headerless?"),
+        (("help", "frames", "flange"), "a name follows robots or formats only"),
+        (("reprot", "x.csv"), "No such command 'reprot'. Did you mean report?"),
+        (("dance",), "No such command 'dance'."),
+        (("report", "--freee", "x"), "No such option: --freee (Possible options: --free)"),
+        (("report", "--zzz", "x"), "No such option: --zzz"),
+    ],
+)
+def test_what_there_is_not_names_the_nearest_if_it_is_near(
+    words: tuple[str, ...], said: str, run
+) -> None:
+    code, out, err = run(*words)
+    assert (code, out) == (1 if words[0] == "help" else 2, "")
+    assert said in " ".join(err.split())
+    assert ("Did you mean" in err or "Possible" in err) == ("Did you" in said or "Possib" in said)
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = (
+        "import sys\nsys.argv = ['vftcli', 'report', '--help']\n"
+        "from vftcli.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'scipy', 'polars', 'pinocchio', 'rerun', 'rich'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_only_the_command_that_is_asked_for_is_loaded(monkeypatch) -> None:
+    loaded = []
+    monkeypatch.setattr(cli, "make_app", lambda load: lambda **_: loaded.append({*load}))
+    for words in ("help report", "report log.csv", "./log.csv", ""):
+        monkeypatch.setattr("sys.argv", ["vftcli", *words.split()])
+        main()
+    each = [some & {*COMMANDS} for some in loaded]
+    assert each == [{"help", "report"}, {"report"}, {"contacts"}, set()]

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from example_logs import CIRCLE
 
 from vftcli.outputs.files import digests
 
@@ -11,13 +12,12 @@ pytestmark = pytest.mark.slow
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
-LOG = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 SHORT = ("--robot", "ur5", "--interval", "0:4", "--observer", "gmo")
 
 
 def test_a_report_holds_its_figures_and_the_seal_lists_them(run, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = ("report", LOG, *SHORT, "-o", out)
+    words = ("report", CIRCLE, *SHORT, "-o", out)
     assert run(*words, "--reference", "zero", "--figures", "svg")[0] == 0
     listed = json.loads((out / "run.json").read_text(encoding="utf-8"))["files"]
     assert {"figures/torque-single.svg", "figures/errors-double.svg"} <= set(listed)
@@ -30,7 +30,7 @@ def test_a_report_holds_its_figures_and_the_seal_lists_them(run, tmp_path: Path)
 
 
 def test_compare_draws_into_a_folder_and_nowhere_else(run, tmp_path: Path) -> None:
-    words = ("compare", LOG, *SHORT, "--reference", "zero")
+    words = ("compare", CIRCLE, *SHORT, "--reference", "zero")
     assert run(*words, "--figures", "svg", "-o", tmp_path / "out")[0] == 0
     names = sorted(path.name for path in tmp_path.rglob("*.*"))
     assert names == ["errors-double.svg", "errors-single.svg"]

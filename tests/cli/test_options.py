@@ -1,18 +1,38 @@
-"""An option means and takes the same in every command that has it."""
+"""What is typed: options mean the same in every command, former words, first words."""
 
+import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import typer
+from example_logs import CIRCLE, TAPS
 
+import vftcli as vft
+from vftcli.admittance import ControlChoice
+from vftcli.batch import WorkersChoice
+from vftcli.bias import RefinementChoice
 from vftcli.cli import COMMANDS, make_app
-from vftcli.signals.option import settings_by_name
+from vftcli.cli.commands import former, with_command
+from vftcli.doctor.examination import Examiner
+from vftcli.free_motion import FreeChoice
+from vftcli.observers import ObserverChoice
+from vftcli.outputs import OutputChoice
+from vftcli.pipeline import choice_of
+from vftcli.readers.library import Library
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots import RobotChoice
+from vftcli.signals.option import Asked, Choice, settings_by_name
+from vftcli.wrench import FIT, WrenchChoice
+
+# An option means and takes the same in every command that has it.
 
 ROOT = Path(__file__).parents[2]
-FIXTURE = ROOT / "fixtures" / "ur5_circle.csv"
-
 READING = {
     "estimate": ("-o", "out"),
     "compare": ("--reference", "zero"),
@@ -25,7 +45,6 @@ READING = {
     "contacts": (),
 }
 """Command that reads a log → what else it has to be given."""
-
 OWN = {("simulate", "--set"), ("identify", "--gains"), ("simulate", "--output"),
        ("admit", "--output"), ("identify", "--output"), ("convert", "--output"),
        ("inspect", "--output"), ("compare", "--output"),
@@ -35,7 +54,6 @@ OWN = {("simulate", "--set"), ("identify", "--gains"), ("simulate", "--output"),
 """Options that are a command's own: --set of a scenario, the goal of --method gains, what is
 written where, and --csv, which the contract makes a file of `estimate` and a table of the others.
 """
-
 BAD = {
     "--interval": ("8:4", "is not A:B with A < B"),
     "log.format": ("excel", "known formats"),
@@ -95,7 +113,7 @@ def test_the_same_bad_value_is_refused_with_the_same_line(option: str, refused, 
         if option not in there or (command, option) in OWN:
             continue
         robot = ("--robot", "ur5") if "--robot" in there and option != "--robot" else ()
-        lines[command] = refused(command, FIXTURE, *robot, *needed, *typed(option, value))
+        lines[command] = refused(command, CIRCLE, *robot, *needed, *typed(option, value))
     assert words in next(iter(lines.values()))
     assert len(set(lines.values())) == 1, lines
     assert not any(here.iterdir())  # nothing half written
@@ -105,7 +123,7 @@ def test_the_same_bad_value_is_refused_with_the_same_line(option: str, refused, 
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_bad_number_of_an_observer_is_refused(command: str, refused) -> None:
     words = ("--robot", "ur5", *READING[command], "--set", "gmo.gain=much")
-    assert "is not a number or a list" in refused(command, FIXTURE, *words)
+    assert "is not a number or a list" in refused(command, CIRCLE, *words)
 
 
 def test_every_shared_option_is_tried() -> None:
@@ -164,3 +182,233 @@ def test_documents_name_every_option_and_no_other() -> None:
     there = {name for c in COMMANDS for name in parameters(c) if name.startswith("--")}
     of_help = {"--version", "--install-completion"}
     assert named - of_help == there
+
+
+# Options once: what is not typed is decided by the room, what is typed asks for its work.
+
+EVERY = (
+    ReadChoice, RobotChoice, ObserverChoice, FreeChoice, RefinementChoice, WrenchChoice,
+    OutputChoice, ControlChoice, WorkersChoice,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("choice", EVERY)
+def test_a_choice_of_nothing_typed_is_the_choice_s_default(choice: type[Choice]) -> None:
+    assert choice.parsed() == choice()
+    nothing = dict.fromkeys(choice.options())
+    assert choice.parsed(**nothing) == choice()
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        {"wrench": True},
+        {"frame": "base"},
+        {"virtual-sensor.solver": "map"},
+        {"virtual-sensor.tool": "0,0,0.1"},
+        {"virtual-sensor.sensor": FIT},
+        {"zero": ["1:2"]},
+        {"virtual-sensor.torque-sd": "own"},
+        {},
+    ],
+)
+def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, Any]) -> None:
+    settings = {name: text for name, text in typed.items() if "." in name}
+    words = {"zero": [], **{name: word for name, word in typed.items() if "." not in name}}
+    asked = choice_of(Asked(words, settings, ""), Library(), Examiner())
+    assert (asked.wrench is not None) == bool(typed)
+
+
+@pytest.mark.usefixtures("here")
+def test_figures_without_matplotlib_are_refused_before_the_log_is_read(refused, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    error = refused("compare", "no.csv", "--reference", "zero", "--figures", "pdf", "-o", "out")
+    assert "pip install 'vftcli[figures]'" in error
+
+
+# Without a command the words are of `contacts`: a log or options may come first.
+
+
+@pytest.mark.parametrize("words", [(TAPS, "--robot", "ur5"), ("--robot", "ur5", TAPS)])
+def test_a_log_alone_is_asked_what_touched_the_arm(run, words: tuple[object, ...]) -> None:
+    asked = ("--interval", "0:3", "--csv", "-q")
+    expected = run("contacts", *words, *asked)
+    assert expected[0] == 0
+    assert run(*words, *asked) == expected
+
+
+@pytest.mark.parametrize("name", ["nowhere.csv", "no/where", "-"])
+def test_a_word_that_looks_as_a_path_is_a_log(refused, name: str) -> None:
+    assert refused(name).startswith(f"error: {name}: ")
+
+
+def test_a_file_of_the_folder_is_a_log_and_a_command_goes_before_it(run, here: Path) -> None:
+    for name in ("push", "report"):
+        (here / name).write_text("no log\n")
+    assert run("push")[2].startswith("error: push: ")
+    assert "Missing argument" in run("report")[2]
+    assert run("./report")[2].startswith("error: report: ")
+
+
+@pytest.mark.usefixtures("here")
+def test_an_arm_that_is_not_settled_is_asked_for(run) -> None:
+    """Behind what the log holds, on one line, with the two that fit best."""
+    log = vft.read(TAPS)
+    held = np.column_stack([log.t, log.q, log.require("dq"), log.require("current")])
+    # A longer path would leave no room for the format beside it.
+    np.savetxt("push.csv", held, delimiter=",")
+    words = ("push.csv", "--columns", "t,q:6,dq:6,current:6")
+    code, out, err = run(*words)
+    assert code == 1
+    assert out.startswith("push.csv: headerless\n  joints    6\n")
+    assert re.fullmatch(
+        r"error: Which arm\? Best fits: ur5 .*%\), .*%\)\. Add --robot ur5\n", err
+    )
+    assert run(*words, "--json") == (code, "", err)
+
+
+# Words of the release before do what they did, each with a note that says today's words.
+
+TABLE = former()
+SHORT = ("--robot", "ur5", "--interval", "4:6", "--json", "-q")
+pytestmark = pytest.mark.usefixtures("here")
+
+
+@pytest.fixture(scope="module")
+def commands() -> dict[str, Any]:
+    """Name → command."""
+    return vars(typer.main.get_command(make_app()))["commands"]
+
+
+@pytest.mark.parametrize("word", TABLE["options"])
+def test_what_a_former_option_is_now_exists(word: str, commands) -> None:
+    option, _, value = TABLE["options"][word].partition(" ")
+    each = commands.values()
+    if option.startswith("--"):
+        assert option in {"--help", *(name for c in each for p in c.params for name in p.opts)}
+    if option == "--set":
+        setting = value.partition("=")[0]
+        assert any(kind.takes(setting) for c in each for kind in vars(c.callback)["choices"])
+
+
+@pytest.mark.parametrize("name", TABLE["commands"])
+def test_what_a_former_command_is_now_exists(name: str, commands) -> None:
+    now = TABLE["commands"][name].split()
+    assert now[0] in commands
+    options = {option for param in commands[now[0]].params for option in param.opts}
+    assert {word for word in now if word.startswith("-")} <= options
+
+
+@pytest.mark.parametrize(
+    ("words", "now"),
+    [
+        ("init a.csv", "inspect -o vftcli.toml a.csv"),
+        ("init a.csv -o b.toml", "inspect a.csv -o b.toml"),
+        ("init --output=b.toml a.csv", "inspect --output=b.toml a.csv"),
+        ("tune a.csv -o b.toml", "identify --method gains a.csv -o b.toml"),
+    ],
+)
+def test_a_former_command_is_called_with_its_words(words: str, now: str) -> None:
+    assert with_command(words.split()) == now.split()
+
+
+def test_no_former_word_is_a_word_of_today(commands) -> None:
+    assert not {*TABLE["commands"], *TABLE["gone"]} & {*commands}
+    for name in (*(f"--{word}" for word in TABLE["options"]), *TABLE["gone"]):
+        assert not [n for n, c in commands.items() for p in c.params if name in p.opts], name
+
+
+def test_a_former_option_does_what_its_setting_does(run) -> None:
+    typed = ("--set", "log.effort=current", "--set", "model.friction=none")
+    code, expected, _ = run("contacts", TAPS, *SHORT, *typed)
+    assert (code, expected == run("contacts", TAPS, *SHORT)[1]) == (0, False)
+    code, out, err = run(TAPS, *SHORT, "--effort", "current", "--friction=none")
+    assert (code, out) == (0, expected)
+    assert err.splitlines() == [
+        "note: --effort is now --set log.effort=…",
+        "note: --friction is now --set model.friction=…",
+    ]
+
+
+def test_the_command_line_of_run_json_has_today_s_words(run, here: Path) -> None:
+    words = ("--interval", "0:2", "--observer", "gmo", "--robot", "ur5", "-o", "out")
+    code, _, err = run("estimate", TAPS, *words, "--no-contacts", "--match", "bandwidth=2")
+    assert (code, err.count(" is now ")) == (0, 2)
+    command = json.loads((here / "out/run.json").read_text("utf-8"))["command"]
+    assert command.endswith(" --set contacts.list=no --gains bandwidth=2")
+
+
+def test_a_former_command_is_run_as_what_it_is_now(run) -> None:
+    code, out, err = run("robots", "ur5")
+    assert (code, err) == (0, "note: robots is now help robots\n")
+    assert out == run("help", "robots", "ur5")[1]
+
+
+def test_the_arguments_of_a_xacro_go_to_the_robot(run, here: Path) -> None:
+    for package in ("xacro", "xacrodoc"):
+        pytest.importorskip(package, reason="the extra vftcli[xacro] is not installed")
+    text = (TAPS.parent / "arm.urdf").read_text("utf-8")
+    text = text.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1)
+    head, _, tail = text.partition('<mass value="')
+    text = f'{head}<mass value="$(arg heavy){tail[tail.index(chr(34)) :]}'
+    (here / "arm.xacro").write_text(text, "utf-8")
+    now = run("inspect", TAPS, "--robot", "arm.xacro heavy:=4")
+    then = run("inspect", TAPS, "--robot", "arm.xacro", "--robot-arg", "heavy=4")
+    assert "heavy" not in now[2]
+    assert then[:2] == now[:2]
+    assert then[2] == "note: --robot-arg is now --robot 'FILE …'\n" + now[2]
+
+
+def test_former_keys_of_a_file_of_options_are_read(run, here: Path) -> None:
+    code, expected, _ = run("contacts", TAPS, *SHORT, "--set", "model.friction=none")
+    (here / "vftcli.toml").write_text('friction = "none"\nno-contacts = false\n', "utf-8")
+    code, out, err = run("contacts", TAPS, *SHORT)
+    assert code == 0
+    assert json.loads(out)["logs"] == json.loads(expected)["logs"]
+    assert err.splitlines()[:2] == [
+        "note: vftcli.toml: friction is now --set model.friction=…",
+        "note: vftcli.toml: no-contacts is now --set contacts.list=no",
+    ]
+    (here / "vftcli.toml").write_text("[batch]\nlimit = 3\n", "utf-8")
+    assert run("contacts", TAPS)[2] == "error: --limit is gone; leave it out\n"
+
+
+# What a shell is offered behind the words that were typed.
+
+PROGRAM = "import sys; sys.argv[0] = 'vftcli'; from vftcli.cli import launch; launch()"
+LOG = str(CIRCLE)
+
+
+@pytest.mark.parametrize(
+    ("words", "values"),
+    [
+        (("rep",), {"report", "reproduce"}),
+        (("report", "--fr"), {"--free", "--frame"}),
+        (("contacts", "--robot", "ur1"), {"ur10", "ur10e", "ur16e"}),
+        ((LOG, "--robot", "ur10"), {"ur10", "ur10e"}),
+        (("--robot", "ur5", LOG, "--arm", "l"), {"left"}),
+        (("report", "--observer", "kfo-"), {"kfo-auto", "kfo-fe", "kfo-rts", "kfo-zoh"}),
+        (("compare", "--reference", "ze"), {"zero"}),
+        (("report", "--gains", "p"), {"paper"}),
+        (("report", "--frame", "f"), {"flange"}),
+        (("report", "--figures", "s"), {"svg"}),
+        (("batch", "--do", "co"), {"compare", "contacts"}),
+        (("simulate", "--as", "lib"), {"libfranka"}),
+        (("report", "--set", "two-cycle.l"), {"two-cycle.low-pass="}),
+        (("report", "--set", "gmo."), {"gmo.gain="}),
+        (("admit", "--set", "rz.thr"), {"rz.threshold="}),
+        (("contacts", "--set", "bench"), set()),
+        (("help", "fr"), {"frames"}),
+        (("help", "co"), {"columns", "config", "contacts", "compare", "convert"}),
+        (("report", "--robot", "my_"), set()),  # the shell offers files
+    ],
+)
+def test_values_are_offered(words: tuple[str, ...], values: set[str]) -> None:
+    asked = {
+        "_VFTCLI_COMPLETE": "complete_bash",
+        "COMP_WORDS": " ".join(("vftcli", *words)),
+        "COMP_CWORD": str(len(words)),
+    }
+    shell = {"capture_output": True, "text": True, "env": {**os.environ, **asked}}
+    done = subprocess.run([sys.executable, "-c", PROGRAM], check=False, **shell)
+    assert (set(done.stdout.split()), done.stderr) == (values, "")

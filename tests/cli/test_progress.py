@@ -8,16 +8,12 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
+from example_logs import BEARING, CIRCLE, EPISODES, TAPS
 
 from vftcli.cli.progress import Stages, fitted
 from vftcli.signals.progress import heard_by, stage, steps
-
-FIXTURES = Path(__file__).parents[2] / "fixtures"
-LOG, CIRCLE = FIXTURES / "ur5_taps_ur_rtde.csv", FIXTURES / "ur5_circle.csv"
-BEARING, EPISODES = FIXTURES / "panda_bearing.csv", FIXTURES / "panda_episodes"
 
 
 @pytest.fixture
@@ -188,19 +184,19 @@ SHORT = ("--robot", "ur5", "--interval", "3:6")
 GMO = (*SHORT, "--observer", "gmo")
 #: Commands, quick ones of each.
 COMMANDS = (
-    (LOG, *SHORT),
-    ("contacts", LOG, CIRCLE, *SHORT),
+    (TAPS, *SHORT),
+    ("contacts", TAPS, CIRCLE, *SHORT),
     ("contacts", CIRCLE, "--robot", "ur5e"),
-    ("report", LOG, *SHORT, "--wrench", "-o", "out"),
-    ("estimate", LOG, *GMO, "-v", "-o", "out"),
-    ("compare", LOG, *GMO, "--reference", "zero", "-v"),
-    ("compare", LOG, *SHORT, "--reference", "zero"),
+    ("report", TAPS, *SHORT, "--wrench", "-o", "out"),
+    ("estimate", TAPS, *GMO, "-v", "-o", "out"),
+    ("compare", TAPS, *GMO, "--reference", "zero", "-v"),
+    ("compare", TAPS, *SHORT, "--reference", "zero"),
     ("inspect", CIRCLE),
     ("identify", CIRCLE, *SHORT, "-o", "out.toml"),
     ("identify", CIRCLE, "--robot", "ur5", "--method", "gains", "-o", "out.toml"),
     ("thresholds", BEARING, "--robot", "panda", "--rate", 60, "--anyway"),
-    ("convert", LOG, "-o", "out.csv"),
-    ("batch", LOG, *GMO, "--do", "estimate", "--jobs", 0, "-o", "out"),
+    ("convert", TAPS, "-o", "out.csv"),
+    ("batch", TAPS, *GMO, "--do", "estimate", "--jobs", 0, "-o", "out"),
     ("annotate", EPISODES, "--robot", "panda", "--jobs", 0, "-o", "out"),
     ("admit", CIRCLE, "--robot", "ur5", "--interval", "0:6"),
     ("simulate", "list"),
@@ -211,8 +207,8 @@ COMMANDS = (
     ("help", "settings"),
     ("help", "robots", "ur5"),
     ("report", "--help"),
-    ("contact", LOG),
-    ("contacts", LOG, "--robot", "ur55"),
+    ("contact", TAPS),
+    ("contacts", TAPS, "--robot", "ur55"),
 )
 
 
@@ -234,7 +230,7 @@ def test_no_line_is_wider_than_the_terminal_or_printed_into_the_line(
 
 
 def test_what_is_for_programs_is_printed_as_it_is() -> None:
-    lines = on_a_terminal("compare", LOG, *GMO, "--reference", "zero", "--json", "-q")
+    lines = on_a_terminal("compare", TAPS, *GMO, "--reference", "zero", "--json", "-q")
     assert json.loads("\n".join(lines))["rows"][0]["observer"] == "gmo"
 
 
@@ -258,5 +254,5 @@ def test_a_line_is_broken_where_it_does_not_fit(text: str, width: int, lines: li
 
 
 def test_a_dumb_terminal_has_no_line() -> None:
-    lines = on_a_terminal("contacts", LOG, "--interval", "0:2", TERM="dumb")
+    lines = on_a_terminal("contacts", TAPS, "--interval", "0:2", TERM="dumb")
     assert "ur5_taps_ur_rtde.csv" in "".join(lines)

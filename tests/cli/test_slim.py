@@ -6,12 +6,12 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from example_logs import CIRCLE
 
 from vftcli.readers.reading import read
 
 pytestmark = pytest.mark.statistical  # long: CI does the same in an environment without the three
 
-FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 
 FEW = "--robot", "ur5", "--interval", "0:6"
 
@@ -34,11 +34,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("slim")
     bare = "parquet without units beside its columns: pip install pyarrow"
     no_recording = "recording.rrd not written: pip install rerun-sdk"
-    estimate = ("estimate", FIXTURE, *FEW, "--observer", "gmo", "--wrench")
+    estimate = ("estimate", CIRCLE, *FEW, "--observer", "gmo", "--wrench")
     for words, lines in {
-        ("report", FIXTURE, *FEW, "-o", folder / "report"): [no_recording, f"estimates.{bare}"],
+        ("report", CIRCLE, *FEW, "-o", folder / "report"): [no_recording, f"estimates.{bare}"],
         (*estimate, "-o", folder / "out"): [f"estimates.{bare}"],
-        ("convert", FIXTURE, "-o", folder / "log.parquet"): [f"log.{bare}"],
+        ("convert", CIRCLE, "-o", folder / "log.parquet"): [f"log.{bare}"],
     }.items():
         done = launched(*words)
         assert done.returncode == 0, done.stderr
@@ -53,7 +53,7 @@ def test_a_report_holds_all_but_the_recording(folder: Path) -> None:
 
 
 def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> None:
-    made, logged = read(folder / "log.parquet"), read(FIXTURE)
+    made, logged = read(folder / "log.parquet"), read(CIRCLE)
     for name in logged.signals:
         assert (getattr(made, name) == getattr(logged, name)).all()
     assert "wrench/gmo/fx" in pl.read_parquet_schema(folder / "out" / "estimates.parquet")
@@ -62,10 +62,10 @@ def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> No
 @pytest.mark.parametrize(
     "words",
     [
-        ("inspect", FIXTURE),
-        ("compare", FIXTURE, "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
-        ("identify", FIXTURE, "--robot", "ur5", "--method", "gains", "-o", "gains.toml"),
-        ("identify", FIXTURE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
+        ("inspect", CIRCLE),
+        ("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
+        ("identify", CIRCLE, "--robot", "ur5", "--method", "gains", "-o", "gains.toml"),
+        ("identify", CIRCLE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
         ("benchmark", "speed", "--set", "bench.rounds=1", "--set", "bench.samples=1200"),
     ],
 )
@@ -80,11 +80,11 @@ def test_what_needs_none_of_them_works(words: tuple[str, ...], folder: Path) -> 
         (("simulate", "ur5-circle", "-o", "x.csv"), "vftcli simulate needs pin"),
         (("admit", "--release", "x=0.3", "--robot", "ur5"), "vftcli admit needs pin"),
         (
-            ("estimate", FIXTURE, "--robot", "ur5", "--rrd", "-o", "x"),
+            ("estimate", CIRCLE, "--robot", "ur5", "--rrd", "-o", "x"),
             "recording.rrd (--rrd, --open) needs rerun-sdk",
         ),
         (
-            ("compare", FIXTURE, "--robot", "ur5", "--reference", "zero", "--as-printed"),
+            ("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--as-printed"),
             "a Pinocchio model (simulation, replay, --as-printed) needs pin",
         ),
     ],
