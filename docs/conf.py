@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 from vftcli.cli import help as topics
 from vftcli.doctor.examination import REFUSING
 from vftcli.readers.reading import FORMATS
-from vftcli.signals.version import VERSION
+from vftcli.signals.packages import VERSION
 
 DOCS = Path(__file__).parent
 WORDS = DOCS.parent / "vftcli" / "signals" / "words"

@@ -22,7 +22,7 @@ from vftcli.observers.table import OBSERVERS
 from vftcli.readers.reading import FORMATS
 from vftcli.robots import PROFILES
 from vftcli.signals.option import settings_by_name
-from vftcli.signals.version import VERSION
+from vftcli.signals.packages import VERSION
 
 app = make_app()
 

@@ -18,8 +18,7 @@ One observer alone::
 
 from typing import TYPE_CHECKING
 
-from vftcli.signals.packages import door
-from vftcli.signals.version import VERSION
+from vftcli.signals.packages import VERSION, door
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from vftcli.admittance.replay import DrivingForce
     from vftcli.contacts.thresholds import ComparedSignals, Thresholds
     from vftcli.doctor.examination import Examination
-    from vftcli.identification import Identification
+    from vftcli.identification.fitting import Identification
     from vftcli.observers.spectra import Spectra
     from vftcli.observers.tuning import Goal, Tuned
 
@@ -116,7 +116,7 @@ def identified(
     tell: Callable[[Recording], None] | None = None,
 ) -> "Identification":
     """The robot from logs, tried on those to `check`; free motion has no load."""
-    from vftcli.identification import identify
+    from vftcli.identification.fitting import identify
 
     examiner, library = choice.examiner, choice.library
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from vftcli.free_motion.free_motion import PARTLY
-from vftcli.identification import Task, identify
+from vftcli.identification import Task
+from vftcli.identification.fitting import identify
 from vftcli.identification.training import prepare
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.evaluation.errors import rmse
-from vftcli.identification import Task, identify
+from vftcli.identification import Task
+from vftcli.identification.fitting import identify
 from vftcli.identification.methods import chosen_method
 from vftcli.identification.training import prepare_training
 from vftcli.observers import MomentumObserver

@@ -6,8 +6,8 @@ Scored from the first to the last sample that moves, 8 Hz zero-phase on the log'
 import numpy as np
 import pytest
 
-from vftcli.identification import Task, identify
-from vftcli.identification.fitting import REPEATED, repeated_share
+from vftcli.identification import Task
+from vftcli.identification.fitting import REPEATED, identify, repeated_share
 from vftcli.identification.training import prepare
 from vftcli.observers import MomentumObserver
 from vftcli.readers.reading import read

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.identification import Task, identify
+from vftcli.identification import Task
+from vftcli.identification.fitting import identify
 from vftcli.identification.links import is_physical
 from vftcli.identification.training import prepare
 from vftcli.robots import load_robot

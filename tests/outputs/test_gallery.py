@@ -5,7 +5,7 @@ import shlex
 
 from gallery import EXAMPLE, EXHIBITS, LARGEST, PICTURES, ROOT
 
-from vftcli.signals.version import VERSION
+from vftcli.signals.packages import VERSION
 
 
 def test_every_picture_is_taken_shown_and_small() -> None:

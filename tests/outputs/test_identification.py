@@ -10,7 +10,8 @@ import pytest
 from unpacking import Page, page_data
 
 from vftcli.doctor import examine
-from vftcli.identification import Task, identify
+from vftcli.identification import Task
+from vftcli.identification.fitting import identify
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import terminal
 from vftcli.outputs.identification import (

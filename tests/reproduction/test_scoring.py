@@ -9,8 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.evaluation.detection import ListedRow
-from vftcli.evaluation.scores import LAGS
+from vftcli.evaluation.scores import LAGS, ListedRow
 from vftcli.pipeline import AnalysisChoice
 from vftcli.reproduction import scoring
 from vftcli.reproduction.manifest import BenchmarkLog, Declaration, Rival

@@ -21,8 +21,8 @@ from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.library import Library
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, VftError
+from vftcli.signals.packages import VERSION
 from vftcli.signals.recording import Recording
-from vftcli.signals.version import VERSION
 from vftcli.signals.wrench import AXES
 from vftcli.wrench.frames import FRAMES
 

@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from vftcli.batch import EXTRA, MEMORY, MOST_WORKERS, WorkersChoice
 from vftcli.signals.errors import VftError
+from vftcli.signals.packages import VERSION
 from vftcli.signals.parsing import counted
 from vftcli.signals.progress import heard_by, nobody
-from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -15,7 +15,7 @@ from typing import Any
 from vftcli.outputs.files import digest
 from vftcli.readers.opening import files_of
 from vftcli.signals.option import FILE
-from vftcli.signals.version import VERSION
+from vftcli.signals.packages import VERSION
 
 
 @cache

@@ -1,13 +1,59 @@
-"""Identification: logs become a robot. `identify` is the door."""
+"""Identification: logs become a robot. `fitting.identify` does it all.
 
-from typing import TYPE_CHECKING
+Here is the user's choice of it.
+"""
 
-from vftcli.identification.choice import Task
-from vftcli.signals.packages import door
+from typing import Annotated
 
-if TYPE_CHECKING:
-    from vftcli.identification.fitting import Identification, identify
-else:
-    __getattr__ = door(__name__, "fitting")
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import Choice, Option, interval, is_yes
+from vftcli.signals.parsing import check_known
 
-__all__ = ["Identification", "Task", "identify"]
+#: Values of ``--method``; the gains of observers are `vftcli.observers.tuning`'s.
+METHODS = ("friction", "base", "targets", "payload", "gains")
+
+
+class Task(Choice):
+    """Method and settings of an identification."""
+
+    #: Of `METHODS`; None: friction, or base without the arm's own links.
+    method: Annotated[
+        str | None,
+        Option("--method", "|".join(METHODS), "Fit friction, base, targets, payload or gains."),
+    ] = None
+    #: End of the used band. [Hz]
+    cutoff: Annotated[
+        float, Option("identify.cutoff", "HZ", "Cutoff of the zero-phase filter.")
+    ] = 8.0
+    #: Whether the friction method also fits drive constants.
+    constants: Annotated[
+        bool,
+        Option(
+            "identify.constants", "yes|no", "Whether friction fits drive constants K.", is_yes
+        ),
+    ] = False
+    #: The span of the logs for the check, None for all. [s]
+    check_interval: Annotated[
+        tuple[float, float] | None,
+        Option("identify.check-interval", "A:B", "Seconds A to B of the --check logs.", interval),
+    ] = None
+    name: str = ""  #: Name of the new robot.
+    #: Whether the joints have friction to fit; a simulator's may have none.
+    friction: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.cutoff < 1e4:
+            raise ParameterError(f"cutoff is {self.cutoff:g} Hz; it must be positive")
+        if self.method is not None:
+            check_known(self.method, METHODS, f"--method {self.method}")
+        if self.constants and self.method not in {None, "friction"}:
+            raise ParameterError("--set identify.constants=yes is for --method friction")
+        if self.method == "targets" and not self.friction:
+            raise ParameterError(
+                "--method targets reads the controller's friction; leave model.friction=none away"
+            )
+
+    @property
+    def keeps_links(self) -> bool:
+        """Whether the profile's links stay, or the fit begins with them."""
+        return self.method in {None, "friction"}

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 import polars as pl
 
-from vftcli.identification.choice import Task
+from vftcli.identification import Task
 from vftcli.identification.methods import (
     MethodResult,
     Number,

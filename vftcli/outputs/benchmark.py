@@ -7,8 +7,7 @@ from functools import cached_property
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.detection import rate_interval, share_interval
-from vftcli.evaluation.scores import LAGS, Score
+from vftcli.evaluation.scores import LAGS, Score, rate_interval, share_interval
 from vftcli.observers.table import BEST
 from vftcli.outputs import Record, grid
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine, Span, colours_of_names, paint

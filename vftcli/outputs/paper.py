@@ -15,8 +15,8 @@ from vftcli.outputs.charts import INK, QUIET, REFERENCE, Chart, ChartLine, drawn
 from vftcli.outputs.error_tables import DAGGER
 from vftcli.outputs.files import OutputFolder
 from vftcli.signals.arrays import Array
+from vftcli.signals.packages import VERSION
 from vftcli.signals.parsing import printable
-from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -21,10 +21,10 @@ from vftcli.outputs.files import OutputFolder, digest
 from vftcli.robots import PROFILES
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import root_mean_squares
+from vftcli.signals.packages import VERSION
 from vftcli.signals.parsing import whole
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
-from vftcli.signals.version import VERSION
 from vftcli.wrench.frames import FRAMES
 
 #: Meaning of every number in an output.

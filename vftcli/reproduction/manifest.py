@@ -17,7 +17,7 @@ import numpy as np
 
 from vftcli.batch.keys import content_digest, digest_of, with_files
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation.detection import ListedRow
+from vftcli.evaluation.scores import ListedRow
 from vftcli.notebook import OF_ESTIMATE
 from vftcli.pipeline import AnalysisChoice, choice_of
 from vftcli.readers.library import Library, absolute

@@ -13,9 +13,17 @@ from polars import Boolean, Float64, Int64, String
 
 from vftcli.batch.cluster import begin
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation.detection import ListedRow, TrueContact, score_list
 from vftcli.evaluation.references import on_the_logs_clock, since_start, table_reference
-from vftcli.evaluation.scores import Score, episodes, lag_sums, parts_of, weights
+from vftcli.evaluation.scores import (
+    ListedRow,
+    Score,
+    TrueContact,
+    episodes,
+    lag_sums,
+    parts_of,
+    score_list,
+    weights,
+)
 from vftcli.free_motion.free_motion import within
 from vftcli.observers.table import BEST, OBSERVERS
 from vftcli.outputs.batch_folder import BatchFolder

@@ -1,4 +1,4 @@
-"""Optional packages: loaded when needed; an error names a missing one.
+"""Packages: our version; optional ones, loaded when needed. An error names a missing one.
 
 Estimation, errors, contacts and pages need none of them.
 """
@@ -11,6 +11,7 @@ from typing import Any
 
 from vftcli.signals.errors import PackageError, VftError
 
+VERSION = "0.3.0"  #: The version that every output states.
 #: Module → the package that holds it, and how to install it.
 PACKAGES = {
     "pinocchio": ("pin", "pip install pin"),

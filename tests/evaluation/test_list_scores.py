@@ -2,7 +2,7 @@
 
 import pytest
 
-from vftcli.evaluation.detection import ListedRow, rate_interval, score_list, share_interval
+from vftcli.evaluation.scores import ListedRow, rate_interval, score_list, share_interval
 
 NAN = float("nan")
 

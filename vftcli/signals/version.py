@@ -1,3 +1,0 @@
-"""The version that every output states."""
-
-VERSION = "0.3.0"
