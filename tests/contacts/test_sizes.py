@@ -8,7 +8,7 @@ from vftcli.contacts.search import split_at_turns, split_run
 from vftcli.contacts.windows import START, WindowWrench, contact_lanes, learn_prior, smooth_lanes
 from vftcli.robots.terms import Blocks
 from vftcli.wrench.model_error import TorqueNoise, error_process
-from vftcli.wrench.smoother import BlockLog
+from vftcli.wrench.smoother import BlockLog, in_blocks
 
 
 @pytest.mark.parametrize(
@@ -57,12 +57,12 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
         at_rest=np.full(6, 0.09), pushed=np.full(6, 0.36),
     )  # fmt: skip
     log = BlockLog(blocks, error_process(noise, blocks))
-    prior = learn_prior(log, jacobian, runs, START, rounds=2)
+    prior = learn_prior(log, in_blocks(jacobian), runs, START, rounds=2)
     assert prior.time == 0.3
     # A dozen pushes of 1.6 correlation times and three axes: some 60 numbers, 10 %; two of these.
     assert abs(prior.force / 30.0 - 1.0) < 0.25
     assert abs(prior.moment / 3.0 - 1.0) < 0.25
-    lanes = contact_lanes(log, [jacobian] * len(runs), runs, [prior] * len(runs))
+    lanes = contact_lanes(log, [in_blocks(jacobian)] * len(runs), runs, [prior] * len(runs))
     for run, course in zip(runs, smooth_lanes(log, lanes), strict=True):
         inside = course.within(run)
         sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))

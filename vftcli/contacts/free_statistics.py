@@ -29,7 +29,7 @@ from vftcli.wrench.model_error import (
     infer_noise,
     learn_noise,
 )
-from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior, contact_block
+from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior, contact_block, in_blocks
 
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
@@ -228,7 +228,7 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
             continue
         process = error_process(free.noise, blocks, covered(made_up, len(blocks.t), 1))
         log = BlockLog(blocks, process)
-        J = [flange_jacobian(free.log.robot.loaded_chain, blocks.q)]
+        J = [in_blocks(flange_jacobian(free.log.robot.loaded_chain, blocks.q))]
         # Each alone: nobody touches the others.
         lanes = [contact_lanes(log, J, [run], [prior])[0] for run in made_up]
         for run, wrench in zip(made_up, smooth_lanes(log, lanes), strict=True):

@@ -18,19 +18,20 @@ from vftcli.contacts.windows import (
     WindowWrench,
     arm_parts,
     contact_lanes,
+    jacobian_of,
     learn_prior,
     point_fits,
     smooth_lanes,
     times_of,
 )
-from vftcli.robots.chain import link_jacobian, link_poses, points_on
+from vftcli.robots.chain import link_poses, points_on
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Z_95, Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import covered, resample_columns
 from vftcli.wrench.model_error import ErrorProcess, error_model, error_process
-from vftcli.wrench.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
+from vftcli.wrench.smoother import BENT, BlockLog, JacobianIn, WrenchPrior, hidden_by_blocks
 
 #: Factors on the model's deviations of force and moment: friction's errors are not
 #: Gaussian. Chosen on simulated seeds.
@@ -153,10 +154,10 @@ class ContactMeasurement:
     def rows(self, locations: Sequence[ContactLocation] | None = None) -> list[Contact]:
         """The contacts, numbered, in the order of time; better places may be given."""
         runs, J, wrenches = self.found.runs, self.found.places[0].jacobian, [*self.wrenches]
-        poses = link_poses(self.run.robot.loaded_chain, self.log.blocks.q)
+        chain, q = self.run.robot.loaded_chain, self.log.blocks.q
         locations = self.locations if locations is None else locations
         moved = {
-            i: link_jacobian(poses, where.fits[0].link, where.fits[0].share)
+            i: jacobian_of(chain, q, where.fits[0].link, where.fits[0].share)
             for i, where in enumerate(locations)
             if not where.on_wrist
         }
@@ -189,7 +190,7 @@ class ContactMeasurement:
         return ContactLocation(fits, chain.joints, tuple(likely))
 
     def row(
-        self, number: int, course: WindowWrench, location: ContactLocation, jacobian: Array
+        self, number: int, course: WindowWrench, location: ContactLocation, jacobian: JacobianIn
     ) -> Contact:
         """One row of the list."""
         run, blocks = self.found.runs[number], self.log.blocks
@@ -199,7 +200,7 @@ class ContactMeasurement:
         covariances = inside.covariance * np.outer(factor, factor) + hidden[: len(inside.values)]
         force, length = inside.values[:, :3], blocks.length[span]
         forces = force_course(blocks.t[span], force, covariances[:, :3, :3])
-        k = forces.force.argmax()
+        k = int(forces.force.argmax())
         peak, size, band, covariance = run[0] + k, forces.force[k], forces.band[k], covariances[k]
         where, named, lead = self.part(number, location)
         anywhere = location.sizes(size, band)
@@ -215,8 +216,8 @@ class ContactMeasurement:
         (start, stop), cuts = times_of(blocks, run), self.run.recording.source.cuts
         near = [c.start for c in cuts if c.start <= stop + BESIDE and c.stop >= start - BESIDE]
         remarks += [caution("samples-cut-inside", at_s=at) for at in near[:1]]
-        J, at, values = jacobian[peak], blocks.t[peak], inside.values[k]
-        wrench = values.copy()
+        J, at, values = jacobian(peak, peak + 1)[0], blocks.t[peak], inside.values[k]
+        flange, wrench = self.found.places[0].jacobian(peak, peak + 1)[0], values.copy()
         if not location.on_wrist:
             poses = link_poses(self.run.robot.loaded_chain, blocks.q[[peak]])
             fit = location.fits[0]
@@ -242,7 +243,7 @@ class ContactMeasurement:
             joint_torque=J.T @ values,
             joint_torque_sd=np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J)),
             at_rest=bool(blocks.part(slice(peak, peak + 1)).rests.all()),
-            vendor_force=vendor_force(self.run, self.found.places[0].jacobian[peak], at),
+            vendor_force=vendor_force(self.run, flange, at),
             sensor_force=sensor_force(self.run, at),
             course=forces,
             remarks=tuple(remarks),

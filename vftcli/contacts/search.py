@@ -30,6 +30,7 @@ from vftcli.contacts.windows import (
     places,
     smooth_lanes,
 )
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.robots.terms import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
@@ -109,7 +110,7 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     """
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)
-    J = options[0].jacobian
+    flange, J = options[0].jacobian, flange_jacobian(run.robot.loaded_chain, blocks.q)
     ahead = error_process(noise, blocks)
     inside = filtered_contacts(blocks, (ahead, error_process(noise, turned_round(blocks))), J)
     spans = np.reshape(runs_of(beyond_threshold(run, level)), (-1, 2)).astype(int)
@@ -132,8 +133,8 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     log = BlockLog(blocks, ahead._replace(white=white))
     if not runs:
         return Candidates(log, options, [], np.zeros((0, len(options))), [], START)
-    prior, count = learn_prior(log, J, runs, START, rounds=1), len(runs)
-    wrenches = smooth_lanes(log, contact_lanes(log, [J] * count, runs, [prior] * count))
+    prior, count = learn_prior(log, flange, runs, START, rounds=1), len(runs)
+    wrenches = smooth_lanes(log, contact_lanes(log, [flange] * count, runs, [prior] * count))
     pairs = zip(wrenches, runs, strict=True)
     pieces = [piece for pair in pairs for piece in split_run(blocks.t, *pair, J)]
     passed = [any(a < stop and b > start for a, b in beyond) for start, stop in pieces]

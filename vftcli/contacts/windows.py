@@ -12,6 +12,7 @@ Jacobian of the place. The best place counts.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.linear_model import SPIKE, LinearModel, log_likelihood, smoothed
 from vftcli.signals.series import covered
 from vftcli.wrench.model_error import UNKNOWN, ErrorProcess, error_model, innovations
-from vftcli.wrench.smoother import BlockLog, BlockSpan, Lane, WrenchPrior, assembled
+from vftcli.wrench.smoother import BlockLog, BlockSpan, JacobianIn, Lane, WrenchPrior, assembled
 
 ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
 POINTS = 10  #: Points along each link that a force is tried at.
@@ -41,19 +42,27 @@ class ContactPlace(NamedTuple):
 
     link: int  #: Number of the link; 0 for the flange.
     lever: float  #: SD of the moment over that of the force. [m]
-    #: J of its point, zero for joints that do not move it. (K, 6, n)
-    jacobian: Array
+    jacobian: JacobianIn  #: J of its point, zero for joints that do not move it.
 
 
 def places(chain: Chain, q: Array) -> list[ContactPlace]:
     """The flange, and the middle of every link from the second on, at q (K, n)."""
-    poses, n = link_poses(chain, q), chain.joints
-    found = [ContactPlace(0, LEAST_LEVER, link_jacobian(poses, n))]
+    at, n = link_poses(chain, q[:1]).translation[0], chain.joints
+    found = [ContactPlace(0, LEAST_LEVER, jacobian_of(chain, q, n, 1.0))]
     for link in range(FIRST_LINK, n + 1):
-        span = poses.translation[0, link] - poses.translation[0, link - 1]
-        lever = max(LEAST_LEVER, 0.5 * float(np.linalg.norm(span)))
-        found.append(ContactPlace(link, lever, link_jacobian(poses, link, 0.5)))
+        lever = max(LEAST_LEVER, 0.5 * float(np.linalg.norm(at[link] - at[link - 1])))
+        found.append(ContactPlace(link, lever, jacobian_of(chain, q, link, 0.5)))
     return found
+
+
+def jacobian_of(chain: Chain, q: Array, link: int, share: float) -> JacobianIn:
+    """J of a point along a link at q (K, n), window by window: a long log's would not fit."""
+
+    @lru_cache(MOST_LANES)
+    def jacobian(first: int, last: int) -> Array:
+        return link_jacobian(link_poses(chain, q[first:last]), link, share)
+
+    return jacobian
 
 
 def arm_parts(joints: int) -> dict[int, ArmPart]:
@@ -164,12 +173,12 @@ def times_of(blocks: Blocks, run: BlockSpan) -> Array:
 
 def contact_lanes(
     log: BlockLog,
-    jacobians: Sequence[Array],
+    jacobians: Sequence[JacobianIn],
     runs: Sequence[BlockSpan],
     priors: Sequence[WrenchPrior | None],
     margin: float = MARGIN,
 ) -> list[Lane]:
-    """A lane for every run of blocks, the others hidden; jacobians (K, 6, n)."""
+    """A lane for every run of blocks, the others hidden."""
     t, own = log.blocks.t, {}
     every = covered(runs, len(t), 1)
     for run in set(runs):
@@ -236,7 +245,11 @@ def untouched_likelihood(log: BlockLog, lanes: Sequence[Lane], model: LinearMode
 
 
 def learn_prior(
-    log: BlockLog, jacobian: Array, runs: Sequence[BlockSpan], prior: WrenchPrior, rounds: int
+    log: BlockLog,
+    jacobian: JacobianIn,
+    runs: Sequence[BlockSpan],
+    prior: WrenchPrior,
+    rounds: int,
 ) -> WrenchPrior:
     """The prior by expectation and maximisation: τ_w by likelihood, σ by the mean."""
     for _ in range(rounds):

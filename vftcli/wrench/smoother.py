@@ -7,7 +7,7 @@ the wrench as its prior says. Where a force turns no joint the estimate rests on
 and future, and its band grows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -108,13 +108,21 @@ class BlockLog(NamedTuple):
     process: ErrorProcess  #: b along them.
 
 
+JacobianIn = Callable[[int, int], Array]  #: First, end of some blocks → J. (k, 6, n)
+
+
+def in_blocks(jacobian: Array) -> JacobianIn:
+    """J of the blocks asked for, from that of all. (K, 6, n)"""
+    return lambda first, last: jacobian[first:last]
+
+
 class Lane(NamedTuple):
     """One hypothesis on one window."""
 
     window: BlockSpan  #: Its blocks.
     gate: Mask  #: Its blocks in which a wrench may act. (k,)
     hidden: Mask  #: Its blocks that say nothing. (k,)
-    jacobian: Array  #: J along the log. (K, 6, n)
+    jacobian: JacobianIn  #: J along the log.
     prior: WrenchPrior | None  #: Prior of the wrench; None without contact.
 
 
@@ -143,7 +151,7 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
             d[own] = log.blocks.d[span]
             white[own] = np.where(lane.hidden[:, None], UNKNOWN, process.white[span])
             if prior is not None:
-                jacobian[own] = lane.jacobian[span]
+                jacobian[own] = lane.jacobian(*lane.window)
     # A window begins with the stationary b.
     added[0, :, 6:] /= np.maximum(1.0 - decay[0, :, 6:] ** 2, 1e-9)
     decay[0, :, 6:] = 0.0
@@ -163,8 +171,8 @@ class BlockModel(NamedTuple):
         # With the whole log a contact, a push and its re-settling look alike.
         touched = None if self.inside.all() else self.inside
         process = steady_process(self.noise, self.blocks, touched)
-        lane = Lane((0, len(self.inside)), self.inside, ~self.blocks.known, self.jacobian, None)
-        lanes = [lane._replace(prior=prior) for prior in priors]
+        whole = (0, len(self.inside)), self.inside, ~self.blocks.known, in_blocks(self.jacobian)
+        lanes = [Lane(*whole, prior) for prior in priors]
         return assembled(BlockLog(self.blocks, process), lanes)
 
 
