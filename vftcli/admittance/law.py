@@ -259,13 +259,6 @@ def controllers(
     return tuple(c for c in (traditional(parameters), *every) if kind in {None, c.kind})
 
 
-def kinetic_shape(u: Array) -> Array:
-    """φ(u) = ¼[1 − (1 + 2u)e^{−2u}], which is ½u² for small u and never exceeds ¼."""
-    small = u < 1e-3
-    shape = 0.25 * (1.0 - (1.0 + 2.0 * u) * np.exp(-2.0 * u))
-    return np.where(small, u**2 * (0.5 - u * (2.0 / 3.0 - 0.5 * u)), shape)
-
-
 def energy(controller: Controller, x: Array, v: Array) -> Array:
     """The Lyapunov function of each axis in a recovery phase. (…, 6) [J]
 
@@ -277,7 +270,11 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     p, varies = controller.parameters, controller.rate > 0.0
     # The traditional controller does not use this quotient.
     rate = np.where(varies, controller.rate, 1.0)
-    shape = np.where(varies, kinetic_shape(abs(v) * rate) / rate**2, 0.5 * v**2)
+    u = abs(v) * rate
+    # φ(u) = ¼[1 − (1 + 2u)e^{−2u}], which is ½u² for small u and never exceeds ¼.
+    phi = 0.25 * (1.0 - (1.0 + 2.0 * u) * np.exp(-2.0 * u))
+    phi = np.where(u < 1e-3, u**2 * (0.5 - u * (2.0 / 3.0 - 0.5 * u)), phi)
+    shape = np.where(varies, phi / rate**2, 0.5 * v**2)
     return 0.5 * p.stiffness * x**2 + p.mass * shape / controller.alpha**2
 
 

@@ -18,7 +18,7 @@ from vftcli.observers.observer import Complex, Observer, Tuning
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.smoother import KalmanSmoother
 from vftcli.observers.spectra import Spectra
-from vftcli.signals.arrays import Array, Mask, frozen
+from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.option import numbers
@@ -345,7 +345,21 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
     n, step = spectra.joints, spectra.step
     if goal.name == "false-alarms" and goal.threshold is not None:
         curve = error_curve(kind, spectra)
-        few = few_alarms(kind, curve.omega_n, spectra, goal.threshold, goal.value)
+        grid, noise = curve.omega_n, spectra.noise * spectra.width
+        response = kind(grid).frequency_response(spectra.frequency, step, len(grid))
+        powers = (abs(column[:, None]) ** 2 * noise for column in response.T)
+        # Whether a rate raises at most so many false alarms an hour. (G, n)
+        few = np.array(
+            [crossings(x, spectra.frequency, goal.threshold) <= goal.value for x in powers]
+        )
+        if len(never := np.flatnonzero(~few.any(axis=0))):
+            read = np.sqrt(noise.sum(axis=0))
+            listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
+            raise ParameterError(
+                f"no gain keeps the false alarms at {goal.value:g} an hour: the free part itself "
+                f"is too loud for the threshold on {listed}; raise --set alarm.threshold=N·m or "
+                "remove the bias"
+            )
         # The fastest that still raises few alarms: the last of their run.
         fastest = curve.omega_n[len(few) - 1 - few[::-1].argmax(axis=0)]
         best_is_one = few[curve.rmse.argmin(axis=0), np.arange(n)]
@@ -356,23 +370,6 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
     if goal.name == "auto" or kind is kalman_smoother:
         return error_curve(kind, spectra).best
     return tune(kind(np.full(n, 10.0)), goal, step, n).tuning(step, n).omega_n
-
-
-def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most: float) -> Mask:
-    """Whether a rate raises at most so many false alarms an hour. (G, n)"""
-    response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
-    noise = spectra.noise * spectra.width
-    powers = (abs(column[:, None]) ** 2 * noise for column in response.T)
-    few = np.array([crossings(one, spectra.frequency, threshold) <= most for one in powers])
-    if len(never := np.flatnonzero(~few.any(axis=0))):
-        read = np.sqrt(noise.sum(axis=0))
-        listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
-        raise ParameterError(
-            f"no gain keeps the false alarms at {most:g} an hour: the free part itself is "
-            f"too loud for the threshold on {listed}; raise --set alarm.threshold=N·m or remove "
-            "the bias"
-        )
-    return few
 
 
 def crossings(power: Array, frequency: Array, threshold: Array) -> Array:
