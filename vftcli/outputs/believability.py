@@ -272,7 +272,10 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
             f"pushes below {sizes} N·m do not show" if robot.friction else "friction hides pushes"
         )
         subject = "the arm is still" if rests.all() else "joints at rest"
-        yield Ground("caution", subject, f"{joint_words(joints)}: {hides}", of_log=False)
+        names = ", ".join(f"J{j + 1}" for j in joints)
+        if len(joints) > 2 and joints[-1] - joints[0] == len(joints) - 1:
+            names = f"J{joints[0] + 1}…J{joints[-1] + 1}"
+        yield Ground("caution", subject, f"{names}: {hides}", of_log=False)
     name = robot_option(analysis)
     if not robot.friction or is_profile(analysis):
         where = "a typical arm's" if robot.friction else "none is modelled"
@@ -292,13 +295,6 @@ def resting(recording: Recording) -> Mask:
     if recording.dq is None:
         return np.zeros(recording.joints, dtype=bool)
     return np.asarray(slower(recording.dq).mean(axis=0) > FULL_OF_REST)
-
-
-def joint_words(joints: Sequence[int]) -> str:
-    """Joints, from zero, as ``J1…J6`` if without a gap, else one by one."""
-    if len(joints) > 2 and joints[-1] - joints[0] == len(joints) - 1:
-        return f"J{joints[0] + 1}…J{joints[-1] + 1}"
-    return ", ".join(f"J{j + 1}" for j in joints)
 
 
 def reference_ground(analysis: Analysis) -> Ground:

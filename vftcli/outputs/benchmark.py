@@ -294,19 +294,6 @@ def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[Recor
     return scales, arms, found
 
 
-def worst_charts(results: Results) -> Iterator[Chart]:
-    """The worst 10 s of `best` in every log, by the log's first protocol."""
-    drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
-    for row in drawn.iter_rows(named=True):
-        t, truth, best = (np.array(row[f"worst_{k}"]) for k in ("t", "truth", "estimate"))
-        lines = [
-            ChartLine("truth", truth[:, None], REFERENCE),
-            ChartLine(BEST, best[:, None], results.colours[BEST]),
-        ]
-        title = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
-        yield Chart.of_one(row["log"], title, "N·m", t, lines)
-
-
 def text_of(results: Results, form: str, *, every: bool) -> str:
     """The results as CSV, as Markdown or LaTeX tables, or for the terminal.
 
@@ -325,14 +312,24 @@ def text_of(results: Results, form: str, *, every: bool) -> str:
 
 def render_benchmark(results: Results, title: str, record: Record) -> str:
     """The page of a benchmark."""
-    keys = ("recording", "arm", "truth", "truth_error", "licence", "source")
+    keys, worst = ("recording", "arm", "truth", "truth_error", "licence", "source"), []
+    # The worst 10 s of `best` in every log, by the log's first protocol.
+    drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
+    for row in drawn.iter_rows(named=True):
+        t, truth, best = (np.array(row[f"worst_{k}"]) for k in ("t", "truth", "estimate"))
+        lines = [
+            ChartLine("truth", truth[:, None], REFERENCE),
+            ChartLine(BEST, best[:, None], results.colours[BEST]),
+        ]
+        name = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
+        worst.append(Chart.of_one(row["log"], name, "N·m", t, lines))
     return page(
         "benchmark.html",
         title,
         styles={method: (colour, "") for method, colour in results.colours.items()},
         results=results,
         plots=[(p, *dots(results, p)) for p in results.protocols if results.arms(p, "contact")],
-        worst=list(worst_charts(results)),
+        worst=worst,
         logs=keyed_grid(dict(zip(keys, keys, strict=True)), record["logs"]),
         record=record,
     )

@@ -29,7 +29,7 @@ from vftcli.readers.objects import (
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage, unpacked_limit
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
-from vftcli.readers.table import Column, Columns, Notes, listed
+from vftcli.readers.table import Columns, Notes, listed
 from vftcli.readers.tables import UR, ArrayTable, from_table
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import fact
@@ -48,7 +48,15 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if layout.name == "npz":
         return _read_arrays(file, _npz_arrays(file), request)
     if layout.name == "npy":
-        array = _npy_array(file)
+        stream = BytesIO(file.content)
+        with naming_damage(
+            file.path, "it is cut, damaged or no array", TokenError, remedy=RESAVE
+        ):
+            array = np.lib.format.read_array(stream, allow_pickle=False)
+        if left := len(file.content) - stream.tell():
+            raise LogError(
+                f"{file.path}: {left} bytes follow the array, so it holds more than one."
+            )
         fields = array.dtype.names or ()
         return _read_arrays(file, {name: array[name] for name in fields} or array, request)
     lines = list(lines_of(file.content))
@@ -143,15 +151,6 @@ def _npz_arrays(file: LogFile) -> Columns:
         check_unpacked(file.path, total, len(file.content))
         each = ((name, bundle[name]) for name in bundle.files)
         return {name: array for name, array in each if isinstance(array, np.ndarray)}
-
-
-def _npy_array(file: LogFile) -> Column:
-    stream = BytesIO(file.content)
-    with naming_damage(file.path, "it is cut, damaged or no array", TokenError, remedy=RESAVE):
-        array = np.lib.format.read_array(stream, allow_pickle=False)
-    if left := len(file.content) - stream.tell():
-        raise LogError(f"{file.path}: {left} bytes follow the array, so it holds more than one.")
-    return array
 
 
 #: Type words of the second line of a binary file by UR's official client.

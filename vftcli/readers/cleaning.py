@@ -151,7 +151,17 @@ def measured(raw: RawLog, path: Path, *, examining: bool = False) -> RawLog:
     """
     if len(raw.stamps) == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
-    part = raw if raw.segment is None else _segment_of(raw, raw.segment, path)
+    part = raw
+    if (number := raw.segment) is not None:
+        # The clock's restarts part the recordings of a file.
+        restarts = np.flatnonzero(np.diff(raw.stamps) < 0) + 1
+        edges, count = [0, *restarts.tolist(), len(raw.stamps)], restarts.size + 1
+        if not 1 <= number <= count:
+            raise ClockError(f"{path}: there is no segment {number}; the file holds {count}.")
+        first, last = edges[number - 1 : number + 1]
+        places = {"first_row": first + 1, "last_row": last}
+        said = fact("segment-chosen", number=number, recordings=count, **places)
+        part = kept(raw, slice(first, last), said)
     part = without_leading_garbage(_without_empty_joints(part))
     _refuse_unknown_numbers(part, path)
     if rows := _restarts(part, path, examining=examining):
@@ -298,19 +308,6 @@ def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
             f"{path}: steps of {usual:.3g} s over {span:.3g} s, which no robot's log is. Say "
             "the unit of the clock with --columns, as in t[ms]=…"
         )
-
-
-def _segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
-    """One recording of several in a file, from 1; the clock's restarts part them."""
-    edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(raw.stamps) < 0)), len(raw.stamps)]
-    if not 1 <= number < len(edges):
-        raise ClockError(
-            f"{path}: there is no segment {number}; the file holds {len(edges) - 1}."
-        )
-    first, last = edges[number - 1], edges[number]
-    count, row = len(edges) - 1, first + 1
-    said = fact("segment-chosen", number=number, recordings=count, first_row=row, last_row=last)
-    return kept(raw, slice(first, last), said)
 
 
 def without_repeats(raw: RawLog, path: Path) -> RawLog:

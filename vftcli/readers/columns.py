@@ -295,7 +295,14 @@ def _efforts(parts: Sequence[Array], dq: Array) -> tuple[tuple[str, ...] | None,
         return (None if parts else ()), ""
     current, target, torque = parts
     (misfit, constants), (rival, _) = (_driven(torque, x, dq) for x in (target, current))
-    if not (misfit < DRIVEN and CLEAR * misfit < rival and _alike(current, target)):
+    product = np.sum(current * target, axis=0)
+    own, other = np.sum(current**2, axis=0), np.sum(target**2, axis=0)
+    live = (own > 0) & (other > 0)
+    slope = product[live] / other[live]
+    cosine = product[live] / np.sqrt(own[live] * other[live])
+    # Where a joint rests its stiction is in what was measured alone.
+    alike = np.any((slope > ALIKE[0]) & (slope < ALIKE[1]) & (cosine > NEAR))
+    if not (misfit < DRIVEN and CLEAR * misfit < rival and alike):
         return None, ""
     shown = " ".join(f"{constant:.3g}" for constant in constants)
     return TARGETS, f", target_torque is target_current times {shown} N·m/A but for friction"
@@ -314,13 +321,3 @@ def _driven(torque: Array, current: Array, dq: Array) -> tuple[float, list[float
             left.append(float(root_mean_squares(y - terms @ values) / size))
     good = left and CONSTANTS[0] < min(constants) <= max(constants) < CONSTANTS[1]
     return float(np.median(left)) if good else np.inf, constants
-
-
-def _alike(measured: Array, target: Array) -> bool:
-    product = np.sum(measured * target, axis=0)
-    own, other = np.sum(measured**2, axis=0), np.sum(target**2, axis=0)
-    live = (own > 0) & (other > 0)
-    slope = product[live] / other[live]
-    cosine = product[live] / np.sqrt(own[live] * other[live])
-    # Where a joint rests its stiction is in what was measured alone.
-    return bool(np.any((slope > ALIKE[0]) & (slope < ALIKE[1]) & (cosine > NEAR)))

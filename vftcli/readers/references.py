@@ -143,25 +143,29 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     if np.count_nonzero(inside) < 2:
         raise ClockError(f"{path}: fewer than two samples in {interval_text(start, stop)} [s]")
     signals = kept(raw, inside).signals
+    # Revolute axes have length 1: the other rows are those of the velocity, which go first.
+    stored = signals["jacobian"].reshape(-1, 6, n)
+    jacobian = next(
+        (
+            J
+            for J in (stored, np.roll(stored, 3, axis=1))
+            if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT)
+        ),
+        None,
+    )
+    if jacobian is None:
+        raise LogError(
+            f"{path}: no three rows of the Jacobian are axes of revolute joints, of length 1."
+        )
     return JacobianLog(
         name=name,
         path=path,
         sha256=sha256_of(path),
         t=t[inside],
         tau_ext=signals[TORQUE],
-        jacobian=velocity_first(signals["jacobian"].reshape(-1, 6, n), path),
+        jacobian=jacobian,
         wrench=signals.get("wrench"),
         remarks=raw.remarks,
-    )
-
-
-def velocity_first(jacobian: Array, path: Path) -> Array:
-    """The Jacobian with its velocity rows first: revolute axes have length 1."""
-    for J in (jacobian, np.roll(jacobian, 3, axis=1)):
-        if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT):
-            return J
-    raise LogError(
-        f"{path}: no three rows of the Jacobian are axes of revolute joints, of length 1."
     )
 
 
