@@ -20,7 +20,7 @@ from vftcli.outputs.page.pages import (
     index_headline,
     index_line,
     model_pairs,
-    overview_row,
+    overview,
     render,
     render_batch,
     render_index,
@@ -268,19 +268,18 @@ def test_the_index_links_every_report(pushed: Analysis, without_reference: Analy
 
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
     line = index_line("a b", pushed)
-    log, robot, span, contacts, hardest, least, error, state = overview_row(line)
+    log, robot, span, contacts, hardest, least, error, state = overview([line]).rows[0]
     assert (log.text, robot, span) == ("ur5_circle.csv", "ur5", "20.0 s")
     assert log.html == '<a href="a%20b/index.html">ur5_circle.csv</a>'
     assert (contacts, hardest, least) == ("12", "91 ± 7 N at 5.1 s", "2 N")
     assert error == "0.273 N·m (best)"  # without J5, which rests
     assert state.text == f"{MARKS[line.standing]} {line.words}"
     bad = line._replace(standing="bad", words="load: heavy <b>", name="<i>")
-    assert "load: heavy &lt;b&gt;" in overview_row(bad)[-1].html
-    assert overview_row(bad)[0].html == '<a href="a%20b/index.html">&lt;i&gt;</a>'
-    assert (
-        overview_row(index_line("a", replace(pushed, contacts=None, errors=None)))[3:7]
-        == ("–",) * 4
-    )
+    (shown,) = overview([bad]).rows
+    assert "load: heavy &lt;b&gt;" in shown[-1].html
+    assert shown[0].html == '<a href="a%20b/index.html">&lt;i&gt;</a>'
+    nothing = index_line("a", replace(pushed, contacts=None, errors=None))
+    assert overview([nothing]).rows[0][3:7] == ("–",) * 4
 
 
 def test_the_worst_comes_first(pushed: Analysis) -> None:

@@ -294,22 +294,21 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
 
 def overview(lines: Sequence[LogSummary]) -> Grid:
     """The table of all logs, the worst first; a click on a head sorts by it."""
-    ordered = sorted(lines, key=lambda line: line.rank)
-    return Grid(HEADS, list(map(overview_row, ordered)))
-
-
-def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
-    """A line of the overview: the log's name links to its page, if any."""
-    return (
-        GridCell(line.name, html=part("parts/link", line.page, line.name) if line.page else ""),
-        line.robot,
-        f"{line.duration:.1f} s",
-        line.contacts,
-        line.hardest,
-        DASH if line.least is None else at_least_shown(line.least),
-        line.error,
-        GridCell(f"{MARKS[line.standing]} {line.words}", html=part("parts/state", line, MARKS)),
-    )
+    rows: Rows = [
+        (
+            # The name links to the log's page, if any.
+            GridCell(x.name, html=part("parts/link", x.page, x.name) if x.page else ""),
+            x.robot,
+            f"{x.duration:.1f} s",
+            x.contacts,
+            x.hardest,
+            DASH if x.least is None else at_least_shown(x.least),
+            x.error,
+            GridCell(f"{MARKS[x.standing]} {x.words}", html=part("parts/state", x, MARKS)),
+        )
+        for x in sorted(lines, key=lambda line: line.rank)
+    ]
+    return Grid(HEADS, rows)
 
 
 def render_batch(lines: Sequence[LogSummary], failures: pl.DataFrame) -> str:
