@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,9 @@ def test_an_unknown_force_has_no_arrow(path: Path) -> None:
 
 
 def test_the_hardest_force_fits() -> None:
-    assert [arrow_scale(hardest) for hardest in (2.0, 90.0, 1e6)] == [5.0, 200.0, 2000.0]
+    hardest = (SimpleNamespace(peak_force=force) for force in (2.0, 90.0, 1e6))
+    scales = [arrow_scale(SimpleNamespace(hardest=contact)) for contact in hardest]
+    assert scales == [5.0, 200.0, 2000.0]
     assert LONGEST * 200.0 >= 90.0
 
 

@@ -17,11 +17,10 @@ from vftcli.observers import ObserverChoice
 from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import PLACES
 from vftcli.outputs.contacts import answer
-from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion, painted_links
+from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, arrow_scale, motion, painted_links
 from vftcli.outputs.rerun_recording import (
     contact_log,
     force_arrow,
-    newton_per_metre,
     plot_groups,
     summary,
     tabs_of,
@@ -295,6 +294,6 @@ def test_arrows_last_as_long_as_the_contact(touched: Analysis, tmp_path: Path) -
         last.append(drawn[-1])
     assert last[0] == pytest.approx(stop, abs=1e-6)
     # On a link it is the force of the peak, whatever the flange's would be.
-    expected = np.array([0.4, 51.9, -38.8]) / newton_per_metre(touched)
+    expected = np.array([0.4, 51.9, -38.8]) / arrow_scale(touched.contacts)
     np.testing.assert_allclose(arrows[0][0], expected, rtol=1e-6)  # float32
     assert not rows_of(path, "/robot/flange_force", "Arrows3D:vectors")

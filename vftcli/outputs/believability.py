@@ -79,11 +79,6 @@ class Ground(NamedTuple):
     #: Whether it was found in this log, and is not true of every log like it.
     of_log: bool = True
 
-    @property
-    def mark(self) -> str:
-        """Its sign."""
-        return MARKS[self.standing]
-
 
 class LogSummary(NamedTuple):
     """One log among several: a line of the screen, the index or a batch's page."""

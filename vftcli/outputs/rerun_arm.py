@@ -66,9 +66,12 @@ def xyzw(rotation: Array) -> Array:
     return np.roll(matrix_quaternion(rotation), -1, axis=-1)
 
 
-def arrow_scale(hardest: float) -> float:
+def arrow_scale(found: ContactList | None) -> float:
     """Newtons of 1 m of arrow, for a visible hardest force. [N/m]"""
-    return next((scale for scale in SCALES if hardest <= LONGEST * scale), SCALES[-1])
+    if found is None or (hardest := found.hardest) is None:
+        return NEWTON_PER_METRE
+    force = hardest.peak_force or NEWTON_PER_METRE
+    return next((scale for scale in SCALES if force <= LONGEST * scale), SCALES[-1])
 
 
 def send_arm(

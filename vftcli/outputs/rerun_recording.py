@@ -32,7 +32,6 @@ from vftcli.outputs.page.log_charts import (
 from vftcli.outputs.quantity import at_least_shown
 from vftcli.outputs.rerun_arm import (
     CONTACTS,
-    NEWTON_PER_METRE,
     ArmPoses,
     arrow_scale,
     motion,
@@ -74,7 +73,7 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     poses = motion(robot.chain, analysis.t, analysis.recording.q)
     if found is None or any(wrench.name == BEST for wrench in analysis.wrenches):
         arrow = force_arrow(analysis, poses, np.searchsorted(analysis.t, poses.t))
-    scale, name = newton_per_metre(analysis), analysis.recording.name
+    scale, name = arrow_scale(found), analysis.recording.name
     space = f"Arm (arrow: 1 m is {scale:g} N)"
     analysis.recording.release()
     with rerun_file(path, name, tabs, words, poses, space) as stream:
@@ -96,12 +95,6 @@ def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
         if plots := list(shown):
             tabs.append(Tab(name, plots))
     return tabs
-
-
-def newton_per_metre(analysis: Analysis) -> float:
-    """Length of arrows, by the hardest contact. [N/m]"""
-    hardest = analysis.contacts and analysis.contacts.hardest
-    return arrow_scale(hardest.peak_force or NEWTON_PER_METRE) if hardest else NEWTON_PER_METRE
 
 
 def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
@@ -223,7 +216,7 @@ def summary(analysis: Analysis) -> str:
     recording, robot, source = analysis.recording, analysis.robot, analysis.recording.source
     drawing = (remark for remark in robot.remarks if remark.code == "meshes-not-found")
     notes = (*source.remarks, *all_remarks(analysis), *drawing)
-    scale = f"1 m is {newton_per_metre(analysis):g} N"
+    scale = f"1 m is {arrow_scale(analysis.contacts):g} N"
     arrow = (
         "the force on the robot as the tables of the wrench have it, where one was asked for: "
         f"that of best, else of the first observer; {scale}; none where the pose leaves it open"

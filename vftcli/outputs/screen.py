@@ -208,7 +208,7 @@ def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> l
     lines = ["Can it be believed?"]
     good = [ground for ground in found if ground.standing == "good"]
     if most == 0 and len(good) > 1:
-        mark = canvas.painted(canvas.shown(good[0].mark), "good")
+        mark = canvas.painted(canvas.shown(MARKS["good"]), "good")
         lines.append(f"  {mark} {' · '.join(dict.fromkeys(g.subject for g in good))}")
         found = [ground for ground in found if ground not in good]
     for ground in found:
@@ -223,7 +223,7 @@ def ground_lines(
     """Lines of one ground: mark, subject and sentence; then its remedy."""
     subject, indent = f"{about}: {ground.subject}" if about else ground.subject, SUBJECT + 5
     first, *more = canvas.wrapped(printable(ground.sentence), indent, most)
-    mark = canvas.painted(canvas.shown(ground.mark), ground.standing)
+    mark = canvas.painted(canvas.shown(MARKS[ground.standing]), ground.standing)
     if len(subject) > SUBJECT:
         yield f"  {mark} {printable(subject)}"
         yield f"{'':{indent}}{first}"

@@ -304,7 +304,7 @@ def overview(lines: Sequence[LogSummary]) -> Grid:
             x.hardest,
             DASH if x.least is None else at_least_shown(x.least),
             x.error,
-            GridCell(f"{MARKS[x.standing]} {x.words}", html=part("parts/state", x, MARKS)),
+            GridCell(f"{MARKS[x.standing]} {x.words}", html=part("parts/state", x)),
         )
         for x in sorted(lines, key=lambda line: line.rank)
     ]

@@ -17,6 +17,7 @@ import numpy as np
 
 from vftcli.doctor import in_words
 from vftcli.outputs import Record
+from vftcli.outputs.believability import MARKS
 from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line, paint
 from vftcli.outputs.contacts import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
@@ -91,7 +92,11 @@ def templates() -> "Environment":
     words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
     functions = (*drawing, *words, at_least_shown, asset, Box)
     made.globals |= {each.__name__: each for each in functions}
-    made.globals |= {"is_plain": re.compile(r"[\w.,=×+ -]+").fullmatch, "QUIET": QUIET}
+    made.globals |= {
+        "is_plain": re.compile(r"[\w.,=×+ -]+").fullmatch,
+        "QUIET": QUIET,
+        "MARKS": MARKS,
+    }
     filters = (counted, warnings_of, worst_first, options, capital)
     made.filters |= {each.__name__: each for each in filters}
     made.filters |= {
