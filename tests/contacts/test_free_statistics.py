@@ -12,6 +12,7 @@ import vftcli as vft
 from vftcli.bias.whole_log import whole_log_bias
 from vftcli.contacts import free_statistics as free_statistics_room
 from vftcli.contacts.free_statistics import (
+    beyond_threshold,
     free_part,
     free_statistics,
     observer_noise,
@@ -25,6 +26,7 @@ from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import runs_of
 
 LOG = read(FIXTURES / "ur5_circle.csv")
 
@@ -76,6 +78,23 @@ def test_the_level_is_that_of_the_free_samples_that_move() -> None:
     run = run.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
     level = torque_level([RunSamples(run, t < 2.8)])
     np.testing.assert_allclose(level, np.array([2.0, 9.0, 9.0, 9.0, 9.0, 9.0]) / 1.96, rtol=0.02)
+
+
+def test_a_threshold_takes_what_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond 8 N·m of a joint without friction; of one with 20 N·m beyond 16, 24.5 near rest."""
+    torque, dq = np.zeros((400, 2)), np.ones((400, 2))
+    torque[10:20, 0] = 9.0  # while the observer settles
+    torque[50, 0] = 9.0  # one sample
+    torque[100:110, 1] = 17.0  # .1 s
+    torque[120:130, 1] = -17.0  # closer than .2 s: the same
+    torque[250:260, 1] = 20.0  # .2 s before a rest
+    torque[320:330, 1] = 25.0  # in it
+    dq[280:, 1] = 0.0
+    monkeypatch.setattr(free_statistics_room, "observed", lambda _: torque)
+    monkeypatch.setattr(free_statistics_room, "dry_torques", lambda _: np.array([0.0, 20.0]))
+    run = SimpleNamespace(t=0.01 * np.arange(400), dq=dq, robot=None)
+    found = beyond_threshold(run, np.array([2.0, 2.0]))  # type: ignore[arg-type]
+    assert runs_of(found) == [(100, 130), (320, 330)]
 
 
 def test_a_load_in_the_free_part_is_no_noise() -> None:
