@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from known_errors import motion
+from known_errors import motion, shortened, ur10e
 
 from vftcli.bias.robust_fit import slow_loads
 from vftcli.robots import load_robot
@@ -34,6 +34,13 @@ def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
         ]
         felt = np.vstack([J[0], J[1][:3], J[2][:3]]).T
         np.testing.assert_allclose(found, -sd * felt, atol=1e-12 * 50.0)
+
+
+@pytest.mark.parametrize("joints", [3, 4, 5])
+def test_on_a_short_arm_elbow_and_wrist_are_one_point(joints):
+    """A wrench of six components at the flange and one force of three along the arm."""
+    loads = slow_loads(shortened(ur10e(), joints).chain, np.arange(4.0), np.zeros((4, joints)))
+    assert loads.torque.shape[2] == 6 + 3
 
 
 @pytest.mark.parametrize(("seconds", "knots"), [(14.0, 1), (16.0, 3), (55.0, 7), (3600.0, 61)])

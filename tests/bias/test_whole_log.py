@@ -139,6 +139,17 @@ def test_a_short_log_is_refused():
     assert found.of(run) is run
 
 
+def test_half_a_second_without_samples_costs_no_band():
+    robot = shortened(ur10e(), 3)
+    log = wrong_run(robot, drawn_error(robot), seconds=16.0, noise=0.3).recording
+    there = abs(log.t - 9.0) > 0.25
+    cut = {name: getattr(log, name)[there] for name in ("t", "q", "dq", "torque")}
+    found = whole_log_bias(Run(recording=Recording(**cut), robot=robot))
+    assert found.applied.all()
+    assert np.isfinite(found.bias).all()
+    assert np.all((found.sd > 0.0) & np.isfinite(found.sd))
+
+
 def by_friction(robot, seconds, external=None):
     """A log of an arm that slides by a fifth of its dry friction more than its model knows."""
     error = drawn_error(robot, size=0.0)
