@@ -64,6 +64,18 @@ def test_the_kind_of_effort_survives(tmp_path: Path, ending: str, kept: tuple[st
     assert read(tmp_path / f"x{ending}").signals == ("q", *kept)
 
 
+def test_what_is_converted_is_read_by_rosbags(tmp_path: Path) -> None:
+    """The effort of /joint_states is the torque [N·m], not the current; joints have names."""
+    recording = full()
+    convert(recording, tmp_path / "x.mcap")
+    found = messages_of(tmp_path / "x.mcap")["/joint_states"]
+    assert found[0][1].name == [f"joint_{j}" for j in range(1, 8)]
+    assert found[0][1].header.stamp.nanosec == 250_000_000
+    for field, signal in (("position", "q"), ("velocity", "dq"), ("effort", "torque")):
+        values = [getattr(message, field) for _, message in found]
+        np.testing.assert_array_equal(values, getattr(recording, signal))
+
+
 def test_what_exists_is_kept_and_unknown_endings_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_text("mine")

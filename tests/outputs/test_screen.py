@@ -11,7 +11,7 @@ from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ForceCourse
-from vftcli.outputs.believability import Ground
+from vftcli.outputs.believability import MARKS, Ground
 from vftcli.outputs.error_tables import blocks
 from vftcli.outputs.screen import (
     FILE_LINES,
@@ -19,6 +19,7 @@ from vftcli.outputs.screen import (
     PLAIN,
     Canvas,
     against,
+    belief_lines,
     column_peaks,
     facts,
     force_bars,
@@ -204,6 +205,12 @@ def test_a_ground_is_a_mark_a_subject_and_a_sentence_with_its_remedy_below() -> 
         "                      The clock waits 12 times, for 40 ms at most, …",
         "    " + "x" * 51,
     ]
+
+
+def test_where_room_is_short_good_grounds_share_a_line() -> None:
+    log, model = (Ground("good", name, f"{name} is sound") for name in ("log", "model"))
+    assert belief_lines([log, model], CANVAS, 0)[1:] == [f"  {MARKS['good']} log · model"]
+    assert belief_lines([log], CANVAS, 0)[1].endswith("log is sound")
 
 
 HEADS = "  #  from – to [s]    |F| [N]  range  direction  where  trust"

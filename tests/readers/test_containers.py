@@ -74,6 +74,16 @@ def test_a_square_log_is_not_turned(path):
     np.testing.assert_array_equal(read(path).q, q)
 
 
+def test_a_signal_of_neither_length_is_not_turned(path):
+    """49 samples of six joints beside 50 times are refused; turned they would be left out."""
+    with path.open("wb") as file:
+        savemat(
+            file, {"t": motion()["t"][:50], "q": np.zeros((6, 50)), "current": np.ones((49, 6))}
+        )
+    with pytest.raises(LogError, match="t 50, q 50, current 49 rows"):
+        read(path)
+
+
 def test_a_pickled_clock_of_numpy_scalars_is_a_clock(path):
     t = 0.01 * np.arange(30)
     q = np.outer(np.sin(t), np.ones(7))

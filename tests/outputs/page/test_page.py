@@ -19,6 +19,7 @@ from vftcli.outputs.page.pages import (
     contact_details,
     index_headline,
     index_line,
+    joint_values,
     model_pairs,
     overview,
     render,
@@ -228,6 +229,11 @@ def test_the_details_hold_every_number(pushed: Analysis) -> None:
     assert pairs["free motion"].endswith(" s")
     unknown = replace(found.model, noise_sd=np.full(6, np.nan), prior=None)
     assert "nan" not in str(model_pairs(replace(found, model=unknown)))
+
+
+def test_joints_of_equal_value_share_a_line() -> None:
+    text = joint_values(np.array([5.0, 10.0, 10.0, 7.0]))
+    assert re.sub(r"<[^>]*>", " ", text).split() == ["J1", "5.00", "J2–J3", "10.0", "J4", "7.00"]
 
 
 def test_the_wrench_of_a_row_is_force_moment_mean_and_impulse() -> None:
