@@ -255,6 +255,14 @@ def test_inspect_in_words_and_strict_fails_on_warnings(run, table: Path) -> None
         assert (code, err) == (1, said)
 
 
+def test_a_log_of_another_number_of_joints_is_refused_as_by_every_command(run) -> None:
+    log = Path(__file__).parents[2] / "fixtures" / "panda_bearing.csv"
+    for command in ("inspect", "contacts"):
+        code, out, err = run(command, log, "--robot", "ur5")
+        assert (code, out, err.count("\n")) == (1, "", 1)
+        assert "the log has 7 joints but robot 'ur5' has 6; choose another with --robot" in err
+
+
 def test_names_with_control_characters_are_shown_harmlessly(run, tmp_path: Path) -> None:
     names = ("\x1b[31mred", "two\nlines", "<b>three</b>")
     log = Recording(t=0.1 * np.arange(5), q=np.zeros((5, 3)), joint_names=names)

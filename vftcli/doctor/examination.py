@@ -16,7 +16,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice, choices_for, load_robot
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, paired, unwound
-from vftcli.robots.terms import check_effort, effort_name
+from vftcli.robots.terms import check_effort, check_joints, effort_name
 from vftcli.signals.errors import ExaminationError, UnsettledRobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks, as_record, fact, filled, sentence, words
@@ -199,9 +199,11 @@ class Examiner:
         Joints are matched by name, endless ones unwound, impossible samples cut out.
 
         Raises:
-            RobotError: If the names of its joints are not the robot's.
+            RobotError: If the names of its joints, or their number, are not the robot's.
         """
-        recording = unwound(paired(recording, robot), robot)
+        recording = paired(recording, robot)
+        check_joints(recording, robot)
+        recording = unwound(recording, robot)
         # Blocks of a long log show whether to clean all of it at once.
         blocks = recording.blocks(BLOCK) if in_stretches else ()
         if not in_stretches or any(without_bad_samples(b, robot) is not b for b in blocks):

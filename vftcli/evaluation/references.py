@@ -20,7 +20,6 @@ from vftcli.readers.references import read_reference
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
-from vftcli.robots.terms import check_joints
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
@@ -147,7 +146,6 @@ def make_reference(
         return ReferenceLoad(two_cycle_reference(motion))
     remark = caution(f"reference-{name}")
     if name == "sensor":
-        check_joints(log, robot)
         return load_of(logged_wrench(log, robot.chain, mounting), log, robot, name, remark)
     touched = touched_remarks(motion.log) if name == "zero" else ()
     tau = np.zeros(log.q.shape) if name == "zero" else log.require("tau_ext")
