@@ -180,7 +180,7 @@ CASES: dict[str, tuple[Callable[[Path], Path], str, str]] = {
     ),
     "NaN in the middle": (lambda d: changed(d, SOME, 3, "nan"), COLUMNS, "q of joint 3"),
     "time backwards": (lambda d: changed(d, SOME, 0, "0.5"), COLUMNS, "backwards"),
-    "one sample": (lambda d: saved(d / "log.csv", table(rows=1)), COLUMNS, "one sample"),
+    "one sample": (lambda d: saved(d / "log.csv", table(rows=1)), COLUMNS, "samples is 1"),
     "letters in a number": (lambda d: changed(d, SOME, 3, "abc"), COLUMNS, ""),
 }  # fmt: skip
 
@@ -201,6 +201,28 @@ def test_binary_noise_is_one_line(tmp_path: Path, refused) -> None:
     log = tmp_path / "noise.csv"
     log.write_bytes(np.random.default_rng(0).bytes(5000))
     refused("estimate", log, "--robot", "ur5", "-o", tmp_path / "out")
+
+
+def test_blank_lines_are_no_binary_file(tmp_path: Path, refused) -> None:
+    assert "a text of blank lines" in refused("inspect", saved(tmp_path / "log.csv", [[""]] * 3))
+
+
+def test_a_column_of_a_known_format_that_is_there_twice_is_not_chosen_from(
+    tmp_path: Path, refused
+) -> None:
+    head, *rows = CIRCLE.read_text().splitlines()
+    text = [f"{head} actual_q_0", *(f"{row} 1.0" for row in rows), ""]
+    (tmp_path / "log.csv").write_text("\n".join(text))
+    said = refused("inspect", tmp_path / "log.csv")
+    assert "2 columns are called 'actual_q_0'" in said
+    assert "recipe" not in said  # nothing is missing
+
+
+@pytest.mark.parametrize("span", ["5:2", "3:3"])
+def test_a_free_span_that_ends_before_it_begins_is_no_file_name(refused, span: str) -> None:
+    assert f"interval '{span}' is not A:B with A < B" in refused(
+        "contacts", CIRCLE, "--free", span
+    )
 
 
 def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run) -> None:

@@ -32,6 +32,7 @@ REFUSING = NO_FIT | {
     "current-as-turned-torque", "torque-as-turned-current",
     "upside-down", "tilted-base", "time-unit", "clock-rate",
     "velocity-unit", "velocity-of-another-kind", "velocity-sign", "no-friction-in-effort",
+    "too-short",
 }  # fmt: skip
 #: Findings on the size of a current, which a model of the arm knows better.
 SIZED = CORRECTIONS.keys() - {"torque-with-gravity"}

@@ -3,6 +3,7 @@
 Here is the user's choice of free motion.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
 ALIGNMENTS = ("commanded", "period", "phase", "model")
 
 
+SPAN = re.compile(r"[-+.\d]*:[-+.\d]*")  #: Two times with a colon, in any order.
 #: Most digits of a cycle's number: at a second each, a log of 99 999 cycles takes a day.
 DIGITS = 5
 
@@ -138,5 +140,7 @@ class FreeChoice(Choice):
             try:
                 spans.append(interval(str(word)))
             except ParameterError:
+                if SPAN.fullmatch(str(word)):
+                    raise
                 logs.append(Path(word))
         return replace(super().parsed(**words), logs=tuple(logs), spans=tuple(spans))

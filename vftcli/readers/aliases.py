@@ -155,12 +155,10 @@ class NamedColumns:
             return None
         try:
             pick = pick_of(item, named_cells(self.table, item))
-        except LogError as error:
+        except NoColumnError as error:
             if signal in {"t", "q"}:
                 raise LogError(f"{error} {self.remedy}".strip()) from None
-            if isinstance(error, NoColumnError):
-                return None
-            raise
+            return None
         # Of the vendors' signals libfranka's residual alone is turned.
         return pick._replace(remark=pick.remark and RESIDUAL_TURNED)
 

@@ -132,8 +132,12 @@ def named_cells(table: Table, item: Item) -> Cells:
     )
     found: dict[int, Cell] = {}
     for column, name in enumerate(table.names):
-        if column not in table.lists and (match := template.fullmatch(name)):
-            found.setdefault(int(match[1]), Cell(column))  # of two of one name the first
+        if column in table.lists or not (match := template.fullmatch(name)):
+            continue
+        first = found.setdefault(int(match[1]), Cell(column))
+        # Old libfranka logs call commands as sent q_d and dq_d, as in the state before them.
+        if first != Cell(column) and not item.signal.startswith("target"):
+            raise _several(table, name)
     if not found:
         raise NoColumnError(table, item.signal, pattern)
     indices = range(min(found), min(found) + len(found))  # from 0 or from 1, but without holes
@@ -143,6 +147,14 @@ def named_cells(table: Table, item: Item) -> Cells:
             f"index {missing[0]}. Name them one by one with |."
         )
     return tuple(found[index] for index in indices)
+
+
+def _several(table: Table, name: str) -> LogError:
+    """The error on several columns of one name."""
+    return LogError(
+        f"{table.path}: {table.names.count(name)} columns are called {name!r}. Count the columns "
+        "in file order instead, as in t,q:6,_:12."
+    )
 
 
 def _exact(table: Table, item: Item, name: str) -> Cells:
@@ -159,10 +171,7 @@ def _exact(table: Table, item: Item, name: str) -> Cells:
     if bare not in names:
         raise NoColumnError(table, item.signal, bare)
     if names.count(bare) > 1:
-        raise LogError(
-            f"{table.path}: {names.count(bare)} columns are called {bare!r}. Count the "
-            "columns in file order instead, as in t,q:6,_:12."
-        )
+        raise _several(table, bare)
     column = names.index(bare)
     length, cells = table.lists.get(column), cells_of(table, column, elements)
     if length is None and bare != name:
