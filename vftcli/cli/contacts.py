@@ -31,7 +31,7 @@ class ListForm(Choice):
 def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     """List what touched the arm. The default command.
 
-    Needs no output folder and no reference; with --free LOG or --free A:B it tells more.
+    Needs no reference. Name contact-free motion (--free LOG or A:B) to find weaker contacts.
 
     Example: vftcli contacts fixtures/ur5_circle.csv --robot ur5 --free 0.3:4
     """

@@ -79,8 +79,8 @@ def simulate_log(
 ) -> None:
     """Simulate an experiment, with its true forces.
 
-    They are written beside the log, as PATH.truth.parquet. The settings are the scenario's keys,
-    as duration=8 or servo.stiffness=soft; without --as the format is the arm's own.
+    The true forces go beside the log, as PATH.truth.parquet. The settings are the scenario's keys,
+    as duration=8. Without --as, a UR writes rtde, a Franka arm libfranka, any other arm parquet.
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """

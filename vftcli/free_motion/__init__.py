@@ -59,7 +59,11 @@ class FreeChoice(Choice):
     logs: Annotated[
         tuple[Path, ...],
         Option(
-            "--free", "LOG|A:B", "Name motion that nobody touched. Repeatable.", str, several=True
+            "--free",
+            "LOG|A:B",
+            "Name contact-free motion: a log or seconds A:B. Repeatable.",
+            str,
+            several=True,
         ),
     ] = ()
     #: Free spans of the log itself, from and to. [s]
