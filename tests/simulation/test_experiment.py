@@ -10,11 +10,11 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import root_mean_squares as rms
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.progress import heard_by
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
 from vftcli.simulation.arm import build_arm
 from vftcli.simulation.experiment import simulate_pair
-from vftcli.simulation.trajectories import Reference
 from vftcli.wrench.solvers import wrench_of
 
 EXACT = [
@@ -144,16 +144,11 @@ def test_a_push_moves_the_arm_by_millimetres(stiffness: str, low: float, high: f
     assert np.all((off[:3] > low) & (off[:3] < high)), off
 
 
-def advance(arm: Arm, reference: Reference) -> None:
-    """One inner step of an arm along a reference of one row."""
-    arm.command(*(rows[0] for rows in reference), arm.servo.feed_forward(reference)[0])
-
-
 def test_stepping_the_arm_oneself_gives_the_same_log() -> None:
     scenario = load_scenario("ur5-circle", ["duration=0.4"])
     arm, reference = prepare(scenario, 3)
     for k in range(arm.steps):
-        advance(arm, Reference(*(rows[k : k + 1] for rows in reference)))
+        arm.command(reference.q[k], reference.dq[k], reference.ddq[k])
     mine, theirs = observe(arm).recording, simulate(scenario, 3).recording
     np.testing.assert_allclose(mine.q, theirs.q, atol=1e-12)
     np.testing.assert_allclose(mine.require("current"), theirs.require("current"), atol=1e-12)
@@ -163,9 +158,8 @@ def test_controller_in_the_loop_reads_what_it_needs() -> None:
     arm, reference = prepare(load_scenario("ur5-drag", ["duration=0.1"]), 1)
     assert isinstance(arm, Arm)
     seen = []
-    still = Reference(reference.q[:1], *np.zeros((2, 1, 6)))
     for _ in range(50):
-        advance(arm, still)
+        arm.command(reference.q[0])
         seen.append((arm.mean_torque(0.001) - arm.true.offset) * arm.true.gain)
     assert arm.t == pytest.approx(0.05)
     np.testing.assert_array_equal([arm.q, arm.v], [arm.plant.q, arm.plant.v])
@@ -177,6 +171,10 @@ def test_controller_in_the_loop_reads_what_it_needs() -> None:
     data = arm.robot.model.createData()
     weight = pin.computeGeneralizedGravity(arm.robot.model, data, arm.q)
     assert np.all(np.abs(arm.mean_torque(0.008) - weight) < 10.0)
+    for _ in range(50):
+        arm.command(reference.q[0])
+    with pytest.raises(ParameterError, match="prepared for 100 steps and has made them"):
+        arm.command(reference.q[0])
 
 
 @pytest.mark.parametrize(("duration", "steps"), [(0.07, 70), (0.0702, 71), (0.3, 300)])
@@ -221,7 +219,7 @@ def test_friction_follows_the_temperature_every_quarter_of_a_second() -> None:
     scenario = load_scenario("ur5-circle", ["robot=ur5e", "duration=1", "contacts=[]", *span])
     arm, reference = prepare(scenario, 1)
     for k in range(251):
-        advance(arm, Reference(reference.q[k : k + 1], *np.zeros((2, 1, 6))))
+        arm.command(reference.q[k])
         if k in {0, 249, 250}:
             middle = np.array([0.0005 if k < 250 else 0.2505])  # of the step that looks
             factor = friction_factor(arm.robot.friction, arm.temperature(middle))[0]

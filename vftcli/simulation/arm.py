@@ -58,7 +58,9 @@ class Servo:
         self.spec, self.robot = spec, robot
         self.model, self.data = robot.model, robot.model.createData()
         self.omega, self.rate = omega, 2.0 * spec.damping * omega
-        self.limit = np.fmin(robot.limits.tau_max if spec.torque_limits else np.inf, np.inf)
+        limits = robot.limits
+        self.limit = np.fmin(limits.tau_max if spec.torque_limits else np.inf, np.inf)
+        self.q_min, self.q_max = np.fmax(limits.q_min, -np.inf), np.fmin(limits.q_max, np.inf)
 
     def feed_forward(self, reference: Reference) -> Array:
         """Nominal torque along a reference; gravity only if so asked. (T, n) [N·m]"""
@@ -148,9 +150,31 @@ class Arm:
         """True velocities now. (n,) [rad/s]"""
         return self.plant.v
 
-    def command(self, q_d: Array, dq_d: Array, ddq_d: Array, forward: Array) -> None:
-        """Make one inner step by a reference and its feed-forward torque. (n,) each"""
+    def command(
+        self,
+        q_d: Array,
+        dq_d: Array | None = None,
+        ddq_d: Array | None = None,
+        forward: Array | None = None,
+    ) -> None:
+        """Make one inner step.
+
+        Args:
+            q_d: Commanded positions. (n,) [rad]
+            dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
+            ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
+            forward: Feed-forward torque; if not given the servo's own, with positions
+                brought to the joint limits. (n,) [N·m]
+        """
+        rest = np.zeros_like(q_d)
+        dq_d, ddq_d = rest if dq_d is None else dq_d, rest if ddq_d is None else ddq_d
+        if forward is None:
+            q_d = q_d.clip(self.servo.q_min, self.servo.q_max)
+            reference = Reference(q_d[None], dq_d[None], ddq_d[None])
+            forward = self.servo.feed_forward(reference)[0]
         history, plant, k = self.history, self.plant, self.made
+        if k >= self.steps:
+            raise ParameterError(f"the run was prepared for {self.steps} steps and has made them")
         tau = self.servo.torque(forward, q_d, dq_d, plant.q, plant.v)
         history["q"][k], history["v"][k], history["tau"][k] = plant.q, plant.v, tau
         for name, target in zip(KEPT[-3:], (q_d, dq_d, ddq_d), strict=True):
