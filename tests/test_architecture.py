@@ -270,12 +270,12 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 51_546,
-    "files": 239,
-    "functions": 2776,
-    "functions over 60 lines": 10,
-    "names, operators, numbers": 368_728,
-    "characters a line that is not blank": 50.42,
+    "lines of Python": 51_255,
+    "files": 227,
+    "functions": 2734,
+    "functions over 60 lines": 9,
+    "names, operators, numbers": 367_482,
+    "characters a line that is not blank": 50.36,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7392,
 }
