@@ -10,9 +10,10 @@ whose speed drifts drifts for both sides; medians over the rounds are printed.
 import argparse
 import subprocess
 import sys
+import time
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -34,7 +35,6 @@ from vftcli.reproduction.timing import (
     SAMPLES,
     SCRIPT_SAMPLES,
     TUNED,
-    Timings,
     circle,
     dense_kalman_loop,
     estimate_tuned,
@@ -67,6 +67,23 @@ RATIOS = {
 
 FILLED = "output_double_register"
 """Columns that fill the wide log and that no command reads begin so."""
+
+
+@dataclass
+class Timings:
+    """Seconds by name, one value a round."""
+
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+
+    def measure(self, name: str, work: Callable[[], object], scale: float = 1.0) -> None:
+        """Time one call; `scale` extrapolates a shortened one."""
+        begin = time.perf_counter()
+        work()
+        self.seconds.setdefault(name, []).append((time.perf_counter() - begin) * scale)
+
+    def median(self, name: str) -> float:
+        """Median over the rounds. [s]"""
+        return float(np.median(self.seconds[name]))
 
 
 def driven(motion: Recording, robot: Robot) -> tuple[Recording, Array]:
@@ -253,7 +270,7 @@ def command_ratio(robot: Robot, log: Path, columns: list[str], rounds: int) -> f
 def memory_per_sample(samples: int) -> float:
     """Peak memory of dynamics and all four observers beyond the recording's own. [B/sample]"""
     robot = load_robot("panda")
-    recording = circle(robot, samples, rate=1000.0)
+    recording = circle(robot, samples)
     observers, _ = ObserverChoice(names=PAPER).build(robot, recording.median_step)
     tracemalloc.start()
     terms = dynamics_terms(recording, robot)
