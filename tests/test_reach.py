@@ -17,9 +17,8 @@ from vftcli.doctor.causes import readings
 from vftcli.doctor.windows import windows_of
 from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.readers.reading import read
+from vftcli.readers.reading import Library, read
 from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.run import paired

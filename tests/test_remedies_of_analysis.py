@@ -38,7 +38,7 @@ from vftcli.robots.chain import flange_jacobian
 
 ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", "outputs",
          "bias", "free_motion", "reproduction", "simulation", "wrench",
-         "answering.py", "notebook.py", "pipeline.py", "proposal.py", "streaming.py")  # fmt: skip
+         "answering.py", "notebook.py", "pipeline.py", "proposal.py")  # fmt: skip
 
 
 def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:

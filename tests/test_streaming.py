@@ -13,18 +13,17 @@ import polars as pl
 import pytest
 from made_runs import command
 
-from vftcli import streaming
+from vftcli import pipeline
 from vftcli.doctor import examination
 from vftcli.evaluation import ReferenceChoice
 from vftcli.free_motion import FreeChoice
 from vftcli.observers import ObserverChoice
-from vftcli.pipeline import AnalysisChoice
+from vftcli.pipeline import AnalysisChoice, comes_in_blocks
 from vftcli.readers.reading import read
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.errors import VftError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
-from vftcli.streaming import comes_in_blocks
 from vftcli.wrench import WrenchChoice, ZeroChoice
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
@@ -35,8 +34,8 @@ def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every table counts as a long log, in blocks of 320 samples."""
     monkeypatch.setattr("vftcli.readers.delimited.BLOCK_BYTES", 1 << 16)
     monkeypatch.setattr("vftcli.readers.table.HELD", 1 << 14)
-    monkeypatch.setattr(streaming, "WHOLE_ROWS", 0)
-    monkeypatch.setattr(streaming, "PIECE", 320)
+    monkeypatch.setattr(pipeline, "WHOLE_ROWS", 0)
+    monkeypatch.setattr(pipeline, "PIECE", 320)
 
 
 def estimated(folder: Path, *words: str, log: Path = FIXTURE) -> tuple[pl.DataFrame, Any]:
@@ -100,7 +99,7 @@ def test_interruption_leaves_nothing(tmp_path: Path, monkeypatch) -> None:
             raise KeyboardInterrupt
         return whole(terms, block)
 
-    monkeypatch.setattr(streaming.RunningTerms, "next", broken)
+    monkeypatch.setattr(pipeline.RunningTerms, "next", broken)
     with pytest.raises(AssertionError):  # its exit code is not 0
         estimated(tmp_path / "out", "--causal")
     assert len(blocks) == 3

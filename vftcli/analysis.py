@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from vftcli.free_motion.free_motion import FreeMotion
     from vftcli.signals.wrench import Wrench
     from vftcli.wrench.sensing import FreeLog
-    from vftcli.wrench.sensor_reading import SensorReading
+    from vftcli.wrench.sensor import SensorReading
 
 
 @record

@@ -36,8 +36,8 @@ from vftcli.free_motion import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers import GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, choice_of, list_touches, prepared
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import Library
 from vftcli.robots import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError

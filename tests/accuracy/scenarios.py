@@ -11,8 +11,8 @@ import numpy as np
 from planted_pushes import joint_torque, moving_window, planted, pushes, with_torque
 
 from vftcli.free_motion import FreeChoice
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import Library
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 

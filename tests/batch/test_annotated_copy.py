@@ -16,7 +16,7 @@ from vftcli.batch import WorkersChoice, annotated_copy
 from vftcli.batch.annotated_copy import annotate, gathered, joint_names
 from vftcli.batch.annotation import ForceChoice
 from vftcli.batch.cluster import Outcome
-from vftcli.batch.datasets.copying import partial_of
+from vftcli.batch.datasets import partial_of
 from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import recognise

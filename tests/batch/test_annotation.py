@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.batch.annotation import ForceChoice, by_row, check_signals, force_columns
-from vftcli.batch.keys import options_digest
+from vftcli.batch.log_work import options_digest
 from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ALL, ReadChoice
 from vftcli.readers.reading import read, read_chosen

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
+from vftcli.batch.log_work import content_digest, key_of, options_digest, with_files
 from vftcli.evaluation import ReferenceChoice
 from vftcli.free_motion import FreeChoice
 from vftcli.observers import ObserverChoice
@@ -75,7 +75,7 @@ def test_files_are_found_in_paths_references_and_robots(tmp_path: Path) -> None:
 def test_another_process_makes_the_same_key() -> None:
     """Sets and dictionaries have another order there."""
     script = (
-        "from vftcli.batch.keys import options_digest as d\n"
+        "from vftcli.batch.log_work import options_digest as d\n"
         "from vftcli.readers.reader import ReadChoice as R\n"
         "print(d(R(signals=frozenset('abcdefgh'))))"
     )

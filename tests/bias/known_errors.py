@@ -13,11 +13,10 @@ from vftcli.bias.model_error import (
 )
 from vftcli.bias.robust_fit import Rows, slow_loads
 from vftcli.robots import load_robot
-from vftcli.robots.friction import friction_torque
+from vftcli.robots.friction import friction_torque, play
 from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.robots.robot import Limits, SensorNoise
 from vftcli.robots.run import Run
-from vftcli.robots.running_friction import play
 from vftcli.signals.filters import zero_phase
 from vftcli.signals.recording import Recording
 

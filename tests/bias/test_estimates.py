@@ -12,8 +12,8 @@ from vftcli.analysis import Analysis
 from vftcli.free_motion import FreeChoice
 from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import Library
 from vftcli.robots import RobotChoice
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.recording import Recording

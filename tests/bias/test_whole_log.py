@@ -244,8 +244,8 @@ def test_real_pushes_come_out_better(logs):
 
     from vftcli.observers.spectra import spectra_of
     from vftcli.observers.tuning import tune_to_spectra
-    from vftcli.readers.library import Library
     from vftcli.readers.reader import ReadChoice
+    from vftcli.readers.reading import Library
     from vftcli.robots.run import RunSamples
 
     path = logs / "ur10e" / "free_12harm.csv"

@@ -11,8 +11,7 @@ import pytest
 from example_logs import CIRCLE, FIXTURES
 
 from vftcli.evaluation.references import since_start
-from vftcli.readers.library import Library
-from vftcli.readers.reading import read
+from vftcli.readers.reading import Library, read
 from vftcli.reproduction import experiments, paper
 from vftcli.reproduction.paper import Experiment, Paper, PaperItem, PrintedLine
 from vftcli.signals.errors import ParameterError

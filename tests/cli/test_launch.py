@@ -17,8 +17,8 @@ import polars as pl
 import pytest
 from example_logs import CIRCLE, FIXTURES, TAPS
 
-from vftcli.cli.analysis import LARGE, give_back
 from vftcli.cli.console import canvas, say, speaking
+from vftcli.cli.options import LARGE, give_back
 from vftcli.signals.errors import ParameterError
 
 # The program as the shell calls it: it leaves at once, all written, with the right code.

@@ -24,8 +24,8 @@ from vftcli.free_motion import FreeChoice
 from vftcli.observers import ObserverChoice
 from vftcli.outputs import OutputChoice
 from vftcli.pipeline import choice_of
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import Library
 from vftcli.robots import RobotChoice
 from vftcli.signals.option import Asked, Choice, settings_by_name
 from vftcli.wrench import FIT, WrenchChoice

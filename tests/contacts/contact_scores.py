@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.contacts.contact_list import Contact
-from vftcli.signals.arrays import Array
-from vftcli.signals.series import intervals
+from vftcli.signals.arrays import Array, intervals
 from vftcli.wrench.detection import ContactInterval, assignment, overlaps
 
 LEAST_FORCE, LEAST_MOMENT, GAP = 1.0, 0.2, 0.12

@@ -14,7 +14,7 @@ from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, run_of, sense
 from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.kernels import load_regressor, load_wrench
-from vftcli.signals.series import resample_columns
+from vftcli.signals.arrays import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench import WrenchChoice
 

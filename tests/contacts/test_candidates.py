@@ -15,7 +15,7 @@ from vftcli.contacts.search import (
 )
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.linear_model import SPIKE
+from vftcli.signals.estimation import SPIKE
 from vftcli.wrench.model_error import ErrorProcess, error_process
 
 

@@ -23,10 +23,10 @@ from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run, RunSamples
+from vftcli.signals.arrays import runs_of
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import runs_of
 
 LOG = read(FIXTURES / "ur5_circle.csv")
 

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation.wrenches import JacobianJudgement, judge_jacobian
+from vftcli.evaluation.references import JacobianJudgement, judge_jacobian
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read
 from vftcli.readers.references import JacobianLog, jacobian_log

@@ -18,7 +18,7 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.sensor_reading import SensorReading
+from vftcli.wrench.sensor import SensorReading
 from vftcli.wrench.solvers import VirtualSensor
 
 ROBOT = load_robot("ur5")

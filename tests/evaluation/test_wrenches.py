@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation.wrenches import evaluate_wrenches, with_contacts
+from vftcli.evaluation.references import evaluate_wrenches, with_contacts
 from vftcli.signals.wrench import AXES, Wrench
 from vftcli.wrench.detection import ContactScore, Detection
 

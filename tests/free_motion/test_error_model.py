@@ -7,12 +7,13 @@ import pytest
 
 from vftcli.free_motion.difference import (
     ErrorModel,
+    PairedRuns,
     error_model,
     noise_below,
     noise_of,
     noise_when_quiet,
+    pair_with_run,
 )
-from vftcli.free_motion.paired_runs import PairedRuns, pair_with_run
 from vftcli.robots.run import Run
 from vftcli.signals.filters import low_pass
 

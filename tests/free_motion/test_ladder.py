@@ -5,8 +5,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.free_motion.difference import Difference, ErrorModel, difference, most_certain
-from vftcli.free_motion.paired_runs import PairedRuns, pair_with_run
+from vftcli.free_motion.difference import (
+    Difference,
+    ErrorModel,
+    PairedRuns,
+    difference,
+    most_certain,
+    pair_with_run,
+)
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 

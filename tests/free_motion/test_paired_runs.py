@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.free_motion.paired_runs import PairedRuns, by_phase, pair_with_run
+from vftcli.free_motion.difference import PairedRuns, by_phase, pair_with_run
 
 T = 0.008 * np.arange(600)
 

@@ -7,9 +7,8 @@ import pytest
 
 from vftcli.identification.shapes import BENDS, Shape, bent, term_values
 from vftcli.robots import load_robot
-from vftcli.robots.friction import friction_torque
+from vftcli.robots.friction import RunningFriction, friction_torque
 from vftcli.robots.profile import robot_toml
-from vftcli.robots.running_friction import RunningFriction
 
 PANDA = load_robot("panda")
 

@@ -12,10 +12,10 @@ from vftcli.observers.table import Setup, build_observers
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms
+from vftcli.signals.arrays import median_step
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import Remark
-from vftcli.signals.series import median_step
 from vftcli.signals.steady_filter import PIECE
 
 RATE = 125.0

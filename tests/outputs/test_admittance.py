@@ -16,20 +16,18 @@ from vftcli.admittance.closed_loop import Replayed
 from vftcli.admittance.law import controllers, from_table, variable
 from vftcli.admittance.replay import Replay, replay, replay_release
 from vftcli.outputs.admittance import (
+    COLUMNS,
     FILES,
     REPLAY_FIGURES,
     admittance_record,
     charts,
+    comparison_grid,
     motion_table,
+    parameter_grid,
     render_admittance,
     replay_figures,
-    write_admittance,
-)
-from vftcli.outputs.admittance_tables import (
-    COLUMNS,
-    comparison_grid,
-    parameter_grid,
     stability_grid,
+    write_admittance,
 )
 from vftcli.outputs.charts import GREY
 from vftcli.outputs.paper import WIDTHS, paper_style

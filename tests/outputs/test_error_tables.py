@@ -9,7 +9,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import SCHEMA
-from vftcli.evaluation.wrenches import WRENCH_SCHEMA
+from vftcli.evaluation.references import WRENCH_SCHEMA
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.error_tables import (
     Block,
@@ -26,7 +26,7 @@ from vftcli.outputs.grid import latex, markdown, terminal
 from vftcli.outputs.grids import contact_grids, drift_grid, pairs_text
 from vftcli.outputs.page.shell import part
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.sensor_reading import Drift
+from vftcli.wrench.sensor import Drift
 
 
 def marks(*tables: Block) -> str:

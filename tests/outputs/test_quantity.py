@@ -1,6 +1,6 @@
 """Numbers with their units, as every output writes them."""
 
-from vftcli.outputs.quantity import at_least_shown, banded, percent, signed, significant, vector
+from vftcli.outputs.grid import at_least_shown, banded, percent, signed, significant, vector
 from vftcli.signals.parsing import counted
 
 

@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 from rerun_rows import rows_of
 
-from vftcli.outputs.rerun_arm import (
+from vftcli.outputs.rerun_file import (
     LINK,
     LONGEST,
     MOST_POSES,
+    Tab,
     arrow_scale,
     collada,
     motion,
+    rerun_file,
     rgba,
     send_arm,
     send_force,
 )
-from vftcli.outputs.rerun_file import Tab, rerun_file
 from vftcli.outputs.shapes import capsules
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses

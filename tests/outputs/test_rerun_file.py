@@ -9,8 +9,8 @@ import rerun.chunk
 from rerun_rows import rows_of
 
 from vftcli.outputs.charts import Chart, ChartLine
-from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import (
+    ArmPoses,
     LogLine,
     Tab,
     blueprint,
@@ -108,7 +108,7 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 from vftcli.outputs.charts import Chart, ChartLine, Span
-from vftcli.outputs.rerun_arm import ArmPoses
+from vftcli.outputs.rerun_file import ArmPoses
 from vftcli.outputs.rerun_file import Tab, rerun_file
 from vftcli.signals.errors import OutputError
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)

@@ -17,7 +17,7 @@ from vftcli.observers import ObserverChoice
 from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import PLACES
 from vftcli.outputs.contacts import answer
-from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, arrow_scale, motion, painted_links
+from vftcli.outputs.rerun_file import NEWTON_PER_METRE, arrow_scale, motion, painted_links
 from vftcli.outputs.rerun_recording import (
     contact_log,
     force_arrow,
@@ -34,7 +34,7 @@ from vftcli.signals.arrays import Z_95
 from vftcli.signals.remarks import Where, caution
 from vftcli.signals.wrench import AXES
 from vftcli.wrench import WrenchChoice, ZeroChoice
-from vftcli.wrench.frames import frame_pose
+from vftcli.wrench.solvers import frame_pose
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 

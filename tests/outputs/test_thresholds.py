@@ -11,8 +11,7 @@ import pytest
 
 from vftcli.contacts.threshold_check import CheckedContact, CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds, tail_of
-from vftcli.outputs.grid import terminal
-from vftcli.outputs.quantity import significant
+from vftcli.outputs.grid import significant, terminal
 from vftcli.outputs.run_record import jsonable
 from vftcli.outputs.thresholds import (
     calls,

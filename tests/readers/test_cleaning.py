@@ -11,9 +11,8 @@ import pytest
 
 import vftcli.readers
 from vftcli.readers.cleaning import cleaned
-from vftcli.readers.library import Library
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.reading import assemble
+from vftcli.readers.reading import Library, assemble
 from vftcli.signals.errors import ClockError, LogError, MissingSignalError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import WORDS

@@ -9,9 +9,8 @@ import polars as pl
 import pytest
 from seed_logs import motion
 
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ALL, ReadChoice
-from vftcli.readers.reading import read
+from vftcli.readers.reading import Library, read
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.recording import refuse_repeated_logs
 

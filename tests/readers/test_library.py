@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import vftcli.readers.reading
 from vftcli.batch.run import LogCollection, LogEntry
-from vftcli.readers.library import Library, absolute, labelled
 from vftcli.readers.reader import ALL, ReadChoice
+from vftcli.readers.reading import Library, absolute, labelled
 from vftcli.signals.recording import same_run
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"

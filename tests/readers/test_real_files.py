@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import examine
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ALL, ReadChoice
-from vftcli.readers.reading import read
+from vftcli.readers.reading import Library, read
 from vftcli.robots import load_robot
 from vftcli.signals.errors import VftError
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from vftcli.readers.bags.ros_messages import long_name
+from vftcli.readers.bags.decode import long_name
 from vftcli.signals.errors import OutputError
 from vftcli.simulation.writers.rosbag2 import in_parts, schema_text, serialised, stamped
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.batch.keys import digest_of
+from vftcli.batch.log_work import digest_of
 from vftcli.reproduction.manifest import Declaration, Manifest, Rival, load_manifest, rival_of
 from vftcli.signals.errors import ParameterError
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.robots import JointFriction, load_robot
-from vftcli.robots.friction import friction_torque
+from vftcli.robots.friction import RunningFriction, friction_torque, measured_temperature, play
 from vftcli.robots.kernels import CHUNK, momentum_terms
-from vftcli.robots.running_friction import RunningFriction, measured_temperature, play
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.recording import Recording
 

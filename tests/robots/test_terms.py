@@ -18,11 +18,11 @@ from vftcli.robots.terms import (
     dynamics_terms,
     effort_name,
 )
+from vftcli.signals.arrays import clock_of
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import welch
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import clock_of
 
 T = np.arange(3.0)
 Q = np.linspace(0.2, 1.3, 18).reshape(3, 6)

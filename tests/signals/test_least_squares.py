@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.least_squares import (
+from vftcli.signals.estimation import (
     correlation_time,
     cross_validated,
     fit_column,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from vftcli.signals import linear_model as module
+from vftcli.signals import estimation as module
 from vftcli.signals.arrays import Array
-from vftcli.signals.linear_model import (
+from vftcli.signals.estimation import (
     SPIKE,
     LinearModel,
     beside_errors,

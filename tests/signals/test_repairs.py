@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import Library
 from vftcli.signals.recording import Recording
 from vftcli.signals.repairs import is_fast, with_velocity, without_isolated
 

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.signals.errors import ClockError
-from vftcli.signals.lag import bridge_unknown
-from vftcli.signals.series import (
+from vftcli.signals.arrays import (
     clock_of,
     covered,
     gaps_of,
@@ -20,6 +18,8 @@ from vftcli.signals.series import (
     resample_columns,
     runs_of,
 )
+from vftcli.signals.errors import ClockError
+from vftcli.signals.lag import bridge_unknown
 
 
 def test_a_clock_is_even_or_not_and_has_a_step() -> None:

@@ -10,7 +10,7 @@ from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.pose import Pose
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.wrench.frames import Mounting, logged_wrench
+from vftcli.wrench.solvers import Mounting, logged_wrench
 
 ROBOT = load_robot("ur5e")
 TOOL = Mounting(tool=Pose(np.eye(3), np.array([0.02, 0.0, 0.16])))

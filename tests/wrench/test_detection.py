@@ -28,7 +28,7 @@ from vftcli.wrench.detection import (
     read_in_free_runs,
     true_contacts,
 )
-from vftcli.wrench.sensor_reading import SensorReading, zero_drift
+from vftcli.wrench.sensor import SensorReading, zero_drift
 from vftcli.wrench.solvers import VirtualSensor
 
 T = np.arange(0.0, 20.0, 0.01)

@@ -5,7 +5,7 @@ import pytest
 from drawn_blocks import B, blocks, drawn, noise
 
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
-from vftcli.signals.linear_model import SPIKE
+from vftcli.signals.estimation import SPIKE
 from vftcli.wrench.model_error import (
     LEAST_TIME,
     UNKNOWN,

@@ -9,11 +9,11 @@ from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import Pose, adjoint, rpy_matrix
-from vftcli.wrench.frames import (
+from vftcli.wrench.solvers import (
     Mounting,
+    VirtualSensor,
     read_pose,
 )
-from vftcli.wrench.solvers import VirtualSensor
 
 
 def test_the_printed_56_turns_the_rotation_round_in_its_lower_left_block() -> None:

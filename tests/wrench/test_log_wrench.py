@@ -20,7 +20,7 @@ from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.wrench.frames import FRAMES, Mounting, from_base, logged_wrench
+from vftcli.wrench.solvers import FRAMES, Mounting, from_base, logged_wrench
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 UR5 = load_robot("ur5")

@@ -14,7 +14,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import RunSamples
-from vftcli.signals.series import resample_columns
+from vftcli.signals.arrays import resample_columns
 from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.sensing import (
     FreeLog,
@@ -23,7 +23,7 @@ from vftcli.wrench.sensing import (
     sense,
     smooth_all,
 )
-from vftcli.wrench.sensor_reading import SensorReading
+from vftcli.wrench.sensor import SensorReading
 from vftcli.wrench.smoother import WrenchPrior, deviations, smooth_wrench
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"

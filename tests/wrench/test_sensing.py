@@ -15,7 +15,7 @@ from vftcli.robots import RobotChoice, load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.sensing import mask_remark
-from vftcli.wrench.sensor_reading import SensorReading, null_space_limit
+from vftcli.wrench.sensor import SensorReading, null_space_limit
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 

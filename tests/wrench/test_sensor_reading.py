@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.wrench import Wrench
-from vftcli.wrench.sensor_reading import (
+from vftcli.wrench.sensor import (
     MARGIN,
     Drift,
     SensorReading,

@@ -8,8 +8,8 @@ import pytest
 from drawn_blocks import blocks, noise
 from made_runs import run_of
 
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import Library
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot

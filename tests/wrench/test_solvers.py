@@ -9,12 +9,12 @@ from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
-from vftcli.wrench.frames import Mounting
 from vftcli.wrench.solvers import (
     LEAST_SIGMA,
     PRIOR,
     SCALE,
     SOLVERS,
+    Mounting,
     VirtualSensor,
     decompose,
     null_space,

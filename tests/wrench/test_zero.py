@@ -8,7 +8,7 @@ import pytest
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench import ZeroChoice
-from vftcli.wrench.sensor_reading import (
+from vftcli.wrench.sensor import (
     unloaded_start,
     without_drift,
     without_zero,

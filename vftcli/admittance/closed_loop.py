@@ -18,14 +18,13 @@ from vftcli.doctor.examination import Examination
 from vftcli.observers import ObserverChoice
 from vftcli.observers.paper import KalmanObserver
 from vftcli.robots import load_robot
+from vftcli.robots.friction import RunningFriction
 from vftcli.robots.robot import FlangeSolver, Robot
-from vftcli.robots.running_friction import RunningFriction
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, resample_columns
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
 from vftcli.signals.progress import stage, steps
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Simulation, observe

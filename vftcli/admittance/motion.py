@@ -11,10 +11,9 @@ import numpy as np
 
 from vftcli.admittance.law import AXES, UNITS, Admittance, Controller
 from vftcli.robots.robot import LARGEST_STEP, FlangeSolver, Robot
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, intervals
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix, exp_quaternion, log_quaternion, quaternion_product
-from vftcli.signals.series import intervals
 
 PAUSE = 1.0  #: Drags of one axis that follow each other within this time are one. [s]
 #: Return time → share of the deviation at release inside which the axis has to stay.

@@ -35,7 +35,7 @@ from vftcli.admittance.motion import (
 )
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.arrays import Array, Indices, median_step
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import refuse_mostly_gap
@@ -43,12 +43,10 @@ from vftcli.signals.option import assignment, numbers
 from vftcli.signals.pose import log_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
-from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench import SMOOTHER, WrenchChoice
-from vftcli.wrench.frames import logged_wrench
-from vftcli.wrench.sensor_reading import SensorReading, without_zero
-from vftcli.wrench.solvers import VirtualSensor
+from vftcli.wrench.sensor import SensorReading, without_zero
+from vftcli.wrench.solvers import VirtualSensor, logged_wrench
 
 LONGEST = 600.0  #: Longest release that is computed. [s]
 #: A flange that stays this near to its first pose is at rest. [m]

@@ -18,10 +18,13 @@ from vftcli.batch.annotation import (
     force_columns,
 )
 from vftcli.batch.cluster import Outcome, Tell, begin, run_tasks
-from vftcli.batch.datasets import DataFile, ForceColumn, Single, Statistics
-from vftcli.batch.datasets.copying import (
+from vftcli.batch.datasets import (
     RECORD,
     WORK,
+    DataFile,
+    ForceColumn,
+    Single,
+    Statistics,
     check_copy,
     copy_others,
     files_within,
@@ -31,7 +34,7 @@ from vftcli.batch.datasets.copying import (
 )
 from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of
-from vftcli.batch.keys import key_of, options_digest
+from vftcli.batch.log_work import key_of, options_digest
 from vftcli.outputs.files import digest, put_text
 from vftcli.outputs.run_record import envelope, to_json
 from vftcli.readers.opening import open_log

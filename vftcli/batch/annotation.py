@@ -10,21 +10,20 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.batch.cluster import begin
-from vftcli.batch.datasets import DataFile, ForceColumn, Single
-from vftcli.batch.datasets.copying import put_rows, stored_rows
+from vftcli.batch.datasets import DataFile, ForceColumn, Single, put_rows, stored_rows
 from vftcli.doctor.examination import Examiner
 from vftcli.doctor.signals import efforts_of
 from vftcli.observers import ObserverChoice, settling_samples
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.run_record import observer_record, robot_record, to_json
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
-from vftcli.readers.library import Library
+from vftcli.readers.reading import Library
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, VftError
 from vftcli.signals.packages import VERSION
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.frames import FRAMES
+from vftcli.wrench.solvers import FRAMES
 
 USUAL = "kfo-zoh"  #: The observer if none is named: it needs no later sample.
 Record = dict[str, Any]  #: Facts of episodes, by name.

@@ -13,17 +13,24 @@ import polars as pl
 
 from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import Effort, Failure, Outcome, Tell, run_tasks
-from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
-from vftcli.batch.log_work import SCHEMA, LogJob, LogTask, work_on_log
+from vftcli.batch.log_work import (
+    SCHEMA,
+    LogJob,
+    LogTask,
+    content_digest,
+    key_of,
+    options_digest,
+    with_files,
+    work_on_log,
+)
 from vftcli.outputs.batch_folder import MARKER, BatchFolder
 from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.files import SEAL
 from vftcli.outputs.page.pages import batch_lines, render_batch
 from vftcli.outputs.run_record import envelope, versions
-from vftcli.readers.library import absolute, labelled
 from vftcli.readers.opening import files_of, open_log
 from vftcli.readers.reader import ALL, ReadChoice
-from vftcli.readers.reading import LogFormat, read_chosen, recognise
+from vftcli.readers.reading import LogFormat, absolute, labelled, read_chosen, recognise
 from vftcli.readers.references import stored_observers
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 from vftcli.signals.progress import stage

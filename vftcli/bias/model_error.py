@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.chain import Chain
-from vftcli.robots.friction import dry_friction, steady_torque
+from vftcli.robots.friction import dry_friction, play, steady_torque
 from vftcli.robots.kernels import (
     CHUNK,
     LINK,
@@ -24,11 +24,9 @@ from vftcli.robots.kernels import (
 )
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
-from vftcli.robots.running_friction import play
 from vftcli.robots.terms import GAP
-from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.arrays import Array, Indices, median_step, summed
 from vftcli.signals.filters import derivative, zero_phase
-from vftcli.signals.series import median_step, summed
 
 #: What is faster is noise, or contact: the model's error follows the motion. [Hz]
 CUTOFF = 6.0

@@ -18,11 +18,10 @@ from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, Spectra, error_b
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
 from vftcli.robots.friction import HELD, ONE_STOP
-from vftcli.signals.arrays import Array, Mask, handed_over, rms_of_known
+from vftcli.signals.arrays import Array, Mask, handed_over, resample_columns, rms_of_known
 from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
-from vftcli.signals.series import resample_columns
 from vftcli.signals.shown import Shown, record
 
 #: The cause that no sum holds: friction hidden at rest.

@@ -22,10 +22,9 @@ import numpy as np
 
 from vftcli.bias.model_error import column_numbers
 from vftcli.robots.chain import Chain, link_jacobian, link_poses
-from vftcli.signals.arrays import Array, Indices, Mask
-from vftcli.signals.least_squares import FOLDS, SD_PER_MEDIAN, NormalEquations, huber, robust_sd
+from vftcli.signals.arrays import Array, Indices, Mask, covered, runs_of, summed
+from vftcli.signals.estimation import FOLDS, SD_PER_MEDIAN, NormalEquations, huber, robust_sd
 from vftcli.signals.rest import faster
-from vftcli.signals.series import covered, runs_of, summed
 
 FORCE = 50.0  #: SD of an external force. [N]
 MOMENT = 10.0  #: SD of an external moment. [N·m]

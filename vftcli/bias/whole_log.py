@@ -31,12 +31,19 @@ from vftcli.bias.robust_fit import (
     slow_loads,
 )
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares, seal
+from vftcli.signals.arrays import (
+    Array,
+    Mask,
+    handed_over,
+    median_step,
+    resample_columns,
+    root_mean_squares,
+    seal,
+)
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution, fact, on_joints
 from vftcli.signals.rest import faster
-from vftcli.signals.series import median_step, resample_columns
 
 #: Least motion, first to last: in less, inertia looks like a push; friction alone is
 #: fitted. [s]

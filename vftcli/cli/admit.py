@@ -7,7 +7,6 @@ import typer
 
 from vftcli.admittance import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_ANALYSIS, choice_for
 from vftcli.cli.console import (
     detail,
     echo,
@@ -17,6 +16,7 @@ from vftcli.cli.console import (
     say_json,
     say_left_out,
 )
+from vftcli.cli.options import OF_ANALYSIS, choice_for
 from vftcli.signals.option import WRITE, Asked, Option
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def admit(
     from vftcli.answering import replayed
     from vftcli.outputs.admittance import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
 
     if (log is None) != bool(release):
         raise typer.BadParameter("give one of LOG, SCENARIO, --release AXIS=VALUE")
@@ -79,7 +79,7 @@ def admit(
 
 def show(found: "Replayed", *, json: bool, latex: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
-    from vftcli.outputs.admittance_tables import (
+    from vftcli.outputs.admittance import (
         comparison_grid,
         latency_grid,
         latex_text,

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_LOG
 from vftcli.cli.console import detail, echo_data, say
+from vftcli.cli.options import OF_LOG
 from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice

@@ -8,8 +8,8 @@ import typer
 
 from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import say
+from vftcli.cli.options import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
@@ -50,7 +50,7 @@ def batch(
     from vftcli.batch.run import BatchRun, LogCollection
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
-    from vftcli.readers.library import Library, absolute
+    from vftcli.readers.reading import Library, absolute
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.parsing import counted
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_ANALYSIS, choice_for
 from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
+from vftcli.cli.options import OF_ANALYSIS, choice_for
 from vftcli.evaluation import ReferenceChoice
 from vftcli.signals.errors import VftError
 from vftcli.signals.option import COMPARE, WRITE, Asked, Option
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from vftcli.analysis import Analysis
-    from vftcli.evaluation.wrenches import JacobianJudgement
+    from vftcli.evaluation.references import JacobianJudgement
     from vftcli.outputs.files import OutputFolder
     from vftcli.pipeline import AnalysisChoice
 
@@ -44,7 +44,7 @@ def judged_by_jacobian(
     log: Path, error: VftError, choice: "AnalysisChoice", reference: str
 ) -> "JacobianJudgement":
     """Errors of a vendor's torques beside a Jacobian; raises any other error."""
-    from vftcli.evaluation.wrenches import judge_jacobian
+    from vftcli.evaluation.references import judge_jacobian
     from vftcli.readers.references import jacobian_log
     from vftcli.readers.table import JacobianError
 
@@ -121,7 +121,7 @@ def compare(
     from vftcli.outputs.figures import error_figures
     from vftcli.outputs.paper import write_figures
     from vftcli.pipeline import analyse_logs
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
 
     folder, form = figure_folder(figures, output, force), opt.form_of(asked)
     library = Library(logs)

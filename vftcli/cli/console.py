@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
     from vftcli.outputs.screen import Canvas
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
@@ -229,7 +229,7 @@ def say_analysis(analysis: "Analysis") -> None:
     if (sensed := analysis.virtual_sensor) is not None:
         from vftcli.outputs.grid import terminal
         from vftcli.outputs.grids import drift_grid
-        from vftcli.wrench.frames import FRAMES
+        from vftcli.wrench.solvers import FRAMES
 
         detail(
             f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}"

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
+from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.free_motion import FreeChoice
 from vftcli.signals.option import OUTPUT, Anyway, Asked, Choice, Option
 
@@ -40,7 +40,7 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
         raise typer.BadParameter("choose one of --json, --csv")
 
     from vftcli.pipeline import analyse_logs, list_touches
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
     from vftcli.readers.references import stored_observers
 
     if len(logs) == 1 and asked.words["columns"] is None and stored_observers(logs[0]):

@@ -25,7 +25,7 @@ def convert_log(
     from vftcli.doctor import examine
     from vftcli.outputs.conversion import check_conversion, convert
     from vftcli.outputs.examination import health_line
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
     from vftcli.signals.errors import ParameterError
 
     check_conversion(output, force)

@@ -7,7 +7,6 @@ from typing import Annotated
 
 from vftcli.bias import RefinementChoice
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import (
     detail,
     echo,
@@ -19,6 +18,7 @@ from vftcli.cli.console import (
     say_recording,
     say_robots,
 )
+from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.free_motion import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers import GoalChoice
@@ -90,7 +90,7 @@ def identify_robot(
         tables_text,
         write_identification,
     )
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
 
     task, free = asked.of(Task), asked.of(FreeChoice)
     others = {"--check": check, "--open": show, "--gains": asked.words["gains"]}
@@ -129,7 +129,7 @@ def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None
     from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.grids import tuned_grid
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
 
     choice, goal = choice_for(asked, Library([log]), observers=TUNED), asked.of(GoalChoice)
     force = asked.words["force"]

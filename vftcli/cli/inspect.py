@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.config import NAME
 from vftcli.cli.console import echo, say, say_json, say_robots
+from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.signals.option import Asked, Option
@@ -77,7 +77,7 @@ def write_options(
     """Write the options for logs, and return them for machines."""
     from vftcli.outputs.files import write_text
     from vftcli.proposal import config_text, propose
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
 
     words = {word: asked.words.get(word) for kind in OF_LOG for word in kind.options()}
     words |= asked.settings

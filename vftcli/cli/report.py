@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_written, show
+from vftcli.cli.options import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
 from vftcli.signals.option import WRITE, Asked, Choice, Option
@@ -56,7 +56,7 @@ def report(
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.report import FILES, SUMMARY_FILES, report_files, write_report
     from vftcli.pipeline import WRITING, analyse_logs, sense
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
 
     library, published, written = Library(logs), asked.of(PrintChoice).table, outputs_of(asked)
     output, details = opt.folder_of(output, logs, asked), asked.words["details"]
@@ -140,12 +140,11 @@ def estimate(
     from vftcli.batch.log_work import for_estimates
     from vftcli.outputs.estimates import estimate_files, write_estimate_folder
     from vftcli.outputs.files import OutputFolder
-    from vftcli.pipeline import analyse, prepared, sense
-    from vftcli.readers.library import Library
+    from vftcli.pipeline import analyse, analysed_in_blocks, comes_in_blocks, prepared, sense
+    from vftcli.readers.reading import Library
     from vftcli.readers.references import refuse_estimates
     from vftcli.signals.packages import check_installed
     from vftcli.signals.recording import EXAMINED
-    from vftcli.streaming import analysed_in_blocks, comes_in_blocks
 
     output, library = opt.folder_of(output, [log], asked), Library([log])
     written = outputs_of(asked.but(rrd=asked.words["rrd"] or show))

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
-from vftcli.cli.analysis import OF_LOG, choice_for
 from vftcli.cli.console import echo, say, say_json, say_recording, say_robots
+from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.evaluation import ReferenceChoice
 from vftcli.signals.option import FILE, Anyway, Asked, Option
 
@@ -39,7 +39,7 @@ def contact_thresholds(
     from vftcli.free_motion.free_motion import FreeMotion
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
-    from vftcli.readers.library import Library
+    from vftcli.readers.reading import Library
     from vftcli.signals.errors import ParameterError
 
     choice = choice_for(asked, Library([*logs, *(check or ())]))

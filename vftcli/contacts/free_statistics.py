@@ -15,12 +15,20 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import Blocks, disturbance_blocks
-from vftcli.signals.arrays import Z_95, Array, Mask
+from vftcli.signals.arrays import (
+    Z_95,
+    Array,
+    Mask,
+    covered,
+    intervals,
+    median_step,
+    near,
+    runs_of,
+)
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.least_squares import robust_sd
+from vftcli.signals.estimation import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
-from vftcli.signals.series import covered, intervals, median_step, near, runs_of
 from vftcli.wrench.model_error import (
     DRY_SHARE,
     LEAST_ERROR,

@@ -40,12 +40,11 @@ from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.robots.terms import disturbance_blocks
-from vftcli.signals.arrays import Z_95, Array
+from vftcli.signals.arrays import Z_95, Array, covered
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, REST, faster
-from vftcli.signals.series import covered
 from vftcli.wrench.model_error import UNSEEN_SHARE, error_process
 from vftcli.wrench.smoother import (
     BLOCK,

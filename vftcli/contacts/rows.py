@@ -26,10 +26,9 @@ from vftcli.contacts.windows import (
 )
 from vftcli.robots.chain import link_poses, points_on
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Z_95, Array, Mask
-from vftcli.signals.linear_model import smoothed
+from vftcli.signals.arrays import Z_95, Array, Mask, covered, resample_columns
+from vftcli.signals.estimation import smoothed
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import covered, resample_columns
 from vftcli.wrench.model_error import ErrorProcess, error_model, error_process
 from vftcli.wrench.smoother import BENT, BlockLog, JacobianIn, WrenchPrior, hidden_by_blocks
 

@@ -33,9 +33,8 @@ from vftcli.contacts.windows import (
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.robots.terms import Blocks, disturbance_blocks
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.linear_model import SPIKE
-from vftcli.signals.series import covered, intervals, runs_of
+from vftcli.signals.arrays import Array, Mask, covered, intervals, runs_of
+from vftcli.signals.estimation import SPIKE
 from vftcli.wrench.model_error import (
     ErrorProcess,
     TorqueNoise,

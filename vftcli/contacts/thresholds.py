@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Z_95, Array
+from vftcli.signals.arrays import Z_95, Array, median_step
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown, joined, record
 from vftcli.signals.wrench import AXES, unit_of
 from vftcli.wrench.detection import ContactInterval, contact_intervals

@@ -19,9 +19,8 @@ import numpy as np
 
 from vftcli.robots.chain import Chain, link_jacobian, link_poses, points_on
 from vftcli.robots.terms import Blocks
-from vftcli.signals.arrays import Array
-from vftcli.signals.linear_model import SPIKE, LinearModel, log_likelihood, smoothed
-from vftcli.signals.series import covered
+from vftcli.signals.arrays import Array, covered
+from vftcli.signals.estimation import SPIKE, LinearModel, log_likelihood, smoothed
 from vftcli.wrench.model_error import UNKNOWN, ErrorProcess, error_model, innovations
 from vftcli.wrench.smoother import BlockLog, BlockSpan, JacobianIn, Lane, WrenchPrior, assembled
 

@@ -14,11 +14,10 @@ from vftcli.doctor.signals import WAY, repeated_rows, stuck_stretches, travel_of
 from vftcli.doctor.velocity import GAP_STEPS
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name, gravity_torque
-from vftcli.signals.arrays import Array, Indices, Mask, median
+from vftcli.signals.arrays import Array, Indices, Mask, covered, median, runs_of
 from vftcli.signals.recording import EFFORTS, Cut, Recording
 from vftcli.signals.remarks import Remark, Where, fact, on_joints, warning
 from vftcli.signals.rest import REST
-from vftcli.signals.series import covered, runs_of
 
 #: Multiple of its largest torque that no drive gives. [1]
 BEYOND = 1.5

@@ -8,11 +8,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.arrays import Array, Indices, Mask, runs_of
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.rest import HELD, NONZERO
-from vftcli.signals.series import runs_of
 
 #: Net share of work that shows an inverted effort: gravity moves energy between joints.
 STRONG = -0.4

@@ -12,11 +12,10 @@ import numpy as np
 
 from vftcli.doctor.signals import TRAVEL, repeated_rows, stuck_stretches, travel_of
 from vftcli.doctor.windows import spread
-from vftcli.signals.arrays import Array, Mask, median
+from vftcli.signals.arrays import Array, Mask, gaps_of, median, runs_of
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.rest import MOVES, NONZERO
-from vftcli.signals.series import gaps_of, runs_of
 
 #: Window: short beside motion, long beside noise. [s]
 WINDOW = 0.2

@@ -19,7 +19,7 @@ from vftcli.robots import Robot
 from vftcli.robots.chain import link_poses
 from vftcli.robots.kernels import load_regressor, momentum_terms, usual_errors
 from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_mean_squares
-from vftcli.signals.least_squares import inverse_of
+from vftcli.signals.estimation import inverse_of
 from vftcli.signals.recording import Recording
 
 WINDOW, WINDOWS = 0.3, 200  #: Length of a window [s], and most windows.

@@ -12,13 +12,20 @@ import polars as pl
 
 from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
 from vftcli.evaluation.scores import skill
-from vftcli.signals.arrays import Z_95, Array, Mask, number_array, rms_of_known, root_mean_square
+from vftcli.signals.arrays import (
+    Z_95,
+    Array,
+    Mask,
+    median_step,
+    number_array,
+    rms_of_known,
+    root_mean_square,
+)
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import lags_of_each
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.progress import steps
-from vftcli.signals.series import median_step
 
 Schema = dict[str, type[pl.DataType]]  #: Column of a table → its type.
 #: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.

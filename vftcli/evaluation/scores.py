@@ -14,9 +14,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from vftcli.free_motion.free_motion import within
-from vftcli.signals.arrays import Z_95, Array, Mask
+from vftcli.signals.arrays import Z_95, Array, Mask, intervals, resample_columns, runs_of
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.series import intervals, resample_columns, runs_of
 
 CELL = 2.0  #: Length of a cell. [s]
 DRAWS, FEWEST = 1000, 8  #: Draws of a bootstrap, and its fewest cells.

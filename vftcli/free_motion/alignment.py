@@ -4,12 +4,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, root_mean_square
+from vftcli.signals.arrays import (
+    Array,
+    Mask,
+    covered,
+    intervals,
+    resample_columns,
+    root_mean_square,
+    summed,
+)
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.estimation import robust_sd
 from vftcli.signals.lag import lag_fit
-from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import covered, intervals, resample_columns, summed
 
 LEAST_OVERLAP = 0.3  #: Least overlap, by the shorter log.
 #: A larger difference after alignment means another trajectory. [rad]

@@ -5,17 +5,15 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.free_motion.alignment import robust_equations
-from vftcli.free_motion.difference import difference
-from vftcli.free_motion.paired_runs import PairedRuns, Pairing, in_gap
+from vftcli.free_motion.difference import PairedRuns, Pairing, difference, in_gap
 from vftcli.robots.run import Run, signal_edge
-from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.arrays import Array, Indices, Mask, resample_columns, summed
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
 from vftcli.signals.lag import overlapping, parabola
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import standing
-from vftcli.signals.series import resample_columns, summed
 
 LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.
 

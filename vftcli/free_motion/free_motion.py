@@ -26,7 +26,7 @@ from vftcli.free_motion.cycles import (
     find_period,
     segment,
 )
-from vftcli.free_motion.paired_runs import Pairing, pair_with_run
+from vftcli.free_motion.difference import Pairing, pair_with_run
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import load_regressor, load_wrench
 from vftcli.robots.run import Run, RunSamples
@@ -36,6 +36,7 @@ from vftcli.signals.arrays import (
     Indices,
     Mask,
     handed_over,
+    median_step,
     root_mean_square,
     root_mean_squares,
     seal,
@@ -45,7 +46,6 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.option import interval_text
 from vftcli.signals.recording import Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown
 
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.

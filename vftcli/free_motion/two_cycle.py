@@ -12,12 +12,13 @@ from vftcli.free_motion.difference import (
     RUNGS,
     TRUSTED_SHARE,
     Difference,
+    Pairing,
     differences,
     most_certain,
+    pair_with_run,
     rms,
 )
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
-from vftcli.free_motion.paired_runs import Pairing, pair_with_run
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask, root_mean_squares

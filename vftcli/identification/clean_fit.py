@@ -11,12 +11,11 @@ from vftcli.identification.links import residuals
 from vftcli.identification.shapes import Shape
 from vftcli.identification.training import ParameterColumns, PreparedLog, Training, apparent_load
 from vftcli.robots.friction import SMOOTHING, dry_torque
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, covered, intervals, median_step, near
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.least_squares import NormalEquations, folds, normal_equations, robust_sd
+from vftcli.signals.estimation import NormalEquations, folds, normal_equations, robust_sd
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints, warning
 from vftcli.signals.rest import SLIDES, slower
-from vftcli.signals.series import covered, intervals, median_step, near
 
 TOUCH = 7.0  #: Residual of a contact, in robust standard deviations.
 TOUCH_TIME = 0.15  #: Time it must last. [s]

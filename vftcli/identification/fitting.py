@@ -33,12 +33,11 @@ from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.profile import robot_document
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import uses_current
-from vftcli.signals.arrays import Array, root_mean_square, root_mean_squares
-from vftcli.signals.least_squares import fit_column
+from vftcli.signals.arrays import Array, resample_columns, root_mean_square, root_mean_squares
+from vftcli.signals.estimation import fit_column
 from vftcli.signals.recording import Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import faster
-from vftcli.signals.series import resample_columns
 
 #: Name at the command line → method; None chooses between the first two.
 FITS: dict[str | None, Callable[[Training], MethodResult]] = {

@@ -16,8 +16,8 @@ from vftcli.identification.training import PreparedLog, Training
 from vftcli.robots.friction import SMOOTHING, falling_speed
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array, root_mean_square, root_mean_squares
+from vftcli.signals.estimation import ColumnFit, cross_validated, fit_column, left_out
 from vftcli.signals.filters import low_pass
-from vftcli.signals.least_squares import ColumnFit, cross_validated, fit_column, left_out
 from vftcli.signals.rest import MOVES
 
 PLAIN = ("coulomb", "viscous", "offset")

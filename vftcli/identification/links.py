@@ -24,7 +24,7 @@ from vftcli.identification.training import ParameterColumns, PreparedLog
 from vftcli.robots.kernels import LINK, TENSOR, torque_regressor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd
+from vftcli.signals.estimation import FOLDS, correlation_time, folds, huber, robust_sd
 
 #: One row a base parameter, or a friction coefficient beside them.
 BASE = pl.Schema({"parameter": str, "value": float, "sd": float, "determined": bool})

@@ -38,7 +38,7 @@ from vftcli.robots.kernels import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.least_squares import robust_sd
+from vftcli.signals.estimation import robust_sd
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints, warning
 
 #: Parameter → its unit.

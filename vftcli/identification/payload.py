@@ -33,16 +33,17 @@ from vftcli.signals.arrays import (
     Array,
     Indices,
     handed_over,
+    intervals,
+    resample_columns,
     root_mean_square,
     root_mean_squares,
 )
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.estimation import folds, inverse_of, solve
 from vftcli.signals.filters import zero_phase
-from vftcli.signals.least_squares import folds, inverse_of, solve
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import faster, held
-from vftcli.signals.series import intervals, resample_columns
 
 PASSES = 3  #: Fits, each with the joints' residuals of the last one.
 SAME_MOTION = 5e-3  #: Largest position difference of two logs of one motion. [rad rms]

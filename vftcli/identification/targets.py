@@ -25,14 +25,13 @@ from vftcli.identification.training import PreparedLog, Training, prepare
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import gravity_torque
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, runs_of
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.estimation import fit_column, solve
 from vftcli.signals.filters import derivative, zero_phase
-from vftcli.signals.least_squares import fit_column, solve
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, on_joints
 from vftcli.signals.rest import NONZERO, SLIDES, faster
-from vftcli.signals.series import runs_of
 
 #: Cutoff for targets: above it the measured motion departs from them. [Hz]
 CUTOFF = 4.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from vftcli.identification.shapes import Shape, term_values
 from vftcli.robots.chain import Chain
-from vftcli.robots.friction import friction_factor
+from vftcli.robots.friction import RunningFriction, friction_factor, measured_temperature, play
 from vftcli.robots.kernels import (
     INERTIAL_NAMES,
     LINK,
@@ -18,14 +18,12 @@ from vftcli.robots.kernels import (
     torque_regressor,
 )
 from vftcli.robots.robot import Robot
-from vftcli.robots.running_friction import RunningFriction, measured_temperature, play
 from vftcli.robots.terms import drive_torque, gravity_torque, uses_current
-from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.arrays import Array, Indices, Mask, covered, gaps_of, intervals, median_step
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import MOVES, NONZERO, faster
-from vftcli.signals.series import covered, gaps_of, intervals, median_step
 
 #: Cutoff of the zero-phase low-pass, −3 dB a pass; the used band ends there. [Hz]
 CUTOFF = 8.0

@@ -33,10 +33,18 @@ from numpy.typing import NDArray
 from vftcli.robots.friction import HELD
 from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import disturbance_stretches
-from vftcli.signals.arrays import Array, Mask, handed_over, seal
+from vftcli.signals.arrays import (
+    Array,
+    Mask,
+    grown,
+    handed_over,
+    intervals,
+    median_step,
+    seal,
+    summed,
+)
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import welch
-from vftcli.signals.series import grown, intervals, median_step, summed
 
 SEGMENT = 4.0  #: Length of a segment: slower changes are constant. [s]
 #: Fewest samples of a segment; a shorter free or loaded part has no spectrum.

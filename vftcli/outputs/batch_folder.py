@@ -16,12 +16,13 @@ from vftcli.outputs.files import (
     SEAL,
     atomic,
     check_letters,
+    check_writable,
     digest,
+    held,
     table_file,
     write_text,
     writing,
 )
-from vftcli.outputs.partial import check_writable, held
 from vftcli.outputs.run_record import to_json
 from vftcli.signals.errors import OutputError
 

@@ -17,7 +17,7 @@ from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
 from vftcli.outputs.contacts import answer, free_words, hardest_words
 from vftcli.outputs.examination import command, path_of
-from vftcli.outputs.quantity import DASH, percent
+from vftcli.outputs.grid import DASH, percent
 from vftcli.robots import PROFILES
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Mask

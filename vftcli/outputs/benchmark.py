@@ -11,9 +11,17 @@ from vftcli.evaluation.scores import LAGS, Score, rate_interval, share_interval
 from vftcli.observers.table import BEST
 from vftcli.outputs import Record, grid
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine, Span, colours_of_names, paint
-from vftcli.outputs.grid import Column, Grid, GridCell, Rows, keyed_grid
+from vftcli.outputs.grid import (
+    DASH,
+    Column,
+    Grid,
+    GridCell,
+    Rows,
+    keyed_grid,
+    percent,
+    significant,
+)
 from vftcli.outputs.page.shell import Box, Scales, page
-from vftcli.outputs.quantity import DASH, percent, significant
 
 SILENT = 0.05  #: Share of time without an answer from which it is mentioned.
 LISTS = {"list": "counted", "list with candidates": "all"}

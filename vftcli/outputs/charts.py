@@ -12,8 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import gaps_of
+from vftcli.signals.arrays import Array, Mask, gaps_of
 
 #: Okabe and Ito's hues, in tones visible on white and on black.
 COLOURS = {

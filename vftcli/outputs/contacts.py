@@ -22,8 +22,16 @@ from vftcli.contacts.contact_list import (
 )
 from vftcli.outputs import Record
 from vftcli.outputs.files import SEAL
-from vftcli.outputs.grid import Column, Grid, csv_rows, latex
-from vftcli.outputs.quantity import DASH, at_least_shown, banded, ranged
+from vftcli.outputs.grid import (
+    DASH,
+    Column,
+    Grid,
+    at_least_shown,
+    banded,
+    csv_rows,
+    latex,
+    ranged,
+)
 from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import counted

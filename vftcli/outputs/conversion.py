@@ -25,7 +25,7 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import beginning, contact_name
 from vftcli.outputs.files import SEAL, OutputFolder, atomic, check_file, put_table, table_file
 from vftcli.outputs.run_record import envelope, seal
-from vftcli.readers.bags.ros_messages import long_name
+from vftcli.readers.bags.decode import long_name
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame

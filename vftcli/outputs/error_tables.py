@@ -16,6 +16,7 @@ from vftcli.evaluation.errors import POOLED, JointMeans, joint_means
 from vftcli.outputs import Record
 from vftcli.outputs.examination import refused_codes
 from vftcli.outputs.grid import (
+    DASH,
     Column,
     Grid,
     GridCell,
@@ -25,10 +26,11 @@ from vftcli.outputs.grid import (
     joint_columns,
     latex,
     markdown,
+    minus,
+    significant,
     terminal,
 )
 from vftcli.outputs.grids import contact_grids
-from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.run_record import to_json
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.parsing import printable

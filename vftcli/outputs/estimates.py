@@ -19,7 +19,7 @@ from vftcli.signals.packages import installed, needed
 from vftcli.signals.progress import steps
 from vftcli.signals.shown import ALL, frame_of, per_joint
 from vftcli.signals.wrench import per_axis
-from vftcli.wrench.frames import FRAMES
+from vftcli.wrench.solvers import FRAMES
 
 if TYPE_CHECKING:
     import polars as pl

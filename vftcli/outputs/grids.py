@@ -4,8 +4,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from vftcli.outputs import Record
-from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal
-from vftcli.outputs.quantity import significant
+from vftcli.outputs.grid import (
+    Column,
+    Grid,
+    Rows,
+    joint_columns,
+    keyed_grid,
+    significant,
+    terminal,
+)
 from vftcli.signals.wrench import AXES, unit_of
 
 if TYPE_CHECKING:
@@ -14,7 +21,7 @@ if TYPE_CHECKING:
     from vftcli.evaluation.published import Comparison
     from vftcli.observers.tuning import Tuned
     from vftcli.robots.robot import Robot
-    from vftcli.wrench.sensor_reading import Drift
+    from vftcli.wrench.sensor import Drift
 
 SURE = 0.05  #: A difference of two observers is sure below this p.
 #: Column of the contact table → its heading.

@@ -14,7 +14,7 @@ from vftcli.outputs import Record
 from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, signed, terminal
 from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.page.shell import Box, Scales, page, polyline
 from vftcli.outputs.paper import (
@@ -26,7 +26,6 @@ from vftcli.outputs.paper import (
     plots_of,
     write_figures,
 )
-from vftcli.outputs.quantity import signed
 from vftcli.outputs.run_record import (
     CONVENTIONS,
     envelope,

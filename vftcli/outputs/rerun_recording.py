@@ -22,25 +22,29 @@ from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import COLOURS, GREY, PLACES, REFERENCE, SPARE, Chart, ChartLine
 from vftcli.outputs.contacts import answer, beginning
 from vftcli.outputs.error_tables import DAGGER, to_markdown
-from vftcli.outputs.grid import escape_markdown
+from vftcli.outputs.grid import at_least_shown, escape_markdown
 from vftcli.outputs.page.log_charts import (
     estimate_lines,
     reference_name,
     torque_chart,
     wrench_chart,
 )
-from vftcli.outputs.quantity import at_least_shown
-from vftcli.outputs.rerun_arm import (
+from vftcli.outputs.rerun_file import (
+    BAR,
     CONTACTS,
+    EDGES,
     ArmPoses,
+    LogLine,
+    Tab,
     arrow_scale,
     motion,
     painted_links,
+    rerun_file,
     send_arm,
     send_contacts,
     send_force,
+    thinned,
 )
-from vftcli.outputs.rerun_file import BAR, EDGES, LogLine, Tab, rerun_file, thinned
 from vftcli.outputs.run_record import CONVENTIONS, all_remarks
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Z_95, Array

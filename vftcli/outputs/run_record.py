@@ -25,7 +25,7 @@ from vftcli.signals.packages import VERSION
 from vftcli.signals.parsing import whole
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
-from vftcli.wrench.frames import FRAMES
+from vftcli.wrench.solvers import FRAMES
 
 #: Meaning of every number in an output.
 CONVENTIONS = {

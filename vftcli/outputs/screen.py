@@ -34,9 +34,18 @@ from vftcli.outputs.contacts import (
 )
 from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
-from vftcli.outputs.grid import Column, Grid, GridCell, Rows, terminal
+from vftcli.outputs.grid import (
+    DASH,
+    Column,
+    Grid,
+    GridCell,
+    Rows,
+    at_least_shown,
+    percent,
+    significant,
+    terminal,
+)
 from vftcli.outputs.grids import contact_grids
-from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence

@@ -7,8 +7,16 @@ from math import ceil, isnan
 from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
 from vftcli.outputs import Record
-from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal
-from vftcli.outputs.quantity import DASH, significant
+from vftcli.outputs.grid import (
+    DASH,
+    Column,
+    Grid,
+    Rows,
+    joint_columns,
+    keyed_grid,
+    significant,
+    terminal,
+)
 from vftcli.robots.robot_file import lines_of
 from vftcli.signals.parsing import counted
 

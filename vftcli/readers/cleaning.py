@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from vftcli.readers.reader import RawLog
 from vftcli.readers.table import joined
-from vftcli.signals.arrays import Array, Indices, Mask, handed_over, median
+from vftcli.signals.arrays import Array, Indices, Mask, gaps_of, handed_over, median, median_step
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording, Source, pieces
 from vftcli.signals.remarks import Remark, caution, fact, warning
-from vftcli.signals.series import gaps_of, median_step
 
 
 def in_parts(signals: Mapping[str, NDArray[Any]]) -> Iterator[dict[str, NDArray[Any]]]:

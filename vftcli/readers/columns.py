@@ -11,10 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, root_mean_squares
+from vftcli.signals.arrays import Array, median_step, root_mean_squares
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark
-from vftcli.signals.series import median_step
 
 #: Name in --columns → field of Recording. `t` is the clock and `_` skips.
 SIGNALS = {

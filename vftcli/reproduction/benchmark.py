@@ -16,7 +16,7 @@ from polars import String
 from vftcli.answering import identified
 from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import Failure, Outcome, Tell, perform, run_tasks
-from vftcli.batch.keys import content_digest, digest_of, key_of, options_digest
+from vftcli.batch.log_work import content_digest, digest_of, key_of, options_digest
 from vftcli.doctor.examination import Examiner
 from vftcli.identification import Task
 from vftcli.outputs.batch_folder import BatchFolder
@@ -25,7 +25,7 @@ from vftcli.outputs.conversion import companions, convert, save
 from vftcli.outputs.files import put_table
 from vftcli.outputs.run_record import envelope
 from vftcli.pipeline import prepared
-from vftcli.readers.library import Library, absolute
+from vftcli.readers.reading import Library, absolute
 from vftcli.reproduction.manifest import (
     PUSHED,
     BenchmarkLog,

@@ -18,10 +18,9 @@ from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import perform, run_tasks
 from vftcli.outputs.charts import Chart
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import Column, Grid, GridCell, markdown
+from vftcli.outputs.grid import DASH, Column, Grid, GridCell, markdown, minus, significant
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import Drawing, figure_files, line_figure, plots_of, write_figures
-from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.run_record import envelope, seal
 from vftcli.reproduction.control import closed_loop, latest_turns, released
 from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from vftcli.batch.keys import content_digest, digest_of, with_files
+from vftcli.batch.log_work import content_digest, digest_of, with_files
 from vftcli.doctor.examination import Examiner
 from vftcli.evaluation.scores import ListedRow
 from vftcli.notebook import OF_ESTIMATE
 from vftcli.pipeline import AnalysisChoice, choice_of
-from vftcli.readers.library import Library, absolute
+from vftcli.readers.reading import Library, absolute
 from vftcli.readers.table import listed
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError, ParameterError

@@ -29,8 +29,8 @@ from vftcli.observers.table import BEST, OBSERVERS
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice, analyse, prepared, run_of
 from vftcli.readers.columns import Cell, Item
-from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import Library
 from vftcli.readers.references import TORQUE, program_clock, read_reference, table_at
 from vftcli.readers.table import listed
 from vftcli.readers.tables import load_signals
@@ -44,7 +44,7 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES
-from vftcli.wrench.frames import NOTHING
+from vftcli.wrench.solvers import NOTHING
 
 #: A joint is touched from here on, until below this. [N·m]
 TOUCHED, UNTOUCHED = 0.05, 0.025

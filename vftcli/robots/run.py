@@ -13,7 +13,7 @@ from vftcli.readers.table import listed
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import drive_torque, dynamics_terms
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over, median_step
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
@@ -21,7 +21,6 @@ from vftcli.signals.recording import JOINT_SIGNALS, Recording, trim
 from vftcli.signals.remarks import fact, on_joints
 from vftcli.signals.repairs import without_isolated
 from vftcli.signals.rest import duration, resting, standing
-from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown
 
 #: Samples from which on a recording's series do not stay in memory beside its results.

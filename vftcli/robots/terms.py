@@ -8,17 +8,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.robots.friction import RunningFriction, measured_temperature
 from vftcli.robots.kernels import MomentumTerms, momentum_chunks, momentum_terms
 from vftcli.robots.robot import Robot
-from vftcli.robots.running_friction import RunningFriction, measured_temperature
-from vftcli.signals.arrays import Array, Mask, empty_series, handed_over, is_uniform
+from vftcli.signals.arrays import (
+    Array,
+    Clock,
+    Mask,
+    empty_series,
+    gaps_of,
+    handed_over,
+    is_uniform,
+    median_step,
+    resample_columns,
+    runs_of,
+)
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.external_torque import DynamicsTerms, Instant
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.rest import REST, slower
-from vftcli.signals.series import Clock, gaps_of, median_step, resample_columns, runs_of
 
 #: Deviation of drive constants and sensors: a UR10e's make 2.88 kg of a weighed 2.805 kg. [1]
 CONSTANT_SD, SENSOR_SD = 0.03, 0.01

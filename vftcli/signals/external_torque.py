@@ -9,16 +9,17 @@ import numpy as np
 from vftcli.signals.arrays import (
     Z_95,
     Array,
+    Clock,
     Mask,
     check_clock,
     check_shape,
+    clock_of,
     empty_series,
     handed_over,
     root_mean_square,
     seal,
 )
 from vftcli.signals.remarks import Remark
-from vftcli.signals.series import Clock, clock_of
 from vftcli.signals.shown import ALL, Shown, TimeSeries, joined, per_joint, record
 
 

@@ -15,9 +15,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, handed_over, is_uniform
+from vftcli.signals.arrays import Array, handed_over, is_uniform, median_step, resample_columns
 from vftcli.signals.errors import ClockError, ParameterError
-from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.steady_filter import steady_filter
 
 #: Butterworth order; forwards and backwards it counts twice.

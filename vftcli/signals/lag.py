@@ -8,8 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Indices, Mask, is_uniform
-from vftcli.signals.series import median_step, resample_columns, summed
+from vftcli.signals.arrays import (
+    Array,
+    Indices,
+    Mask,
+    is_uniform,
+    median_step,
+    resample_columns,
+    summed,
+)
 
 LONGEST = 1.0  #: Longest delay looked for. [s]
 LEAD = 0.2  #: Longest lead looked for: a two-sided estimate may come early. [s]

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Indices, Mask, check_clock, check_shape, release, seal
+from vftcli.signals.arrays import (
+    Array,
+    Indices,
+    Mask,
+    check_clock,
+    check_shape,
+    median_step,
+    release,
+    seal,
+)
 from vftcli.signals.errors import (
     ClockError,
     MissingSignalError,
@@ -19,7 +28,6 @@ from vftcli.signals.errors import (
 )
 from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.series import median_step
 from vftcli.signals.shown import ALL, Shown, TimeSeries, per_joint, record
 from vftcli.signals.wrench import WrenchFrame, per_axis
 

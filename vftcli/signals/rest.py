@@ -5,8 +5,7 @@ In every function t is a clock (T,) [s], and dq are joint velocities (T, n) [rad
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import grown, median_step, runs_of, summed
+from vftcli.signals.arrays import Array, Mask, grown, median_step, runs_of, summed
 
 #: Above it, more than noise and last digits, a joint has a direction: a log moves. [rad/s]
 NONZERO = 1e-3

@@ -103,7 +103,7 @@ class Wrench(TimeSeries):
     t: Array  #: Time on the recording's clock. (T,) [s]
     #: Force, then moment, even where the pose leaves them open: see `known`. (T, 6) [N, N·m]
     values: Array
-    frame: str  #: Axes and reference point: a key of `vftcli.wrench.frames.FRAMES`.
+    frame: str  #: Axes and reference point: a key of `vftcli.wrench.solvers.FRAMES`.
     sd: Array | None = None  #: One standard deviation of `values`. (T, 6) [N, N·m]
     #: Least singular value of J, angular rows × .3 m; None: no J. (T,) [m]
     sigma_min: Array | None = None

@@ -7,12 +7,11 @@ import numpy as np
 
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.chain import Chain, flange_jacobian, link_poses
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, resample_columns
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.progress import stage, steps
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
-from vftcli.signals.series import resample_columns
 from vftcli.signals.shown import per_joint
 from vftcli.signals.wrench import WrenchFrame, per_axis
 from vftcli.simulation.arm import Arm

@@ -2,7 +2,7 @@
 
 Friction is τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest
 (Coulomb, load and Stribeck), s the state of the play operator
-(`vftcli.robots.running_friction`) and λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: such a
+(`vftcli.robots.friction`) and λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: such a
 joint holds a·s at rest, v₀ is `CREEP`; smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1
 + |q̇|/b) sign(q̇) + sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
 

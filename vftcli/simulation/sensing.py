@@ -11,10 +11,9 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.terms import gravity_torque
-from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.arrays import Array, Indices, resample_columns, summed
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import rpy_matrix
-from vftcli.signals.series import resample_columns, summed
 from vftcli.signals.steady_filter import steady_filter
 from vftcli.simulation.arm import Arm, rigid_torque
 from vftcli.simulation.scenario import SensingSpec

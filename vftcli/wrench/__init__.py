@@ -13,7 +13,7 @@ from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
-    from vftcli.wrench.frames import Mounting
+    from vftcli.wrench.solvers import Mounting
 
 FIT = "fit"  #: The word for a sensor pose that is to be estimated from the log.
 START = "start"  #: The word for the unloaded start of the log.
@@ -64,7 +64,7 @@ class WrenchChoice(Choice):
 
     GROUP = WRENCH
 
-    #: Frame of the answer, a key of `vftcli.wrench.frames.FRAMES`.
+    #: Frame of the answer, a key of `vftcli.wrench.solvers.FRAMES`.
     frame: Annotated[
         str,
         Option(
@@ -126,8 +126,7 @@ class WrenchChoice(Choice):
     ] = None
 
     def __post_init__(self) -> None:
-        from vftcli.wrench.frames import check_frame
-        from vftcli.wrench.solvers import SOLVERS
+        from vftcli.wrench.solvers import SOLVERS, check_frame
 
         check_frame(self.frame)
         if self.solver is not None:
@@ -152,7 +151,7 @@ class WrenchChoice(Choice):
 
     def mounting(self, robot: "Robot") -> "Mounting":
         """Poses of tool and sensor: as asked, else as in the robot file."""
-        from vftcli.wrench.frames import Mounting, read_pose
+        from vftcli.wrench.solvers import Mounting, read_pose
 
         tool, sensor = robot.tools.get(""), robot.sensors.get("")
         if self.tool is not None:

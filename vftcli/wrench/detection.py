@@ -10,11 +10,10 @@ import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.robots.run import Run, RunSamples
-from vftcli.signals.arrays import Array, Mask, rms_of_known
+from vftcli.signals.arrays import Array, Mask, intervals, rms_of_known, runs_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.series import intervals, runs_of
-from vftcli.wrench.sensor_reading import SETTLING, SensorReading
+from vftcli.wrench.sensor import SETTLING, SensorReading
 from vftcli.wrench.solvers import VirtualSensor
 
 #: A contact ends where the score falls below this share of its threshold, 1: hysteresis.
@@ -44,7 +43,7 @@ class ContactInterval(NamedTuple):
 def contact_intervals(
     t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0
 ) -> tuple[ContactInterval, ...]:
-    """Stretches of a mask by `vftcli.signals.series.intervals`, in time."""
+    """Stretches of a mask by `vftcli.signals.arrays.intervals`, in time."""
     runs = intervals(t, mask, least, gap)
     return tuple(ContactInterval(t[start], t[stop - 1]) for start, stop in runs)
 

@@ -31,11 +31,9 @@ from vftcli.robots.friction import (
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
-from vftcli.signals.arrays import Array, Mask, median
-from vftcli.signals.least_squares import robust_sd
-from vftcli.signals.linear_model import SPIKE, LinearModel, filtered
+from vftcli.signals.arrays import Array, Mask, grown, median, near, runs_of
+from vftcli.signals.estimation import SPIKE, LinearModel, filtered, robust_sd
 from vftcli.signals.rest import NEAR_REST
-from vftcli.signals.series import grown, near, runs_of
 from vftcli.wrench.solvers import TORQUE_SD
 
 REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]

@@ -21,19 +21,18 @@ from vftcli.observers.spectra import error_band, free_error, spectra_of
 from vftcli.robots.chain import link_poses
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import disturbance_impulse
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over, resample_columns
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.option import numbers
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench import WrenchChoice
-from vftcli.wrench.frames import from_base
-from vftcli.wrench.sensor import find_mounting, vendor_remarks
-from vftcli.wrench.sensor_reading import (
+from vftcli.wrench.sensor import (
     SensorReading,
     contact_elsewhere,
+    find_mounting,
+    vendor_remarks,
     without_drift,
     zero_drift,
     zero_moved,
@@ -47,7 +46,7 @@ from vftcli.wrench.smoother import (
     prior_of,
     smooth_wrench,
 )
-from vftcli.wrench.solvers import CHUNK, VirtualSensor
+from vftcli.wrench.solvers import CHUNK, VirtualSensor, from_base
 
 #: Half the averaging time: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
 HALF = 0.05

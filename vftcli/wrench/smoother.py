@@ -16,11 +16,18 @@ from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import (
+    Array,
+    Mask,
+    covered,
+    median_step,
+    resample_columns,
+    runs_of,
+    summed,
+)
 from vftcli.signals.errors import RobotError
-from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed
+from vftcli.signals.estimation import LinearModel, beside_errors, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.series import covered, median_step, resample_columns, runs_of, summed
 from vftcli.wrench.model_error import (
     UNKNOWN,
     ErrorProcess,

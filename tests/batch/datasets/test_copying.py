@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.batch.datasets.copying import (
+from vftcli.batch.datasets import (
     RECORD,
     WORK,
     check_copy,

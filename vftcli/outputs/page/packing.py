@@ -15,8 +15,7 @@ import numpy as np
 
 from vftcli.outputs import Record
 from vftcli.outputs.charts import GAP_STEPS, REFERENCE, Chart, ChartLine, paint
-from vftcli.signals.arrays import Array
-from vftcli.signals.series import gaps_of
+from vftcli.signals.arrays import Array, gaps_of
 
 #: Samples kept whole; stretches of two values of longer logs.
 WHOLE, STRETCHES = 8192, 4096

@@ -24,18 +24,29 @@ from vftcli.outputs.error_tables import (
     rmse_grid,
 )
 from vftcli.outputs.examination import rate_of
-from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns
+from vftcli.outputs.grid import (
+    DASH,
+    Column,
+    Grid,
+    GridCell,
+    Rows,
+    at_least_shown,
+    banded,
+    joint_columns,
+    ranged,
+    significant,
+    vector,
+)
 from vftcli.outputs.grids import contact_grids, drift_grid, print_grid
 from vftcli.outputs.page import log_charts
 from vftcli.outputs.page.shell import Box, page, part, scales_of
 from vftcli.outputs.page.stage import contact_words, free_spans, stage_data, still_arm, view_of
-from vftcli.outputs.quantity import DASH, at_least_shown, banded, ranged, significant, vector
 from vftcli.outputs.run_record import observer_record, run_record
 from vftcli.outputs.shapes import link_surfaces
 from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.parsing import counted, printable
 from vftcli.signals.remarks import fact, sentence
-from vftcli.wrench.frames import FRAMES
+from vftcli.wrench.solvers import FRAMES
 
 MOST_NAMED = 6  #: Most uncertain contacts that the lead names; more are counted.
 FORCE_BOX = Box(width=1120, height=250, left=44, bottom=22, top=34, right=10)  #: That of |F|.

@@ -21,12 +21,11 @@ from vftcli.outputs.believability import MARKS
 from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line, paint
 from vftcli.outputs.contacts import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
+from vftcli.outputs.grid import at_least_shown, minus, ranged
 from vftcli.outputs.page.packing import PageClock, page_data
-from vftcli.outputs.quantity import at_least_shown, minus, ranged
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, runs_of
 from vftcli.signals.parsing import counted, printable
 from vftcli.signals.remarks import Remark, sentence
-from vftcli.signals.series import runs_of
 
 if TYPE_CHECKING:
     from jinja2 import Environment

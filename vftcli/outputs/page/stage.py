@@ -14,15 +14,14 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact
 from vftcli.outputs import Record
 from vftcli.outputs.contacts import contact_name, direction, force_size, place_words
+from vftcli.outputs.grid import at_least_shown
 from vftcli.outputs.page.packing import PageClock
 from vftcli.outputs.page.shell import polyline
-from vftcli.outputs.quantity import at_least_shown
 from vftcli.outputs.shapes import Surface, capsules, spot_of, touched_point
 from vftcli.robots.chain import link_poses
-from vftcli.signals.arrays import Z_95, Array
+from vftcli.signals.arrays import Z_95, Array, resample_columns, runs_of
 from vftcli.signals.errors import VftError
 from vftcli.signals.pose import Pose
-from vftcli.signals.series import resample_columns, runs_of
 
 ASIDE, PITCH = 0.45, 0.3  #: Turn of the view from the arm's side, and downwards. [rad]
 AWAY = 4.2  #: Distance of the camera, in reaches.

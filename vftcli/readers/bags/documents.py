@@ -14,8 +14,7 @@ import numpy as np
 
 from vftcli.readers.aliases import TABLE
 from vftcli.readers.bags.container import Batch, Channel, Integers
-from vftcli.readers.bags.decode import Decoder
-from vftcli.readers.bags.ros_messages import VECTORS, parts_at
+from vftcli.readers.bags.decode import VECTORS, Decoder, parts_at
 from vftcli.readers.objects import flat
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import Names

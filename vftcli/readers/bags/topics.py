@@ -17,11 +17,10 @@ from vftcli.readers.columns import SIGNALS
 from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import LogFormat
-from vftcli.signals.arrays import Array, release
+from vftcli.signals.arrays import Array, median_step, release, resample_columns
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import EFFORTS, pieces
 from vftcli.signals.remarks import Remark, caution, fact, warning
-from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
 
 TARGETS = re.compile(r"(?i)desired|command|target|goal|reference")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.bags.container import Bytes, type_name
-from vftcli.readers.bags.ros_messages import (
+from vftcli.readers.bags.decode import (
     SIZES,
     MessageLayout,
     element_of,
