@@ -12,6 +12,7 @@ from vftcli.readers.table import (
     Names,
     NoColumnError,
     Picks,
+    SameNameError,
     Signals,
     Table,
     cells_of,
@@ -155,10 +156,12 @@ class NamedColumns:
             return None
         try:
             pick = pick_of(item, named_cells(self.table, item))
-        except NoColumnError as error:
-            if signal in {"t", "q"}:
+        except LogError as error:
+            if signal in {"t", "q"} and not isinstance(error, SameNameError):
                 raise LogError(f"{error} {self.remedy}".strip()) from None
-            return None
+            if isinstance(error, NoColumnError):
+                return None
+            raise
         # Of the vendors' signals libfranka's residual alone is turned.
         return pick._replace(remark=pick.remark and RESIDUAL_TURNED)
 

@@ -82,6 +82,16 @@ class NoColumnError(LogError):
         )
 
 
+class SameNameError(LogError):
+    """Several columns of one name."""
+
+    def __init__(self, table: Table, name: str) -> None:
+        super().__init__(
+            f"{table.path}: {table.names.count(name)} columns are called {name!r}. Count the "
+            "columns in file order instead, as in t,q:6,_:12."
+        )
+
+
 def picks_of(table: Table, spec: ColumnSpec) -> Picks:
     """The columns that a --columns text means, whatever signals they are."""
     if spec.named:
@@ -137,7 +147,7 @@ def named_cells(table: Table, item: Item) -> Cells:
         first = found.setdefault(int(match[1]), Cell(column))
         # Old libfranka logs call commands as sent q_d and dq_d, as in the state before them.
         if first != Cell(column) and not item.signal.startswith("target"):
-            raise _several(table, name)
+            raise SameNameError(table, name)
     if not found:
         raise NoColumnError(table, item.signal, pattern)
     indices = range(min(found), min(found) + len(found))  # from 0 or from 1, but without holes
@@ -147,14 +157,6 @@ def named_cells(table: Table, item: Item) -> Cells:
             f"index {missing[0]}. Name them one by one with |."
         )
     return tuple(found[index] for index in indices)
-
-
-def _several(table: Table, name: str) -> LogError:
-    """The error on several columns of one name."""
-    return LogError(
-        f"{table.path}: {table.names.count(name)} columns are called {name!r}. Count the columns "
-        "in file order instead, as in t,q:6,_:12."
-    )
 
 
 def _exact(table: Table, item: Item, name: str) -> Cells:
@@ -171,7 +173,7 @@ def _exact(table: Table, item: Item, name: str) -> Cells:
     if bare not in names:
         raise NoColumnError(table, item.signal, bare)
     if names.count(bare) > 1:
-        raise _several(table, bare)
+        raise SameNameError(table, bare)
     column = names.index(bare)
     length, cells = table.lists.get(column), cells_of(table, column, elements)
     if length is None and bare != name:

@@ -71,7 +71,7 @@ class WrenchChoice(Choice):
             "--frame",
             "FRAME",
             "Give the wrench in flange, base, tool or sensor.",
-            completes=names_at("wrench.frames:FRAMES"),
+            completes=names_at("wrench.solvers:FRAMES"),
         ),
     ] = "flange"
     #: A key of `vftcli.wrench.solvers.SOLVERS` or `SMOOTHER`; None for the observer's own
