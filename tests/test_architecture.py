@@ -269,12 +269,12 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 51_255,
-    "files": 227,
+    "lines of Python": 51_204,
+    "files": 210,
     "functions": 2734,
     "functions over 60 lines": 9,
-    "names, operators, numbers": 367_482,
-    "characters a line that is not blank": 50.36,
+    "names, operators, numbers": 366_267,
+    "characters a line that is not blank": 50.21,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7392,
 }
