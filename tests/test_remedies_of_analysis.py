@@ -290,7 +290,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
     "only Python gets as far; the command line refuses such a log or word first": (
         "samples are not finite; leave them out with --interval",
         "a free run must be of the same arm"),
-    "said as contacts-not-judged, tried in tests/evaluation/test_obvious_contacts.py": (
+    "said as contacts-not-judged, tried in tests/evaluation/test_references.py": (
         "no free part to learn the band",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
     "tried in tests/reproduction/test_manifest.py": (

@@ -5,6 +5,7 @@ the Panda's assembly are marked statistical.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,12 +21,16 @@ from vftcli.admittance.law import controllers, from_table, parse_settings, varia
 from vftcli.admittance.replay import replay
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
 from vftcli.simulation.scenario import ProfileSpec
+from vftcli.wrench.solvers import VirtualSensor
 
 WINDOWS = {"literal": (0.45, 0.85), "density": (0.2, 0.45), "discrete": (0.1, 0.3)}
 """The issue's windows for 20 N to 5 mm of motion. [s]"""
@@ -208,3 +213,129 @@ def test_bearing_is_guided_assembled_released_and_knocks_do_not_move_it() -> Non
     still = x[(t > 24.0) & (t < 27.0), :3] - x[np.searchsorted(t, 24.0), :3]
     # servo give under a 10 N knock, and the tail
     assert np.linalg.norm(still, axis=1).max() < 2e-3
+
+
+# The virtual sensor of a loop: its wrench is the log's, and nothing where the pose tells none
+
+
+KFO = KalmanObserver(discretisation="fe", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "q"),
+    [
+        ("ur5", [0.3, -1.2, 1.4, -1.7, -1.5, 0.2]),
+        ("panda", [0.3, -0.6, 0.2, -2.2, 0.1, 1.8, 0.5]),
+    ],
+)
+def test_the_wrench_is_that_of_the_log(name: str, q: list[float]) -> None:
+    robot = load_robot(name)
+    sensor = OnlineKalman(KFO, robot, 0.001, averaged=False)
+    sensor.tau = np.random.default_rng(1).normal(0.0, 10.0, robot.joints)
+    torque = ExternalTorque(name="x", t=np.zeros(1), tau=sensor.tau[None])
+    logged = VirtualSensor(frame="base").wrench(torque, np.array([q]), robot.chain)
+    # two ways to the Jacobian, κ² of some 1e3 times rounding of 10 N·m
+    np.testing.assert_allclose(sensor.wrench(np.array(q)), logged.values[0], atol=1e-10)
+
+
+def test_a_singular_pose_reads_no_force() -> None:
+    sensor = OnlineKalman(KFO, load_robot("ur5"), 0.001, averaged=False)
+    sensor.tau = np.ones(6)
+    np.testing.assert_array_equal(sensor.wrench(np.array([0, -1.0, 0, 0.3, 1.2, 0])), np.zeros(6))
+
+
+def test_the_first_sample_starts_at_no_torque() -> None:
+    robot = load_robot("ur5")
+    sensor = OnlineKalman(KFO, robot, 0.001, averaged=True)
+    q, dq = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]), np.full(6, 0.1)
+    np.testing.assert_array_equal(sensor.sample(q, dq, np.full(6, 50.0)), np.zeros(6))
+    terms = momentum_terms(robot.loaded_chain, q[None], dq[None])
+    np.testing.assert_allclose(sensor.p, terms.p[0], atol=1e-12)
+    # its mean of 50 N·m over the step enters as it is
+    mu = terms.coriolis_transpose_dq - terms.gravity
+    mu -= friction_torque(robot.friction, dq[None], terms.gravity)
+    np.testing.assert_allclose(sensor.mu, mu[0], atol=1e-9)
+
+
+# Latencies of a loop whose times are made up, so that they are known
+
+
+CONTROLLER = controllers(from_table(load_robot("ur5").admittance, "ur5", {}))[-1]
+PERIOD = CONTROLLER.parameters.period
+LIMIT = CONTROLLER.parameters.threshold
+ROWS = 1000
+
+
+def timed_loop(**changed: Any) -> ClosedLoop:
+    """A push along x in rows 300 to 500, seen 10 rows late, followed 20 rows late."""
+    rows = np.arange(ROWS)
+    truth, estimate, moved = (np.zeros((ROWS, 6)) for _ in range(3))
+    truth[(rows >= 300) & (rows < 500), 0] = 2.0 * LIMIT[0]
+    estimate[(rows >= 310) & (rows < 515), 0] = -1.5 * LIMIT[0]
+    moved[:, 1] = np.clip((rows - 319) * 0.01, 0.0, 1.0)
+    still = np.zeros((ROWS, 6))
+    run = ClosedLoop(
+        controller=CONTROLLER,
+        t=rows * PERIOD,
+        estimate=estimate,
+        truth=truth,
+        dragged=still > 0,
+        commanded=still,
+        q=still,
+        moved=moved,
+        reached=np.ones(ROWS, dtype=bool),
+        zero=np.zeros(6),
+        simulation=None,
+    )
+    return run._replace(**changed)
+
+
+def test_a_push_is_seen_followed_and_withdrawn() -> None:
+    (found,) = latencies(timed_loop())
+    assert found.axis == 0
+    assert found.force == pytest.approx(300 * PERIOD)
+    assert found.detection == pytest.approx(10 * PERIOD)
+    assert found.motion == pytest.approx(20 * PERIOD)  # 10 mm, the first beyond 5
+    assert found.withdrawal == pytest.approx(15 * PERIOD)
+    assert found.rested
+
+
+def test_the_paper_times_from_detection_and_from_the_estimate_s_fall() -> None:
+    """Seen in row 310, 10 mm on in 320; gone in 515, and the way ends in 518 at 199 · 10 mm."""
+    moved = np.zeros((ROWS, 6))
+    moved[:, 1] = np.clip((np.arange(ROWS) - 319) * 0.01, 0.0, 1.99)
+    (found,) = latencies(timed_loop(moved=moved))
+    assert found.reaction == pytest.approx(10 * PERIOD)
+    assert found.turn == pytest.approx(3 * PERIOD)
+    never = latencies(timed_loop(estimate=np.zeros((ROWS, 6)), moved=np.zeros((ROWS, 6))))[0]
+    assert never.reaction is never.detection is never.motion is None
+    away = np.where(np.arange(ROWS)[:, None] < 300, 0.0, moved + np.arange(ROWS)[:, None])
+    assert latencies(timed_loop(moved=away))[0].turn is None
+
+
+@pytest.mark.parametrize(
+    ("axis", "speed", "begin", "rested"),
+    # below 5 mm/s and .05 rad/s an arm rests, whatever it does once the force is there
+    [
+        *((0, 0.0045, 0, True), (0, 0.0055, 0, False), (1, 1.0, 300, True)),
+        *((3, 0.045, 0, True), (4, 0.055, 0, False)),
+    ],
+)
+def test_an_arm_that_moves_already_did_not_rest(
+    axis: int, speed: float, begin: int, rested: bool
+) -> None:
+    moved, truth = np.zeros((2, ROWS, 6))
+    moved[:, axis] = np.clip(np.arange(ROWS) - begin, 0, None) * PERIOD * speed
+    truth[300:500, axis] = 2.0 * LIMIT[axis]
+    (found,) = latencies(timed_loop(moved=moved, truth=truth))
+    assert found.rested == rested
+
+
+def test_a_second_push_soon_after_is_the_same_one() -> None:
+    truth = np.array(timed_loop().truth)
+    truth[510:600, 0] = 2.0 * LIMIT[0]
+    assert len(latencies(timed_loop(truth=truth))) == 1
+    late = np.array(timed_loop().truth)
+    pause = round(1.0 / PERIOD)
+    late[499 + pause : 520 + pause, 3] = 2.0 * LIMIT[3]
+    assert [one.axis for one in latencies(timed_loop(truth=late))] == [0, 3]

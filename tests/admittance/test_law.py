@@ -4,18 +4,28 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from vftcli.admittance import ControlChoice
 from vftcli.admittance.law import (
+    AXES,
     Admittance,
+    UnstableError,
+    check_stable,
     controllers,
+    discrete_number,
     energy,
+    escape_factor,
     from_table,
+    parse_settings,
     printed_energy,
     traditional,
     variable,
 )
 from vftcli.admittance.motion import AxisMotion, release, run
-from vftcli.robots import load_robot
+from vftcli.admittance.replay import release_deviation
+from vftcli.robots import PROFILES, load_robot
+from vftcli.signals.errors import ParameterError
 
 UR5 = from_table(load_robot("ur5").admittance, "ur5", {})
 
@@ -180,3 +190,216 @@ def test_controllers_run_side_by_side_as_alone() -> None:
     for n, controller in enumerate(found):
         alone = run([controller], np.where(dragged, force, 0.0), dragged)
         np.testing.assert_array_equal(together.x[:, n], alone.x[:, 0])
+
+
+# Stability before motion: the discrete condition and the escape bound, each in two ways
+
+
+def profile_of(name: str) -> Admittance:
+    """A profile's parameters."""
+    robot = load_robot(name)
+    return from_table(robot.admittance, robot.name, {})
+
+
+def spectral_radius(mass: float, damping: float, stiffness: float, period: float) -> float:
+    """Of one step of (49)–(51) without force."""
+    a = np.array([1.0 - period * damping / mass, -period * stiffness / mass])
+    step = np.array([a, [period * a[0], 1.0 + period * a[1]]])
+    return float(np.max(np.abs(np.linalg.eigvals(step))))
+
+
+def test_discrete_condition_is_the_eigenvalues() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        mass, damping, stiffness = rng.uniform(0.1, 10.0, 3)
+        damping *= 50.0 * rng.uniform()
+        period = rng.uniform(1e-3, 0.5)
+        number = float(discrete_number(*map(np.asarray, (mass, damping, stiffness)), period))
+        if abs(number - 4.0) > 1e-6:  # on the border the radius is 1 to rounding
+            assert (spectral_radius(mass, damping, stiffness, period) < 1.0) == (number < 4.0)
+
+
+def escapes(xi: float, y: float) -> bool:
+    """Whether a release from y runs away, by integrating with the speed-stretched time."""
+
+    def slope(_s: float, state: np.ndarray) -> list[float]:
+        u, y = state
+        return [np.exp(min(u, 300.0)) * y - 2.0 * xi * u, -u * np.exp(-u)]
+
+    def gone(_s: float, state: np.ndarray) -> float:
+        return float(state[0] - 15.0)
+
+    def turned(s: float, state: np.ndarray) -> float:
+        return slope(s, state)[0]
+
+    gone.terminal = turned.terminal = True  # type: ignore[attr-defined]
+    turned.direction = -1.0  # type: ignore[attr-defined]
+    found = solve_ivp(
+        slope, [0.0, 1e4], [0.0, y], events=[gone, turned], rtol=1e-9, atol=1e-12, method="Radau"
+    )
+    return len(found.t_events[0]) > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("xi", [0.0, 0.510, 0.671, 1.0, 1.0607, 2.7386])
+def test_escape_factor_against_a_stiff_integrator(xi: float) -> None:
+    bound = escape_factor(xi)
+    assert not escapes(xi, bound * (1.0 - 1e-4))  # 1e-4: the integrator's own accuracy
+    assert escapes(xi, bound * (1.0 + 1e-4))
+
+
+def test_escape_factors_of_the_science() -> None:
+    """Printed to three digits; 2.653 printed for ξ = 2.74 is not confirmed by either method."""
+    found = [escape_factor(xi) for xi in (0.510, 0.671, 1.0, 1.0607)]
+    np.testing.assert_allclose(found, [1.006, 1.108, 1.321, 1.362], atol=8e-4)
+    assert escape_factor(0.0) == pytest.approx(1.0 / np.sqrt(2.0), rel=1e-9)  # W alone decides
+    assert escape_factor(120.0 / (2.0 * np.sqrt(480.0))) == pytest.approx(2.511, abs=1e-3)
+    ur5 = variable(replace(profile_of("ur5"), alpha=1.0))
+    assert ur5.escape[[0, 3]] == pytest.approx([0.616, 0.495], abs=1e-3)
+    # At the position's speed limit, two digits.
+    numbers = [variable(profile_of(name)).recovery[0] for name in ("ur5", "panda")]
+    assert numbers == pytest.approx([0.11, 0.22], abs=5e-3)
+
+
+@pytest.mark.parametrize("name", [name for name in PROFILES if load_robot(name).admittance])
+def test_every_profile_is_stable(name: str) -> None:
+    complaints = check_stable(controllers(profile_of(name)))
+    assert complaints == ()
+
+
+def test_unstable_settings_are_refused_with_the_number() -> None:
+    robot = load_robot("ur5")
+    slow = from_table(robot.admittance, "ur5", {"admittance": {"period": 0.5}})
+    with pytest.raises(UnstableError, match=r"axis rx, drag phase: .* = 4\.25 must be below 4"):
+        check_stable(controllers(slow))
+    complaints = check_stable(controllers(slow), anyway=True)
+    assert len(complaints) > 1
+    free = from_table(robot.admittance, "ur5", {"rotation": {"speed_limit": np.inf}})
+    with pytest.raises(UnstableError, match=r"axis rx has no speed limit.*beyond 0\.31 rad"):
+        check_stable(controllers(free))
+    check_stable([traditional(free)])  # constant parameters need no limit
+
+
+def test_a_release_is_excused_only_inside_the_escape_bound_of_its_axes() -> None:
+    robot = load_robot("ur5")
+    free = from_table(robot.admittance, "ur5", {"rotation": {"speed_limit": np.inf}})
+    near, far = np.array([0, 0, 0, 0.3, 0, 0]), np.array([0, 0, 0, 0.3, 0.4, 0])
+    complaints = check_stable(controllers(free), release=near)
+    assert {remark.code for remark in complaints} == {"law-escapes"}
+    assert {remark.values["axis"] for remark in complaints} == {"rx", "ry", "rz"}
+    with pytest.raises(UnstableError, match=r"axis ry has no speed limit.*beyond 0\.31 rad"):
+        check_stable(controllers(free), release=far)
+
+
+def test_the_condition_decides_what_happens() -> None:
+    """Just beyond the condition a constant-parameter release grows, just inside it decays."""
+    period = 0.008
+    for share, decays in ((0.97, True), (1.03, False)):
+        damping = share * (4.0 - period**2 * 8.0 / 3.0) / (2.0 * period) * 3.0
+        p = replace(profile_of("ur5"), damping=np.full(6, damping))
+        motion = release([traditional(p)], np.array([0.1, 0, 0, 0, 0, 0]), 3.0)
+        assert (np.abs(motion.v[-1, 0, 0]) < 0.1) == decays
+
+
+# Parameters from profiles and assignments, and one clear line for each that is wrong
+
+
+def read_parameters(robot: str = "ur5", *assignments: str):
+    """A profile's parameters with assignments."""
+    return from_table(load_robot(robot).admittance, robot, parse_settings(assignments))
+
+
+def test_table_iii_and_iv() -> None:
+    """The paper's Tables III and IV."""
+    ur, panda = read_parameters("ur5"), read_parameters("panda")
+    np.testing.assert_array_equal(ur.mass, [3, 3, 3, 0.1, 0.1, 0.1])
+    np.testing.assert_array_equal(ur.damping, [5, 5, 5, 0.3, 0.3, 0.3])
+    np.testing.assert_array_equal(ur.stiffness, [8, 8, 8, 0.5, 0.5, 0.5])
+    np.testing.assert_array_equal(ur.threshold, [20, 20, 20, 6, 6, 6])
+    np.testing.assert_array_equal(panda.mass, [40, 40, 40, 4, 4, 4])
+    np.testing.assert_array_equal(panda.damping, [120, 120, 120, 6, 6, 6])
+    np.testing.assert_array_equal(panda.stiffness, [12, 12, 12, 2, 2, 2])
+    np.testing.assert_array_equal(panda.alpha, [6, 6, 6, 3, 3, 3])
+    np.testing.assert_array_equal(panda.threshold, [4, 4, 15, 2, 2, 2])
+    assert (ur.period, panda.period, ur.alpha[0]) == (0.008, 0.0025, 1.6)
+    # B_d/(2√(M_d K_d)) as the issue's science prints it
+    np.testing.assert_allclose(ur.xi[[0, 3]], [0.510, 0.671], atol=5e-4)
+    np.testing.assert_allclose(panda.xi[[0, 3]], [2.74, 1.06], atol=5e-3)
+
+
+def test_assignments_reach_their_axes() -> None:
+    p = read_parameters(
+        "ur5", "position.stiffness=9", "z.threshold=15", "xi=1", "rotation.mass=0.1,0.2,0.3"
+    )
+    np.testing.assert_array_equal(p.stiffness, [9, 9, 9, 0.5, 0.5, 0.5])
+    np.testing.assert_array_equal(p.threshold, [20, 20, 15, 6, 6, 6])
+    np.testing.assert_array_equal(p.mass, [3, 3, 3, 0.1, 0.2, 0.3])
+    np.testing.assert_array_equal(p.xi, np.ones(6))
+    part = read_parameters("ur5", "position.xi=1")
+    np.testing.assert_allclose(part.xi, np.r_[[1.0] * 3, [0.6708204] * 3], rtol=1e-7)
+    assert np.isinf(read_parameters("ur5", "rotation.speed_limit=none").speed_limit[3])
+
+
+def test_which_assignments_are_ours() -> None:
+    ours = ["xi=1", "admittance.xi=1", "position.mass=3", "rz.threshold=4"]
+    theirs = ["kfo.noise_convention=discrete", "gmo.gain=30"]
+    assert all(map(ControlChoice.takes, ours))
+    assert not any(map(ControlChoice.takes, theirs))
+
+
+@pytest.mark.parametrize(
+    ("assignment", "words"),
+    [
+        ("admittance.alpha=0", "admittance.alpha of axis x is 0; it must be positive"),
+        ("rz.alpha=-1", "admittance.alpha of axis rz is -1; it must be positive"),
+        ("xi=0", "admittance.xi of axis x is 0; it must be positive"),
+        ("position.mass=0", "admittance.mass of axis x is 0; it must be positive"),
+        ("y.stiffness=-8", "admittance.stiffness of axis y is -8; it must be positive"),
+        ("z.damping=-1", "admittance.damping of axis z is -1; it must be zero or positive"),
+        ("rx.threshold=nan", "no admittance threshold for rx; give it in its"),
+        ("rotation.speed_limit=nan", "no admittance speed_limit for rx, ry, rz; give it in its"),
+        ("position.hysteresis=1", "share of the threshold and must be below 1"),
+        ("period=0", "the control period must be positive"),
+        ("position.mass=1,2", "position.mass has 2 values; give one, or one for each of 3"),
+        ("position.mass=heavy", "'heavy' is not a number or a list"),
+        ("threshold_mode=medium", "there is hard, soft"),
+        ("position.weight=3", "no such admittance parameter"),
+        ("sideways.mass=3", "no such admittance parameter"),
+        ("position.period=0.01", "no such admittance parameter"),
+        ("start=1", "no such admittance parameter"),
+    ],
+)
+def test_wrong_parameters_are_one_clear_line(assignment: str, words: str) -> None:
+    with pytest.raises(ParameterError) as raised:
+        read_parameters("ur5", assignment)
+    assert words in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_missing_section_names_what_is_missing() -> None:
+    with pytest.raises(ParameterError, match="no admittance mass for x, y, z, rx, ry, rz"):
+        from_table({}, "mine", {})
+    partial = {"period": 0.01, "position": {"mass": 1.0}}
+    with pytest.raises(ParameterError, match="no admittance mass for rx, ry, rz"):
+        from_table(partial, "mine", {})
+
+
+def test_controllers_of_a_comparison() -> None:
+    p = read_parameters("panda")
+    names = [c.name for c in controllers(p)]
+    assert names == ["traditional", "α = 6 / 3"]
+    assert [c.name for c in controllers(p, "variable", [1.0, 1.9])] == ["α = 1", "α = 1.9"]
+    with pytest.raises(ParameterError, match="there is traditional, variable"):
+        ControlChoice(kind="adaptive")
+    with pytest.raises(ParameterError, match="alpha of axis x is 0"):
+        controllers(p, alphas=[0.0])
+
+
+def test_release_deviation() -> None:
+    np.testing.assert_array_equal(release_deviation(["x=0.3,rz=-1"]), [0.3, 0, 0, 0, 0, -1])
+    for text in ("q=1", "x", "x=much", "x=inf"):
+        with pytest.raises(ParameterError, match=f"axis of {', '.join(AXES)}"):
+            release_deviation([text])
+    np.testing.assert_array_equal(release_deviation(["rx=3.14"])[3], 3.14)
+    with pytest.raises(ParameterError, match="turns by 4 rad; it must be less than π"):
+        release_deviation(["rx=2.4,ry=-3.2"])

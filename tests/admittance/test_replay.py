@@ -1,20 +1,45 @@
 """Replay: forces from every source, joints, comparison figures, remarks."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
-from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings
-from vftcli.admittance.motion import follow, largest_speed
-from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
+from vftcli.admittance.law import (
+    Admittance,
+    UnstableError,
+    controllers,
+    from_table,
+    parse_settings,
+)
+from vftcli.admittance.motion import AxisMotion, Drag, JointPath, follow, largest_speed
+from vftcli.admittance.replay import (
+    Replay,
+    drag_remarks,
+    on_control_clock,
+    replay,
+    replay_release,
+    sensor_force,
+    stored_force,
+    trouble,
+    truth_force,
+)
 from vftcli.robots import load_robot
-from vftcli.robots.chain import link_poses
+from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.robot import FlangeSolver
-from vftcli.signals.errors import ClockError, ParameterError
+from vftcli.signals.errors import (
+    ClockError,
+    MissingSignalError,
+    ParameterError,
+    ReferenceTorqueError,
+)
 from vftcli.signals.pose import exp_matrix
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
-from vftcli.signals.wrench import Wrench
+from vftcli.signals.wrench import Wrench, WrenchFrame
+from vftcli.wrench import WrenchChoice, ZeroChoice
 
 UR5 = load_robot("ur5")
 START = np.array([0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0])
@@ -234,3 +259,163 @@ def test_control_clock_takes_the_newest_sample() -> None:
     printed = np.round(100.0 + np.arange(500) * 0.008, 6)  # a log's stamps, in step with control
     _, kept = on_control_clock(printed - printed[0], 0.008)
     np.testing.assert_array_equal(kept, np.arange(500))
+
+
+# What is said of a replay: each remark where it is due, and nowhere else
+
+
+PARAMETERS = from_table(load_robot("ur5").admittance, "ur5", {})
+TWO = controllers(PARAMETERS)
+ROWS = 51
+
+
+REST = np.zeros((ROWS, 2, 6))
+
+
+def motion_of(x: np.ndarray = REST, v: np.ndarray = REST) -> AxisMotion:
+    """Five seconds of two controllers, at rest unless something is given."""
+    return AxisMotion(t=np.arange(ROWS) * 0.1, x=x, v=v)
+
+
+def path_of(reached: np.ndarray | None = None, speed: float = 0.5) -> JointPath:
+    good = np.ones((ROWS, 2), dtype=bool) if reached is None else reached
+    return JointPath(q=np.zeros((ROWS, 2, 6)), reached=good, speed=np.array([speed, np.nan]))
+
+
+def replayed(
+    made: AxisMotion | None = None,
+    way: JointPath | None = None,
+    *,
+    parameters: Admittance = PARAMETERS,
+    **others: np.ndarray,
+) -> Replay:
+    """A replay without trouble, but for what is given."""
+    zero = np.zeros((ROWS - 1, 6))
+    given = {"start": zero[0], "wrench": zero, "drags": (), **others}
+    found = Replay(
+        robot=load_robot("ur5"),
+        controllers=controllers(parameters),
+        motion=made or motion_of(),
+        **given,
+    )
+    vars(found).update(path=way or path_of())
+    return found
+
+
+def test_nothing_is_said_of_a_replay_without_trouble() -> None:
+    assert not [*trouble(replayed())]
+    assert not [*trouble(replayed(logged=np.full((5, 6), 0.005)))]
+
+
+def test_each_limit_is_reported_with_its_number_and_its_controller() -> None:
+    (x, v), reached = np.zeros((2, ROWS, 2, 6)), np.ones((ROWS, 2), bool)
+    x[20:, 1, 0] = v[20:, 1, 0] = np.inf
+    limit = PARAMETERS.speed_limit
+    v[3:6, 0, 2], v[5, 0, 3], v[7, 0, 3] = limit[2], -limit[3], 0.99 * limit[3]
+    reached[30:40, 1] = False
+    found = [*trouble(replayed(motion_of(x, v), path_of(reached, 1.5)))]
+    assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
+    reported = {(r.code, r.where.about): dict(r.values) for r in found}
+    first, second = (controller.name for controller in TWO)
+    assert reported.pop(("travel-implausible-hard", ""))["travel_m"] > 1e300  # it escaped
+    assert reported == {
+        ("speed-limit-acted", first): {"periods": 3},
+        ("joint-too-fast", first): {"share": 1.5},
+        ("motion-escaped", second): {"time_s": pytest.approx(2.0)},
+        ("poses-out-of-reach", second): {
+            "lost": 10,
+            "poses": ROWS,
+            "first_s": pytest.approx(3.0),
+        },
+    }
+
+
+@pytest.mark.parametrize(
+    ("mode", "code"), [("hard", "travel-implausible-hard"), ("soft", "travel-implausible")]
+)
+def test_travel_counts_where_poses_are_out_of_reach(mode: str, code: str) -> None:
+    x = np.zeros((ROWS, 2, 6))
+    x[10, 0, :3], x[10, 1, :3] = [9.0, 0, 0], [0.6, 0.8, 0]
+    reached = np.ones((ROWS, 2), dtype=bool)
+    reached[10, 1] = False
+    parameters = replace(PARAMETERS, threshold_mode=mode)
+    _, remark = trouble(replayed(motion_of(x), path_of(reached), parameters=parameters))
+    assert remark.code == code
+    assert remark.values["travel_m"] == pytest.approx(1.0)  # not the other controller's 9 m
+
+
+def test_the_axis_nearest_to_its_threshold_is_named() -> None:
+    wrench = np.zeros((10, 6))
+    wrench[4, 0], wrench[5, 4] = -10.0, 0.75 * PARAMETERS.threshold[4]
+    wrench[6] = np.nan
+    (remark,) = drag_remarks(replayed(wrench=wrench, logged=wrench))
+    assert remark.values["axis"] == "ry"
+    assert remark.values["share"] == pytest.approx(0.75)
+    assert not [*drag_remarks(replayed(wrench=wrench, logged=wrench, drags=[drag(4, 5)]))]
+    assert not [*drag_remarks(replayed(wrench=wrench[:0], logged=wrench))]
+
+
+def drag(begin: int, release: int, axis: int = 2) -> Drag:
+    return Drag(axis=axis, number=1, begin=begin, release=release, end=release)
+
+
+def test_the_travel_of_a_log_that_moves_is_reported() -> None:
+    logged = np.zeros((5, 6))
+    logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
+    (remark,) = trouble(replayed(logged=logged))
+    assert remark.values["distance_m"] == pytest.approx(0.05)
+
+
+# What drives a replay: an observer's torque of a file, the log's sensor, or the truth
+
+
+TIMES = np.arange(0.0, 4.0, 0.01)
+POSES = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(
+    np.outer(TIMES, np.arange(1, 7) / 3)
+)
+LOADED = np.where(TIMES[:, None] > 2.0, 10.0, 0.0) + np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
+
+
+def choice(**zero: object) -> WrenchChoice:
+    return WrenchChoice(frame="base", zero=ZeroChoice(**zero))  # type: ignore[arg-type]
+
+
+def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed() -> None:
+    tau = np.einsum("tij,ti->tj", flange_jacobian(UR5.chain, POSES), LOADED)
+    log = Recording(t=TIMES, q=POSES, tau_ext=tau)
+    found = stored_force(log, UR5, choice(spans=((0.0, 1.9),)), "kfo-fe")
+    expected = np.where(TIMES[:, None] > 2.0, 10.0, 0.0) * np.ones(6)
+    np.testing.assert_allclose(found.wrench.known, expected, atol=1e-8)  # κ(J)² times rounding
+    assert found.source.values == {"observer": "kfo-fe"}
+    assert [remark.code for remark in found.wrench.remarks] == ["zero-removed"]
+    with pytest.raises(MissingSignalError):
+        stored_force(Recording(t=TIMES, q=POSES), UR5, choice(), "kfo-fe")
+    with pytest.raises(ParameterError, match="needs the log itself"):
+        stored_force(log, UR5, WrenchChoice(frame="base", solver="smoother"), "kfo-fe")
+
+
+def test_the_logs_sensor_drives_as_the_log_states_it() -> None:
+    log = Recording(
+        t=TIMES, q=POSES, wrench=-LOADED, wrench_frame=WrenchFrame("base", "flange", "by-robot")
+    )
+    found = sensor_force(log, UR5, choice())
+    np.testing.assert_array_equal(found.wrench.values, LOADED)
+    assert found.wrench.remarks == ()
+    assert "BY the robot" in found.source.values["frame"]
+    unstated = sensor_force(Recording(t=TIMES, q=POSES, wrench=LOADED), UR5, choice())
+    assert unstated.source.values["frame"] == "frame not stated"
+    codes = [remark.code for remark in unstated.wrench.remarks]
+    assert codes == ["wrench-frame-unstated", "sensor-pose-unstated"]
+
+
+def test_a_truth_file_s_wrench_is_the_force_and_torques_alone_are_none(tmp_path: Path) -> None:
+    file, axes = tmp_path / "truth.parquet", ("fx", "fy", "fz", "mx", "my", "mz")
+    columns = {f"wrench/{axis}": LOADED[:, k] for k, axis in enumerate(axes)}
+    pl.DataFrame({"t": TIMES, **columns}).write_parquet(file)
+    force = truth_force(Recording(t=TIMES, q=POSES), UR5, choice(), file)
+    np.testing.assert_allclose(force.wrench.known, LOADED, atol=1e-12)
+    assert force.source.values == {"file": "truth.parquet"}
+    columns = {f"tau_ext/{j}": np.zeros(len(TIMES)) for j in range(1, 7)}
+    pl.DataFrame({"t": TIMES, **columns}).write_parquet(file)
+    with pytest.raises(ReferenceTorqueError, match="it has no wrench"):
+        truth_force(Recording(t=TIMES, q=POSES), UR5, choice(), file)

@@ -4,7 +4,15 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation.errors import evaluate, rmse
+from vftcli.evaluation.errors import (
+    POOLED,
+    SCHEMA,
+    PoolMember,
+    evaluate,
+    evaluate_pooled,
+    joint_means,
+    rmse,
+)
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 
@@ -152,3 +160,112 @@ def test_a_reference_of_zero_tells_no_lag() -> None:
     noise = np.random.default_rng(0).standard_normal(len(T))
     row = row_of(torque("gmo", noise), torque("zero", np.zeros_like(T)))
     assert (row["lag_s"], row["correlation"]) == (None, None)
+
+
+# The one mean over joints: only of those with a reference to be trusted
+
+
+def table(*rows: tuple[str, int, float | None, bool | None]) -> pl.DataFrame:
+    names = ("observer", "joint", "rmse_Nm", "reference_trusted")
+    lines = [dict(zip(names, row, strict=True)) | {"reference_floor_Nm": row[1]} for row in rows]
+    return pl.DataFrame(lines, schema=SCHEMA)
+
+
+def test_a_joint_whose_reference_rests_is_left_out_and_named() -> None:
+    means = joint_means(
+        table(("a", 1, 1.0, True), ("a", 2, 9.0, False), ("a", 3, 3.0, None), ("b", 1, 0.5, True))
+    )
+    assert means.errors == {"a": 2.0, "b": 0.5}
+    assert means.floor == 2.0  # of J1 and J3
+    assert means.left_out == " without J2"
+    assert means.least == ("b", 0.5)
+
+
+def test_where_no_joint_can_be_trusted_all_count() -> None:
+    means = joint_means(table(("a", 1, 1.0, False), ("a", 2, 3.0, False)))
+    assert (means.errors, means.left_out) == ({"a": 2.0}, "")
+
+
+def test_nothing_known_has_no_mean() -> None:
+    means = joint_means(table(("a", 1, None, True)).with_columns(reference_floor_Nm=pl.lit(None)))
+    assert means.errors == {}
+    assert means.least is None
+    assert np.isnan(means.floor)
+
+
+# Logs as one experiment: what is pooled is weighed by samples, and never over two arms
+
+
+def member(error: float, until: float = 99.0, robot: str = "ur5", **more: object) -> PoolMember:
+    """A log with a constant error, its reference known until a time."""
+    reference = torque("x", np.where(until > T, WAVE, np.nan), floor=np.array([1.0]))
+    return PoolMember(robot, [torque("fdo", WAVE + error, **more)], reference)
+
+
+def pooled_row(*members: PoolMember) -> dict[str, object]:
+    return evaluate_pooled(members).row(0, named=True)
+
+
+def test_pooled_rows_weigh_samples() -> None:
+    """Errors 1 over 1500 samples and 3 over 500: √((1500 + 9·500)/2000)."""
+    whole, part = member(1.0), member(3.0, until=4.0)
+    part = part._replace(reference=torque("x", part.reference.tau[:, 0], floor=np.array([2.0])))
+    row = pooled_row(whole, part)
+    assert row["recording"] == POOLED
+    assert row["samples"] == 2000
+    assert row["rmse_Nm"] == pytest.approx(np.sqrt((1500.0 + 9.0 * 500.0) / 2000.0))
+    assert row["bias_Nm"] == pytest.approx(1.5)
+    assert row["reference_floor_Nm"] == pytest.approx(np.sqrt((1500.0 + 4.0 * 500.0) / 2000.0))
+
+
+def test_a_pool_of_one_log_twice_has_its_rmse_and_a_narrower_interval() -> None:
+    rng = np.random.default_rng(0)
+    noisy = [
+        PoolMember("ur5", [torque("fdo", WAVE + rng.standard_normal(len(T)))], torque("x", WAVE))
+        for _ in range(4)
+    ]
+    pooled = pooled_row(*noisy)
+    alone = evaluate("log", noisy[0].estimates, noisy[0].reference).row(0, named=True)
+    width = [row["rmse_high_Nm"] - row["rmse_low_Nm"] for row in (pooled, alone)]
+    # Four logs: half the width, known to some 20 % by the bootstrap of each.
+    assert width[0] / width[1] == pytest.approx(0.5, rel=0.3)
+
+
+def test_logs_of_two_arms_are_not_pooled() -> None:
+    """A UR5 and a UR10e have six joints each and the same observers; their errors are two arms'."""
+    assert evaluate_pooled([member(1.0), member(1.0, robot="ur10e")]).is_empty()
+    assert not evaluate_pooled([member(1.0), member(1.0)]).is_empty()
+
+
+def test_one_log_or_other_observers_are_not_pooled() -> None:
+    one = member(1.0)
+    other = one._replace(estimates=[torque("gmo", WAVE)])
+    assert evaluate_pooled([one]).is_empty()
+    assert evaluate_pooled([one, other]).is_empty()
+
+
+def test_coverage_is_pooled_over_the_samples_of_all() -> None:
+    """1500 samples within the band and 500 outside it: three quarters."""
+    sd = np.ones((len(T), 1))
+    row = pooled_row(member(0.0, error_sd=sd), member(3.0, until=4.0, error_sd=sd))
+    assert row["coverage_95"] == pytest.approx(0.75)
+
+
+def test_a_log_without_a_lag_does_not_pull_the_others() -> None:
+    late = np.interp(T - 0.08, T, WAVE)
+    delayed = PoolMember("ur5", [torque("fdo", late)], torque("x", WAVE))
+    still = PoolMember("ur5", [torque("fdo", np.zeros_like(T))], torque("x", WAVE))
+    assert pooled_row(delayed, still)["lag_s"] == pytest.approx(
+        0.08, abs=2e-3
+    )  # a quarter of a step
+    # One of a third of the samples that is not late takes a quarter of the weight.
+    prompt = PoolMember(
+        "ur5", [torque("fdo", WAVE)], torque("x", np.where(T < 4.0, WAVE, np.nan))
+    )
+    assert pooled_row(delayed, prompt)["lag_s"] == pytest.approx(0.06, abs=2e-3)
+
+
+def test_a_log_without_a_known_sample_adds_none() -> None:
+    empty = member(1.0, until=-1.0)
+    assert pooled_row(empty, member(2.0))["rmse_Nm"] == pytest.approx(2.0)
+    assert pooled_row(empty, member(2.0))["samples"] == len(T)

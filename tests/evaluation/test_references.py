@@ -1,13 +1,38 @@
 """Reference files: the clock that their times are on."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
-from vftcli.evaluation.references import on_the_logs_clock, since_start
+from vftcli.evaluation import NAMES, ReferenceChoice, references
+from vftcli.evaluation.references import (
+    evaluate_wrenches,
+    judge,
+    make_reference,
+    on_the_logs_clock,
+    reference_wrench,
+    since_start,
+    touched_remarks,
+    touches,
+    with_contacts,
+)
+from vftcli.free_motion.free_motion import FreeMotion
+from vftcli.readers import reading
+from vftcli.readers.references import read_reference
+from vftcli.robots import load_robot
+from vftcli.robots.chain import flange_jacobian
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
+from vftcli.signals.remarks import sentence
+from vftcli.signals.wrench import AXES, Wrench
+from vftcli.wrench.detection import ContactScore, Detection
+from vftcli.wrench.sensor import SensorReading
+from vftcli.wrench.solvers import VirtualSensor
 
 
 @pytest.mark.parametrize("zero", [0.0, 0.02, 798.467])
@@ -35,3 +60,319 @@ def test_a_file_of_another_time_is_refused_with_both_spans() -> None:
     # Half a sample beyond either end is the same clock, rounded; more is no answer.
     there = on_the_logs_clock(t[:-2] + 0.2, t[:-2, None], log, Path("a.csv"))[:, 0]
     assert np.isfinite(there).tolist() == [True] * 8 + [False] * 2
+
+
+# References by name: what is checked before a log is read, and what each is made from
+
+
+ROBOT = load_robot("ur5")
+T = 0.01 * np.arange(300)
+RNG = np.random.default_rng(3)
+Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(
+    np.outer(T, RNG.uniform(0.3, 1, 6))
+)
+RECORDING = Recording(t=T, q=Q, tau_ext=RNG.standard_normal((300, 6)))
+MOTION = FreeMotion(log=Run(recording=RECORDING, robot=ROBOT))
+WRENCH = 5.0 * RNG.standard_normal((300, 6))
+
+
+def write(
+    path: Path, t: np.ndarray = T, wrench: np.ndarray | None = None, **groups: np.ndarray
+) -> ReferenceChoice:
+    """A reference file of groups of columns, chosen."""
+    columns = {"t": t}
+    for name, values in groups.items():
+        columns |= {f"{name}/{k + 1}": values[:, k] for k in range(values.shape[1])}
+    if wrench is not None:
+        columns |= {f"wrench/{axis}": wrench[:, k] for k, axis in enumerate(AXES)}
+    pl.DataFrame(columns).write_parquet(path)
+    return ReferenceChoice(name=f"file:{path}")
+
+
+def test_an_unknown_name_is_refused_before_any_log_is_read() -> None:
+    with pytest.raises(
+        ReferenceTorqueError, match="there is zero, vendor, two-cycle, sensor, file"
+    ):
+        ReferenceChoice(name="magic")
+    assert [ReferenceChoice(name=name).path for name in NAMES] == [None] * len(NAMES)
+
+
+def test_zero_is_zero_and_vendor_is_the_log_s_own() -> None:
+    zero = make_reference(MOTION, ReferenceChoice(name="zero")).torque
+    assert not zero.tau.any()
+    assert zero.floor is None  # nobody knows how free the motion was
+    vendor = make_reference(MOTION, ReferenceChoice(name="vendor")).torque
+    np.testing.assert_array_equal(vendor.tau, RECORDING.tau_ext)
+    assert vendor.floor is None  # its error is not known
+
+
+def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> None:
+    reads = []
+    monkeypatch.setattr(
+        references, "read_reference", lambda *a: reads.append(a) or read_reference(*a)
+    )
+    choice = write(tmp_path / "truth.parquet", wrench=WRENCH)
+    reference = make_reference(MOTION, choice)
+    wrench = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
+    assert len(reads) == 1
+    # A file of base axes, asked for in base axes, comes back as it is.
+    np.testing.assert_allclose(wrench.values, WRENCH, atol=1e-9)
+
+
+def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) -> None:
+    choice = write(tmp_path / "truth.parquet", wrench=WRENCH)
+    tau = make_reference(MOTION, choice).torque.tau
+    J = flange_jacobian(ROBOT.chain, Q)
+    np.testing.assert_allclose(tau[7], J[7].T @ WRENCH[7], atol=1e-12)
+
+
+def test_a_file_may_say_that_nobody_touched_the_arm(tmp_path) -> None:
+    """Zero throughout is a truth; of a log's own wrench it means that nothing was measured."""
+    zero = np.zeros((300, 6))
+    both = make_reference(MOTION, write(tmp_path / "x.parquet", wrench=zero, tau_ext=zero))
+    assert not both.torque.tau.any()
+    assert not both.wrench.values.any()
+
+
+def test_torques_of_a_file_go_before_its_wrench(tmp_path) -> None:
+    tau = RNG.standard_normal((300, 6))
+    choice = write(tmp_path / "truth.parquet", wrench=WRENCH, tau_ext=tau)
+    reference = make_reference(MOTION, choice)
+    np.testing.assert_allclose(reference.torque.tau, tau, atol=1e-12)
+    assert reference.wrench is not None
+    remark = reference.torque.remarks[0]
+    assert remark.values["covered"] == remark.values["samples"] == 300
+
+
+def test_samples_beyond_the_file_are_unknown_half_a_sample_allowed(tmp_path) -> None:
+    """The file begins 4 ms after the log's 50th sample: half of the 10 ms step covers it."""
+    t = T[50:200] + 0.004
+    choice = write(tmp_path / "truth.parquet", t, tau_ext=np.repeat(t[:, None], 6, axis=1))
+    tau = make_reference(MOTION, choice).torque.tau
+    known = np.isfinite(tau).all(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(known), np.arange(50, 200))
+    np.testing.assert_allclose(tau[51:200, 0], T[51:200], atol=1e-12)  # linear between stamps
+
+
+@pytest.mark.parametrize("what", ["tau_ext", "wrench"])
+def test_a_clock_of_another_day_is_refused(tmp_path, what) -> None:
+    path = tmp_path / "truth.parquet"
+    choice = write(path, wrench=WRENCH) if what == "wrench" else write(path, tau_ext=WRENCH)
+    pl.read_parquet(path).with_columns(pl.col("t") + 1e6).write_parquet(path)
+    with pytest.raises(ReferenceTorqueError, match="does not overlap the log's"):
+        make_reference(MOTION, choice)
+
+
+def test_a_file_of_another_arm_is_refused(tmp_path) -> None:
+    choice = write(tmp_path / "truth.parquet", tau_ext=np.zeros((300, 7)))
+    with pytest.raises(ReferenceTorqueError, match="7 torque columns for a log of 6 joints"):
+        make_reference(MOTION, choice)
+
+
+def test_a_torque_becomes_a_wrench_by_least_squares(tmp_path) -> None:
+    """Jᵀ w of a wrench, away from singular poses, gives the wrench back."""
+    tau = np.einsum("tij,ti->tj", flange_jacobian(ROBOT.chain, Q), WRENCH)
+    choice = write(tmp_path / "truth.parquet", tau_ext=tau)
+    reference = make_reference(MOTION, choice)
+    assert reference.wrench is None
+    solved = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
+    assert not solved.hidden.any()
+    np.testing.assert_allclose(solved.values, WRENCH, atol=1e-6)  # condition of J below 1e3
+
+
+def test_a_lag_behind_the_sensor_is_said_where_the_sensor_is_the_reference(tmp_path) -> None:
+    """A wrench equal to the sensor's: no lag. A file's wrench is no sensor's."""
+    recording = Recording(t=T, q=Q, wrench=WRENCH)
+    motion = FreeMotion(log=Run(recording=recording, robot=ROBOT))
+    estimate = ExternalTorque(name="gmo", t=T, tau=np.zeros((300, 6)))
+    never = np.zeros(300, bool)
+    sensor, choice = VirtualSensor(frame="base"), ReferenceChoice(name="sensor")
+    same = reference_wrench(recording, ROBOT, make_reference(motion, choice), sensor)
+    wrenches = (replace(same, name="gmo"),)
+    read = SensorReading(sensor=sensor, wrenches=wrenches, masked=never, free=never)
+    found = judge(motion, [estimate], read, choice)[2]
+    (lag,) = (remark for remark in found.remarks if remark.code == "lag-behind-sensor")
+    assert lag.values["lag_ms"] == pytest.approx(0.0, abs=5.0)  # half a sample
+    assert lag.values["correlation"] == pytest.approx(1.0)
+    file = write(tmp_path / "truth.parquet", wrench=WRENCH)
+    found = judge(motion, [estimate], read, file)[2]
+    assert found.remarks == ()
+
+
+# Rows of wrenches: axes, units, bands, and contacts below them
+
+
+TIMES = 0.01 * np.arange(200)
+WAVES = np.column_stack([np.sin((k + 1) * TIMES) for k in range(6)])
+
+
+def wrench(values: np.ndarray, name: str = "gmo", **more: object) -> Wrench:
+    return Wrench(name=name, t=TIMES, values=values, frame="base", **more)  # type: ignore[arg-type]
+
+
+def wrench_rows(found: Wrench, reference: Wrench) -> dict[str, dict[str, object]]:
+    table = evaluate_wrenches("log", [found], reference)
+    return {row["axis"]: row for row in table.iter_rows(named=True)}
+
+
+def test_an_axis_has_its_own_unit() -> None:
+    """Errors 1 to 6: newtons for the first three, newton metres for the others."""
+    found = wrench_rows(wrench(WAVES + np.arange(1.0, 7.0)), wrench(WAVES, "sensor"))
+    assert list(found) == list(AXES)
+    for k, axis in enumerate(AXES):
+        here, there = ("N", "Nm") if axis.startswith("f") else ("Nm", "N")
+        for size in ("rmse", "bias", "max"):
+            assert found[axis][f"{size}_{here}"] == pytest.approx(k + 1.0)
+        assert found[axis][f"rmse_{there}"] is None
+        assert found[axis]["samples"] == len(TIMES)
+        assert found[axis]["correlation"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("error", "share"), [(0.0, 1.0), (0.97, 1.0), (0.99, 0.0), (3.0, 0.0)])
+def test_the_band_holds_1_96_deviations(error: float, share: float) -> None:
+    found = wrench_rows(wrench(WAVES + error, sd=np.full((200, 6), 0.5)), wrench(WAVES, "sensor"))
+    assert {row["band_share"] for row in found.values()} == {share}
+
+
+def test_a_sample_without_an_answer_is_zero_and_in_no_band() -> None:
+    """A quarter without an answer, three eighths outside: three eighths are left within."""
+    values = WAVES.copy()
+    values[:50] = np.nan
+    values[50:125] += 9.0
+    found = wrench_rows(wrench(values, sd=np.ones((200, 6))), wrench(WAVES, "sensor"))
+    assert found["mz"]["band_share"] == pytest.approx(0.375)
+    assert found["mz"]["missing"] == pytest.approx(0.25)
+    assert found["mz"]["samples"] == 200
+    wanted = np.sqrt((np.sum(WAVES[:50, 5] ** 2) + 75 * 81.0) / 200)
+    assert found["mz"]["rmse_Nm"] == pytest.approx(wanted)
+
+
+def test_without_a_deviation_or_a_known_sample_there_is_no_share() -> None:
+    assert wrench_rows(wrench(WAVES), wrench(WAVES, "sensor"))["fx"]["band_share"] is None
+    nothing = wrench(np.full((200, 6), np.nan), sd=np.ones((200, 6)))
+    row = wrench_rows(wrench(WAVES, sd=np.ones((200, 6))), nothing)["fx"]
+    assert row["band_share"] is None
+    assert row["rmse_N"] is None
+    assert row["samples"] == 0
+
+
+def test_contacts_stand_below_the_errors() -> None:
+    detection = Detection(
+        contacts=3, listed=5, missed=1, false_alarms=2, false_alarms_per_h=7.5,
+        delay=(0.1, 0.3, np.nan),
+    )  # fmt: skip
+    score = ContactScore(name="gmo", signal="torque", detection=detection)
+    errors = pl.DataFrame({"recording": ["log"], "observer": ["gmo"]})
+    row = with_contacts(errors, "log", "truth", [score]).row(1, named=True)
+    names = ("contacts", "listed_contacts", "found_contacts", "missed_contacts", "false_alarms")
+    assert [row[name] for name in names] == [3, 5, 2, 1, 2]
+    assert row["false_alarms_per_h"] == 7.5
+    assert row["detection_delay_s"] == pytest.approx(0.2)  # the mean of those that were found
+    assert row["longest_delay_s"] == pytest.approx(0.3)
+
+
+# Where a log shows contact by itself: planted pushes, free logs, and what cannot be known
+
+
+ROOT = Path(__file__).parent.parent.parent
+FIXTURE = reading.read(ROOT / "fixtures" / "ur5_circle.csv")
+UR5 = load_robot("ur5")
+REAL = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+
+
+def test_a_simulated_push_is_found_where_it_was() -> None:
+    """The scenario holds 30 N and more from 4 s on; its first cycle of 4 s is free."""
+    found = touches(Run(recording=FIXTURE, robot=UR5))
+    assert found
+    assert min(touch.start for touch in found) > 4.0
+    remarks = touched_remarks(Run(recording=FIXTURE, robot=UR5))
+    (warned,) = remarks
+    assert (warned.code, warned.level) == ("reference-zero-touched", "warning")
+    assert "--interval 0.0:" in sentence(warned)
+    free = Run(recording=FIXTURE.between(0.0, 4.0), robot=UR5)
+    assert touches(free) == ()
+    assert touched_remarks(free) == ()
+
+
+def test_two_planted_torques_are_where_they_were_planted() -> None:
+    """30 N·m on J3 and 12 N·m on J5 of a free motion, as the current that they need.
+
+    A first-order flank of the 2 Hz low-pass spreads a pulse by .1 s or so. The excess is over
+    the largest of 8 times the quiet level, 1.5 times the dry friction and 2 N·m, by definition.
+    """
+    free = FIXTURE.between(0.0, 4.0)
+    pulses = ((0.5, 1.0, 2, 30.0), (3.3, 3.6, 4, 12.0))
+    current = free.require("current").copy()
+    for start, stop, j, torque in pulses:
+        on = (free.t > start) & (free.t < stop)
+        current[on, j] -= torque / UR5.torque_constant[j]
+    log = Run(recording=replace(free, current=current), robot=UR5)
+    found = touches(log)
+    for touch, (start, stop, j, torque) in zip(found, pulses, strict=True):
+        assert touch.joint == j
+        assert (touch.start, touch.stop) == pytest.approx((start, stop), abs=0.12)
+        assert touch.torque == pytest.approx(torque, rel=0.15)
+        limit = max(8.0 * touch.quiet, 1.5 * log.dry_friction[j], 2.0)
+        assert touch.excess == pytest.approx(touch.torque / limit)
+    (warned,) = touched_remarks(log)
+    assert (warned.where.joints, warned.where.span) == ((3,), (found[0].start, found[0].stop))
+    assert warned.values["spans"] == 2
+    begin, end = warned.values["begin_s"], warned.values["end_s"]
+    assert 0.0 <= begin - found[0].stop < 0.1
+    assert 0.0 <= found[1].start - end < 0.1
+    assert [round(float(x), 1) for x in (begin, end)] == [begin, end]
+
+
+def test_the_worst_contact_is_the_largest_for_its_joint_s_quiet_level() -> None:
+    """Half of a sine of 7 N·m on J2 is above 4.9: 60 N·m there are less than 30 of 2 on J5."""
+    free = FIXTURE.between(0.0, 4.0)
+    torque = np.zeros_like(free.q)
+    torque[:, 1] = 7.0 * np.sin(2.0 * np.pi * free.t / 2.0)
+    torque[(free.t > 0.4) & (free.t < 0.9), 1] += 60.0
+    torque[(free.t > 3.0) & (free.t < 3.4), 4] += 30.0
+    current = free.require("current") - torque / UR5.torque_constant
+    log = Run(recording=replace(free, current=current), robot=UR5)
+    assert [touch.joint for touch in touches(log)] == [1, 4]
+    assert touches(log)[0].quiet > 4.0
+    (warned,) = touched_remarks(log)
+    assert warned.where.joints == (5,)
+    assert warned.values["torque_Nm"] == pytest.approx(30.0, rel=0.15)
+
+
+def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -> None:
+    """That nobody touched this UR10 is its authors' word; 7 N·m of J6's friction are open."""
+    path = logs / "salerno_ur10" / "ur10_exciting.db3"
+    recording = reading.read(path, columns="tau=effort")
+    log = Run(recording=recording, robot=load_robot("ur10"))
+    made = make_reference(FreeMotion(log=log), ReferenceChoice(name="zero"))
+    assert not made.torque.tau.any()
+    assert [remark.code for remark in made.torque.remarks] == [
+        "reference-zero",
+        "reference-zero-touched",
+    ]
+
+
+def test_without_friction_or_a_quiet_level_a_log_is_not_judged() -> None:
+    bare = Run(recording=FIXTURE, robot=UR5.without_friction())
+    assert touches(bare) == ()
+    assert touches(Run(recording=FIXTURE.between(5.0, 6.9), robot=UR5)) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "touched"),
+    [
+        ("ur10e/free_14harm.csv", REAL, False),
+        ("ur10e/free_12harm.csv", REAL, False),
+        ("ur10e/free_repeat_b.csv", REAL, False),
+        ("ur10e/jointwise_2.csv", REAL, False),
+        ("ur10e/load_14harm.csv", REAL, False),  # a load is no contact
+        ("ur10e/push_pose.csv", REAL, True),  # four pushes by hand
+    ],
+)
+def test_hands_are_found_in_real_logs_and_in_those_alone(
+    name: str, columns: str, touched: bool, logs: Path
+) -> None:
+    recording = reading.read(logs / name, columns=columns)
+    found = touches(Run(recording=recording, robot=load_robot("ur10e")))
+    assert bool(found) == touched
+    assert np.all([touch.torque > touch.quiet for touch in found])

@@ -34,7 +34,7 @@ ROOT = Path(__file__).parent.parent.parent
 
 ROOMS: Mapping[str, str] = {
     "observers": "observers test_pipeline.py",
-    "free_motion": "free_motion bias/test_reference_runs.py evaluation/test_reference_choice.py "
+    "free_motion": "free_motion bias/test_reference_runs.py evaluation/test_references.py "
     "test_pipeline.py",
     "wrench": "wrench contacts evaluation outputs",
     "evaluation": "evaluation wrench/test_sensor.py test_pipeline.py",

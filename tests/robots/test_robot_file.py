@@ -1,18 +1,25 @@
 """Users' own robot files: what is accepted, and that a complaint names the line that is wrong."""
 
+import csv
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from made_urdfs import written
+from made_urdfs import two_armed, written
 
-from vftcli.robots import PROFILES, JointFriction, Payload, load_robot
+from vftcli.robots import PROFILES, JointFriction, Payload, RobotChoice, load_robot
+from vftcli.robots.chain import link_poses, unphysical
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.profile import robot_toml
 from vftcli.robots.robot_file import lines_of, value_text
-from vftcli.signals.errors import RobotError
+from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.recording import Recording
+
+# Users' own robot files: what is accepted, and that a complaint names the line that is wrong
+
 
 HEAD = """schema = 1
 name = "planar"
@@ -201,3 +208,158 @@ sign = "\\U000E0001 \\u0007"
     assert tomllib.loads("".join(lines_of(document))) == document
     with pytest.raises(RobotError, match="cannot hold a complex"):
         value_text(1j, "here")
+
+
+# Built-in profiles against numbers Pinocchio computed from the manufacturers' URDFs
+
+
+POSES = Path(__file__).with_name("profile_poses.csv")
+"""Two poses an arm: joint positions, flange position and gravity torque, of one row each.
+
+Origin: Pinocchio 4.1 on the manufacturers' URDFs (UniversalRobots ROS 2 description for the UR
+arms, franka_description for the FR3, an arm-only URDF with the parameters of Gaz et al. 2019 for
+the Panda; for the others the maker's own description that each file names, right angles made
+exact), in the DH base frame, g = (0, 0, −9.81).
+"""
+
+# The files print α as ±1.5707963267949, 13 digits, which is 1e-10 m over an arm.
+POSITION, TORQUE = 1e-6, 1e-6
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_flange_and_gravity_are_the_makers(name: str) -> None:
+    robot = load_robot(name)
+    lines = csv.reader(POSES.read_text("utf-8").splitlines())
+    rows = [
+        [np.array(text.split(), float) for text in row[1:]] for row in lines if row[0] == name
+    ]
+    assert len(rows) == 2
+    for q, position, gravity in rows:
+        at = q[None]
+        flange = link_poses(robot.chain, at).translation[0, -1]
+        np.testing.assert_allclose(flange, position, atol=POSITION)
+        terms = momentum_terms(robot.chain, at, np.zeros_like(at))
+        np.testing.assert_allclose(terms.gravity[0], gravity, atol=TORQUE)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_every_number_has_a_source_and_every_body_is_physical(name: str) -> None:
+    robot = load_robot(name)
+    assert robot.sources
+    assert "falling-friction" not in {remark.code for remark in robot.remarks}
+    for mass, inertia in zip(robot.chain.mass, robot.chain.inertia, strict=True):
+        assert unphysical(float(mass), inertia) == ""
+    assert robot.joints == robot.document["dof"]
+
+
+def test_the_papers_torque_constants_are_kept_beside_the_corrected_ones() -> None:
+    robot = load_robot("ur5")
+    assert robot.document["torque_constant_printed"][1] == 12.1625  # Sec. IV-A, as printed
+    assert robot.torque_constant is not None
+    assert robot.torque_constant[1] == 12.625  # 0.125 N·m/A · 101
+
+
+def test_the_hand_is_mounted_turned_as_the_maker_mounts_it() -> None:
+    """The same hand in the simulated FR3's own file has its centre of mass at ∓6.8 mm."""
+    bare, hand = load_robot("fr3"), load_robot("fr3").with_payload("franka_hand")
+    assert hand.payload is not None
+    np.testing.assert_allclose(hand.payload.com[:2], [-0.00707, 0.00707], atol=1e-5)
+    assert hand.loaded_chain.mass[-1] == bare.chain.mass[-1] + 0.73
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("pnada", "panda"), ("ru5e", "ur5e"), ("ur6e", ""), ("ur9", ""), ("fr4", "")],
+)
+def test_a_misspelt_name_suggests_the_arm_it_means_and_never_another(name, meant) -> None:
+    """A profile of another arm gives wrong newtons, however near its name is."""
+    words = f"Did you mean {meant}?" if meant else "Built in: ur3"
+    with pytest.raises(RobotError, match=rf"no robot '{name}'\. {re.escape(words)}"):
+        load_robot(name)
+
+
+@pytest.mark.parametrize("word", ["UR5e", "ur-5e", "ur_5e", "UR 5E"])
+def test_a_name_is_understood_however_it_is_written(word: str) -> None:
+    assert load_robot(word).name == "ur5e"
+
+
+def test_tools_sensors_and_admittance_are_typed(tmp_path):
+    text = PROFILES["ur5"].read_text("utf-8") + (
+        "\n[tool]\nxyz = [0, 0, 0.1]\n[tool.gripper]\nrpy = [0, 0, 1.0]\n"
+        "[sensor.wrist]\nxyz = [0, 0, 0.03]\n"
+    )
+    robot = load_robot(written(tmp_path, text, "own.toml"))
+    assert sorted(robot.tools) == ["", "gripper"]
+    assert list(robot.sensors) == ["wrist"]  # no plain [sensor], so none is mounted
+    np.testing.assert_array_equal(robot.tools[""].translation, [0.0, 0.0, 0.1])
+    np.testing.assert_allclose(robot.tools["gripper"].rotation[0, 0], np.cos(1.0))
+    assert robot.admittance["period"] == 0.008
+    assert load_robot("panda").tools == {}
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ("[tool.gripper]\nxyz = [0, 0]", r"line \d+: xyz .*3"),
+        ("[sensor]\nrpy = 'up'", r"line \d+: rpy .*3"),
+    ],
+)
+def test_a_pose_that_is_none_is_refused_with_its_line(tmp_path, section, words):
+    text = PROFILES["ur5"].read_text("utf-8") + f"\n{section}\n"
+    with pytest.raises(RobotError, match=words):
+        load_robot(written(tmp_path, text, "own.toml"))
+
+
+# RobotChoice: the arm that is named, or the one the log settles
+
+
+def log(joints: int = 6, hint: str | None = None) -> Recording:
+    return Recording(t=np.array([0.0, 0.1]), q=np.zeros((2, joints)), robot_hint=hint)
+
+
+def test_the_named_arm_wins_over_the_log_s() -> None:
+    assert RobotChoice(name="ur5").load(log(hint="ur10e")).name == "ur5"
+    assert RobotChoice().load(log(hint="ur10e")).name == "ur10e"
+
+
+def test_without_either_the_fitting_profiles_are_listed() -> None:
+    """Of an arm that none fits all of them."""
+    for joints, words in (
+        (6, r"choose one with --robot: ur3, ur5, .*, m1013, or"),
+        (7, "choose one with --robot: panda, fr3, iiwa7, iiwa14, gen3, xarm7, or"),
+        (4, r"ur3, ur5, .*panda, .*m1013, or .* of 4 joints"),
+    ):
+        with pytest.raises(RobotError, match=words):
+            RobotChoice().load(log(joints))
+
+
+def test_friction_can_be_left_away() -> None:
+    assert any(f.model != "none" for f in RobotChoice(name="ur5").load(log()).friction)
+    without = RobotChoice.parsed(robot="ur5", settings={"model.friction": "none"}).load(log())
+    assert all(f.model == "none" for f in without.friction)
+
+
+def test_another_friction_is_refused_before_a_log_is_read() -> None:
+    with pytest.raises(ParameterError, match=r"model\.friction=lugre; there is profile, none"):
+        RobotChoice(friction="lugre")
+
+
+def test_a_payload_that_the_file_has_not_is_refused() -> None:
+    with pytest.raises(RobotError, match=r"no payload 'bucket'.*the robot file has franka_hand"):
+        RobotChoice(name="panda", payload="bucket").load(log(7))
+
+
+def test_the_tip_of_a_description_are_part_of_the_choice(tmp_path: Path) -> None:
+    path = written(tmp_path, two_armed())
+    choice = RobotChoice.parsed(robot=str(path), tip="left_tool0")
+    assert choice.load(log(7)).chain.names[0] == "left_joint1"
+    assert hash(choice) == hash(RobotChoice(name=str(path), tip="left_tool0"))
+
+
+def test_the_payload_that_the_log_declares_is_mounted() -> None:
+    reported = replace(log(6), payload_mass=1.2, payload_com=(0.0, 0.01, 0.1))
+    payload = RobotChoice(name="ur5e", payload="log").load(reported).payload
+    assert payload is not None
+    assert (payload.mass, payload.com.tolist()) == (1.2, [0.0, 0.01, 0.1])
+    with pytest.raises(RobotError, match="does not say which payload"):
+        RobotChoice(name="ur5e", payload="log").load(log(6))
