@@ -1,10 +1,10 @@
 """FDO and GMO: analytic answers, their identity, uneven clocks, and the printed forms."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_terms import random_walk, run_in_blocks
 
 from vftcli.observers import FilteredDynamicsObserver, MomentumObserver
 from vftcli.observers.observer import Observer
@@ -15,13 +15,9 @@ from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import median_step
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms
-from vftcli.signals.remarks import Remark
 from vftcli.signals.steady_filter import PIECE
 
 RATE = 125.0
-
-MakesTerms = Callable[..., DynamicsTerms]
-InBlocks = Callable[..., tuple[np.ndarray, tuple[Remark, ...]]]
 
 
 def clock(samples: int) -> np.ndarray:
@@ -40,11 +36,9 @@ def with_gaps(pieces: int, samples: int = 50) -> DynamicsTerms:
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.05])
-def test_bilinear_fdo_is_the_momentum_observer_of_equal_gain(
-    jitter: float, wandering: MakesTerms
-) -> None:
+def test_bilinear_fdo_is_the_momentum_observer_of_equal_gain(jitter: float) -> None:
     """From a moving start, on an even and on an uneven clock."""
-    terms = wandering(3000, jitter)
+    terms = random_walk(3000, jitter)
     fdo = FilteredDynamicsObserver(omega=10.0).estimate(terms).tau
     gmo = MomentumObserver(gain=10.0).estimate(terms).tau
     # an identity in exact arithmetic; the FDO's terms are of the size of ωp and cancel
@@ -81,10 +75,8 @@ def test_fdo_follows_the_continuous_filter() -> None:
     "observer", [FilteredDynamicsObserver(omega=7.0), MomentumObserver(gain=7.0)]
 )
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
-def test_agrees_with_the_formula_written_as_a_loop(
-    observer: Observer, jitter: float, wandering: MakesTerms
-) -> None:
-    terms = wandering(700, jitter, joints=2)
+def test_agrees_with_the_formula_written_as_a_loop(observer: Observer, jitter: float) -> None:
+    terms = random_walk(700, jitter, joints=2)
     r, k = np.zeros_like(terms.p), 7.0
     for i in range(1, terms.samples):
         a = 0.5 * k * (terms.t[i] - terms.t[i - 1])
@@ -153,19 +145,17 @@ def test_as_printed_fdo_leaks_momentum() -> None:
 
 
 @pytest.mark.parametrize(("kappa", "stable"), [(0.3, True), (1.9, True), (2.1, False)])
-def test_as_printed_gmo_is_unstable_from_two_on(
-    kappa: float, stable: bool, wandering: MakesTerms
-) -> None:
+def test_as_printed_gmo_is_unstable_from_two_on(kappa: float, stable: bool) -> None:
     """z² − (1−κ/2)z + κ/2 = 0 has its roots on the unit circle at κ = 2."""
-    terms = wandering(2000, joints=1)
+    terms = random_walk(2000, joints=1)
     printed = MomentumObserver(gain=kappa * RATE, as_printed=True).estimate(terms)
     peak = np.nanmax(np.abs(printed.tau))
     assert (peak < 1e6) == stable
     assert bool(printed.remarks) != stable
 
 
-def test_as_printed_gmo_agrees_with_its_formula_as_a_loop(wandering: MakesTerms) -> None:
-    terms = wandering(400, joints=2)
+def test_as_printed_gmo_agrees_with_its_formula_as_a_loop() -> None:
+    terms = random_walk(400, joints=2)
     printed = MomentumObserver(gain=10.0, as_printed=True).estimate(terms).tau
     r = np.zeros((401, 2))
     half = 0.5 * 10.0 / RATE
@@ -187,24 +177,24 @@ def test_a_gain_that_is_not_positive_is_refused(gain: float) -> None:
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
 @pytest.mark.parametrize("observer", [FilteredDynamicsObserver, MomentumObserver])
 def test_blocks_of_a_log_give_the_whole_log_s_estimate(
-    observer: type, jitter: float, as_printed: bool, wandering: MakesTerms, in_blocks: InBlocks
+    observer: type, jitter: float, as_printed: bool
 ) -> None:
-    log, fdo = wandering(PIECE + 900, jitter, joints=2), observer(as_printed=as_printed)
+    log, fdo = random_walk(PIECE + 900, jitter, joints=2), observer(as_printed=as_printed)
     whole = fdo.estimate(log).tau
-    np.testing.assert_array_equal(in_blocks(fdo, log, PIECE)[0], whole)
+    np.testing.assert_array_equal(run_in_blocks(fdo, log, PIECE)[0], whole)
     for size in (1, 37, 5000):
         short = slice(0, 300 if size == 1 else None)
         part = DynamicsTerms(
             t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock
         )
         # the same sums in another order; momenta of 10 times ω
-        found = in_blocks(fdo, part, size)[0]
+        found = run_in_blocks(fdo, part, size)[0]
         np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)
 
 
-def test_gaps_are_counted_over_all_blocks(in_blocks: InBlocks) -> None:
+def test_gaps_are_counted_over_all_blocks() -> None:
     log, gmo = with_gaps(3), MomentumObserver(gain=10.0)
-    (tau, remarks), whole = in_blocks(gmo, log, 25), gmo.estimate(log)
+    (tau, remarks), whole = run_in_blocks(gmo, log, 25), gmo.estimate(log)
     assert remarks == whole.remarks
     np.testing.assert_allclose(tau, whole.tau, atol=1e-12)
 

@@ -1,10 +1,10 @@
 """Kalman observers against a dense textbook filter, SciPy's Riccati and matrix exponential."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from made_terms import dense_filter, random_walk, run_in_blocks
 from scipy.linalg import expm, solve_discrete_are
 
 from vftcli.observers import KalmanObserver
@@ -24,9 +24,6 @@ R = np.array([0.5, 0.5, 0.5, 1.3, 1.3, 1.3])  # the paper's UR5 values, Sec. IV-
 Q_P = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
 Q_TAU = np.full(6, 5000.0)
 STEP = 0.008
-
-MakesTerms = Callable[..., DynamicsTerms]
-DenseFilter = Callable[..., list[Any]]
 
 
 def dense_torque(steps: list[Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -52,10 +49,10 @@ def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObs
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 def test_agrees_with_the_dense_textbook_filter(
-    scheme: str, convention: str, jitter: float, wandering: MakesTerms, dense: DenseFilter
+    scheme: str, convention: str, jitter: float
 ) -> None:
-    observer, log = paper(scheme, convention), wandering(jitter=jitter)
-    tau, sd = dense_torque(dense(observer, log))
+    observer, log = paper(scheme, convention), random_walk(jitter=jitter)
+    tau, sd = dense_torque(dense_filter(observer, log))
     estimate = observer.estimate(log)
     # the decoupled filter is the same filter; 1500 steps of rounding at values of 100 N·m
     np.testing.assert_allclose(estimate.tau, tau, atol=1e-10, rtol=0)
@@ -67,11 +64,11 @@ def test_agrees_with_the_dense_textbook_filter(
     [("fe", {"decay": 3.0}), ("zoh", {"decay": 3.0}), ("fe", {"as_printed": True})],
 )
 def test_decay_and_printed_euler_agree_with_the_dense_textbook_filter(
-    scheme: str, more: dict[str, Any], wandering: MakesTerms, dense: DenseFilter
+    scheme: str, more: dict[str, Any]
 ) -> None:
     """The print is on μ alone, of the literal noise."""
-    observer, log = paper(scheme, **more), wandering(samples=600)
-    tau, _ = dense_torque(dense(observer, log))
+    observer, log = paper(scheme, **more), random_walk(samples=600)
+    tau, _ = dense_torque(dense_filter(observer, log))
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-10)
     printed, named = (one.model(STEP, 6) for one in (observer, paper("fe", "literal")))
     assert observer.as_printed is np.array_equal(printed.q22, named.q22)
@@ -99,10 +96,8 @@ def printed_loop(log: DynamicsTerms, joint: int, decay: float) -> tuple[np.ndarr
 
 @pytest.mark.parametrize("decay", [0.0, 2.0])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
-def test_as_printed_hold_runs_the_printed_block(
-    jitter: float, decay: float, wandering: MakesTerms
-) -> None:
-    log = wandering(samples=300, jitter=jitter)
+def test_as_printed_hold_runs_the_printed_block(jitter: float, decay: float) -> None:
+    log = random_walk(samples=300, jitter=jitter)
     found = paper("zoh", as_printed=True, decay=decay).estimate(log)
     for joint in (0, 3):
         tau, sd = printed_loop(log, joint, decay)
@@ -111,11 +106,9 @@ def test_as_printed_hold_runs_the_printed_block(
         np.testing.assert_allclose(found.sd[:, joint], sd, rtol=1e-9)
 
 
-def test_as_printed_hold_goes_on_where_a_block_ends(
-    wandering: MakesTerms, in_blocks: Callable[..., Any]
-) -> None:
-    observer, log = paper("zoh", as_printed=True), wandering(samples=300, jitter=0.2)
-    np.testing.assert_array_equal(in_blocks(observer, log, 37)[0], observer.estimate(log).tau)
+def test_as_printed_hold_goes_on_where_a_block_ends() -> None:
+    observer, log = paper("zoh", as_printed=True), random_walk(samples=300, jitter=0.2)
+    np.testing.assert_array_equal(run_in_blocks(observer, log, 37)[0], observer.estimate(log).tau)
 
 
 def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_sample() -> None:
@@ -226,9 +219,9 @@ def test_the_density_convention_does_not_change_with_the_rate() -> None:
     np.testing.assert_allclose(slow.delay, fast.delay, atol=(0.008 - 0.001) / 2)
 
 
-def test_forward_euler_refuses_a_decay_it_cannot_hold(wandering: MakesTerms) -> None:
+def test_forward_euler_refuses_a_decay_it_cannot_hold() -> None:
     with pytest.raises(ParameterError, match=r"unstable: decay·Ts = 2\.4"):
-        paper("fe", decay=300.0).estimate(wandering(samples=50))
+        paper("fe", decay=300.0).estimate(random_walk(samples=50))
 
 
 @pytest.mark.parametrize(
@@ -251,21 +244,19 @@ def test_half_the_power_passes_at_the_bandwidth(scheme: str) -> None:
 
 @pytest.mark.parametrize("as_printed", [False, True])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
-def test_blocks_of_a_log_give_the_whole_log_s_estimate(
-    jitter: float, as_printed: bool, wandering: MakesTerms, in_blocks: Callable[..., Any]
-) -> None:
+def test_blocks_of_a_log_give_the_whole_log_s_estimate(jitter: float, as_printed: bool) -> None:
     # (44) as printed has no pieces.
     scheme = "fe" if as_printed else "zoh"
-    observer, log = paper(scheme, as_printed=as_printed), wandering(PIECE + 900, jitter)
+    observer, log = paper(scheme, as_printed=as_printed), random_walk(PIECE + 900, jitter)
     whole = observer.estimate(log).tau
-    np.testing.assert_array_equal(in_blocks(observer, log, PIECE)[0], whole)
+    np.testing.assert_array_equal(run_in_blocks(observer, log, PIECE)[0], whole)
     for size in (37, 5000):
         short = slice(0, 400 if size == 37 else None)
         part = DynamicsTerms(
             t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock
         )
         # the same sums in another order; some 100 N·m
-        found = in_blocks(observer, part, size)[0]
+        found = run_in_blocks(observer, part, size)[0]
         np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)
 
 

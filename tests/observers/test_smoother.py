@@ -1,10 +1,10 @@
 """The smoother against a dense Rauch–Tung–Striebel textbook implementation, and its symmetries."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from made_terms import dense_filter, random_walk
 
 from vftcli.observers import KalmanObserver
 from vftcli.observers.smoother import KalmanSmoother
@@ -13,9 +13,6 @@ from vftcli.signals.external_torque import DynamicsTerms
 R, Q_P, Q_TAU = np.array([0.5, 1.3]), np.array([0.01, 0.02]), np.array([5000.0, 5000.0])
 STEP = 0.008
 WIDE = 1e9  # [(N·m·s)², (N·m)²]
-
-MakesTerms = Callable[..., DynamicsTerms]
-DenseFilter = Callable[..., list[Any]]
 
 
 def smoother(scheme: str = "fe", convention: str = "density", **more: object) -> KalmanSmoother:
@@ -41,12 +38,12 @@ def dense_rts(steps: list[Any]) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
 def test_agrees_with_a_dense_textbook_smoother(
-    scheme: str, convention: str, jitter: float, wandering: MakesTerms, dense: DenseFilter
+    scheme: str, convention: str, jitter: float
 ) -> None:
-    log = wandering(700, jitter, joints=2)
+    log = random_walk(700, jitter, joints=2)
     smooth = smoother(scheme, convention)
     # The first state may be anything: `WIDE` is its variance.
-    estimate, (tau, sd) = smooth.estimate(log), dense_rts(dense(smooth.filter, log, WIDE))
+    estimate, (tau, sd) = smooth.estimate(log), dense_rts(dense_filter(smooth.filter, log, WIDE))
     # the dense one rounds at `WIDE`, 1e-7 (N·m)² beside variances of .001 to 1000
     np.testing.assert_allclose(estimate.tau, tau, atol=2e-6, rtol=0)
     np.testing.assert_allclose(estimate.sd, sd, rtol=5e-4)

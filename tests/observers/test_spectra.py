@@ -1,11 +1,11 @@
 """Spectra of the raw disturbance: known densities, gaps, and the error they predict."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from made_runs import samples_of
+from made_terms import momentum_of
 
 from vftcli.observers.spectra import (
     ENOUGH,
@@ -25,14 +25,12 @@ from vftcli.signals.external_torque import DynamicsTerms
 
 STEP = 0.008
 
-MakesTerms = Callable[..., DynamicsTerms]
 
-
-def test_spectra_hold_the_mean_square_and_the_mean(terms_of: MakesTerms) -> None:
+def test_spectra_hold_the_mean_square_and_the_mean() -> None:
     """Parseval: the density summed over frequency is the power, a constant's included."""
     t = STEP * np.arange(4000)
     torque = 2.0 + np.random.default_rng(5).normal(0.0, 0.5, (4000, 2))
-    terms = terms_of(t, torque)
+    terms = momentum_of(t, torque)
     half = np.arange(4000) < 2000
     found = spectra_of(samples_of(terms, ~half), [samples_of(terms, half)])
     power = found.free.sum(axis=0) * found.width
@@ -56,11 +54,11 @@ def test_white_noise_has_a_flat_spectrum_of_the_known_height() -> None:
     assert found.external.sum() < 0.1 * found.loaded.sum()
 
 
-def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: MakesTerms) -> None:
+def test_an_uneven_clock_has_the_spectrum_of_its_median_step() -> None:
     rng = np.random.default_rng(11)
     t = np.cumsum(STEP * rng.uniform(0.9, 1.1, 6000))
     torque = 3.0 * np.sin(2 * np.pi * 2.0 * t)[:, None]
-    terms = terms_of(t, torque)
+    terms = momentum_of(t, torque)
     half = np.arange(len(t)) < 3000
     found = spectra_of(samples_of(terms, ~half), [samples_of(terms, half)])
     peak = found.frequency[np.argmax(found.loaded[:, 0])]
@@ -69,17 +67,17 @@ def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: MakesTerm
     assert found.loaded.sum() * found.width == pytest.approx(4.5, rel=0.03)
 
 
-def test_a_part_too_short_for_a_spectrum_is_refused(terms_of: MakesTerms) -> None:
-    terms = terms_of(STEP * np.arange(100), np.zeros((100, 1)))
+def test_a_part_too_short_for_a_spectrum_is_refused() -> None:
+    terms = momentum_of(STEP * np.arange(100), np.zeros((100, 1)))
     few = np.arange(100) < 20
     with pytest.raises(ParameterError, match="needs 32 samples in a row; the loaded part has 99"):
         spectra_of(samples_of(terms, ~few), [samples_of(terms, few)])
 
 
-def test_no_segment_reaches_across_a_gap(terms_of: MakesTerms) -> None:
+def test_no_segment_reaches_across_a_gap() -> None:
     t = np.concatenate([STEP * np.arange(60), 10.0 + STEP * np.arange(25)])
     t += np.random.default_rng(0).uniform(0, 1e-4, len(t))
-    terms = terms_of(t, np.ones((85, 1)))
+    terms = momentum_of(t, np.ones((85, 1)))
     few = np.arange(85) >= 60
     with pytest.raises(ParameterError, match=r"free part 2[34]"):
         spectra_of(samples_of(terms, ~few), [samples_of(terms, few)])

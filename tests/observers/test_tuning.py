@@ -2,13 +2,13 @@
 
 import json
 import tomllib
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from made_runs import samples_of
+from made_terms import momentum_of
 from typer.testing import CliRunner
 
 from vftcli.cli import make_app
@@ -174,10 +174,6 @@ def test_a_gain_at_a_bound_is_said_with_the_numbers() -> None:
     assert bounds_reached(tune_all(quiet, slow), quiet, slow) == ()
 
 
-MakesTerms = Callable[..., DynamicsTerms]
-Pushed = Callable[..., tuple[RunSamples, RunSamples]]
-
-
 def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
     """A random torque without jumps, two poles at a corner [rad/s], standard deviation 1."""
     from scipy.signal import lfilter
@@ -189,25 +185,19 @@ def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
     return lfilter([1.0], [1.0, -2.0 * a, a * a], white, axis=0)
 
 
-@pytest.fixture
-def pushed(terms_of: MakesTerms) -> Pushed:
-    """Makes a log that is half free, half under a random torque."""
-    return lambda **how: half_pushed(terms_of, **how)
-
-
-def half_pushed(
-    terms_of: MakesTerms, samples: int = 8000, scale: float = 5.0, noise: float = 2.0
+def pushed(
+    samples: int = 8000, scale: float = 5.0, noise: float = 2.0
 ) -> tuple[RunSamples, RunSamples]:
     """Half free, half with a random torque; white torque noise everywhere. Seed 1."""
     t = STEP * np.arange(samples)
     free = np.arange(samples) < samples // 2
     torque = scale * low_passed_noise(samples, 6.0, 1) * ~free[:, None]
-    terms = terms_of(t, torque, noise)
+    terms = momentum_of(t, torque, noise)
     return samples_of(terms, ~free), samples_of(terms, free)
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_expected_error_is_the_measured_one(name: str, pushed: Pushed) -> None:
+def test_the_expected_error_is_the_measured_one(name: str) -> None:
     """The spectra predict the rmse that the tuned observer then has against the truth."""
     loaded, free = pushed()
     observer = tune_to_spectra(name, spectra_of(loaded, [free]))
@@ -222,7 +212,7 @@ def test_the_expected_error_is_the_measured_one(name: str, pushed: Pushed) -> No
     np.testing.assert_allclose(rmse, observer.curve.least, rtol=0.2)
 
 
-def test_tuning_finds_the_best_of_all_natural_frequencies(pushed: Pushed) -> None:
+def test_tuning_finds_the_best_of_all_natural_frequencies() -> None:
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
     found = error_curve(kalman_filter, spectra)
@@ -236,7 +226,7 @@ def test_tuning_finds_the_best_of_all_natural_frequencies(pushed: Pushed) -> Non
         assert np.all(expected(found.best * factor) >= found.least)
 
 
-def test_the_noise_level_gives_innovations_their_expected_variance(pushed: Pushed) -> None:
+def test_the_noise_level_gives_innovations_their_expected_variance() -> None:
     """NIS = 1 on the loaded part, which is what R is scaled for."""
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
@@ -250,7 +240,7 @@ def test_the_noise_level_gives_innovations_their_expected_variance(pushed: Pushe
     np.testing.assert_allclose(nis, 1.0, rtol=0.1)
 
 
-def test_without_spectra_auto_falls_back_and_says_so(pushed: Pushed) -> None:
+def test_without_spectra_auto_falls_back_and_says_so() -> None:
     setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
     observers, remarks = build_observers(("kfo-auto", "rts-auto", "kfo-zoh", "kfo-rts"), setup)
     untuned = [r for r in remarks if r.code == "tuning-without-free-part"]
@@ -301,7 +291,7 @@ def test_a_bound_is_never_reached_in_silence() -> None:
     assert str(fast).startswith("kfo-auto: J3: ")
 
 
-def test_best_keeps_a_push_where_the_log_shows_none(pushed: Pushed) -> None:
+def test_best_keeps_a_push_where_the_log_shows_none() -> None:
     """Tuned on noise alone it keeps what 1/(1 + (ω/9)⁴) leaves of a half sine of .6 s."""
     _, free = pushed()
     t = free.run.terms.t

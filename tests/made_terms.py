@@ -1,20 +1,12 @@
-"""What tests of observers and spectra share."""
+"""Terms of known momenta, the textbook filter over them, and observers run block by block."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 
 from vftcli.observers import KalmanObserver, MomentumObserver
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import Remark
-
-
-@pytest.fixture
-def terms_of() -> Callable[..., DynamicsTerms]:
-    """Makes the terms of a body whose momentum integrates a torque, plus white torque noise."""
-    return momentum_of
 
 
 def momentum_of(t: np.ndarray, external: np.ndarray, noise: float = 0.0) -> DynamicsTerms:
@@ -29,12 +21,6 @@ def momentum_of(t: np.ndarray, external: np.ndarray, noise: float = 0.0) -> Dyna
     return DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
 
 
-@pytest.fixture
-def wandering() -> Callable[..., DynamicsTerms]:
-    """Makes the terms of a momentum that wanders, on a clock of 8 ms that may jitter."""
-    return random_walk
-
-
 def random_walk(
     samples: int = 1500, jitter: float = 0.0, seed: int = 0, joints: int = 6
 ) -> DynamicsTerms:
@@ -44,12 +30,6 @@ def random_walk(
     t = np.concatenate([[0.0], np.cumsum(steps)])
     p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, joints)), axis=0)
     return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, joints)))
-
-
-@pytest.fixture
-def dense() -> Callable[..., list[Any]]:
-    """Runs the 2n-state textbook filter with full matrices over a log."""
-    return dense_filter
 
 
 def dense_filter(observer: KalmanObserver, log: DynamicsTerms, wide: float = 0.0) -> list[Any]:
@@ -78,12 +58,6 @@ def dense_filter(observer: KalmanObserver, log: DynamicsTerms, wide: float = 0.0
         P = (whole - L @ C) @ P @ (whole - L @ C).T + L @ np.diag(m.r) @ L.T
         steps.append((before, (x, P)))
     return steps
-
-
-@pytest.fixture
-def in_blocks() -> Callable[..., tuple[np.ndarray, tuple[Remark, ...]]]:
-    """Runs an observer over a log block by block."""
-    return run_in_blocks
 
 
 def run_in_blocks(
