@@ -1,13 +1,12 @@
 """What a user may choose of the virtual sensor: one meaning of each option."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
+from fault_commands import run
 
-from vftcli.cli import main
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.wrench import FIT, WrenchChoice, ZeroChoice
@@ -59,19 +58,7 @@ def test_what_is_asked_goes_before_the_robot_file() -> None:
 
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
-COMMON = [str(CIRCLE), "--robot", "ur5", "--observer", "gmo"]
-
-
-def run(monkeypatch, capsys, *words: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of a command."""
-    monkeypatch.setattr(sys, "argv", ["vftcli", *words])
-    code = 0
-    try:
-        main()
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
+COMMON = [CIRCLE, "--robot", "ur5", "--observer", "gmo"]
 
 
 @pytest.mark.parametrize(
@@ -83,10 +70,8 @@ def run(monkeypatch, capsys, *words: str) -> tuple[int, str, str]:
         ((), False),
     ],
 )
-def test_any_wrench_option_asks_for_the_wrench(
-    monkeypatch, capsys, tmp_path, option, asks
-) -> None:
-    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *option, "-o", str(tmp_path))
+def test_any_wrench_option_asks_for_the_wrench(tmp_path, option, asks) -> None:
+    code, _, err = run(["estimate", *COMMON, *option, "-o", tmp_path])
     assert code == 0, err
     columns = pl.read_parquet_schema(tmp_path / "estimates.parquet")
     assert any("wrench" in name for name in columns) is asks
@@ -108,11 +93,9 @@ def test_any_wrench_option_asks_for_the_wrench(
         ),
     ],
 )
-def test_bad_options_are_one_line_and_leave_nothing(
-    monkeypatch, capsys, tmp_path, option, words
-) -> None:
+def test_bad_options_are_one_line_and_leave_nothing(tmp_path, option, words) -> None:
     out = tmp_path / "out"
-    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *option, "-o", str(out))
+    code, _, err = run(["estimate", *COMMON, *option, "-o", out])
     assert code == 1
     assert words in err
     lines = [line for line in err.splitlines() if not line.startswith(("log health: ", "note: "))]
