@@ -73,11 +73,7 @@ def free_thresholds(
 
 
 def modelled(recording: Recording, choice: AnalysisChoice) -> Run:
-    """A log with its robot, examined.
-
-    Raises:
-        ExaminationError: If a finding makes every result meaningless.
-    """
+    """A log with its robot, examined; meaningless results raise."""
     run = prepared(recording, choice)
     choice.examiner.examine(run.recording, run.robot)
     return run

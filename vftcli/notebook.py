@@ -123,11 +123,7 @@ def call(
 
 
 def checked(log: object, robot: object) -> tuple[Any, str | Robot | None]:
-    """One log or several, and a robot; a file's name as its path.
-
-    Raises:
-        ParameterError: If one is of another kind.
-    """
+    """One log or several, and a robot; names as paths. Others raise."""
     if not isinstance(robot, NamedRobot):
         raise ParameterError(f"robot is {robot!r}; expected a name as 'ur5', a file, or a Robot")
     for each in log if isinstance(log, list | tuple) else [log]:

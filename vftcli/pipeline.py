@@ -194,8 +194,7 @@ def analyse_logs(
 ) -> Iterator[Analysis]:
     """Analyses of a command's logs, one after the other; common parts are made once.
 
-    A log that cannot be analysed goes to `failed` if given, else raises a VftError, as two
-    logs of the same run do.
+    A log that cannot be analysed goes to `failed` if given, else raises a VftError.
     """
     recordings: list[tuple[Path | Recording, Recording]] = []
     for path in logs:

@@ -12,6 +12,7 @@ from contact_rows import contact, contact_list
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ForceCourse
 from vftcli.outputs.believability import MARKS, Ground
+from vftcli.outputs.contacts import forces_along
 from vftcli.outputs.error_tables import blocks
 from vftcli.outputs.screen import (
     FILE_LINES,
@@ -23,7 +24,6 @@ from vftcli.outputs.screen import (
     column_peaks,
     facts,
     force_bars,
-    forces_of_list,
     ground_lines,
     list_lines,
     log_screen,
@@ -285,11 +285,13 @@ def test_every_sample_counts_in_a_column_and_a_gap_is_bridged() -> None:
 
 def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
     rows = [
-        contact(start=1.0, stop=1.5, course=risen(1.0, 1.5, 30.0)),
-        contact(start=2.0, stop=2.2, number=2, course=risen(2.0, 2.2, 12.0)),
+        contact(start=1.0, stop=1.5, peak=1.25, peak_force=30.0, course=risen(1.0, 1.5, 30.0)),
+        contact(
+            start=2.0, stop=2.2, number=2, peak=2.1, peak_force=12.0, course=risen(2.0, 2.2, 12.0)
+        ),
     ]
     t = without_reference.t
-    force = forces_of_list(contact_list(*rows), t)
+    force = np.nan_to_num(forces_along(rows, t)[0])
     assert np.isclose(force[(t >= 1.0) & (t <= 1.5)].max(), 30.0, rtol=0.05)  # between samples
     assert np.isclose(force[(t >= 2.0) & (t <= 2.2)].max(), 12.0, rtol=0.1)
     assert not force[(t < 1.0) | (t > 2.2) | ((t > 1.5) & (t < 2.0))].any()

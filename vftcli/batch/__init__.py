@@ -78,11 +78,11 @@ class WorkersChoice(Choice):
 
     @property
     def tls(self) -> tuple[Path, ...]:
-        """Files of the authority's certificate, the own certificate and its key, or none."""
+        """Files of the authority, the own certificate and its key, or none."""
         return tuple(path for path in (self.ca, self.cert, self.key) if path is not None)
 
     def check_closed(self, *, anyway: bool) -> None:
-        """Refuse a cluster open to anyone on the network, unless the user accepts that."""
+        """Refuse a cluster open to anyone, unless the user accepts that."""
         if self.address is not None and self.address.startswith("tcp") and not anyway:
             raise ParameterError(
                 f"cluster.address={self.address}: anyone who reaches a tcp:// cluster can run code "
@@ -99,5 +99,5 @@ class WorkersChoice(Choice):
 
 
 def is_installed() -> bool:
-    """Whether Dask and cryptography, for its workers' certificates, are installed."""
+    """Whether Dask and cryptography, for certificates, are installed."""
     return all(find_spec(module) is not None for module in ("distributed", "cryptography"))

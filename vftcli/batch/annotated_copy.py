@@ -69,9 +69,7 @@ def annotate(
 ) -> Record:
     """Write a copy of a dataset with the forces of every frame.
 
-    Frames without an estimate stop the run; with `anyway` of the choice they are zero and
-    marked. `force`: an earlier copy may be replaced. Returns the content of
-    ``meta/vftcli.json``.
+    `force`: an earlier copy may be replaced. Returns the content of ``meta/vftcli.json``.
     """
     dataset = open_dataset(path, choice.read.columns)
     check_copy(path, copy, force=force)
@@ -120,7 +118,7 @@ def annotate(
 
 
 def open_dataset(path: Path, columns: str | None = None) -> Dataset:
-    """The dataset in a folder or HDF5 file; `columns` is the value of ``--columns``."""
+    """The dataset in a folder or HDF5 file, by ``--columns``."""
     file = open_log(path)
     if FORMATS["lerobot"].recognises(file):
         return LeRobotDataset(path)
@@ -171,7 +169,7 @@ def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work retu
 
 
 def gathered(outcomes: Iterable[Outcome[Any]], choice: ForceChoice) -> Record:
-    """Results of all episodes as of `estimate_episodes`, in the order of their files."""
+    """Results of all episodes, in the order of their files."""
     episodes: list[Record] = []
     made: Record = {"episodes": episodes, "robot": None, "observer": None}
     for outcome in outcomes:

@@ -82,7 +82,7 @@ class EpisodesTask(NamedTuple):
 
 
 def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
-    """Records of some episodes, robot and observer of the first; writes the forces."""
+    """Records of some episodes; writes their forces."""
     if task.rows.is_file():
         return dict(json.loads(str(stored_rows(task.rows)["record"])))
     library, examiner = Library([task.file.log]), Examiner(anyway=choice.anyway)
@@ -120,7 +120,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
 
 
 def check_signals(recording: Recording, *, anyway: bool) -> None:
-    """Raise an error without velocities, without efforts, or if efforts are constant."""
+    """Raise without velocities or efforts, or if efforts are constant."""
     if recording.dq is None:
         raise MissingSignalError(
             f"{recording.name}: no joint velocities. --set log.derive=dq makes them of positions "

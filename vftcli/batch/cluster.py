@@ -138,8 +138,7 @@ def run_tasks(
 ) -> Iterator[Outcome[Task]]:
     """Outcomes of some work on every task, in the order in which they end.
 
-    An error of the work is an outcome, too. A task runs again if its worker dies, three
-    times in all. Closing the iterator ends what has not begun.
+    A task runs again if its worker dies. Closing the iterator ends what has not begun.
     """
     rest, begun = iter(groups), time.monotonic()
     if choice.in_process or (choice.jobs is None and choice.address is None):
@@ -314,19 +313,15 @@ def perform_there(work: Work[Task], tasks: Sequence[Task]) -> list[Outcome[Task]
 
 @cache
 def settle() -> None:
-    """Once in a worker, wait for its nanny.
+    """Once in a worker, wait for its nanny, which looks every 50 ms.
 
-    The nanny looks every 50 ms whether its process started; Dask does not start one again
-    that ended before.
+    Dask does not start a process again that ended before.
     """
     time.sleep(SETTLED)
 
 
 class Workers:
-    """Count of a cluster's workers; on this machine kept at the initial one.
-
-    Dask does not start a worker again that died before its nanny knew of it.
-    """
+    """Count of a cluster's workers; on this machine kept at the initial one."""
 
     def __init__(self, client: "Client") -> None:
         self._client, self._wanted = client, len(client.nthreads())

@@ -61,7 +61,7 @@ def options_digest(options: Any) -> str:  # noqa: ANN401 - choices of every room
 
 
 def key_of(content: str, options: str, part: object = None) -> str:
-    """The key of one log's result, from its content, options and part of the file."""
+    """The key of a log's result: of content, options, part of the file."""
     return sha256("\n".join((content, options, "" if part is None else str(part))))
 
 
@@ -289,7 +289,7 @@ def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:
 
 
 def size_of(values: Array) -> tuple[float | None, float | None]:
-    """Root mean square and 99 % quantile of |values| that are known, None if none."""
+    """Root mean square and 99 % quantile of known |values|, or None."""
     known = np.abs(values[np.isfinite(values)])
     if not len(known):
         return None, None

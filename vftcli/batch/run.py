@@ -252,7 +252,7 @@ class LogCollection:
         self.passed: list[Path] = []
 
     def find(self, places: Iterable[Path]) -> Iterator[LogEntry]:
-        """The logs of files, folders, and patterns as ``logs/**/*.csv``, each once."""
+        """The logs of files, folders and patterns, each once."""
         given: set[Path] = set()
         for place in places:
             for path in map(absolute, matching(place)):
@@ -311,7 +311,7 @@ class LogCollection:
                 yield from self._parts(path)
 
     def _may_be_log(self, path: Path) -> bool:
-        """Whether a folder's file may be a log, damaged ones too: their error is shown."""
+        """Whether a folder's file may be a log, or a damaged one."""
         if path.name.endswith((".truth.parquet", SEAL)):
             return False
         try:
@@ -335,7 +335,7 @@ class LogCollection:
 
 
 def matching(place: Path) -> list[Path]:
-    """A path, or where there is nothing and it is a pattern, the paths that it fits."""
+    """A path, or the paths that fit a pattern."""
     # A name may hold such a letter: a file that is there wins.
     if place.exists() or not set("*?[") & set(str(place)):
         return [place]

@@ -92,8 +92,7 @@ def main() -> None:
 def launch() -> None:
     """Run `main` as a program and leave at once; this is `vftcli` in a shell.
 
-    Taking the interpreter apart costs as much as reading a large log; everything is written, and
-    exit functions called, before.
+    Taking the interpreter apart costs as much as reading a large log.
     """
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -155,7 +154,7 @@ class ClosedOutput(io.TextIOBase):
 
 
 def open_streams() -> None:
-    """Make standard streams harmless that the caller closed, or that lack letters."""
+    """Mend standard streams that are closed, or lack letters."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)

@@ -18,6 +18,7 @@ from vftcli.signals.option import Asked, Option, names_at
 #: Commands that compare logs with nothing.
 WITHOUT_REFERENCE = ("estimate", "contacts")
 SOME_FAILED = 3  #: Exit code if some logs failed, not all.
+MOST_NAMED = 10  #: Failures that are printed.
 
 
 @opt.command(WorkersChoice, ReferenceChoice, *OF_ANALYSIS, opt.Mcap, OutputChoice)
@@ -51,6 +52,7 @@ def batch(
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
     from vftcli.readers.reading import Library, absolute
+    from vftcli.readers.table import listed
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.parsing import counted
 
@@ -71,7 +73,9 @@ def batch(
     collection = LogCollection(choice.read, output)
     free = {*map(absolute, choice.free.logs)}
     found = [entry for entry in collection.find(logs) if entry.path not in free]
-    say_passed([path.name for path in collection.passed])
+    if passed := sorted(path.name for path in collection.passed):
+        what = "1 file is not a log" if len(passed) == 1 else f"{len(passed)} files are not logs"
+        say(f"note: {what}: {listed(passed, 3)}")
     if not found:
         raise LogError(
             f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"
@@ -96,16 +100,3 @@ def batch(
     )
     if count.failed:
         raise typer.Exit(SOME_FAILED if count.done + count.before else 1)
-
-
-MOST_NAMED = 10  #: Failures that are printed.
-
-
-def say_passed(names: list[str]) -> None:
-    """Name the files of the folders that are no logs."""
-    from vftcli.readers.table import listed
-
-    if not names:
-        return
-    what = "1 file is not a log" if len(names) == 1 else f"{len(names)} files are not logs"
-    say(f"note: {what}: {listed(sorted(names), 3)}")

@@ -82,11 +82,7 @@ def with_command(words: list[str]) -> list[str]:
 
 
 def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[str]]:
-    """The words with today's options for former ones, and a note on each.
-
-    Raises:
-        ParameterError: If one is gone, or lacks its value.
-    """
+    """The words with today's options; notes on former ones. Gone ones raise."""
     found, notes, arguments, rest = list[str](), list[str](), list[str](), iter(words)
     for word in rest:
         name, equals, value = word.partition("=")
@@ -112,11 +108,7 @@ def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[
 
 
 def now_of(name: str, value: str) -> str | None:
-    """Today's form of a former option with a value, None of any other word.
-
-    Raises:
-        ParameterError: If it is gone.
-    """
+    """Today's form of a former option, else None. Gone ones raise."""
     if not name.startswith("-") or len(name) < len("--sd"):
         return None
     if name in former()["gone"]:
@@ -126,11 +118,7 @@ def now_of(name: str, value: str) -> str | None:
 
 
 def add_arguments(words: list[str], arguments: list[str]) -> None:
-    """Add the arguments of a xacro to the robot in the words.
-
-    Raises:
-        ParameterError: If they name none.
-    """
+    """Add the arguments of a xacro to the robot, which the words must name."""
     for k, word in enumerate(words):
         if word.startswith("--robot=") or (k and words[k - 1] == "--robot"):
             words[k] = " ".join([word, *arguments])

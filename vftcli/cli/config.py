@@ -190,11 +190,7 @@ def options_of(command: Click) -> dict[str, Any]:
 
 
 def value_of(ctx: Click, option: Click, key: str, value: object, path: Path) -> Any:  # noqa: ANN401
-    """A value for typer's option: words, or True of a flag.
-
-    Returns:
-        None of an option that is off in the file.
-    """
+    """A value for typer's option: words, True, or None of a flag that is off."""
     if option.is_flag:
         if not isinstance(value, bool):
             raise ParameterError(f"{path}: {key} = {shown(value)} is neither true nor false")

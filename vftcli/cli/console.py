@@ -77,10 +77,7 @@ def detail(text: str) -> None:
 
 
 def show(text: str) -> None:
-    """Print a result that a file holds as well to stdout, unless --quiet.
-
-    Its canvas decides on colours.
-    """
+    """Print a result to stdout, unless --quiet: a file holds it."""
     if _level.get() > QUIET:
         echo(text, nl=not text.endswith("\n"), colour=True)
 

@@ -27,14 +27,7 @@ from vftcli.signals.option import Anyway, Asked
 
 
 def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str, object]) -> None:
-    """Refuse options that the method does not use.
-
-    Args:
-        task: What is identified.
-        free: What ``--free`` names.
-        logs: The logs.
-        others: Option that one method has no use for → what it was given.
-    """
+    """Refuse options that the method does not use."""
     for name, given in others.items():
         if given and (name == "--gains") != (task.method == "gains"):
             raise ParameterError(

@@ -293,7 +293,7 @@ def choice_for(
     on_screen: bool = False,
     observers: ObserverChoice | None = None,
 ) -> "AnalysisChoice":
-    """The choice of a command on its logs, with an examiner that prints their health."""
+    """The choice of a command, with an examiner that prints logs' health."""
     from vftcli.pipeline import choice_of
 
     if "observer" in asked.words:

@@ -97,7 +97,7 @@ def comparison_grid(rows: Sequence[Record], title: str = "") -> Grid:
 
 
 def latency_rows(run: ClosedLoop) -> list[Record]:
-    """The latencies of a closed loop as rows, None where something did not happen."""
+    """The latencies of a closed loop as rows, None for what did not happen."""
     return [
         {
             "axis": AXES[entry.axis],
@@ -272,7 +272,7 @@ def admittance_record(made: Replayed, command: str) -> Record:
 
 
 def render_admittance(found: Replayed, record: Record, title: str) -> str:
-    """The page: self-contained, nothing is loaded from anywhere."""
+    """The page."""
     replay, _, run, examinations = found
     t, p, lost = replay.motion.t, replay.parameters, np.count_nonzero(~replay.path.reached)
     eyebrow = (
@@ -323,7 +323,6 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
     p = replay.parameters
 
     def lines(values: Array) -> tuple[ChartLine, ...]:
-        """One line a controller, each with its own dashes. (T+1, N, 6)"""
         return tuple(
             ChartLine(controller.name, values[:, n], colour, DASHES[n % len(DASHES)])
             for n, (controller, colour) in enumerate(painted(replay))
@@ -365,7 +364,6 @@ def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, D
     shown = [k for k in moved if AXES[k] in dragged] or moved
 
     def draw(width: float) -> "Figure":
-        """Deviations under every controller, below the force if there is one."""
         deviation, force, *_ = charts(replay, run)
         columns = min(len(shown), 3 if width > NARROW else 2)
         plots = []

@@ -328,7 +328,7 @@ def reference_ground(analysis: Analysis) -> Ground:
 
 
 def missed_words(contacts: Sequence[Contact]) -> str:
-    """Rows of known size that miss the sensor by more than their band; "" for none."""
+    """Rows that miss the sensor by more than their band; "" for none."""
     off = []
     for row in contacts:
         force, band, read = row.peak_force, row.peak_band, row.sensor_force

@@ -132,7 +132,7 @@ class Results:
         return found
 
     def of(self, protocol: str, part: str, *, headline: bool = False) -> list[Record]:
-        """Rows of a protocol and part; the `headline` has exact models only if all are."""
+        """Rows of a protocol and part; `headline`: exact models only if all are."""
         own = [row for row in self.rows if (row["protocol"], row["part"]) == (protocol, part)]
         return [row for row in own if headline and not row["exact_model"]] or own
 
@@ -141,7 +141,7 @@ class Results:
         return list(dict.fromkeys(row["arm"] for row in self.of(protocol, part, headline=True)))
 
     def headline(self) -> Grid:
-        """Methods down; skill in contact and L1 in free motion of each protocol across."""
+        """Skill in contact and L1 in free motion, by method and protocol."""
         columns: list[Column | str] = ["method"]
         means: list[dict[str, float]] = []
         for part, (key, column) in HEADLINE.items():
@@ -161,7 +161,7 @@ class Results:
 
     @cached_property
     def lists(self) -> list[pl.DataFrame]:
-        """Counts of lists against the true contacts by arm, a frame a protocol and method."""
+        """Counts of lists by arm, a frame a protocol and method."""
         lists = self.table.filter(pl.col("part").is_in([*LISTS]))
         pooled = lists.group_by(*BY, "part", maintain_order=True).agg(*POOLED)
         return pooled.partition_by("protocol", "method", maintain_order=True)
@@ -194,7 +194,7 @@ class Results:
             yield f"in spite of a complaint (--anyway): {', '.join(marked)}"
 
     def silences(self) -> Iterator[str]:
-        """Share of time without an answer, by protocol and method, from `SILENT` on."""
+        """Lines on methods without an answer for more than `SILENT`."""
         for p in self.protocols:
             spoken = [row for part in HEADLINE for row in self.of(p, part, headline=True)]
             for method in dict.fromkeys(row["method"] for row in spoken):
@@ -303,10 +303,7 @@ def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[Recor
 
 
 def text_of(results: Results, form: str, *, every: bool) -> str:
-    """The results as CSV, as Markdown or LaTeX tables, or for the terminal.
-
-    The terminal has the headline and its lines, and `every` table if asked.
-    """
+    """The results as text; on the terminal the headline, or `every` table."""
     headline, lines = results.headline(), tuple(results.lines())
     if form == "csv":
         return grid.csv_rows(results.rows, results.rows[0] if results.rows else ())

@@ -100,10 +100,7 @@ class Chart(NamedTuple):
         return cls(key, title, (unit,), (title,), x, tuple(lines))
 
     def ends(self, panel: int) -> Span:
-        """Ends of a panel's vertical axis, with some room, for all panels of its family.
-
-        About ±1 where no value is known.
-        """
+        """Ends of the vertical axis of a panel's family, about ±1 without values."""
         low, high, families = np.inf, -np.inf, self.families or self.units
         for j in (j for j, family in enumerate(families) if family == families[panel]):
             # Visible lines, one by one: all of a long log would fill the memory.
@@ -143,7 +140,7 @@ def paint(colour: str) -> str:
 
 
 def families_of(limits: Array) -> tuple[int, ...]:
-    """Family of each joint, by torque limit: neighbours of one limit share a drive."""
+    """Family of each joint: neighbours of one torque limit share a drive."""
     runs = groupby(limits.tolist(), lambda limit: limit if np.isfinite(limit) else None)
     return tuple(number for number, (_, run) in enumerate(runs, 1) for _ in run)
 
@@ -166,7 +163,7 @@ def drawn_line(
 
 
 def thinned(t: Array, values: Array, stretches: int, *, log: bool = False) -> tuple[Array, Array]:
-    """A series with at most two samples a stretch, and the first and last of the log.
+    """A series with at most two samples a stretch, and its ends.
 
     The lowest and highest sample of every stretch keep their time and value. A log of at most
     twice as many samples stays whole. NaN breaks the line at unknown values and at gaps of

@@ -230,6 +230,19 @@ def contact_name(contact: Contact) -> str:
     return f"{'load' if contact.is_load else 'contact'} {contact.number}"
 
 
+def forces_along(contacts: Sequence[Contact], t: Array) -> tuple[Array, Array]:
+    """|F| of contacts along a log, and its 95 % band, else NaN. 2 × (T,) [N]"""
+    force, half = np.full((2, len(t)), np.nan)
+    for contact in contacts:
+        if (course := contact.course) is not None:
+            inside = (t >= course.t[0]) & (t <= course.t[-1])
+            force[inside] = np.interp(t[inside], course.t, course.force)
+            half[inside] = np.interp(t[inside], course.t, course.band)
+            # The nearest sample shows a peak between two.
+            force[np.argmin(np.abs(t - contact.peak))] = contact.peak_force
+    return force, half
+
+
 def contacts_record(found: ContactList) -> Record:
     """A log's contacts for machines, units in the names."""
     model, prior = found.model, found.model.prior
@@ -266,7 +279,7 @@ def contacts_csv(lists: Sequence[ContactList]) -> str:
 
 
 def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Contact]:
-    """At most `most` contacts with the largest force, else evidence, in time order."""
+    """At most `most` contacts, those of the largest force, in time order."""
     order = sorted(contacts, key=by_force, reverse=True)
     return sorted(order[:most], key=lambda contact: contact.start)
 

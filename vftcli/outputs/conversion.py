@@ -128,7 +128,7 @@ def ros_name(name: str) -> str:
 
 
 def source_stamps(recording: Recording) -> Nanoseconds:
-    """Time of every sample on the log's own clock, in whole nanoseconds. (T,) [ns]"""
+    """Time of every sample on the log's own clock. (T,) [ns]"""
     source = recording.source
     start = source.t0_ns if source.t0_ns is not None else round(source.t0 * 1e9)
     stamps: Nanoseconds = start + np.rint(recording.t * 1e9).astype(np.int64)
@@ -148,8 +148,7 @@ def write_topics(
 ) -> None:
     """Write a ros2-profile MCAP with zstd chunks, sample by sample, topics together.
 
-    An existing file is replaced. Each sample has a stamp [ns], (T,); events are in order
-    of time.
+    Each sample has a stamp [ns], (T,); events are in order of time.
     """
     from mcap.writer import CompressionType, Writer
 
@@ -201,10 +200,7 @@ def check_conversion(path: Path, force: bool) -> None:
 
 
 def flat_table(recording: Recording) -> "pl.DataFrame":
-    """A log as columns: t from 0, the source's own stamps, then the signals.
-
-    The table reader knows the names, so that the file reads back.
-    """
+    """A log as columns: t from 0, the source's own stamps, then the signals."""
     import polars as pl
 
     # Whole numbers: a float of today's date [s] is exact to 240 ns only.
@@ -213,7 +209,7 @@ def flat_table(recording: Recording) -> "pl.DataFrame":
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
-    """Write flat columns, zstd; other facts (joint names, frame) go to the metadata."""
+    """Write flat columns, zstd; joint names, frame … in the metadata."""
     frame = recording.wrench_frame
     metadata = {
         "format": recording.source.format,
@@ -228,7 +224,7 @@ def write_parquet(recording: Recording, path: Path) -> None:
 
 
 def write_csv(recording: Recording, path: Path) -> None:
-    """Write flat columns as CSV, with enough digits to restore every number exactly."""
+    """Write flat columns as CSV, with all digits."""
     with table_file(path) as file:
         flat_table(recording).write_csv(file)
 
@@ -295,7 +291,7 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
 def save(
     runs: "Mapping[Path, Simulation]", format: str = "", force: bool = False, command: str = ""
 ) -> list[Path]:
-    """Write each log and its companions; the paths of all files, a bag as a folder."""
+    """Write each log and its companions; the paths of all files."""
     from vftcli.simulation import writers
     from vftcli.simulation.scenario import to_toml
 

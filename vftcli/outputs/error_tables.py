@@ -101,7 +101,7 @@ class Block(NamedTuple):
 
 
 def blocks(errors: pl.DataFrame | None) -> tuple[Block, ...]:
-    """One block for each recording and reference, in table order; () without errors."""
+    """One block for each recording and reference, in table order."""
     return () if errors is None else tuple(map(block, logs_of(errors, "joint")))
 
 
@@ -146,7 +146,7 @@ def block(rows: pl.DataFrame) -> Block:
 def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and mean across, floor last."""
     rows: Rows = []
-    # The mean |error|, and 1 less the mean RMSE over the reference's rms, where known.
+    # 1 less the mean RMSE over the reference's rms is the skill.
     beside = {
         Column(head, form=form, seldom=True): known
         for head, form, known in (
@@ -241,10 +241,7 @@ def marks_in_words(found: Sequence[Block]) -> list[str]:
 
 
 def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Iterator[Grid]:
-    """RMSE of the wrenches, one table for each recording and reference that has any.
-
-    Below the paper's arm are the paper's bounds.
-    """
+    """RMSE of the wrenches, a table a log; the paper's bounds below its arm."""
     published = {a.recording.name: a.robot.published for a in analyses}
     for group in logs_of(errors, "axis"):
         samples = compared_samples(group)
@@ -270,7 +267,7 @@ def compared_samples(rows: pl.DataFrame) -> int:
 
 
 def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
-    """A line for each log and reference without a common wrench sample, with reason."""
+    """A line for each log and reference without a common wrench sample."""
     for rows in logs_of(errors, "axis"):
         if not compared_samples(rows):
             yield (
@@ -283,8 +280,7 @@ def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
 def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame:
     """The errors, with a column `overridden` where a finding makes them meaningless.
 
-    It holds the codes of these findings, in pooled rows those of all logs. Without any the
-    table stays as it is.
+    It holds the codes of these findings, in pooled rows those of all logs.
     """
     found = {a.recording.name: refused_codes(a.examinations) for a in analyses}
     codes = {name: ", ".join(each) for name, each in found.items() if each}
@@ -306,7 +302,7 @@ def doubts_of(errors: pl.DataFrame) -> list[str]:
 def to_terminal(
     errors: pl.DataFrame, analyses: "Sequence[Analysis]" = (), *, every: bool = True
 ) -> str:
-    """The tables of the tidy error table as text, with the meaning of their marks."""
+    """The tables of the errors as text, and what their marks mean."""
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
@@ -321,7 +317,7 @@ def to_terminal(
 
 
 def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
-    """All tables of the errors as GitHub Markdown, best value of each joint bold."""
+    """All tables of the errors as GitHub Markdown."""
     found = blocks(errors)
     doubts = (f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors))
     marks = map(escape_markdown, [*marks_in_words(found), *nothing_to_compare(errors)])
@@ -331,7 +327,7 @@ def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> st
 
 
 def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
-    """The RMSE as LaTeX tables (needs ``booktabs``), best value of each joint bold.
+    """The RMSE as LaTeX tables (needs ``booktabs``).
 
     Logs with equal joint heads share a table.
     """

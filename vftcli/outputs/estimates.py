@@ -32,7 +32,7 @@ LONG, GROUP_ROWS = 1 << 17, 1 << 15
 
 
 def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
-    """Time, motion, every observer's torque and the reference's, one flat column each.
+    """Time, motion, every torque, wrenches: one flat column each.
 
     Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``…
     [N·m]; ``sd/<observer>/1``… [N·m] where the observer gives one;
@@ -69,7 +69,7 @@ def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
 
 
 def wrench_columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
-    """Columns of wrenches: values, deviations, null space, sigma_min, if asked for."""
+    """Columns of wrenches: values, deviations, null space, sigma_min."""
     sensed = analysis.virtual_sensor
     bounded = sensed is not None and sensed.sensor.solver != "pinv"
     for wrench in analysis.wrenches:
@@ -158,7 +158,7 @@ def write_extras(
     folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
     """Write the extra files below a place of a folder."""
-    # Only the writers in use are loaded: the others are a third of a command's modules.
+    # Only the writers in use are loaded.
     for extra in choice.extras:
         path = folder / f"{place}{EXTRAS[extra]}"
         if extra == "csv":

@@ -16,7 +16,7 @@ MOST_FITS = 3  #: Most profiles shown, the nearest, if they do not fit.
 
 
 def examination_record(examination: Examination) -> Record:
-    """All of the doctor's facts for machines; the reader's warnings are findings, too."""
+    """All of the doctor's facts for machines, the reader's warnings too."""
     recording, source = examination.recording, examination.recording.source
     read = [remark for remark in source.remarks if remark.level == "warning"]
     return {
@@ -124,7 +124,7 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
 
 
 def command(name: str, log: Recording | None, *words: str) -> str:
-    """A command on a log as you type it; None is a contact-free log to be recorded."""
+    """A command on a log as typed; None: a free log to be recorded."""
     if log is None:
         return shlex.join(["vftcli", name, "free.csv", *words])
     columns = [f"--columns={log.source.columns}"] if log.source.columns else []
@@ -161,10 +161,7 @@ def refused_codes(examinations: Iterable[Examination]) -> list[str]:
 
 
 def overridden_lines(examinations: Sequence[Examination], *, fitting: bool = True) -> list[str]:
-    """Warning at the top of outputs that a finding makes meaningless.
-
-    One line a finding.
-    """
+    """Warnings above outputs that findings make meaningless."""
     return [
         doubt(f"{one.recording.name}: {words}")
         for one in examinations

@@ -147,7 +147,7 @@ def on_paper(drawing: Drawing) -> "Figure":
 
 
 def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Drawing:
-    """|F| of every numbered contact with its 95 % band over the log's clock. (T,) [s]"""
+    """|F| of every contact with its 95 % band over the log's clock. (T,) [s]"""
     courses = [c.course for c in found.contacts if c.course is not None]
     lines = [ChartLine("|F|", c.force[:, None], half=c.band[:, None], x=c.t) for c in courses]
     spans = contact_spans(found.contacts)
@@ -164,7 +164,7 @@ def force_drawing(found: ContactList, t: "Array | Sequence[float]" = ()) -> Draw
 
 
 def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> Chart:
-    """The chart with these observers' lines and the reference; a band on one alone."""
+    """The chart with these observers' lines and the reference."""
     estimated = [line.name for line in analysis.estimates]
     wanted = names or ([BEST] if BEST in estimated else estimated)
     kept = [x for x in chart.series if x.name in wanted or x.name not in estimated]
@@ -184,10 +184,7 @@ def numbers_of(contacts: Iterable[Contact]) -> dict[int, float]:
 
 
 def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:
-    """RMSE with its interval, joint by joint and observer by observer, a plot a log.
-
-    Empty if no joint has an error, or if more than `MOST` logs have no pooled rows.
-    """
+    """RMSE with its interval by joint, a plot a log; of many pooled."""
     groups = list(logs_of(errors, "joint"))
     if len(groups) > MOST:
         groups = [rows for rows in groups if rows["recording"][0] == POOLED]
@@ -206,7 +203,7 @@ def error_figures(errors: pl.DataFrame) -> dict[str, Drawing]:
 
 
 def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Drawing:
-    """Spectra of the free and the loaded part, and over them |H| of these observers."""
+    """Spectra of free and loaded part, with |H| of these observers."""
     chart = spectra_chart(spectra)
     frequency = spectra.frequency[1:]
     lines = []
@@ -218,7 +215,6 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
     over = chart._replace(key="gain", title="|H|", series=tuple(lines), lowest=LOWEST)
 
     def draw(width: float) -> "Figure":
-        """The spectra with the unit of their decibels."""
         figure = line_figure(width, plots_of(chart, over))
         figure.supylabel("Power density (dB of 1 (N·m)²/Hz)", fontsize=8.0)
         return figure
@@ -229,10 +225,7 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
 def tuning_drawing(
     curves: "Mapping[str, Curve]", chosen: "Mapping[str, tuple[Array, Array]]"
 ) -> Drawing:
-    """Expected error over the natural frequency, and the chosen rates.
-
-    `chosen` is an observer's rates [rad/s] and errors [N·m]. 2 × (n,)
-    """
+    """Expected error over frequency; chosen rates [rad/s] and errors [N·m]."""
     chart = tuning_chart(curves, lines_of_names(list(curves)))
     marks = {name: (rate / (2.0 * np.pi), least) for name, (rate, least) in chosen.items()}
     below = "Natural frequency (Hz)"
@@ -241,7 +234,7 @@ def tuning_drawing(
 
 
 def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:
-    """Spectra with |H| of every observer, and expected error over each one's rate."""
+    """Spectra with |H| of every observer, and expected errors."""
     running = {line.observer: line.running for line in tuned if line.running is not None}
     chosen = {line.observer: (line.rate, line.rmse) for line in tuned}
     return {

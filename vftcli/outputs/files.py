@@ -141,7 +141,7 @@ class OutputFolder:
         put_text(self / name, text)
 
     def digests(self, place: str = "") -> dict[str, str]:
-        """The sha256 of every file written so far below `place`, by its name there."""
+        """The sha256 of every file written below `place`, by its name there."""
         return digests(self.temporary / place)
 
     def check(self) -> None:
@@ -200,7 +200,7 @@ class OutputFolder:
         return declared.union(*listed, *(sealed_files(path, self.path) for path in killed))
 
     def _move(self) -> None:
-        """Put every file into place, after a last check that nothing is in the way."""
+        """Put every file into place, if nothing is in the way."""
         files = [p for p in self.temporary.rglob("*") if not p.is_dir()]
         places = {self.path / file.relative_to(self.temporary): file for file in files}
         to_disk([*files, self.temporary])
@@ -258,7 +258,7 @@ def digest(path: Path) -> str:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """The sha256 of every file in a folder and below it, by its name there, in order."""
+    """The sha256 of every file below a folder, by its name there, in order."""
     files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
     return {path.relative_to(folder).as_posix(): digest(path) for path in files}
 
@@ -282,7 +282,7 @@ def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:
 
 
 def refuse_existing(path: Path, force: bool) -> None:
-    """Raise an OutputError if something is at `path` that must not be overwritten."""
+    """Raise an OutputError if `path` must not be overwritten."""
     if path.is_dir():
         raise OutputError(f"{path} is a folder; give the name of a file")
     refuse_input(path)
@@ -345,7 +345,7 @@ def numbered(names: Iterable[str]) -> list[str]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Raise the operating system's errors in a block as one-line errors on `path`."""
+    """Raise a block's errors of the system as one-line errors on `path`."""
     try:
         yield
     except OSError as error:

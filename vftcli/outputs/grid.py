@@ -1,4 +1,4 @@
-"""Grid: one table of results for terminal, Markdown, LaTeX and HTML; numbers as text.
+"""Grid: a table for terminal, Markdown, LaTeX and HTML; numbers as text.
 
 This file and the pages' templates decide on looks and on escapes: names from files may
 hold any letter. `csv_rows` writes numbers that are not rounded.
@@ -234,7 +234,7 @@ def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = Fal
 
 
 def markdown(grid: Grid) -> str:
-    """A table in GitHub's Markdown with its title above, the best of each column bold."""
+    """A table in GitHub's Markdown, its title above, the best bold."""
     heads = [escape_markdown(column.heading) for column in grid.columns]
     marks = ["---" if column.words else "---:" for column in grid.columns]
     texts = [[(escape_markdown(c.text), c.best) for c in row] for row in grid.cells]
@@ -247,7 +247,6 @@ def markdown(grid: Grid) -> str:
 def latex(*grids: Grid) -> str:
     r"""Tables of equal columns as one ``table`` or ``table*`` of the package booktabs.
 
-    Caption, label and footnotes are inside; decimal points align without a further package.
     Each of several grids has its title above its rows.
     """
     first = grids[0]
@@ -348,7 +347,6 @@ def csv_rows(rows: Sequence[Record], keys: Iterable[str]) -> str:
     """
 
     def cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
-        """A value as a cell of CSV."""
         if isinstance(value, bool | np.bool):
             return str(value).lower()
         if isinstance(value, str):

@@ -133,7 +133,7 @@ def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
 
 
 def drift_grid(drifts: "Iterable[Drift]") -> Grid:
-    """Zero drift per observer and axis, with five decimals as the paper prints it."""
+    """Zero drift per observer and axis, with the decimals of the paper."""
     axes = (Column(axis, unit_of(axis), ".5f") for axis in AXES)
     rows: Rows = [(d.name, f"{d.span[0]:g}–{d.span[1]:g}", *map(float, d.mean)) for d in drifts]
     title = "Zero drift; the first span's is removed"

@@ -61,7 +61,7 @@ DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
 
 
 def files_beside(path: Path, form: str | None) -> list[str]:
-    """Names of a robot file and the files beside it; `form` is the figures' format."""
+    """Names of a robot file, and of page, record and figures beside it."""
     if path.suffix.lower() != ".toml":
         raise OutputError(f"{path}: -o needs a name that ends in .toml, as my_robot.toml")
     drawn = figure_files(form, IDENTIFICATION_FIGURES, f"{path.stem}-")
@@ -76,10 +76,7 @@ def write_identification(
     force: bool,
     form: str | None = None,
 ) -> str:
-    """Write all files or none, with figures if `form`; the text of `run.json`.
-
-    `logs` are the examinations of all logs, also of those outside the fit.
-    """
+    """Write all files or none, with figures if `form`; the text of `run.json`."""
     record = identification_record(found, logs, command)
     heading = [
         *overridden_lines(logs, fitting=False),
@@ -121,7 +118,7 @@ def identification_record(
 def render_identification(
     found: Identification, record: Record, examinations: Sequence[Examination] = ()
 ) -> str:
-    """The page as text: self-contained, nothing is loaded from anywhere."""
+    """The page."""
     logs = list(dict.fromkeys(t.motion.recording.name for t in found.traces))
     title, charts = found.robot.title or found.robot.name, torque_charts(found)
     source = f" from {counted(len(logs), 'log')}" if logs else ""
@@ -156,7 +153,7 @@ def render_identification(
 def velocity_plot(
     coloured: Sequence[tuple[Trace, str]], j: int
 ) -> tuple[str, Scales, list[tuple[str, str]]]:
-    """A joint's residual over velocity: name, scales, colour and dots of each log."""
+    """A joint's residual over velocity: name, scales, dots of each log."""
     # One scale for all logs of a joint.
     speed = max(abs(t.motion.dq[:, j]).max() for t, _ in coloured) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
@@ -195,7 +192,7 @@ def torque_charts(found: Identification) -> tuple[Chart, ...]:
 
 
 def identification_figures(found: Identification) -> dict[str, Drawing]:
-    """Measured and predicted torque, and residuals of each log; none without logs."""
+    """Measured and predicted torque, and residuals, if there are logs."""
     drawings = {}
     if found.traces:
         name = shown_trace(found).motion.recording.name
@@ -220,7 +217,7 @@ def tables_text(found: Identification) -> str:
 
 
 def residual_grid(found: Identification) -> Grid:
-    """RMS of measured less predicted torque, a row for each log, role and model. [N·m]"""
+    """RMS of measured less predicted torque by log, role and model. [N·m]"""
     # The place in the command distinguishes two logs of one label.
     keys = ("log_index", "log", "role", "model")
     rows: Rows = []

@@ -138,7 +138,7 @@ def paper_style() -> Iterator[None]:
 
 
 def sheet(width: float, cells: int, columns: int, height: float) -> "tuple[Figure, NDArray[Any]]":
-    """A figure with room for `cells` plots, row by row; width and row height [in]."""
+    """A figure with room for `cells` plots; width and row height. [in]"""
     from matplotlib.figure import Figure
 
     rows = -(-cells // columns)

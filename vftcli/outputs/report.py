@@ -38,10 +38,7 @@ def places_of(labels: Sequence[str]) -> list[str]:
 def report_files(
     labels: Sequence[str], extras: Sequence[str], form: str | None, *, several: bool
 ) -> list[str]:
-    """Names of all files that a report of these logs may hold, with these extras.
-
-    `several` is whether there is a sub-folder a log.
-    """
+    """Names of a report's files; `several` logs have sub-folders."""
     own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
     own += [CONTACT_TABLE] * (form is not None)
     if not several:
@@ -60,7 +57,7 @@ def write_report(
     form: str | None = None,
     failed: Mapping[str, str] = {},
 ) -> str:
-    """Write a report of one log, or a sub-folder a log below an index and all errors.
+    """Write a report of one log, or a sub-folder a log below an index.
 
     All files are written or none. Returns the text of `run.json`, of several logs one record
     with theirs in it.

@@ -72,7 +72,7 @@ def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:
 
 
 def xyzw(rotation: Array) -> Array:
-    """Unit quaternions of rotation matrices, the scalar last as Rerun has it. (…, 4)"""
+    """Unit quaternions of rotation matrices, the scalar last. (…, 4)"""
     return np.roll(matrix_quaternion(rotation), -1, axis=-1)
 
 
@@ -87,7 +87,7 @@ def arrow_scale(found: ContactList | None) -> float:
 def send_arm(
     stream: Stream, robot: Robot, poses: ArmPoses, painted: Mapping[int, Changes]
 ) -> None:
-    """Send the arm's shape once, its poses over time, and changes of link colours."""
+    """Send the arm's shape, its poses and its changes of colour."""
     time = rr.TimeColumn("t", duration=poses.t)
     for j, shapes in enumerate(capsules(robot.chain)):
         link = f"{ROBOT}/link_{j}" if j else f"{ROBOT}/base"
@@ -259,7 +259,7 @@ def rerun_file(
     Plots leave their tabs as they are sent, to save memory. `words` is name → Markdown of
     every document. The eye sees all `poses` of the arm, in a space of this name.
     """
-    # Equal data make equal recordings: no random id, no time of writing, no batches by time.
+    # Equal data make equal recordings: no random id, no time of writing.
     stream = rr.RecordingStream(
         "vftcli",
         recording_id=recording_id(title, tabs, words),
@@ -313,8 +313,7 @@ def blueprint(
 ) -> rrb.Blueprint:
     """The opening layout: the arm and words to the left, plots to the right, paused.
 
-    The eye sees the base and all places of the links. No file can set Rerun's time cursor: it
-    opens at the first sample, and a click on a time of the text log goes there.
+    No file can set Rerun's time cursor: it opens at the first sample.
     """
     corners = poses.translation.reshape(-1, 3)
     # The base at the origin must be visible too.
@@ -375,7 +374,7 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
 
 
 def send_plot(stream: Stream, plot: Chart) -> None:
-    """Send one plot: names and colours once, all samples in one batch, its points."""
+    """Send one plot: names and colours, all samples, its points."""
     lines = lines_of(plot)
     # Thin edges, thick bars; then the reference, then the best.
     widths = [

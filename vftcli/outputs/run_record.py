@@ -225,10 +225,7 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> Record:
 
 
 def refinement_record(analysis: Analysis) -> Record | None:
-    """Results of the complete log: free part, chosen gains, error budget.
-
-    `best` holds its gains, free part and removed bias.
-    """
+    """Free part, chosen gains, bias and error budget of the complete log."""
     found = analysis.refinement
     if found is None:
         return None

@@ -29,6 +29,7 @@ from vftcli.outputs.contacts import (
     MOST_ROWS,
     answer,
     contact_grid,
+    forces_along,
     hardest_rows,
     otherwise,
 )
@@ -129,7 +130,8 @@ def log_screen(
     listed, found, bars = analysis.contacts, grounds(analysis), list[str]()
     if listed is not None and listed.hardest is not None:
         shown = [] if listed.contacts[0].is_load else hardest_rows(listed.contacts)
-        bars = force_bars(analysis.t, forces_of_list(listed, analysis.t), shown, canvas)
+        force, _ = forces_along(listed.contacts, analysis.t)
+        bars = force_bars(analysis.t, np.nan_to_num(force), shown, canvas)
     tail, text = doubt_lines(analysis), ""
     for block in blocks(analysis.errors)[:1]:
         tail += canvas.wrapped(against(block, analysis), 2)
@@ -246,7 +248,7 @@ def ground_lines(
 
 
 def against(block: Block, analysis: Analysis) -> str:
-    """One line on the errors: the observer in the lead, and the range of the others."""
+    """One line on the errors: the leading observer, and the others' range."""
     means = block.means
     if not means.errors:
         return f"Against {block.reference}: no sample in common with the estimates"
@@ -328,16 +330,6 @@ def log_table(
     ]
     columns = [Column(h, words=h in {"log", "hardest", "health"}) for h in (*heads, "health")]
     return terminal(Grid(columns, rows), canvas.shown).splitlines()
-
-
-def forces_of_list(found: ContactList, t: Array) -> Array:
-    """|F| of the listed contacts along a log, zero outside of them. (T,) [N]"""
-    force = np.zeros(len(t))
-    for contact in found.contacts:
-        if (course := contact.course) is not None:
-            inside = (t >= contact.start) & (t <= contact.stop)
-            force[inside] = np.interp(t[inside], course.t, course.force)
-    return force
 
 
 def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:

@@ -184,7 +184,7 @@ def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
 def franka_text(
     thresholds: Thresholds, frame: str, line: str, phases: Sequence[str] = ("",)
 ) -> str:
-    """A text of Franka's interfaces: a frame about a line for each list of numbers."""
+    """A text of Franka's interfaces: a frame about a line a list."""
     own = thresholds.of_vendor
     head = "" if own else "# learned from gmo, not from the robot's own tau_ext: record that\n"
     lists = "".join(

@@ -128,7 +128,7 @@ class NamedColumns:
         return tuple(group.values())
 
     def find(self, signal: str) -> Item | None:
-        """The columns of the clock or a signal, None where none bears a name of it."""
+        """The columns of the clock or a signal, or None."""
         if self.usual:
             return self._usual(signal)
         if signal in {"t", "wrench"}:
@@ -166,7 +166,7 @@ class NamedColumns:
         return pick._replace(remark=pick.remark and RESIDUAL_TURNED)
 
     def stated(self, item: Item) -> Item:
-        """The columns that an item of --columns means, by their names or by its own."""
+        """The columns that an item of --columns means."""
         pattern = item.pattern or ""
         if pattern not in self.table.names and pattern.lower() in self.groups:
             return pick_of(item, self.cells(pattern))
@@ -367,6 +367,6 @@ def effort_of(names: Sequence[str]) -> str:
 
 
 def robot_of(names: Sequence[str]) -> str | None:
-    """The profile by joint names, None if ambiguous; UR's names fit all its models."""
+    """The profile by joint names, or None: UR's fit all its models."""
     stems = {m[1] for name in names if (m := FRANKA.fullmatch(name))}
     return HINTS.get(stems.pop()) if len(stems) == 1 else None

@@ -40,7 +40,7 @@ SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """The log of a NumPy, MATLAB or UR binary file, or of libfranka's printed states."""
+    """The log of a NumPy, MATLAB or UR binary file, or of libfranka."""
     if layout.name == "mat":
         return _read_matlab(file, request)
     if layout.name == "ur-binary":
@@ -97,7 +97,7 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
 
 
 def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes = ()) -> RawLog:
-    """The log of named arrays as panda-py's, by --columns or by alias; or of rows."""
+    """The log of named arrays, by --columns or alias; or of rows."""
     named = isinstance(log, dict)
     arrays = _arrays_of(file, log if named else {"rows": log})
     if not named:

@@ -40,7 +40,7 @@ def number_of(raw: RawLog, row: int) -> int:
 
 
 def without_unknown_rows(raw: RawLog) -> RawLog:
-    """The log without rows of NaN or infinity, with a remark; as it is if all are."""
+    """The log without rows of NaN or infinity; as it is if all are."""
     known = np.isfinite(raw.stamps)
     for value in raw.signals.values():
         known &= np.concatenate([np.isfinite(rows).all(axis=1) for rows in pieces(value)])
@@ -52,7 +52,7 @@ def without_unknown_rows(raw: RawLog) -> RawLog:
 
 
 def row_samples(raw: RawLog, rows: int) -> Indices | None:
-    """The sample that each row of a file gives, −1 for none; None if all give one."""
+    """The sample of each row of a file, −1 for none; None if all give one."""
     if raw.rows is None:
         return None
     sample: Indices = np.searchsorted(raw.rows, np.arange(rows), side="right") - 1

@@ -74,7 +74,7 @@ class Item(NamedTuple):
 
     @property
     def field(self) -> str:
-        """The field of Recording, of the clock and of what is skipped the name itself."""
+        """The field of Recording, else the name itself."""
         return SIGNALS.get(self.signal, self.signal)
 
 
@@ -94,12 +94,12 @@ class ColumnSpec(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Number of columns that a counting text describes, those of ``_:*`` left out."""
+        """Number of columns that a counting text describes, without ``_:*``."""
         return sum(item.width for item in self.items if item.rate is None)
 
 
 def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
-    """A parsed --columns text, of a log or of a reference, which has no positions."""
+    """A parsed --columns text of a `log`, or of a reference without positions."""
     parts = [part.strip() for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
     if not parts:
         raise LogError(
@@ -163,7 +163,7 @@ def _parse_item(part: str) -> Item:
 
 
 def _unit_factor(signal: str, unit: str | None) -> float:
-    """Factor from a unit in brackets to SI; 1 for a wrench, where they hold a frame."""
+    """Factor from a unit to SI; 1 for a wrench, which has a frame."""
     if unit is None or signal in {"wrench", "_"}:
         return 1.0
     units = UNITS[signal.removeprefix("target_")]

@@ -68,7 +68,7 @@ class TextTable(Table):
 
     @cached_property
     def separator(self) -> str:
-        """The separator that splits the first two lines into the same number of cells."""
+        """The separator that splits the first two lines into as many cells."""
         lines = self.sample[:2]
         for separator in SEPARATORS:
             counts = {len(split_cells(line.strip(" "), separator)) for line in lines}
@@ -79,7 +79,7 @@ class TextTable(Table):
 
     @cached_property
     def decimal_comma(self) -> bool:
-        """Whether numbers are written 0,5: only where semicolons or tabs separate them."""
+        """Whether numbers are written 0,5: between semicolons or tabs."""
         rows = self.sample[1:3] if len(self.sample) > 1 else self.sample
         return self.separator in ";\t" and any(re.search(r"\d,\d", row) for row in rows)
 
@@ -93,7 +93,7 @@ class TextTable(Table):
         return is_number(cell.replace(",", ".") if self.decimal_comma else cell)
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
-        """Parsed columns; a clock of long whole numbers or dates comes as integers."""
+        """Parsed columns; a clock of nanoseconds or dates comes as integers."""
         kinds = dict.fromkeys(columns, "Float64")
         if clock is not None:
             row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]

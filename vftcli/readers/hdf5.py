@@ -222,10 +222,7 @@ LAYOUTS = {ALOHA: read_aloha, f"{DROID_STATE}joint_positions": read_droid}
 
 
 def layout_of(table: Hdf5Table) -> tuple[str, dict[int, str]]:
-    """The layout of a file, and the group of each episode; "" of any other.
-
-    An episode has the number that its group's name ends with, or is counted from 0.
-    """
+    """The layout of a file, "" for none, and each episode's group."""
     for anchor in LAYOUTS:
         own = [name for name in table.names if f"/{name}".endswith(f"/{anchor}")]
         if groups := sorted((name.removesuffix(anchor) for name in own), key=natural):

@@ -158,11 +158,7 @@ class ReadChoice(Choice):
         return replace(self, interval=None, episode=None)
 
     def with_stated_effort(self, recording: "Recording") -> "Recording":
-        """A recording with its effort as `--effort` calls it, and derived velocities.
-
-        Raises:
-            MissingSignalError: If the log has no such effort.
-        """
+        """A recording with its effort as stated, and derived velocities."""
         from vftcli.signals.repairs import is_fast, with_velocity
 
         kind = EFFORT[self.effort] if self.effort is not None else None
@@ -175,11 +171,7 @@ class ReadChoice(Choice):
         return recording
 
     def within(self, recording: "Recording") -> "Recording":
-        """The part of a recording that lies in the interval.
-
-        Raises:
-            ClockError: If no sample does.
-        """
+        """The part of a recording in the interval, which may not be empty."""
         return recording if self.interval is None else recording.between(*self.interval)
 
     def wants(self, signal: str) -> bool:

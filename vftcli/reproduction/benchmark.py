@@ -110,7 +110,7 @@ class BenchmarkRun:
         return path.exists()
 
     def make_log(self, log: BenchmarkLog) -> None:
-        """Find a log, or make it: simulated, of several files, or with pushes planted."""
+        """Find a log, or make it: simulated, joined, or with pushes planted."""
         manifest, base = self.manifest, self.files.get(log.name.removesuffix(PUSHED))
         if log.file and not log.pushes:
             self.files[log.name] = manifest.data / log.file
@@ -178,7 +178,7 @@ class BenchmarkRun:
                 stage(f"{done} of {len(left)} scored", done / len(left))
 
     def tasks(self, logs: Sequence[BenchmarkLog]) -> Iterator[ScoreTask]:
-        """Tasks: per log and protocol, and per log of an arm with outside estimates."""
+        """A task per log and protocol, and per log of an arm with outside estimates."""
         for log in logs:
             for protocol in log.protocols:
                 is_fit = protocol == "identified"
@@ -209,7 +209,7 @@ class BenchmarkRun:
         return ScoreTask(self.folder.path, key, log, protocol, choice, file, truth, rival, marked)
 
     def record(self, logs: Sequence[BenchmarkLog]) -> dict[str, Any]:
-        """Content of `run.json`: the manifest, its logs, absent ones, each task's effort."""
+        """Content of `run.json`: manifest, logs, absent ones, efforts."""
         keys, manifest = ("arm", "truth", "source", "licence"), self.manifest
         entries = [
             {

@@ -53,7 +53,7 @@ FAST = 5.0
 
 
 def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> Iterator[Given]:
-    """RMSE of the virtual sensor against the real one, axis by axis, in flange axes."""
+    """RMSE of the virtual sensor against the real one, in flange axes."""
     hard = simulate(load_scenario("ur5-sensor", ()), seed)
     # A soft position loop: joints slide where a stiff one holds them.
     soft = simulate(load_scenario("ur5-sensor", ("servo.stiffness=soft",)), seed)

@@ -171,7 +171,7 @@ def item_grid(shown: ShownItem) -> Grid:
 
 
 def beside_print(shown: ShownItem) -> str:
-    """Ours over the print, the median of the lines that print a number, and its range."""
+    """Ours over the print: median and range of the lines with a number."""
     kind = shown.item.nearest
     ratios = []
     for line in shown.item.lines:
@@ -222,7 +222,7 @@ def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
 
 
 def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
-    """The page: self-contained, nothing is loaded from anywhere."""
+    """The page."""
     return page(
         "reproduction.html",
         f"{paper.name}, reproduced",

@@ -140,7 +140,7 @@ class Rival(NamedTuple):
     declared: Declaration
 
     def file(self, log: BenchmarkLog, *endings: str) -> Path | None:
-        """A log's file with one of these endings, by default its estimates, or None."""
+        """A log's file with one of these endings, or None; its estimates."""
         tries = (self.folder / f"{log.name}.{end}" for end in endings or ("parquet", "csv"))
         return next(filter(Path.is_file, tries), None)
 
@@ -165,7 +165,7 @@ class Manifest:
         return [self.data / name for name in names if name]
 
     def robot(self, log: BenchmarkLog) -> str | None:
-        """A log's arm: a profile, or a file below the data's folder; None if unnamed."""
+        """A log's arm: a profile, a file below `data`, or None."""
         name: str | None = dict(log.options).get("robot")
         return str(self.data / name) if name and Path(name).suffix else name
 
@@ -184,7 +184,7 @@ class Manifest:
         robot: Path | None = None,
         logs: Mapping[str, Path] = MappingProxyType({}),
     ) -> AnalysisChoice:
-        """Choices of a protocol for a log in `file`; `robot` is protocol 3's robot file.
+        """Choices of a protocol for a log in `file`; `robot` is of protocol 3.
 
         `logs` is name → file of each log, for free motion.
         """
@@ -210,7 +210,7 @@ class Manifest:
             yield from ((self.by_name[name], spans) for name in robot.train)
 
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
-        """Reasons why a log's rows of a protocol are unfair: a line per training log."""
+        """Reasons for unfair rows of a protocol: a line per training log."""
         name, own = log.name.removesuffix(PUSHED), list(map(digest_of, self.paths(log)))
         for other, spans in self.trains_on(log, protocol):
             what = f"{name}, {protocol}: {other.name}"
@@ -231,7 +231,7 @@ class Manifest:
                 yield f"{what} is of the same day, {log.day}"
 
     def complaints(self, rivals: Sequence[Rival]) -> dict[str, list[str]]:
-        """Name of a log → a line on each reason for unfair rows or another file."""
+        """Name of a log → lines on unfair rows or another file."""
         found: dict[str, list[str]] = {}
         for log in self.logs:
             if self.missing(log):
@@ -263,11 +263,7 @@ class Manifest:
 
 
 def load_manifest(name: str, data: Path | None) -> Manifest:
-    """A built-in manifest, or a user's file with its logs beside it or in `data`.
-
-    Raises:
-        ParameterError: If there is none, or an entry is wrong.
-    """
+    """A built-in manifest or a user's; logs are beside it or in `data`."""
     path = Path(name)
     if name in BUILT_IN:
         path = Path(str(files("vftcli.reproduction") / f"{name}.toml"))
@@ -304,7 +300,7 @@ def check_names(manifest: Manifest) -> None:
 
 
 def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
-    """The log of an entry; with pushes two: the untouched log, and one with pushes."""
+    """The log of an entry; with pushes two: without and with them."""
     words = {key: value for key, value in table.items() if key in OPTIONS}
     rest = {key: value for key, value in table.items() if key not in OPTIONS}
     for word, value in words.items():
@@ -332,12 +328,7 @@ def in_words(spans: Spans) -> str:
 
 
 def rival_of(text: str, ours: Sequence[str], logs: Sequence[BenchmarkLog]) -> Rival:
-    """The outside estimates of ``NAME=DIR``.
-
-    Raises:
-        ParameterError: If the name is one of `ours`, the folder has no file of one of `logs`,
-            or its declaration is wrong.
-    """
+    """The outside estimates of ``NAME=DIR`` for some logs."""
     name, _, place = text.partition("=")
     if not re.fullmatch(r"[\w.+-]+", name) or not place:
         raise ParameterError(f"--outside {text!r} is not NAME=DIR")
@@ -381,7 +372,7 @@ def read_list(path: Path) -> list[ListedRow]:
 
 
 def read_parts(files: Mapping[str, Path]) -> dict[str, Array]:
-    """Columns t, q1… of text files, one a signal, t first, numbers row after row."""
+    """Columns t, q1… of text files, one a signal, t first."""
     columns: dict[str, Array] = {}
     samples = 0
     for signal, path in files.items():

@@ -264,7 +264,7 @@ def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[di
 def torque_rows(
     torque: ExternalTorque, truth: Array, parts: Mapping[str, Mask]
 ) -> Iterator[dict[str, Any]]:
-    """Rows of a torque: sums by part and joint, of shifts, and `best`'s worst span."""
+    """Rows of a torque: sums by part and joint, shifts, the worst span."""
     for part, inside in parts.items():
         if inside.any():
             score = Score.of(torque, truth, inside)
@@ -278,7 +278,7 @@ def torque_rows(
 
 
 def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, Any]:
-    """The `WORST` seconds with the largest Σ w e², and the joint with most of it."""
+    """The `WORST` seconds with the largest Σ w e², and their joint."""
     t, answer = torque.t, np.where(torque.known, torque.tau, 0.0)
     squares = np.where(scored[:, None], weights(t)[:, None] * (answer - truth) ** 2, 0.0)
     total = np.concatenate([[0.0], squares.sum(axis=1).cumsum()])
@@ -292,7 +292,7 @@ def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, An
 
 
 def wrench_sums(values: Array, truth: Array, w: Array) -> dict[str, float]:
-    """Σ w |f̂ − f|² and its like over some samples; a missing wrench counts as 0."""
+    """Σ w |f̂ − f|² and its like; a missing wrench counts as 0."""
     error, sums = np.where(np.isfinite(values), values, 0.0) - truth, {}
     for head, wrench in (("", error), ("true_", truth)):
         for kind, part in (("force", wrench[:, :3]), ("moment", wrench[:, 3:])):

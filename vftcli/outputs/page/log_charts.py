@@ -18,6 +18,7 @@ from vftcli.outputs.charts import (
     families_of,
     lines_of_names,
 )
+from vftcli.outputs.contacts import forces_along
 from vftcli.outputs.error_tables import blocks
 from vftcli.signals.arrays import Z_95, Array
 from vftcli.signals.wrench import AXES, unit_of
@@ -168,14 +169,7 @@ def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
     if found.hardest is None and found.detectable_force is None:
         return None
     t = analysis.t
-    force, half = np.full((2, len(t), 1), np.nan)
-    for contact in found.contacts:
-        if (course := contact.course) is not None:
-            inside = (t >= course.t[0]) & (t <= course.t[-1])
-            force[inside, 0] = np.interp(t[inside], course.t, course.force)
-            half[inside, 0] = np.interp(t[inside], course.t, course.band)
-            # The nearest sample shows a peak between two.
-            force[np.argmin(np.abs(t - contact.peak))] = contact.peak_force
+    force, half = (values[:, None] for values in forces_along(found.contacts, t))
     lines = [ChartLine("best", force, COLOURS[BEST], half=half, leads=True)]
     if (own := analysis.recording.wrench) is not None and own.any():
         size = np.linalg.norm(own[:, :3], axis=1)[:, None]

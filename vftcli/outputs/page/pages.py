@@ -73,7 +73,7 @@ HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean R
 
 
 def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
-    """The report of one log: self-contained, nothing is loaded from anywhere.
+    """The report of one log.
 
     `sizes` are bytes of the files beside it, None for one still to be written.
     """
@@ -211,7 +211,6 @@ def model_pairs(found: ContactList) -> dict[str, str]:
     model, prior = found.model, found.model.prior
 
     def each(values: Array) -> str:
-        """One number a joint."""
         return ", ".join(map(significant, values.tolist()))
 
     pairs = {

@@ -66,15 +66,12 @@ def templates() -> "Environment":
                 super().dump_bytecode(bucket)
 
     def shown(value: object) -> object:
-        """A value as HTML."""
         return value if hasattr(value, "__html__") else Markup(escape(printable(str(value))))
 
     def asset(name: str) -> Markup:
-        """The text of the package's style sheet or script."""
         return Markup((HERE / name).read_text(encoding="utf-8"))
 
     def options(text: str) -> Markup:
-        """A text that does not break within an option."""
         whole = r'<span class="option">\g<0></span>'
         return Markup(re.sub(r"(?<![\w-])--?[a-z][\w-]*", whole, str(shown(text))))
 

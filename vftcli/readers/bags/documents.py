@@ -119,10 +119,7 @@ Shape = tuple[str, Names, str, bool]
 
 
 def shape_of(row: Document) -> Shape | None:
-    """The shape of a JointState or WrenchStamped document; None of any other.
-
-    None, too, if its stamp is not whole seconds and nanoseconds.
-    """
+    """The shape of a JointState or WrenchStamped with a whole stamp, or None."""
     stamp, names, positions = stamp_of(row), names_of(row), row.get("position")
     if stamp is not None:
         row["header.stamp.sec"], row["header.stamp.nanosec"] = divmod(stamp, 10**9)

@@ -67,10 +67,7 @@ def _fields(head: bytes) -> Header:
 def _bag_records(
     content: Content, budget: ReadBudget, counts: MessageCount | None = None
 ) -> Iterator[tuple[int, Header, bytes, int]]:
-    """Kind, header, data and place of each record of a bag, and of its chunks.
-
-    Inside a chunk there are no counts.
-    """
+    """Kind, header, data and place of each record; in a chunk without counts."""
     place = counts.end if counts else 0
     while place < len(content):
         start = place
@@ -144,10 +141,7 @@ ENCODINGS = {"cdr", "ros1", "json", "protobuf"}
 def _mcap_records(
     content: Content, budget: ReadBudget, counts: MessageCount | None = None
 ) -> Iterator[tuple[int, bytes]]:
-    """Kind and content of each record of a file, and of its chunks.
-
-    Inside a chunk there are no counts.
-    """
+    """Kind and content of each record; in a chunk without counts."""
     place = counts.end if counts else 0
     while place < len(content):
         kind = content[place]
