@@ -16,7 +16,6 @@ from vftcli.batch import WorkersChoice, annotated_copy
 from vftcli.batch.annotated_copy import annotate, gathered, joint_names
 from vftcli.batch.annotation import ForceChoice
 from vftcli.batch.cluster import Outcome
-from vftcli.batch.datasets import partial_of
 from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import recognise
@@ -162,7 +161,7 @@ def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path, monkeypatch) -> None
     with pytest.raises(KeyboardInterrupt):
         made(FIXTURE, copy)
     assert not copy.exists()
-    assert partial_of(copy).is_dir()
+    assert copy.with_name(f"{copy.name}.partial").is_dir()
     monkeypatch.setattr(annotated_copy, "write_file", write)
     made(FIXTURE, copy)
     assert done == [0, 1, 2]

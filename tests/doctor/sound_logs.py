@@ -22,7 +22,7 @@ import numpy as np
 
 from vftcli.doctor import examine
 from vftcli.readers.reader import ReadChoice
-from vftcli.readers.reading import read_first_recording
+from vftcli.readers.reading import read_chosen
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -132,7 +132,7 @@ def recording_of(log: SoundLog, folder: Path) -> Recording:
     path = folder / log.path
     if log.path == "panda_exciting":
         return panda_exciting(path)
-    return read_first_recording(path, ReadChoice(columns=log.columns))
+    return read_chosen(path, ReadChoice(columns=log.columns, examining=True))
 
 
 def panda_exciting(folder: Path) -> Recording:

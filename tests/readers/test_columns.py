@@ -8,7 +8,8 @@ import pytest
 from seed_logs import headerless_csv, matrix_npy, motion, parquet, table_csv
 
 from vftcli.readers.columns import parse_columns
-from vftcli.readers.reading import read, read_first_recording
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import read, read_chosen
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.wrench import WrenchFrame
 
@@ -116,7 +117,7 @@ def test_one_of_several_recordings(path):
     expected = [-1] * 30 + list(range(30)) + [-1] * 30  # the sample that each row is
     assert second.source.row_samples.tolist() == expected
     assert "read recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
-    reported, *_ = read_first_recording(path).source.remarks
+    reported, *_ = read_chosen(path, ReadChoice(examining=True)).source.remarks
     assert (reported.code, reported.level) == ("time-reset", "warning")
     assert reported.values["rows"] == [30, 60]
 

@@ -16,7 +16,7 @@ from vftcli.readers.hdf5 import numbers_of
 from vftcli.readers.opening import open_log
 from vftcli.readers.parquet import ArrowTable, claims
 from vftcli.readers.reader import ALL, ReadChoice
-from vftcli.readers.reading import episode_numbers, read, read_first_recording, recognise
+from vftcli.readers.reading import episode_numbers, read, read_chosen, recognise
 from vftcli.signals.errors import LogError, ParameterError
 
 FORMATS = {
@@ -200,7 +200,7 @@ class TestHdf5:
         assert right.source.label == "x right arm"
         np.testing.assert_allclose(left.t, np.arange(ROWS) / 50, rtol=1e-15)
         assert left.source.clock == "none: 50 Hz, ALOHA's convention"
-        seen = read_first_recording(path)
+        seen = read_chosen(path, ReadChoice(examining=True))
         assert "arm-side-chosen" in {remark.code for remark in seen.source.remarks}
         np.testing.assert_array_equal(seen.q, log["q"])
 
@@ -284,7 +284,7 @@ def test_an_option_that_does_not_apply_is_refused(path):
     with pytest.raises(LogError, match="no episode 1; it holds 1, from 0 to 0"):
         read(seeds.arrow(path), episode=1)
     with pytest.raises(ParameterError, match="--episode K"):
-        read_first_recording(path, ReadChoice(episode=ALL))
+        read_chosen(path, ReadChoice(episode=ALL))
     with pytest.raises(LogError, match="one recording, without episodes"):
         read(seeds.matlab(path), episode=0)
 

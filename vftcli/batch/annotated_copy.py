@@ -52,9 +52,9 @@ Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes to copy.
 class FileTask(NamedTuple):
     """A data file to write."""
 
-    file: DataFile  #: The data file.
+    file: DataFile
     rows: tuple[Path, ...]  #: The files of its episodes' columns.
-    target: Path  #: The file to write.
+    target: Path
 
 
 def annotate(

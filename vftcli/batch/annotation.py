@@ -1,4 +1,4 @@
-"""Forces of a dataset's episodes: the request, and the columns of each episode."""
+"""Forces of a dataset's episodes: request and columns."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -165,7 +165,7 @@ def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
 
 
 def by_row(values: Array, samples: Indices | None) -> Single:
-    """Sample values (T, k) by row of the file; NaN for a row that is no sample."""
+    """Sample values (T, k) by row of the file; else NaN."""
     if samples is None:
         return values.astype(np.float32)
     return np.where(samples[:, None] >= 0, values[samples], np.nan).astype(np.float32)

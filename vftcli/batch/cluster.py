@@ -92,7 +92,7 @@ class Effort(NamedTuple):
 class Outcome(NamedTuple, Generic[Task]):
     """End of a task."""
 
-    task: Task  #: The task.
+    task: Task
     value: Any = None  #: Value of the work, None if it failed.
     failure: Failure | None = None  #: Why it failed, or None.
     effort: Effort | None = None  #: Its effort; None if its worker died.

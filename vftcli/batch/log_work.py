@@ -130,7 +130,7 @@ class LogTask(NamedTuple):
     command: str  #: The command line, for the records.
     path: Path  #: The log's file or folder, from the root.
     episode: int | None  #: Its episode, None for a file of one recording.
-    label: str  #: Its name.
+    label: str
     key: str  #: Key of its result.
     sha256: str  #: Of its file's bytes; "" for several files.
 
@@ -185,7 +185,7 @@ def for_estimates(choice: AnalysisChoice) -> AnalysisChoice:
 
 
 def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
-    """A choice for printing errors: contacts are listed for a wrench or a score."""
+    """A choice for errors: contacts are listed for a wrench or a score."""
     judged = choice.reference is not None and choice.reference.contacts
     return replace(choice, contacts=choice.contacts and (choice.wrench is not None or judged))
 

@@ -55,17 +55,17 @@ class LogEntry(NamedTuple):
 class BatchCount(NamedTuple):
     """Progress of a batch."""
 
-    logs: int  #: Number of logs.
+    logs: int
     before: int  #: Number done by an earlier run.
     done: int  #: Number done by this run.
-    failed: int  #: Number failed.
+    failed: int
 
 
 @dataclass(kw_only=True)
 class BatchRun:
     """A batch and one run of it: logs done, failures, efforts."""
 
-    logs: Sequence[LogEntry]  #: The logs.
+    logs: Sequence[LogEntry]
     job: LogJob  #: Work on each.
     folder: BatchFolder  #: Where it is written.
     workers: WorkersChoice  #: Where it is done.

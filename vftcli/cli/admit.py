@@ -1,5 +1,6 @@
 """`vftcli admit`: what admittance control would have made of a log's forces."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,23 +8,14 @@ import typer
 
 from vftcli.admittance import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.console import (
-    detail,
-    echo,
-    echo_data,
-    open_made,
-    say,
-    say_json,
-    say_left_out,
-)
-from vftcli.cli.options import OF_ANALYSIS, choice_for
+from vftcli.cli.console import detail, echo, echo_data, open_made, say, say_json, say_left_out
 from vftcli.signals.option import WRITE, Asked, Option
 
 if TYPE_CHECKING:
     from vftcli.admittance.closed_loop import Replayed
 
 
-@opt.command(ControlChoice, *OF_ANALYSIS)
+@opt.command(ControlChoice, *opt.OF_ANALYSIS)
 def admit(
     asked: Asked,
     release: Annotated[
@@ -65,8 +57,8 @@ def admit(
     names = files_of_replay(figures)
     if output is not None:
         OutputFolder(output, force, names).check()
-    library = Library([log] if log else [])
-    found = replayed(log, asked, lambda words: choice_for(words, library), release or (), seed)
+    choice_of = partial(opt.choice_for, library=Library([log] if log else []))
+    found = replayed(log, asked, choice_of, release or (), seed)
     show(found, json=json, latex=latex)
     if output is not None:
         write_admittance(output, found, asked.line, force, figures)

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.console import detail, echo_data, say
-from vftcli.cli.options import OF_LOG
 from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
@@ -18,7 +17,7 @@ from vftcli.wrench import WrenchChoice
 ADDED = ("wrench", "sd", "contact")  #: Values of ``--add``.
 
 
-@opt.command(*OF_LOG, ObserverChoice, WrenchChoice, WorkersChoice, Anyway, opt.Talk)
+@opt.command(*opt.OF_LOG, ObserverChoice, WrenchChoice, WorkersChoice, Anyway, opt.Talk)
 def annotate_dataset(
     dataset: Annotated[
         Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")
@@ -53,29 +52,19 @@ def annotate_dataset(
     added = [name.strip() for word in add or () for name in word.split(",")]
     for name in added:
         check_known(name, ADDED, f"--add {name}")
-    anyway = asked.anyway
+    anyway, wanted = asked.anyway, "wrench" in added or asked.states(WrenchChoice)
     choice = ForceChoice(
         read=asked.of(ReadChoice),
         robot=asked.of(RobotChoice),
         observers=asked.but(observer=asked.words["observer"] or [USUAL]).of(ObserverChoice),
-        wrench=asked.of(WrenchChoice)
-        if "wrench" in added or asked.states(WrenchChoice)
-        else None,
+        wrench=asked.of(WrenchChoice) if wanted else None,
         sd="sd" in added,
         contacts="contact" in added,
         anyway=anyway,
     )
     engine = asked.of(WorkersChoice)
     engine.check_closed(anyway=anyway)
-    record = annotate(
-        dataset,
-        output,
-        choice,
-        engine,
-        command=asked.line,
-        tell=detail,
-        force=force,
-    )
+    record = annotate(dataset, output, choice, engine, asked.line, detail, force=force)
     if json:
         echo_data(to_json(record))
         return

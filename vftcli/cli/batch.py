@@ -9,7 +9,6 @@ import typer
 from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.console import say
-from vftcli.cli.options import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
@@ -21,7 +20,7 @@ SOME_FAILED = 3  #: Exit code if some logs failed, not all.
 MOST_NAMED = 10  #: Failures that are printed.
 
 
-@opt.command(WorkersChoice, ReferenceChoice, *OF_ANALYSIS, opt.Mcap, OutputChoice)
+@opt.command(WorkersChoice, ReferenceChoice, *opt.OF_ANALYSIS, opt.Mcap, OutputChoice)
 def batch(
     logs: Annotated[
         list[Path],
@@ -56,7 +55,7 @@ def batch(
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.parsing import counted
 
-    choice, anyway = choice_for(asked, Library()), asked.anyway
+    choice, anyway = opt.choice_for(asked, Library()), asked.anyway
     choice.robot.check()
     if do == "compare" and choice.reference is None:
         raise ParameterError("--do compare needs --reference: two-cycle, sensor, vendor, zero, …")
@@ -67,7 +66,7 @@ def batch(
         choice = narrowed(choice)
     # These are of each worker.
     choice = replace(choice, library=Library(), examiner=Examiner())
-    job = LogJob(do=do, choice=choice, anyway=anyway, written=outputs_of(asked))
+    job = LogJob(do=do, choice=choice, anyway=anyway, written=opt.outputs_of(asked))
     engine = asked.of(WorkersChoice)
     engine.check_closed(anyway=anyway)
     collection = LogCollection(choice.read, output)

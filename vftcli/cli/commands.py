@@ -15,7 +15,7 @@ class ListedCommand(NamedTuple):
     """One command by its place, so that --help need not load it."""
 
     file: str  #: File of this package.
-    function: str  #: The function in it.
+    function: str
 
     @property
     def summary(self) -> str:

@@ -7,7 +7,6 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
-from vftcli.cli.options import OF_ANALYSIS, choice_for
 from vftcli.evaluation import ReferenceChoice
 from vftcli.signals.errors import VftError
 from vftcli.signals.option import COMPARE, WRITE, Asked, Option
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation.references import JacobianJudgement
     from vftcli.outputs.files import OutputFolder
-    from vftcli.pipeline import AnalysisChoice
 
 MORE = "Intervals, lags, pairs of observers: --details"  #: Left out of screens.
 
@@ -38,23 +36,6 @@ def figure_folder(figures: str | None, output: Path | None, force: bool) -> "Out
     folder = OutputFolder(output, force, figure_files(figures, ERROR_FIGURES))
     folder.check()
     return folder
-
-
-def judged_by_jacobian(
-    log: Path, error: VftError, choice: "AnalysisChoice", reference: str
-) -> "JacobianJudgement":
-    """Errors of a vendor's torques beside a Jacobian; raises any other error."""
-    from vftcli.evaluation.references import judge_jacobian
-    from vftcli.readers.references import jacobian_log
-    from vftcli.readers.table import JacobianError
-
-    if not isinstance(error, JacobianError):
-        raise error
-    read = jacobian_log(log, error, choice.read, choice.library.label(log))
-    made = judge_jacobian(read, choice.wrench, reference)
-    for remark in (*read.remarks, *made.remarks):
-        say(f"note: {read.name}: {remark}")
-    return made
 
 
 def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, details: bool) -> str:
@@ -101,7 +82,7 @@ def print_errors(
         echo_data(FORMS[form](rows, analyses))
 
 
-@opt.command(ReferenceChoice, *OF_ANALYSIS, opt.TableForm)
+@opt.command(ReferenceChoice, *opt.OF_ANALYSIS, opt.TableForm)
 def compare(
     logs: opt.Logs,
     reference: Annotated[str, ReferenceChoice.option("reference", group=COMPARE)],
@@ -118,22 +99,32 @@ def compare(
     """
     from vftcli.answering import errors_of
     from vftcli.batch.log_work import for_comparison
+    from vftcli.evaluation.references import judge_jacobian
     from vftcli.outputs.figures import error_figures
     from vftcli.outputs.paper import write_figures
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.reading import Library
+    from vftcli.readers.references import jacobian_log
+    from vftcli.readers.table import JacobianError
 
     folder, form = figure_folder(figures, output, force), opt.form_of(asked)
     library = Library(logs)
-    choice = for_comparison(choice_for(asked, library))
+    choice = for_comparison(opt.choice_for(asked, library))
     left_out, analyses, judged = LeftOut(library, logs), [], []
 
     def leave_out(log: Path, error: VftError) -> None:
         """Judge a vendor's torques by their Jacobian; leave any other log out."""
         try:
-            judged.append(judged_by_jacobian(log, error, choice, reference))
+            if not isinstance(error, JacobianError):
+                raise error
+            read = jacobian_log(log, error, choice.read, library.label(log))
+            made = judge_jacobian(read, choice.wrench, reference)
         except VftError as reason:
             left_out.add(log, reason)
+            return
+        for remark in (*read.remarks, *made.remarks):
+            say(f"note: {read.name}: {remark}")
+        judged.append(made)
 
     for made in analyse_logs(logs, choice, leave_out):
         if form != "json":

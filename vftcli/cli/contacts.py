@@ -7,7 +7,6 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
-from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.free_motion import FreeChoice
 from vftcli.signals.option import OUTPUT, Anyway, Asked, Choice, Option
 
@@ -27,7 +26,7 @@ class ListForm(Choice):
     all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.")]
 
 
-@opt.command(*OF_LOG, FreeChoice, ListForm, Anyway, opt.Talk)
+@opt.command(*opt.OF_LOG, FreeChoice, ListForm, Anyway, opt.Talk)
 def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     """List what touched the arm. The default command.
 
@@ -47,7 +46,7 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
         print_stored(logs[0], asked)
         return
     library = Library(logs)
-    choice = choice_for(asked, library, on_screen=not (json or csv))
+    choice = opt.choice_for(asked, library, on_screen=not (json or csv))
     left_out = LeftOut(library, logs)
     found = []
     for made in analyse_logs(logs, choice, left_out.add, list_touches):
@@ -85,11 +84,9 @@ def print_lists(found: "list[Analysis]", asked: Asked, failed: "Mapping[str, str
         echo_data(contacts_csv([made.contacts for made in found if made.contacts is not None]))
     else:
         screen, every = canvas(), asked.words["all"] or asked.words["details"]
-        texts = (
-            []
-            if len(found) + len(failed) == 1
-            else [logs_screen(found, screen, failed, every=every)]
-        )
-        if not texts or asked.words["all"]:
+        several, texts = len(found) + len(failed) > 1, list[str]()
+        if several:
+            texts.append(logs_screen(found, screen, failed, every=every))
+        if not several or asked.words["all"]:
             texts += [log_screen(made, screen, every=every) for made in found]
         echo("\n".join(texts), nl=False, colour=screen.colour)

@@ -18,7 +18,6 @@ from vftcli.cli.console import (
     say_recording,
     say_robots,
 )
-from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.free_motion import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers import GoalChoice
@@ -54,7 +53,7 @@ def file_for(robot: str) -> Path:
     return Path("my_" + re.sub(r"[^\w.-]", "_", robot) + ".toml")
 
 
-@opt.command(*OF_LOG, Task, GoalChoice, FreeChoice, RefinementChoice, Anyway, opt.Talk)
+@opt.command(*opt.OF_LOG, Task, GoalChoice, FreeChoice, RefinementChoice, Anyway, opt.Talk)
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[
@@ -78,11 +77,7 @@ def identify_robot(
     """
     from vftcli.answering import identified
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.identification import (
-        files_beside,
-        tables_text,
-        write_identification,
-    )
+    from vftcli.outputs.identification import files_beside, tables_text, write_identification
     from vftcli.readers.reading import Library
 
     task, free = asked.of(Task), asked.of(FreeChoice)
@@ -93,7 +88,7 @@ def identify_robot(
         return
     library = Library([*logs, *(check or ()), *free.logs])
     examiner = health_of(library, anyway=asked.anyway, fitting=task.keeps_links)
-    choice = replace(choice_for(asked, library), examiner=examiner)
+    choice = replace(opt.choice_for(asked, library), examiner=examiner)
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
     output = output or file_for(profile.name)
     OutputFolder(output.parent, force, files_beside(output, figures)).check()
@@ -124,7 +119,7 @@ def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None
     from vftcli.outputs.grids import tuned_grid
     from vftcli.readers.reading import Library
 
-    choice, goal = choice_for(asked, Library([log]), observers=TUNED), asked.of(GoalChoice)
+    choice, goal = opt.choice_for(asked, Library([log]), observers=TUNED), asked.of(GoalChoice)
     force = asked.words["force"]
     if output is None:
         recording = choice.library.open(log, choice.read)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +11,6 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.config import NAME
 from vftcli.cli.console import echo, say, say_json, say_robots
-from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.signals.option import Asked, Option
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vftcli.proposal import ProposedOption
 
 
-@opt.command(*OF_LOG, opt.Talk)
+@opt.command(*opt.OF_LOG, opt.Talk)
 def inspect_log(
     logs: opt.Logs,
     asked: Asked,
@@ -45,14 +45,15 @@ def inspect_log(
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.outputs.files import check_file
     from vftcli.outputs.run_record import log_entry
-    from vftcli.readers.reading import read_first_recording
+    from vftcli.readers.reading import read_chosen
 
     if output is not None:
         check_file(output, force)
-    choice, chosen, examiner = asked.of(ReadChoice), asked.of(RobotChoice), Examiner()
+    choice = replace(asked.of(ReadChoice), examining=True)
+    chosen, examiner = asked.of(RobotChoice), Examiner()
     examinations = []
     for log in logs:
-        recording, arm = read_first_recording(log, choice), None
+        recording, arm = read_chosen(log, choice), None
         recording = choice.within(choice.with_stated_effort(recording))
         if chosen.name or choice.effort == "auto":
             arm = examiner.robot(recording, chosen)
@@ -79,10 +80,10 @@ def write_options(
     from vftcli.proposal import config_text, propose
     from vftcli.readers.reading import Library
 
-    words = {word: asked.words.get(word) for kind in OF_LOG for word in kind.options()}
+    words = {word: asked.words.get(word) for kind in opt.OF_LOG for word in kind.options()}
     words |= asked.settings
     given = {name.replace("_", "-"): value for name, value in words.items() if value is not None}
-    choice = choice_for(asked, Library(logs), on_screen=True)
+    choice = opt.choice_for(asked, Library(logs), on_screen=True)
     proposed = [from_folder(output.parent, option) for option in propose(logs, choice, given)]
     write_text(output, config_text(proposed), force)
     settled = {option.key: option.value for option in proposed if option.key and option.holds}

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
 from vftcli.cli.console import LeftOut, canvas, open_made, say_analysis, say_written, show
-from vftcli.cli.options import OF_ANALYSIS, choice_for, outputs_of
 from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
 from vftcli.signals.option import WRITE, Asked, Choice, Option
@@ -34,7 +33,7 @@ class Tables(Choice):
     rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.")]
 
 
-@opt.command(ReferenceChoice, *OF_ANALYSIS, opt.Mcap, OutputChoice, PrintChoice)
+@opt.command(ReferenceChoice, *opt.OF_ANALYSIS, opt.Mcap, OutputChoice, PrintChoice)
 def report(
     logs: opt.Logs,
     output: opt.LogFolder,
@@ -58,12 +57,13 @@ def report(
     from vftcli.pipeline import WRITING, analyse_logs, sense
     from vftcli.readers.reading import Library
 
-    library, published, written = Library(logs), asked.of(PrintChoice).table, outputs_of(asked)
+    library, written = Library(logs), opt.outputs_of(asked)
     output, details = opt.folder_of(output, logs, asked), asked.words["details"]
+    published = asked.of(PrintChoice).table
     labels = [library.label(log) for log in logs]
     names = report_files(labels, written.extras, figures, several=len(logs) > 1)
     OutputFolder(output, force, names).check()
-    choice = choice_for(asked, library, on_screen=not json)
+    choice = opt.choice_for(asked, library, on_screen=not json)
     if published is not None:
         check_published(published, asked.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
@@ -121,7 +121,7 @@ def show_answers(
             show(terminal(print_grid(made.published)) + "".join(remarks))
 
 
-@opt.command(*OF_ANALYSIS, opt.Mcap, OutputChoice, Tables)
+@opt.command(*opt.OF_ANALYSIS, opt.Mcap, OutputChoice, Tables)
 def estimate(
     log: opt.Log,
     output: opt.LogFolder,
@@ -147,14 +147,14 @@ def estimate(
     from vftcli.signals.recording import EXAMINED
 
     output, library = opt.folder_of(output, [log], asked), Library([log])
-    written = outputs_of(asked.but(rrd=asked.words["rrd"] or show))
+    written = opt.outputs_of(asked.but(rrd=asked.words["rrd"] or show))
     names = estimate_files(written.extras)
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
     if asked.words["columns"] is None:
         refuse_estimates(log)
     OutputFolder(output, force, names).check()
-    choice = choice_for(asked, library)
+    choice = opt.choice_for(asked, library)
     # Of a large log only the needed columns are read; outputs show all.
     few = not (choice.lists_contacts or choice.wrench or written.extras)
     choice = for_estimates(choice)

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
 from vftcli.cli.console import echo, say, say_json, say_recording, say_robots
-from vftcli.cli.options import OF_LOG, choice_for
 from vftcli.evaluation import ReferenceChoice
 from vftcli.signals.option import FILE, Anyway, Asked, Option
 
@@ -13,7 +12,7 @@ if TYPE_CHECKING:
     from vftcli.signals.recording import Recording
 
 
-@opt.command(*OF_LOG, ReferenceChoice, Anyway, opt.Talk)
+@opt.command(*opt.OF_LOG, ReferenceChoice, Anyway, opt.Talk)
 def contact_thresholds(
     logs: opt.Logs,
     asked: Asked,
@@ -42,7 +41,7 @@ def contact_thresholds(
     from vftcli.readers.reading import Library
     from vftcli.signals.errors import ParameterError
 
-    choice = choice_for(asked, Library([*logs, *(check or ())]))
+    choice = opt.choice_for(asked, Library([*logs, *(check or ())]))
     library, reference = choice.library, choice.reference
     if reference is not None and not check:
         raise ParameterError(

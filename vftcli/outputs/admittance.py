@@ -109,7 +109,7 @@ def latency_rows(run: ClosedLoop) -> list[Record]:
 
 
 def latency_grid(run: ClosedLoop) -> Grid:
-    """The latencies of a closed loop, from the true force and as in the paper."""
+    """The latencies of a closed loop."""
     columns = {
         "axis": "axis",
         **{f"{name}_s": Column(head, "s", ".3f") for name, head in LATENCIES.items()},
@@ -157,7 +157,7 @@ def stability_grid(replay: Replay) -> Grid:
 
 
 def latex_text(replay: Replay) -> str:
-    """Parameters (Tables III and IV of the paper) and comparison as LaTeX tables."""
+    """Parameters and comparison as LaTeX tables."""
     grids = [parameter_grid(replay)]
     if replay.rows:
         grids.append(replace(comparison_grid(replay.rows, TITLE), notes=RETURNS))
@@ -193,7 +193,7 @@ def write_admittance(
     force: bool = False,
     form: str | None = None,
 ) -> None:
-    """Write the folder of a replay, all or nothing; figures in a form, or none."""
+    """Write the folder of a replay, all or nothing."""
     replay, run, record = found.replay, found.run, admittance_record(found, command)
     title = found.recording.name if found.recording is not None else "release"
     if run is not None and run.simulation is not None:
@@ -312,14 +312,14 @@ def render_admittance(found: Replayed, record: Record, title: str) -> str:
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
-    """Every controller with its colour; the traditional one has the page's ink."""
+    """Every controller with its colour; the traditional one's is ink."""
     # Colours of variable controllers, again from the first.
     spare = iter(SPARE * len(replay.controllers))
     return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
 
 
 def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
-    """The charts, top to bottom; one panel an axis, three axes on one scale."""
+    """The charts, top to bottom, a panel an axis."""
     p = replay.parameters
 
     def lines(values: Array) -> tuple[ChartLine, ...]:

@@ -84,7 +84,7 @@ class Chart(NamedTuple):
     families: tuple[int, ...] = ()
     #: Half the width of a band about zero, one a panel, or None. (n,)
     band: Array | None = None
-    band_label: str = ""  #: Name of the band.
+    band_label: str = ""
     spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
     unit: str = "s"  #: Unit of the horizontal axis.
     log: bool = False  #: Whether the horizontal axis is logarithmic.
@@ -120,7 +120,7 @@ class Chart(NamedTuple):
 
 
 def colours_of_names(names: Sequence[str]) -> dict[str, str]:
-    """One colour for each estimate's name; two share one only if none is left."""
+    """A colour for each estimate's name, shared only if none is left."""
     # Spare colours are those that no estimate has.
     own = {COLOURS.get(name) for name in names}
     spare = cycle([colour for colour in SPARE if colour not in own] or SPARE)

@@ -1,13 +1,8 @@
-"""Logs as files: flat tables or MCAP; simulated ones with their truth beside them.
+"""Logs as files: flat tables or MCAP; simulated ones with their truth.
 
-An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove; estimates become one too.
-Topics of `estimates.mcap`: `/joint_states` (positions, velocities, measured drive torque
-as effort), `/vftcli/external/<observer>` and `/vftcli/external/reference`
-(external torque as effort), all sensor_msgs/JointState; `/vftcli/wrench/<observer>` and
-`/vftcli/wrench/reference` (geometry_msgs/WrenchStamped, NaN where the pose cannot tell
-it); `/vftcli/contacts/log` (foxglove_msgs/Log) where each contact begins and ends.
-Hyphens, which ROS names may not hold, become underscores. All messages are CDR: JSON in a
-ros2 file stops rosbags' reader.
+An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove; estimates become one too, with
+the topics in docs/outputs.md. All messages are CDR: JSON in a ros2 file stops rosbags'
+reader.
 """
 
 import json
@@ -51,7 +46,7 @@ Nanoseconds = NDArray[np.int64]
 class OutputTopic(NamedTuple):
     """Messages of one topic, one a sample."""
 
-    name: str  #: The topic's name.
+    name: str
     kind: str  #: The type, as package/Name.
     #: Dotted path of a field → value; an array has a row a message.
     values: Mapping[str, Value]
@@ -81,7 +76,7 @@ def joint_topic(
 
 
 def write_mcap(path: Path, analysis: Analysis) -> None:
-    """Write the log's signals, every estimate and the reference; replaces a file."""
+    """Write the log's signals, every estimate and the reference."""
     recording, stamps = analysis.recording, stamps_of(analysis.recording)
     names = recording.joint_names or analysis.robot.chain.names
     torque = drive_torque(recording, analysis.robot)
@@ -146,7 +141,7 @@ def stamps_of(recording: Recording) -> Nanoseconds:
 def write_topics(
     path: Path, stamps: Nanoseconds, found: Sequence[OutputTopic], events: Sequence[Event] = ()
 ) -> None:
-    """Write a ros2-profile MCAP with zstd chunks, sample by sample, topics together.
+    """Write a ros2-profile MCAP with zstd chunks, sample by sample.
 
     Each sample has a stamp [ns], (T,); events are in order of time.
     """
@@ -178,7 +173,7 @@ def write_topics(
 
 
 def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401
-    """Register a topic with its type's definition; return its channel number."""
+    """Register a topic; return its channel number."""
     schema = writer.register_schema(long_name(kind), "ros2msg", schema_text(kind).encode())
     return int(writer.register_channel(topic, "cdr", schema))
 

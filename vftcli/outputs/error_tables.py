@@ -52,7 +52,7 @@ class Block(NamedTuple):
     """RMSE of one recording, observers down, joints across."""
 
     recording: str  #: The log's label, unique in the command.
-    reference: str  #: The reference's name.
+    reference: str
     joints: tuple[int, ...]  #: Joint numbers, from 1.
     observers: tuple[str, ...]  #: Names, in the order in which they ran.
     rmse: Array  #: NaN where unknown. (observers, joints) [N·m]

@@ -34,14 +34,9 @@ LONG, GROUP_ROWS = 1 << 17, 1 << 15
 def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     """Time, motion, every torque, wrenches: one flat column each.
 
-    Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``…
-    [N·m]; ``sd/<observer>/1``… [N·m] where the observer gives one;
-    ``tau_ext/reference/1``… [N·m]; ``contact``, the number in the list of contacts or
-    null, where they are listed; where a wrench is asked for, and of ``best`` where contacts
-    are listed, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose hides it,
-    ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; by
-    the solver ``map`` the masked samples are in ``wrench_masked/<observer>/fx``…. Unknown
-    values are null.
+    docs/outputs.md lists them, each field's metadata states its unit. Of a wrench there are
+    also ``null_space/<observer>`` [N·m], and by the solver ``map`` the masked samples as
+    ``wrench_masked/<observer>/fx``…. Unknown values are null.
     """
     return frame_of(columns(analysis, rows))
 
@@ -86,7 +81,7 @@ def wrench_columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:
-    """Write the table as Parquet (zstd), that of a long log in groups of rows."""
+    """Write the table as Parquet, of a long log in groups of rows."""
     if len(analysis.t) > LONG and installed("pyarrow"):
         starts = range(0, len(analysis.t), GROUP_ROWS)
         write_groups(path, ((analysis, slice(at, at + GROUP_ROWS)) for at in steps(starts)))
@@ -97,7 +92,7 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
 
 
 def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:
-    """Write a long log's table as groups of rows; the analysis of the last group.
+    """Write a table as groups of rows; the analysis of the last group.
 
     The whole table would not fit in memory beside the log.
     """
@@ -126,7 +121,7 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
 
 
 def doubts_of(analysis: Analysis) -> dict[str, str]:
-    """Doubts in the table's metadata, for a reader without the record beside it."""
+    """Doubts for the table's metadata."""
     doubts = overridden_lines(analysis.examinations)
     return {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
 

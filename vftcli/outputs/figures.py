@@ -111,7 +111,7 @@ def plot(
     joints: int | Sequence[int] | None,
     observers: str | Sequence[str] | None,
 ) -> "Figure":
-    """A figure for a notebook: `what` of `PLOTS`, joints from 1, None for all."""
+    """A figure for a notebook: `what` of `PLOTS`, joints from 1."""
     check_known(str(what), PLOTS, f"no plot {what!r}")
     found, errors, drawing = analysis.contacts, analysis.errors, None
     numbers, names = ([] if x is None else np.atleast_1d(x).tolist() for x in (joints, observers))

@@ -23,7 +23,7 @@ DASH = "–"  #: Sign for an unknown number.
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number with three significant digits, with an exponent only below 1e-4."""
+    """A number with significant digits, an exponent only below 1e-4."""
     if not np.isfinite(value):
         return DASH
     if value == 0.0:
@@ -84,7 +84,7 @@ COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
 class GridCell(NamedTuple):
     """An entry with emphasis, or with another text on the page."""
 
-    text: str  #: Its text.
+    text: str
     #: Whether it is the best of its column: bold.
     best: bool = False
     mark: str = ""  #: Mark behind it on the terminal, as a star.
@@ -99,7 +99,7 @@ Rows = list[Sequence[Entry]]  #: Rows of a table while it is filled.
 class Column(NamedTuple):
     """One column."""
 
-    head: str  #: Its heading.
+    head: str
     #: Unit, in brackets behind the heading; "" if the heading says it.
     unit: str = ""
     #: Format of a float as ``.3f``, or a function.
@@ -170,7 +170,7 @@ def keyed_grid(
     *,
     swatches: bool = False,
 ) -> Grid:
-    """A table of rows for machines, with the values of these keys as columns."""
+    """A table of rows, with the values of these keys as columns."""
     entries = [[*map(row.get, columns)] for row in rows]
     return Grid([*columns.values()], entries, title, swatches=swatches)
 

@@ -78,7 +78,7 @@ def joints_grid(robot: "Robot") -> Grid:
 
 
 def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
-    """Gains found for each observer and their expected effects, joint by joint."""
+    """Gains found for each observer, and their effects, by joint."""
     rows: Rows = []
     for line in tuned:
         values = {
@@ -125,7 +125,7 @@ def bench_grid(result: Record) -> Grid:
 
 
 def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
-    """Contact detection, one row a recording and observer; none if not asked."""
+    """Contact detection by recording and observer, if asked for."""
     if errors is None or "contacts" not in errors.columns:
         return
     if len(rows := errors.drop_nulls("contacts")):

@@ -1,4 +1,4 @@
-"""Outputs of an identification: robot file, page, figures, `run.json`, tables."""
+"""Outputs of an identification: robot file, page, figures, record."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -76,7 +76,7 @@ def write_identification(
     force: bool,
     form: str | None = None,
 ) -> str:
-    """Write all files or none, with figures if `form`; the text of `run.json`."""
+    """Write all files or none; the text of `run.json`."""
     record = identification_record(found, logs, command)
     heading = [
         *overridden_lines(logs, fitting=False),

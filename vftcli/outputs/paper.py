@@ -112,7 +112,7 @@ def write_figures(
     form: str,
     before: str = "figures/",
 ) -> None:
-    """Write figures in both widths, without date and machine, for equal bytes."""
+    """Write figures in both widths, without date, for equal bytes."""
     maker = f"vftcli {VERSION}"
     own: dict[str, dict[str, str | None]] = {
         "pdf": {"Creator": maker, "CreationDate": None},
@@ -166,7 +166,7 @@ def shortened(name: str) -> str:
 class Plot(NamedTuple):
     """One plot of a figure."""
 
-    chart: Chart  #: Its chart.
+    chart: Chart
     panel: int  #: Number of the panel, from 0.
     #: A chart over it with an axis of its own, or None.
     over: Chart | None = None
@@ -340,7 +340,7 @@ def dot_figure(
 
 
 def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, Look]) -> None:
-    """The dots of one log, side by side at each joint, and the floor below them."""
+    """The dots of one log side by side at each joint, and the floor."""
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     places = np.arange(len(plot.joints), dtype=np.float64)

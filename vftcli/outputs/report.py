@@ -31,7 +31,7 @@ SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
 
 
 def places_of(labels: Sequence[str]) -> list[str]:
-    """The sub-folder of each of several logs: its file's name without the ending."""
+    """The sub-folder of each log: its file's name without the ending."""
     return numbered(Path(label).stem or "log" for label in labels)
 
 
@@ -145,7 +145,7 @@ def contacts_envelope(
 def put_errors(
     folder: OutputFolder, place: str, analyses: Sequence[Analysis]
 ) -> pl.DataFrame | None:
-    """Write the error tables of all logs, if there are errors; return their rows."""
+    """Write the error tables of all logs, if any; return their rows."""
     found = [a.errors for a in analyses if a.errors is not None]
     if not found:
         return None

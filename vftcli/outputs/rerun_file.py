@@ -114,7 +114,7 @@ def send_arm(
 
 
 def send_meshes(stream: Stream, link: str, meshes: Sequence[Mesh], changes: Changes) -> bool:
-    """Send the meshes of a link once; whether it has any and none is missing."""
+    """Send the meshes of a link; whether it has any, and all."""
     found = [(mesh, mesh.file) for mesh in meshes if mesh.file is not None]
     try:
         contents = [collada(file.read_bytes()) for _, file in found]
@@ -149,7 +149,7 @@ def send_colours(
 
 
 def painted_links(found: ContactList, joints: int) -> dict[int, dict[float, str]]:
-    """Number of a touched link → changes of its colour, to that of the part."""
+    """Number of a touched link → changes of its colour."""
     spans: dict[int, dict[float, str]] = {}
     for c in found.contacts:
         for link in {place or joints for place in c.places}:
@@ -222,7 +222,7 @@ class LogLine(NamedTuple):
 class Tab(NamedTuple):
     """Plots shown together."""
 
-    name: str  #: The tab's name.
+    name: str
     plots: list[Chart]  #: Of one panel each; lines with places of their own are points.
     log: Sequence[LogLine] = ()  #: A text log below them, or none.
 
@@ -233,7 +233,7 @@ def lines_of(plot: Chart) -> list[ChartLine]:
 
 
 def thinned(plot: Chart, stretches: int, whole: Sequence[tuple[float, float]]) -> Chart:
-    """The plot with the samples of `level_rows`, or all if that saves nothing."""
+    """The plot with the samples of `level_rows`."""
     values = np.hstack([line.values for line in lines_of(plot)])
     rows = level_rows(plot.x, values, stretches, whole)
     if rows is None:
@@ -341,7 +341,7 @@ def blueprint(
 
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
-    """One tab, in two columns if it has many plots; the first one has the legend."""
+    """One tab, in two columns if it has many plots."""
     # Plots of a family, else of a unit, share the ends of their vertical axes.
     kinds, views = [plot.families or plot.units for plot in tab.plots], []
     ends: dict[tuple[object, ...], tuple[float, float]] = {}

@@ -1,12 +1,8 @@
 """recording.rrd: contacts, torques, residuals, motion and the arm for Rerun.
 
-Entities: `/tau_ext/J1` … (the reference, then every observer), `/residual/J1` … (every
-estimate minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint),
-`/wrench/fx` … where wrenches are known, as in the page's charts; `/robot` with the arm.
-Where contacts are listed: `/force` with |F|, its band and the spans of the contacts,
-`/force/points` with the peaks, `/contacts/1` … with the arrow and the words of each
-contact, `/remarks` with the list's limits. Else the force of a wrench, if asked for, is
-an arrow, `/robot/flange_force`.
+Where contacts are listed each has its arrow and its words in `/contacts/1` …, and
+`/remarks` has the list's limits. Else the force of a wrench, if asked for, is an arrow,
+`/robot/flange_force`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -102,7 +98,7 @@ def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
 
 
 def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
-    """All plots by tab: force, torques and residuals by joint, wrench, motion."""
+    """All plots by tab."""
     reference, joints = analysis.reference, range(analysis.recording.joints)
     # One 95 % band, of `best`, else the last: all would hide each other.
     banded = [e.name for e in analysis.estimates if e.error_sd is not None]
@@ -216,7 +212,7 @@ def motion_plots(analysis: Analysis) -> Iterator[Chart]:
 
 
 def summary(analysis: Analysis) -> str:
-    """Log, robot, and meaning of numbers, of the arrow and of the arm's colours."""
+    """Log, robot, and the meaning of numbers, arrow and colours."""
     recording, robot, source = analysis.recording, analysis.robot, analysis.recording.source
     drawing = (remark for remark in robot.remarks if remark.code == "meshes-not-found")
     notes = (*source.remarks, *all_remarks(analysis), *drawing)

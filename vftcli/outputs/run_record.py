@@ -184,7 +184,7 @@ def input_record(recording: Recording) -> Record:
 
 
 def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
-    """Repairs in reading the logs (dropped, turned, derived), and suspicions."""
+    """Repairs in reading the logs, and suspicions."""
     found = [remark for log in logs for remark in log.source.remarks]
     return {
         "repairs": [remark for remark in found if remark.level == "fact"],
@@ -265,7 +265,7 @@ def refinement_record(analysis: Analysis) -> Record | None:
 
 
 def all_remarks(analysis: Analysis) -> list[Remark]:
-    """Remarks of the run, of every estimate and of the reference, each once."""
+    """Remarks of run, estimates and reference, each once."""
     found: list[Remark] = [*analysis.remarks]
     # Compared by their words: values may be arrays.
     of_run = set(map(str, found))

@@ -86,7 +86,7 @@ class Canvas(NamedTuple):
 
     width: int = 80  #: Columns that are used.
     unicode: bool = True  #: Whether it has more letters than ASCII.
-    colour: bool = False  #: Whether it has colours.
+    colour: bool = False
 
     @classmethod
     def of(cls, *, columns: int, unicode: bool, colour: bool) -> Self:

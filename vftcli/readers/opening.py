@@ -73,7 +73,7 @@ def reason_of(error: Exception) -> str:
 class LogFile:
     """A file or folder as the readers see it: its first bytes already unwrapped."""
 
-    path: Path  #: The file or folder.
+    path: Path
     #: The first bytes of the content, unpacked from gzip or zstd; empty for a folder.
     head: bytes = b""
     entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.

@@ -167,11 +167,6 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
     return reader.numbers(file)
 
 
-def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
-    """A log as `read` gives it, or a file's first of several recordings or arms."""
-    return read_chosen(path, replace(choice or ReadChoice(), examining=True))
-
-
 def recognise(path: str | Path, choice: ReadChoice | None = None) -> LogFormat:
     """The format that a path's content calls for, or that is chosen."""
     return _reader(open_log(Path(path)), choice or ReadChoice())

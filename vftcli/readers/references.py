@@ -104,7 +104,7 @@ class JacobianLog(NamedTuple):
     """Such a log; the Jacobian's axes and point are the log's own."""
 
     name: str  #: What it is called in tables.
-    path: Path  #: The file.
+    path: Path
     sha256: str  #: Digest of its bytes.
     t: Array  #: Time since its first sample. (T,) [s]
     tau_ext: Array  #: The vendor's estimate of the torque on the robot. (T, n) [N·m]

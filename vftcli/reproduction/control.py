@@ -71,7 +71,7 @@ def looped(
 
 
 def ungated(found: Replay) -> Replay:
-    """A replay by a traditional controller without threshold: (45), whole force."""
+    """A replay by a traditional controller without threshold: (45)."""
     force, motion = np.nan_to_num(found.wrench), found.motion
     alone = follow_force(found.controllers[:1], force, found.phases.dragged)
     x, v = motion.x.copy(), motion.v.copy()

@@ -24,13 +24,7 @@ from vftcli.outputs.paper import Drawing, figure_files, line_figure, plots_of, w
 from vftcli.outputs.run_record import envelope, seal
 from vftcli.reproduction.control import closed_loop, latest_turns, released
 from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle
-from vftcli.reproduction.paper import (
-    FLOOR,
-    Given,
-    Paper,
-    ShownItem,
-    paper_of,
-)
+from vftcli.reproduction.paper import FLOOR, Given, Paper, ShownItem, paper_of
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.progress import stage
 
@@ -58,8 +52,8 @@ RATIOS = (
 class Job(NamedTuple):
     """One experiment with one seed."""
 
-    paper: str  #: Name of the paper.
-    experiment: str  #: Name of the experiment.
+    paper: str
+    experiment: str
     seed: int  #: Of everything drawn.
 
 
@@ -91,7 +85,7 @@ def run_job(job: Job) -> RunResult:
 
 
 def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> dict[Job, Result]:
-    """Results of jobs, timed ones last and one by one; a failure is one line."""
+    """Results of jobs, timed ones last, alone; a failure is one line."""
     stage(f"{len(jobs)} runs")
     experiments = {job: paper_of(job.paper).experiments[job.experiment] for job in jobs}
     alone = [job for job in jobs if experiments[job].alone]
@@ -146,7 +140,7 @@ def spread(values: Sequence[float | None]) -> str:
 
 
 def short_number(value: float) -> str:
-    """Three significant digits, a whole number as it is, with a true minus sign."""
+    """Three significant digits; a whole number as it is."""
     text = f"{value:.0f}" if value == round(value) else significant(value)
     return minus(text)
 

@@ -64,7 +64,7 @@ class BenchmarkLog:
     file: str = ""  #: Below the folder of the data.
     parts: tuple[str, ...] = ()  #: Files of numbers that are one log, as ``q=positions.txt``.
     scenario: str = ""  #: Name of a simulated log's scenario.
-    seed: int = 1  #: Its seed.
+    seed: int = 1
     changes: tuple[str, ...] = ()  #: Keys of the scenario, as ``duration=12``.
     sha256: str = ""  #: Of the file.
     source: str = ""  #: Where it is had.
@@ -198,21 +198,19 @@ class Manifest:
         made = choice_of(asked, Library(), Examiner())
         return cast("AnalysisChoice", with_files(made, absolute))
 
-    def trains_on(self, log: BenchmarkLog, protocol: str) -> Iterator[tuple[BenchmarkLog, Spans]]:
-        """Training data of a protocol: logs, and their spans."""
-        if protocol == "free":
-            for word in log.free:
-                is_log = word in self.by_name
-                yield self.by_name.get(word, log), (ALWAYS if is_log else (interval(word),))
-        if protocol == "identified":
-            robot = next(r for r in self.robots if r.name == log.identified)
-            spans = (interval(robot.interval),) if robot.interval else ALWAYS
-            yield from ((self.by_name[name], spans) for name in robot.train)
-
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
         """Reasons for unfair rows of a protocol: a line per training log."""
         name, own = log.name.removesuffix(PUSHED), list(map(digest_of, self.paths(log)))
-        for other, spans in self.trains_on(log, protocol):
+        training: list[tuple[BenchmarkLog, Spans]] = []
+        if protocol == "free":
+            by_name = self.by_name
+            each = ((w, ALWAYS if w in by_name else (interval(w),)) for w in log.free)
+            training = [(by_name.get(word, log), spans) for word, spans in each]
+        if protocol == "identified":
+            robot = next(r for r in self.robots if r.name == log.identified)
+            whole = (interval(robot.interval),) if robot.interval else ALWAYS
+            training = [(self.by_name[other], whole) for other in robot.train]
+        for other, spans in training:
             what = f"{name}, {protocol}: {other.name}"
             if other.name.removesuffix(PUSHED) == name:
                 near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.score)

@@ -100,7 +100,7 @@ class Paper:
 class ShownItem:
     """An item with its experiments' results."""
 
-    item: PaperItem  #: It.
+    item: PaperItem
     #: Key of a line → variant → one value a seed.
     values: Mapping[str, Mapping[str, Sequence[float | None]]]
     chart: Chart | None  #: Its traces, of the first seed.
@@ -108,7 +108,7 @@ class ShownItem:
 
 
 def load_paper(name: str) -> Paper:
-    """The paper of a TOML file beside this one, with its entries explained there."""
+    """The paper of a TOML file beside this one."""
     text = Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
     declared = tomllib.loads(text)
     each, items = declared.pop("each"), {}
@@ -128,7 +128,7 @@ def load_paper(name: str) -> Paper:
 
 
 def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> list[PrintedLine]:
-    """The lines of a row: one, or one for each key of the name in its braces."""
+    """The lines of a row: one for each key of a name in braces."""
     line = PrintedLine(*row)
     name = next((name for name in each if f"{{{name}}}" in line.key), None)
     if name is None:

@@ -1,4 +1,4 @@
-"""One log scored by one protocol: its truth, each method's answer, and rows."""
+"""One log scored by one protocol: truth, answers, rows."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -11,7 +11,6 @@ from vftcli.batch.datasets import (
     check_copy,
     copy_others,
     files_within,
-    partial_of,
     put_rows,
     stored_rows,
     unfinished,
@@ -82,7 +81,7 @@ def test_a_finished_copy_takes_the_place_of_an_earlier_one(tmp_path: Path) -> No
     copy.mkdir()
     (copy / "old").write_text("")
     with unfinished(copy, "key") as folder:
-        assert folder == partial_of(copy)
+        assert folder == copy.with_name(f"{copy.name}.partial")
         (folder / "new").write_text("")
     assert [path.name for path in tmp_path.rglob("*")] == ["copy", "new"]
 

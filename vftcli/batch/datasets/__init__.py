@@ -57,11 +57,6 @@ WORK = ".vftcli"  #: Folder of finished work in an unfinished copy.
 FILMS = frozenset({".mp4", ".svo", ".svo2", ".mkv", ".webm", ".avi", ".png", ".jpg", ".jpeg"})
 
 
-def partial_of(copy: Path) -> Path:
-    """Place of a copy."""
-    return copy.with_name(f"{copy.name}.partial")
-
-
 def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
     """Raise an OutputError before any work if no copy may be made at a path."""
     source, target = dataset.resolve(), copy.resolve()
@@ -93,7 +88,7 @@ def unfinished(copy: Path, key: str) -> Iterator[Path]:
     If the block fails after some work the folder stays, for the next run; if it ends well
     the folder takes the copy's place and replaces an earlier copy.
     """
-    partial = partial_of(copy)
+    partial = copy.with_name(f"{copy.name}.partial")
     work = partial / WORK
     try:
         work.mkdir(parents=True, exist_ok=True)

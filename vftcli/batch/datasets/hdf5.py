@@ -63,7 +63,7 @@ class Hdf5Dataset:
                     raise LogError(f"{path}: has {name} already; annotate the original dataset")
 
     def write(self, file: DataFile, columns: ForceColumns, forces: Forces, target: Path) -> None:
-        """Copy a file and add the data sets to the copy; the original stays untouched."""
+        """Copy a file and add the data sets to the copy."""
         import h5py
 
         path, places = self._places(file)

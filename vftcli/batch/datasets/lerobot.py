@@ -10,14 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.batch.datasets import (
-    DataFile,
-    ForceColumns,
-    Forces,
-    OfEpisodes,
-    Single,
-    Statistics,
-)
+from vftcli.batch.datasets import DataFile, ForceColumns, Forces, OfEpisodes, Single, Statistics
 from vftcli.readers.lerobot import dataset_episodes, info_of, text_of
 from vftcli.readers.opening import open_log
 from vftcli.readers.parquet import EPISODE, ParquetTable, guarded

@@ -44,7 +44,7 @@ class Blob:
         return len(self.rows) - 1
 
     def data(self) -> Record:
-        """The script's packed data: high bytes of all differences, then low ones."""
+        """The script's packed data: high bytes of differences, then low ones."""
         changes = [np.diff(row, prepend=np.int16(0)) for row in self.rows]
         joined = np.concatenate(changes or [np.empty(0, np.int16)])
         # Zigzag: small changes of either sign are small numbers.

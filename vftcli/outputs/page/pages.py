@@ -17,12 +17,7 @@ from vftcli.observers.table import OBSERVERS
 from vftcli.outputs import Record
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
 from vftcli.outputs.contacts import by_force, hardest_rows, hardest_words, otherwise
-from vftcli.outputs.error_tables import (
-    axis_grids,
-    blocks,
-    nothing_to_compare,
-    rmse_grid,
-)
+from vftcli.outputs.error_tables import axis_grids, blocks, nothing_to_compare, rmse_grid
 from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import (
     DASH,
@@ -250,7 +245,7 @@ def observers_view(analysis: Analysis) -> Record:
 
 
 def joint_values(values: Array) -> str:
-    """One number if all joints agree to three digits, else a line a run of joints."""
+    """One number if all joints agree, else a line a run of joints."""
     # Compared as printed: values that look equal are one.
     texts = enumerate(map(significant, values.tolist()), 1)
     runs = [(text, [j for j, _ in run]) for text, run in groupby(texts, itemgetter(1))]
@@ -303,7 +298,7 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
 
 
 def overview(lines: Sequence[LogSummary]) -> Grid:
-    """The table of all logs, the worst first; a click on a head sorts by it."""
+    """The table of all logs, the worst first."""
     rows: Rows = [
         (
             # The name links to the log's page, if any.

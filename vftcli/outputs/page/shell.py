@@ -152,7 +152,7 @@ class Box(NamedTuple):
 class Scales(NamedTuple):
     """Places of values in the drawing."""
 
-    box: Box  #: The chart.
+    box: Box
     x: Span  #: Ends of the horizontal axis.
     y: Span  #: Ends of the vertical axis.
 

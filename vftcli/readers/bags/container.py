@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 class Channel(NamedTuple):
     """One topic of one container."""
 
-    topic: str  #: Its name.
+    topic: str
     type: str  #: Message type as package/Name, without the middle part that ROS 2 writes.
     encoding: str  #: How its messages are serialised: ros1, cdr, json, protobuf, or other.
     #: Text of the message definition, or nothing if the container has none.
@@ -34,7 +34,7 @@ class Batch(NamedTuple):
 
     channel: Channel  #: The topic of all of them.
     times: list[int]  #: When each was recorded. [ns]
-    contents: list[bytes]  #: Their bytes.
+    contents: list[bytes]
 
 
 #: The channel of a message, None where the file does not say; its time [ns]; its bytes.
