@@ -180,8 +180,6 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "payload": (r"\(3,\)", lambda: vft.Recording(t=T, q=Q, payload_com=(1.0,))),
     "p": (r"\(T, n\)", lambda: vft.DynamicsTerms(t=T, p=Q[:, 0], mu=Q)),
     "tau": (r"\(T, n\)", lambda: vft.ExternalTorque(name="x", t=T, tau=Q[:, 0])),
-    "rows of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=Q[:5])),
-    "no joints of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=T)),
     "keyword": ("refrence. Did you mean reference", lambda: vft.report(CIRCLE, refrence="zero")),
     "setting": ("is no setting here.*low-pass", lambda: vft.contacts(CIRCLE, settings=LOW)),
     "setting's value": ("expected a text", lambda: vft.contacts(CIRCLE, settings=NONE)),

@@ -260,7 +260,7 @@ def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
         for name in ("time", "positions", "velocity", "torques")
     )
     shaped = {"q": q.reshape(-1, 7), "dq": dq.reshape(-1, 7), "torque": torque.reshape(-1, 7)}
-    recording = vft.assemble(t, **shaped)
+    recording = vft.Recording(t=t, **shaped)
     run = vft.Run(recording=recording, robot=vft.load_robot("panda"))
     residual = vft.MomentumObserver(gain=10.0).estimate(run).tau
     rms = np.sqrt(np.mean(residual**2, axis=0))

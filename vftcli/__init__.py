@@ -23,7 +23,6 @@ from vftcli.signals.packages import VERSION, door
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation.errors import evaluate, rmse
-    from vftcli.free_motion.two_cycle import two_cycle_difference
     from vftcli.notebook import (
         admit,
         compare,
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
         thresholds,
     )
     from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
-    from vftcli.readers.reading import assemble, read
+    from vftcli.readers.reading import read
     from vftcli.robots import Payload, Robot, load_robot
     from vftcli.robots.chain import flange_jacobian, link_poses
     from vftcli.robots.run import Run
@@ -56,7 +55,6 @@ else:
         "robots.chain",
         "observers",
         "evaluation.errors",
-        "free_motion.two_cycle",
         "analysis",
         "notebook",
     )
@@ -76,7 +74,6 @@ __all__ = [
     "Run",
     "VftError",
     "admit",
-    "assemble",
     "compare",
     "contacts",
     "estimate",
@@ -91,7 +88,6 @@ __all__ = [
     "rmse",
     "simulate",
     "thresholds",
-    "two_cycle_difference",
 ]
 
 

@@ -42,18 +42,13 @@ def errors_of(
     from vftcli.evaluation.errors import PoolMember, evaluate_pooled
     from vftcli.outputs.error_tables import marked
 
-    errors = [*(made.errors for made in analyses), *others]
     judged = [
         PoolMember(a.robot.name, a.estimates, a.reference)
         for a in analyses
         if a.reference is not None
     ]
-    return marked(
-        pl.concat(
-            [e for e in (*errors, evaluate_pooled(judged)) if e is not None], how="diagonal"
-        ),
-        analyses,
-    )
+    errors = (*(made.errors for made in analyses), *others, evaluate_pooled(judged))
+    return marked(pl.concat([e for e in errors if e is not None], how="diagonal"), analyses)
 
 
 def free_thresholds(

@@ -1,6 +1,6 @@
 """The two-cycle difference against the simulated truth, and on real pairs of logs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +11,12 @@ from sound_logs import UR10E
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.cycles import find_period
 from vftcli.free_motion.difference import RUNGS, Difference, ErrorModel
+from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.free_motion.two_cycle import (
     error_ratio,
     floor_remarks,
     friction_change,
-    two_cycle_difference,
+    two_cycle_reference,
 )
 from vftcli.readers.reading import read
 from vftcli.robots import Robot, load_robot
@@ -43,6 +44,19 @@ def ur5() -> Robot:
 def repeats(logs: Path) -> dict[str, Recording]:
     folder = logs / "ur10e"
     return {k: read(folder / f"free_repeat_{k}.csv", columns=UR10E) for k in "abc"}
+
+
+def two_cycle_difference(
+    recording: Recording,
+    free: Recording | Sequence[Recording],
+    robot: Robot,
+    choice: FreeChoice | None = None,
+) -> ExternalTorque:
+    """The reference of a log by its own cycles, or by one or several free logs."""
+    log = Run(recording=recording, robot=robot)
+    others = (free,) if isinstance(free, Recording) else tuple(free)
+    runs = tuple(FreeRun(run=Run(recording=r, robot=robot), log=log) for r in others)
+    return two_cycle_reference(FreeMotion(log=log, choice=choice or FreeChoice(), runs=runs))
 
 
 def error_of(reference: ExternalTorque, truth: Array) -> Array:

@@ -12,8 +12,8 @@ import pytest
 import vftcli.readers
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.reading import Library, assemble
-from vftcli.signals.errors import ClockError, LogError, MissingSignalError
+from vftcli.readers.reading import Library
+from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import WORDS
 
@@ -137,19 +137,6 @@ def test_rows_with_an_unknown_value_are_left_out_and_counted(tmp_path, empty, fi
     rows = log.source.row_samples
     expected = [kept.index(k) if k in kept else -1 for k in range(20)]
     assert (list(range(20)) if rows is None else rows.tolist()) == expected
-
-
-def test_arrays_are_cleaned_like_a_log_that_is_read():
-    t = [0.0, 0.1, 0.1, 0.2]
-    log = assemble(t, name="mine", q=np.zeros((4, 6)), torque=np.ones((4, 6)))
-    assert (log.name, log.samples, log.source.duplicates) == ("mine", 3, 1)
-    assert log.signals == ("q", "torque")
-
-
-@pytest.mark.parametrize("signals", [{"dq": np.zeros((2, 6))}, {"q": [[0.0], [0.0]], "tau": [1]}])
-def test_positions_are_needed_and_names_are_those_of_a_recording(signals):
-    with pytest.raises(MissingSignalError):
-        assemble([0.0, 0.1], **signals)
 
 
 MADE = re.compile(r"(?:fact|caution|warning)\(\s*\"([a-z-]+)\"")

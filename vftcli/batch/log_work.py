@@ -106,7 +106,7 @@ def plain(value: Any) -> Any:  # noqa: ANN401
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
-COMMANDS = ("estimate", "compare", "report", "contacts")  #: Commands for a log.
+COMMANDS = ("estimate", "compare", "report", "contacts")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,13 +125,13 @@ class LogJob:
 class LogTask(NamedTuple):
     """One log of a batch."""
 
-    job: LogJob  #: Its batch's work.
+    job: LogJob
     folder: Path  #: Where the batch is written, from the root.
     command: str  #: The command line, for the records.
     path: Path  #: The log's file or folder, from the root.
     episode: int | None  #: Its episode, None for a file of one recording.
     label: str
-    key: str  #: Key of its result.
+    key: str
     sha256: str  #: Of its file's bytes; "" for several files.
 
 

@@ -66,9 +66,9 @@ class BatchRun:
     """A batch and one run of it: logs done, failures, efforts."""
 
     logs: Sequence[LogEntry]
-    job: LogJob  #: Work on each.
-    folder: BatchFolder  #: Where it is written.
-    workers: WorkersChoice  #: Where it is done.
+    job: LogJob
+    folder: BatchFolder
+    workers: WorkersChoice
     command: str  #: The command line, for the records.
     tell: Tell = field(repr=False)  #: Receives a sentence on each step.
 

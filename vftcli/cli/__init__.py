@@ -43,7 +43,7 @@ def make_app(load: Collection[str] = COMMANDS) -> typer.Typer:
     return app
 
 
-HELP = {"help_option_names": ["-h", "--help"]}  #: Options for help.
+HELP = {"help_option_names": ["-h", "--help"]}
 
 
 def show_version(asked: bool) -> None:

@@ -29,7 +29,7 @@ OTHERWISE = {
     "thresholds": {"reference", "reference-columns"},  # of --check alone
     "convert": {"log.derive"},  # it writes what was logged
 }
-Table = dict[str, Any]  #: A table of TOML.
+Table = dict[str, Any]
 Click = Any  #: A type of typer's own click, which has none.
 
 

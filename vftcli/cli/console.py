@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from vftcli.signals.remarks import Remark
 
 echo, echo_data = STAGES.echo, STAGES.echo_data  #: All output of a command.
-QUIET, USUAL, DETAILS = range(3)  #: Levels of output.
+QUIET, USUAL, DETAILS = range(3)
 
 _level: ContextVar[int] = ContextVar("level", default=USUAL)
 

@@ -68,7 +68,7 @@ Check = Annotated[
 ]
 
 
-FORMS = ("pdf", "svg", "png")  #: Formats of figures.
+FORMS = ("pdf", "svg", "png")
 
 
 def checked_form(form: str) -> str:

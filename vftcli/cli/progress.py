@@ -144,5 +144,5 @@ def fitted(text: str, width: int) -> str:
     return "\n".join(lines)
 
 
-STAGES = Stages()  #: The program's line.
+STAGES = Stages()
 echo = STAGES.echo  #: Prints over the line.

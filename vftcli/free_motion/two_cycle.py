@@ -5,7 +5,7 @@ from itertools import permutations
 
 import numpy as np
 
-from vftcli.free_motion import AUTOMATIC, FreeChoice
+from vftcli.free_motion import AUTOMATIC
 from vftcli.free_motion.cycles import pair_with_cycle
 from vftcli.free_motion.difference import (
     LOW_PASS,
@@ -18,43 +18,17 @@ from vftcli.free_motion.difference import (
     pair_with_run,
     rms,
 )
-from vftcli.free_motion.free_motion import FreeMotion, FreeRun
-from vftcli.robots.robot import Robot
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask, root_mean_squares
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import REST, faster
 
 BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
 #: Standard errors of a change that is believed.
 SURE = 3.0
-
-
-def two_cycle_difference(
-    recording: Recording,
-    free: Recording | Sequence[Recording],
-    robot: Robot,
-    choice: FreeChoice | None = None,
-) -> ExternalTorque:
-    """τ_ext = τ_free − τ at one place of a repeated motion, with its error.
-
-    Args:
-        recording: The log with contact.
-        free: A free run in another log or several; none to find free cycles in the log itself.
-        robot: For drive constants and the model's torque.
-        choice: Period, free cycles, alignment and low-pass, each found if not given.
-
-    Raises:
-        ReferenceTorqueError: If nothing repeats, or what is asked for is not there.
-        MissingSignalError: If a log has neither currents nor torques, or no velocities.
-    """
-    log = Run(recording=recording, robot=robot)
-    others = (free,) if isinstance(free, Recording) else tuple(free)
-    runs = tuple(FreeRun(run=Run(recording=r, robot=robot), log=log) for r in others)
-    return two_cycle_reference(FreeMotion(log=log, choice=choice or FreeChoice(), runs=runs))
 
 
 def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:

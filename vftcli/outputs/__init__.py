@@ -42,4 +42,4 @@ class OutputChoice(Choice):
             )
 
 
-PLAIN = OutputChoice()  #: The default files.
+PLAIN = OutputChoice()

@@ -83,15 +83,15 @@ class Ground(NamedTuple):
 class LogSummary(NamedTuple):
     """One log among several: a line of the screen, the index or a batch's page."""
 
-    name: str  #: Its label.
-    robot: str  #: Its arm.
+    name: str
+    robot: str
     duration: float  #: Its length. [s]
     contacts: str  #: Their number, "load" or a dash.
     hardest: str  #: The hardest contact in words, or a dash.
     force: float  #: Its force, 0 without one. [N]
     least: float | None  #: Least visible force, None if unknown. [N]
     standing: Standing  #: Health of the log.
-    words: str  #: Why.
+    words: str
     page: str = ""  #: Its own page, relative to that of all logs; "" without one.
     error: str = DASH  #: The least mean RMSE and its observer, or a dash.
 

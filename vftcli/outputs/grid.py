@@ -134,7 +134,7 @@ class Grid:
 
     given: Sequence[Any]  #: The columns; a text alone heads a column of words.
     rows: Sequence[Sequence[Entry]]  #: One entry a column.
-    title: str = ""  #: Title, "" for none.
+    title: str = ""
     quantity: str = ""  #: Quantity of all numbers, as RMSE, if one.
     unit: str = ""  #: Their unit, if one.
     summaries: int = 0  #: Last rows that sum up the others, below a rule.

@@ -300,7 +300,7 @@ def look(series: ChartLine) -> Look:
 class DotPlot(NamedTuple):
     """One plot."""
 
-    title: str  #: Its log.
+    title: str
     joints: Sequence[str]  #: Names below. (n,)
     #: Name, numbers (n,), ends of their intervals (2, n); NaN unknown.
     rows: Sequence[tuple[str, Array, Array | None]]

@@ -38,7 +38,7 @@ Changes = Mapping[float, str]
 
 ROBOT, CONTACTS = "/robot", "/contacts"  #: Roots of the arm and of the contacts, by number.
 RATE = 50.0  #: Drawn poses a second. [Hz]
-MOST_POSES = 20_000  #: Most drawn poses.
+MOST_POSES = 20_000
 NEWTON_PER_METRE = 200.0  #: Default scale of a force arrow: 200 N are 1 m.
 #: Colours of links, joints and the force arrow.
 LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
@@ -212,9 +212,9 @@ BAR, EDGES = "touched: ", ("95 % upper", "95 % lower")
 class LogLine(NamedTuple):
     """One line of a text log."""
 
-    path: str  #: The entity.
+    path: str
     t: float  #: When. [s]
-    text: str  #: The event.
+    text: str
     colour: str  #: ``#rrggbb``.
     level: str = "INFO"  #: INFO, WARN or ERROR.
 

@@ -51,7 +51,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 
-MOST_LINES = 40  #: Lines of a screen.
+MOST_LINES = 40
 #: Lines on written files: a blank one, two of names, the page.
 FILE_LINES = 4
 

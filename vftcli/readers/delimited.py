@@ -59,6 +59,7 @@ class TextTable(Table):
         named = len(names) == len(cells) and not any(map(is_number, names))
         if comment and named and all(map(is_number, cells)):
             self.sample = [comment, *rows]
+        self._is_quoted = any('"' in line for line in self.sample)
         cells = self.cells(self.sample[0])
         self.width = len(cells)
         numbers = all(not cell or self.is_number(cell) for cell in cells)
@@ -152,10 +153,6 @@ class TextTable(Table):
             blank = np.all([series.is_null() for series in found.values()], axis=0).any()
             return None if blank else found
         return found
-
-    @cached_property
-    def _is_quoted(self) -> bool:
-        return any('"' in line for line in self.sample)
 
     def _pieces(self) -> Iterator[bytes]:
         """The text of the rows; in one piece where a line's end may not be a row's."""

@@ -17,22 +17,14 @@ from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from vftcli.readers.cleaning import cleaned, without_unknown_rows
 from vftcli.readers.opening import HEAD_BYTES, LogFile, open_log, sha256_of
 from vftcli.readers.reader import ALL, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import listed
-from vftcli.signals.arrays import number_array
-from vftcli.signals.errors import (
-    LogError,
-    MissingSignalError,
-    ParameterError,
-    ShapeError,
-    UnknownFormatError,
-)
+from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.parsing import did_you_mean, printable, tables_beside
-from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.recording import Recording
 
 
 class LogFormat(NamedTuple):
@@ -203,38 +195,6 @@ def _recognised(file: LogFile) -> LogFormat:
             f"{file.path}: could be {names}. Say which: --set log.format=NAME."
         )
     return found[0]
-
-
-def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Recording:
-    """A Recording of arrays; repeated stamps go and are counted, gaps are reported.
-
-    Args:
-        t: Stamps, not decreasing. (T,) [s]
-        name: What to call the recording in tables.
-        signals: Fields of `Recording` by name, at least ``q``: (T, n) in SI units.
-
-    Raises:
-        ShapeError: If a signal is no array of numbers with a row for each stamp.
-        MissingSignalError: If there is no ``q``, or a name is not a signal of a Recording.
-        LogError: If a signal holds NaN or infinity.
-        ClockError: If the clock runs backwards.
-    """
-    known = (*JOINT_SIGNALS, "wrench")
-    if unknown := [key for key in signals if key not in known]:
-        raise MissingSignalError(f"no signal {unknown[0]!r}; a recording has {', '.join(known)}")
-    if "q" not in signals:
-        raise MissingSignalError(
-            "a recording needs joint positions: give q=… of shape (T, n) [rad]"
-        )
-    arrays = {key: np.array(number_array(value, key, name)) for key, value in signals.items()}
-    for key, value in arrays.items():
-        if value.ndim != 2 or len(value) != np.size(t):
-            raise ShapeError(
-                f"{key} of {name} has shape {value.shape}; expected ({np.size(t)}, n), a row for "
-                "each stamp of t"
-            )
-    raw = RawLog(stamps=np.array(number_array(t, "t", name)), clock="as given", signals=arrays)
-    return cleaned(raw, Path(name), "arrays")
 
 
 def description(file: LogFile) -> str:

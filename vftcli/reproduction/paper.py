@@ -37,7 +37,7 @@ class PrintedLine(NamedTuple):
     """One line of an item's table."""
 
     key: str  #: Where its values stand among the measured ones.
-    label: str  #: Its meaning.
+    label: str
     unit: str = ""  #: Its unit, "" for none.
     printed: str = ""  #: Number in the paper, "" for none.
     compared: bool = True  #: Whether ours over the print says anything.
@@ -56,7 +56,7 @@ class PaperItem:
     """A table or a figure of the paper, or a conclusion."""
 
     label: str  #: Its name in the paper.
-    title: str  #: Its content.
+    title: str
     why: str  #: Why ours differs, or why nothing can be compared, in a sentence.
     verdict: str  #: Whether it is reproduced, in a few words.
     experiments: Sequence[str] = ()  #: Those that it shows; none for a picture.
@@ -79,7 +79,7 @@ class Paper:
 
     name: str  #: Its name at the command line.
     title: str  #: Authors, title, place.
-    doi: str  #: Its identifier.
+    doi: str
     experiments: Mapping[str, Experiment]  #: Name → experiment.
     items: Mapping[str, PaperItem]  #: Name → table or figure, in the paper's order.
     setting: Sequence[str]  #: Settings, in sentences.

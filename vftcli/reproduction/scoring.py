@@ -307,8 +307,8 @@ def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
     total = float(w[known].sum()) or np.nan
     mean = float((w * up)[known].sum()) / total
     square = float((w * (up - weight) ** 2)[known].sum()) / total
-    shares = {"mean_N": mean, "rms_error_N": np.sqrt(square), "answered": total / w.sum()}
-    return {"weight_N": weight, **shares}
+    found = {"weight_N": weight, "mean_N": mean, "rms_error_N": np.sqrt(square)}
+    return {**found, "answered": total / w.sum()}
 
 
 def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:

@@ -33,7 +33,7 @@ class ForceColumn(NamedTuple):
         return max(1, len(self.elements))
 
 
-ForceColumns = Sequence[ForceColumn]  #: The new columns.
+ForceColumns = Sequence[ForceColumn]
 
 
 class DataFile(NamedTuple):

@@ -22,7 +22,7 @@ PREFIX = "observation."  #: Begin of observations' names.
 METADATA = b"huggingface"
 #: Keys of the quantiles.
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
-KEYS = ("min", "max", "mean", "std", "count", *QUANTILES)  #: All keys.
+KEYS = ("min", "max", "mean", "std", "count", *QUANTILES)
 
 
 class LeRobotDataset:

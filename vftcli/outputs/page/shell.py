@@ -141,12 +141,12 @@ def script_json(data: object) -> str:
 class Box(NamedTuple):
     """A chart's size and margins, in units of the drawing."""
 
-    width: float = 460.0  #: Whole width.
-    height: float = 132.0  #: Whole height.
+    width: float = 460.0
+    height: float = 132.0
     left: float = 38.0  #: Room for the numbers beside the vertical axis.
     bottom: float = 18.0  #: Room for the numbers below.
-    top: float = 8.0  #: Room above.
-    right: float = 8.0  #: Room to the right.
+    top: float = 8.0
+    right: float = 8.0
 
 
 class Scales(NamedTuple):

@@ -66,7 +66,7 @@ class MessageCount:
     """Messages found in a container, and its own count."""
 
     end: int  #: Where its last whole record ends. [B]
-    kept: int = 0  #: Messages found.
+    kept: int = 0
     counted: int | None = None  #: Messages that it counts, None where it does not say.
 
     def report(self, budget: "ReadBudget", counter: str, *, cut: bool) -> None:

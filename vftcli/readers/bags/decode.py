@@ -280,7 +280,7 @@ class Stream:
     """Messages of one topic about the same joints, part by part and then whole.
 
     Attributes:
-        channel: The topic.
+        channel, topic, kind: The topic, its name, the meaning of its type.
         names: The joints' names, base to tip, or empty.
         frame: Frame of its stamps' headers, or nothing.
         mixed: Whether the messages had the joints in another order, or others among them.
@@ -290,6 +290,7 @@ class Stream:
 
     def __init__(self, channel: Channel, names: Names, frame: str) -> None:
         self.channel, self.names, self.frame, self.mixed = channel, names, frame, False
+        self.topic, self.kind = channel.topic, KINDS[channel.type]
         self.constants: dict[str, tuple[float, ...]] = {}
         self.series: dict[str, JoinedRows] = defaultdict(JoinedRows)
 
@@ -312,16 +313,6 @@ class Stream:
     def signals(self) -> Signals:
         """Signal → (T, k)."""
         return {name: value for name, value in self.columns.items() if name not in TIMES}
-
-    @property
-    def kind(self) -> Kind:
-        """The meaning of its type."""
-        return KINDS[self.channel.type]
-
-    @property
-    def topic(self) -> str:
-        """The topic's name."""
-        return self.channel.topic
 
     @property
     def messages(self) -> int:
