@@ -8,6 +8,7 @@ import shutil
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import chain
 from typing import Annotated, Any
 
 import typer
@@ -28,7 +29,7 @@ from vftcli.cli.config import (
 from vftcli.cli.progress import echo
 from vftcli.robots import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
-from vftcli.signals.option import GROUPS, LOG, NUMBERS, OUTPUT, Choice, Option, settings_by_name
+from vftcli.signals.option import GROUPS, LOG, NUMBERS, OUTPUT, Option, settings_by_name
 from vftcli.signals.parsing import did_you_mean, nearest, printable, tables_beside
 
 OWN = "This command"  #: Heading of one command's own options.
@@ -253,18 +254,12 @@ def formats(name: str | None) -> Iterator[str]:
 def settings() -> Iterator[str]:
     """Every setting of all commands: name, unit, meaning and default."""
     choices = choices_of(*every_command().values())
-    rows = sorted(row for kind in choices for row in settings_of(kind))
-    yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
-    yield from two_columns(rows)
-    yield "simulate has a scenario's keys: --set servo.stiffness=soft, --set duration=8."
-
-
-def settings_of(kind: type[Choice]) -> Iterator[tuple[str, str]]:
-    """Each setting of a choice as typed, and its meaning."""
-    for name, (option, default) in settings_by_name([kind]).items():
+    rows, each = [], (settings_by_name([kind]).items() for kind in choices)
+    for name, (option, default) in chain(*each):
         shown = {True: "yes", False: "no"}[default] if isinstance(default, bool) else default
         kept = f"; default {shown}" if isinstance(shown, str | int | float) else ""
-        if name == NUMBERS:
-            yield option.metavar, option.help
-        else:
-            yield name, f"{option.help} ({option.metavar}{kept})"
+        meaning = name, f"{option.help} ({option.metavar}{kept})"
+        rows.append((option.metavar, option.help) if name == NUMBERS else meaning)
+    yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
+    yield from two_columns(sorted(rows))
+    yield "simulate has a scenario's keys: --set servo.stiffness=soft, --set duration=8."

@@ -166,7 +166,6 @@ def command(*choices: type[Choice]) -> Callable[[Callable[..., None]], Callable[
             each = (assignment(w, "--set", "NAME=VALUE") for w in values.get("set") or ())
             settings = settings_as_typed(dict(each), choices, "--set ")
             inputs = [*inputs_of(values), *filter(None, [READ.get()])]
-            # By its -v and -q, if it has them.
             loud = speaking(details=bool(values.get("details")), quiet=bool(values.get("quiet")))
             with protected(inputs), loud:
                 asked = Asked(values, settings, command_line())

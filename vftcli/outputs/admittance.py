@@ -313,7 +313,6 @@ def render_admittance(found: Replayed, record: Record, title: str) -> str:
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
     """Every controller with its colour; the traditional one's is ink."""
-    # Colours of variable controllers, again from the first.
     spare = iter(SPARE * len(replay.controllers))
     return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
 

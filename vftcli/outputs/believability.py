@@ -15,7 +15,7 @@ from vftcli.contacts.contact_list import Contact
 from vftcli.doctor.examination import REFUSING, in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
-from vftcli.outputs.contacts import answer, free_words, hardest_words
+from vftcli.outputs.contacts import answer, hardest_words
 from vftcli.outputs.examination import command, path_of
 from vftcli.outputs.grid import DASH, percent
 from vftcli.robots import PROFILES
@@ -245,7 +245,8 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
         false = found.false_on_free or 0
         listed = f"{counted(false, 'contact')} listed in its {found.free_seconds:.0f} s"
         standing: Standing = "caution" if false else "good"
-        yield Ground(standing, subject, f"{free_words(found)}; {listed}")
+        words = "; ".join(map(sentence, found.free))
+        yield Ground(standing, subject, f"{words}; {listed}")
     for remark in found.remarks:
         load = remark.code == "contact-is-load"
         yield Ground(
@@ -272,7 +273,7 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
             names = f"J{joints[0] + 1}…J{joints[-1] + 1}"
         yield Ground("caution", subject, f"{names}: {hides}", of_log=False)
     name = robot_option(analysis)
-    if not robot.friction or is_profile(analysis):
+    if not robot.friction or robot.path in PROFILES.values():
         where = "a typical arm's" if robot.friction else "none is modelled"
         words = f"{where}. Measure yours (1 min contact-free):"
         free = next((run.recording for run in analysis.motion.runs), None)
@@ -372,9 +373,4 @@ def payload_command(analysis: Analysis) -> str:
 def robot_option(analysis: Analysis) -> str:
     """Value of ``--robot`` for an analysis' arm: profile name, or file."""
     robot = analysis.robot
-    return robot.name if is_profile(analysis) or robot.path is None else str(robot.path)
-
-
-def is_profile(analysis: Analysis) -> bool:
-    """Whether the arm is a built-in profile."""
-    return analysis.robot.path in PROFILES.values()
+    return robot.name if robot.path in {None, *PROFILES.values()} else str(robot.path)

@@ -122,7 +122,6 @@ class Results:
             row |= score.numbers(np.nan if best is None or method == BEST else best.drawn)
             if part == "free":
                 row["skill"] = np.nan  # zero is perfect there: L1 and false rows speak
-            # The estimate's shift with the least error, and its RMSE over that at 0.
             row |= {"lag_s": np.nan, "rmse_at_lag": np.nan}
             if place in shifts:
                 sums = np.sum(shifts[place]["lag_squares"].to_list(), axis=0)

@@ -121,7 +121,6 @@ class Chart(NamedTuple):
 
 def colours_of_names(names: Sequence[str]) -> dict[str, str]:
     """A colour for each estimate's name, shared only if none is left."""
-    # Spare colours are those that no estimate has.
     own = {COLOURS.get(name) for name in names}
     spare = cycle([colour for colour in SPARE if colour not in own] or SPARE)
     return {name: COLOURS.get(name) or next(spare) for name in names}

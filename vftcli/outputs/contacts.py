@@ -205,11 +205,6 @@ def reason(contact: Contact) -> str:
     return f"the band is {share:.0%} of the force{by_place}"
 
 
-def free_words(found: ContactList) -> str:
-    """Known free motion in words; "" without any."""
-    return "; ".join(map(sentence, found.free))
-
-
 def beginning(contact: Contact) -> str:
     """Text at a contact's begin: time, duration, force, direction, place.
 
@@ -250,7 +245,7 @@ def contacts_record(found: ContactList) -> Record:
         **{key: getattr(found, field) for field, key in LIST_KEYS.items()},
         "frame": FRAME,
         "sign": SIGN,
-        "free_part": free_words(found) or None,
+        "free_part": "; ".join(map(sentence, found.free)) or None,
         "load": found.load and found.load.record(),
         "largest_unexplained": found.unexplained and found.unexplained._asdict(),
         "stops_s": found.stops,

@@ -301,7 +301,6 @@ def save(
             folder.write(scenario, to_toml(replace(run.scenario, format=form), run.seed))
             own = {truth, scenario, path.name}
             files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}
-            # The scenario file says the rest.
             about = {
                 "scenario": run.scenario.name,
                 "seed": run.seed,

@@ -146,7 +146,6 @@ def block(rows: pl.DataFrame) -> Block:
 def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and mean across, floor last."""
     rows: Rows = []
-    # 1 less the mean RMSE over the reference's rms is the skill.
     beside = {
         Column(head, form=form, seldom=True): known
         for head, form, known in (
@@ -248,7 +247,6 @@ def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Ite
         if not samples:
             continue
         recording, reference = group["recording"][0], group["reference"][0]
-        # A force axis is in newtons, a moment axis in newton-metres.
         values = group.select("observer", "axis", rmse=pl.coalesce("rmse_N", "rmse_Nm"))
         wide = values.pivot("axis", index="observer", values="rmse")
         rows: Rows = list(wide.select("observer", *AXES).rows())

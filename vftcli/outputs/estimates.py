@@ -153,7 +153,6 @@ def write_extras(
     folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
     """Write the extra files below a place of a folder."""
-    # Only the writers in use are loaded.
     for extra in choice.extras:
         path = folder / f"{place}{EXTRAS[extra]}"
         if extra == "csv":

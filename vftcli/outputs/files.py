@@ -225,7 +225,6 @@ class OutputFolder:
                     # Renaming within a file system is atomic for each file.
                     places[path].replace(path)
             except BaseException:
-                # Back to the earlier state.
                 for path in (p for p in paths[::-1] if p not in there):
                     path.unlink(missing_ok=True)
                 for path, place in kept[::-1]:
@@ -234,7 +233,6 @@ class OutputFolder:
                         place.replace(path)
                 raise
             to_disk([self.path])
-            # Folders of an earlier run that are now empty.
             for folder in sorted({path.parent for path in earlier} - {self.path}, reverse=True):
                 with suppress(OSError):
                     folder.rmdir()

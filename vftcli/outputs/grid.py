@@ -222,7 +222,6 @@ def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = Fal
     for k, (column, texts) in enumerate(zip(grid.columns, columns, strict=True)):
         full = [""] * (height - len(texts)) + texts
         wide = max(map(len, full))
-        # Words are at the left of their columns, numbers at the right.
         put = str.ljust if column.words else str.rjust
         columns[k] = [put(text, wide) for text in full]
     lines = ["  ".join(texts).rstrip() for texts in zip(*columns, strict=True)]
@@ -265,7 +264,6 @@ def latex(*grids: Grid) -> str:
     letters = re.sub("[^a-z0-9]+", "-", (first.title or caption).lower())[:40].strip("-")
     parts += [rf"\label{{tab:{letters or 'results'}}}", r"\footnotesize"]
     parts += [r"\setlength{\tabcolsep}{4pt}", rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
-    # Centred headings, units below them.
     heads = [column.symbol or escape_latex(column.head) for column in first.columns]
     heads[0] = heads[0][:1].upper() + heads[0][1:]
     units = [f"[{escape_latex(column.unit)}]" if column.unit else "" for column in first.columns]

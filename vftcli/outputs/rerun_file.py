@@ -274,7 +274,6 @@ def rerun_file(
     for tab in tabs:
         while tab.plots:
             send_plot(stream, tab.plots.pop(0))
-        # Each line to its entity, in the order of time.
         for entity in dict.fromkeys(line.path for line in tab.log):
             own = sorted(
                 (line for line in tab.log if line.path == entity), key=lambda line: line.t

@@ -65,7 +65,6 @@ def run_record(analysis: Analysis, command: str) -> Record:
             observer_record(observer, analysis.tunings.get(observer.name))
             for observer in analysis.observers
         ],
-        # The reference, with its own error.
         "reference": reference
         and {"name": reference.name, "floor_Nm": reference.floor, "notes": reference.remarks},
         "wrench": sensed

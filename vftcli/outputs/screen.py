@@ -350,7 +350,6 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
         lines.append(f"  {labels[row]:>{left}} {canvas.shown('┤')}{bar}")
     indent = " " * (left + 4)
     lines.append(f"{indent}{seconds(t, columns)}")
-    # Each number below its peak.
     share = columns / max(t[-1] - t[0], 1e-9)
     each = ((int((c.peak - t[0]) * share), str(c.number)) for c in contacts)
     if numbers := placed(each, columns):

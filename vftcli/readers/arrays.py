@@ -108,7 +108,6 @@ def _read_arrays(file: LogFile, log: Data, request: ReadChoice, remarks: Notes =
             )
         columns = {str(k): column for k, column in enumerate(rows.T)}
         return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
-    # Rows of matrices become flat.
     shaped = {
         n: a.reshape(len(a), -1) if a.ndim == 3 else a for n, a in arrays.items() if a.ndim < 4
     }

@@ -232,7 +232,6 @@ def guess_columns(columns: Sequence[Array]) -> Guess | None:
         return None
     t = (clock - clock[0]).astype(np.float64) * tick_of(clock, "")[0]
     width = table.shape[1]
-    # The columns behind the first, as many at a time as there are joints.
     blocks = {
         n: [table[:, k : k + n] for k in range(1, width - n + 1, n)]
         for n in JOINTS

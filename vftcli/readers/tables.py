@@ -181,7 +181,6 @@ def recognises(file: LogFile, layout: LogFormat) -> bool:
         return layout.name == "headerless" and not table.names
     if len(table.sample) < 2:
         return table.width > 1
-    # A line of names above mostly numbers.
     cells = table.cells(table.sample[1])
     return len(cells) > 1 and sum(map(table.is_number, cells)) * 2 >= len(cells)
 

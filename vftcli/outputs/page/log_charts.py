@@ -149,7 +149,6 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
     smoothed = {} if analysis.virtual_sensor is None else analysis.virtual_sensor.smoothed
     for k, line in enumerate(lines):
         if line.name in smoothed and smoothed[line.name].gate:
-            # Samples outside of every listed contact.
             lines[k] = line._replace(quiet=smoothed[line.name].unlisted(analysis.t))
     if reference is not None:
         lines.insert(0, ChartLine(reference_name(analysis), reference.known, REFERENCE))

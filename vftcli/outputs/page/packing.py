@@ -99,10 +99,6 @@ class PageClock:
         low, high = (f.reduceat(values, self.starts[::every]) for f in (np.fmin, np.fmax))
         return add(low, step), add(high - low, step)
 
-    def most(self, values: Array, unit: str) -> int:
-        """Row of the largest value of each stretch: half the width of a band. (T,)"""
-        return self.blob.add(np.fmax.reduceat(values, self.starts), step_of(values, unit))
-
     def line(self, chart: Chart, line: ChartLine) -> Record:
         """A line of a chart, panel by panel."""
         every = 1 if line.shown or self.whole else COARSE
@@ -123,8 +119,11 @@ class PageClock:
             data["spread"] = spreads
             data["columns"].append(("high", f"{name} max"))
         if line.half is not None and line.shown:
-            halves = zip(line.half.T, chart.units, strict=True)
-            data["half"] = [self.most(half, unit) for half, unit in halves]
+            # The largest of each stretch.
+            data["half"] = [
+                self.blob.add(np.fmax.reduceat(half, self.starts), step_of(half, unit))
+                for half, unit in zip(line.half.T, chart.units, strict=True)
+            ]
             data["columns"].append(("half", f"{name} ±"))
         return data
 

@@ -301,7 +301,6 @@ def overview(lines: Sequence[LogSummary]) -> Grid:
     """The table of all logs, the worst first."""
     rows: Rows = [
         (
-            # The name links to the log's page, if any.
             GridCell(x.name, html=part("parts/link", x.page, x.name) if x.page else ""),
             x.robot,
             f"{x.duration:.1f} s",

@@ -420,7 +420,6 @@ class Decoder:
         part: Columns = {**signals, "place": places[:, 0], "receive": places[:, 1]}
         if (clock := numbers(["time"])).size:  # a robot's own [s]
             part["robot"] = clock[:, 0]
-        # float64 holds both whole.
         stamp = [numbers([f"header.stamp.{p}"]) for p in ("sec", "nanosec")]
         if all(number.size for number in stamp):
             part["header"] = np.hstack(stamp).astype(np.int64) @ (10**9, 1)
