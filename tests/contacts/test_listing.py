@@ -292,6 +292,25 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     assert row.wrench[2] < 0.0
 
 
+@pytest.mark.slow
+def test_pushes_whose_ends_the_models_error_hides_keep_their_size() -> None:
+    """Slow pushes, nothing free named: between their listed ends alone they look 10 % smaller.
+
+    Of 590 rows of other seeds and arms .985 hold the truth: of these six one may not.
+    """
+    changes = ["robot=ur5e", "contacts.hand.style=slow", "trajectory.period=5"]
+    scenario = load_scenario("ur5-circle", [*changes, "trajectory.radius=0.15"])
+    made = simulate(replace(scenario, duration=20.0), seed=11)
+    found = list_contacts(motion(made.recording, "ur5e"))
+    pairs = score(found.contacts, true_contacts(made.truth.t, made.truth.wrench)).pairs
+    assert (found.basis, len(pairs)) == ("whole log", 6)
+    held = [abs(row.peak_force - true.size) < row.peak_band for row, true in pairs]
+    assert np.count_nonzero(held) >= len(held) - 1
+    assert np.mean([row.peak_force / true.size for row, true in pairs]) == pytest.approx(
+        1, abs=0.05
+    )
+
+
 def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
     """Every second sample of a log at 125 Hz."""
     whole = read(FIXTURES / "ur5_taps_ur_rtde.csv")

@@ -30,6 +30,7 @@ from vftcli.contacts.free_statistics import (
 from vftcli.contacts.rows import (
     BENT_SHORT,
     SHORT,
+    TAIL,
     ContactMeasurement,
     force_course,
     shows_force,
@@ -140,9 +141,11 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     smallest = measurement.test.smallest_force
     if not np.isfinite(smallest) and not named and run.robot.joints >= 6:
         smallest = felt_by(run, free.level)
-    listed, weak = (
-        [row for row in rows if shows_force(row, smallest) == wanted] for wanted in (True, False)
-    )
+    shown = np.array([shows_force(row, smallest) for row in rows], bool)
+    if not named and shown.any():
+        rows = measured_rows(free, replace(measurement, tail=TAIL))
+        shown &= [shows_force(row, smallest) for row in rows]
+    listed, weak = ([rows[k] for k in np.flatnonzero(some)] for some in (shown, ~shown))
     if others:
         beside = ContactMeasurement.of(found.kept(others), free, measurement)
         weak = [*measured_rows(free, beside), *weak]

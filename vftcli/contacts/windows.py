@@ -176,14 +176,16 @@ def contact_lanes(
     runs: Sequence[BlockSpan],
     priors: Sequence[WrenchPrior | None],
     margin: float = MARGIN,
+    tail: float = 0.0,
 ) -> list[Lane]:
-    """A lane for every run of blocks, the others hidden."""
+    """A lane for every run of blocks, the others hidden; its gate is `tail` [s] wider."""
     t, own = log.blocks.t, {}
-    every = covered(runs, len(t), 1)
+    every, more = covered(runs, len(t), 1), round(tail / np.median(log.blocks.length))
     for run in set(runs):
-        first, last = window = window_of(t, run, margin)
-        gate = covered([(run[0] - first, run[1] - first)], last - first, 1)
-        own[run] = window, gate, every[first:last] & ~gate
+        first, last = window = window_of(t, run, margin + tail)
+        inside, blocks = [(run[0] - first, run[1] - first)], last - first
+        hidden = every[first:last] & ~covered(inside, blocks, 1)
+        own[run] = window, covered(inside, blocks, 1 + more) & ~hidden, hidden
     lanes = zip(runs, jacobians, priors, strict=True)
     return [Lane(*own[run], jacobian, prior) for run, jacobian, prior in lanes]
 
