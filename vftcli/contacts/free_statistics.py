@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.bias.whole_log import WholeLogBias
 from vftcli.contacts.windows import contact_lanes, smooth_lanes
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
-from vftcli.observers import MomentumObserver
+from vftcli.observers.paper import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor.windows import SHED, Case, Terms, Windows, solve, spread, up_axes, windows_of
-from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
+from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import root_mean_square, root_mean_squares
 from vftcli.signals.recording import Recording

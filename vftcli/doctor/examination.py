@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from vftcli.doctor.causes import CORRECTIONS
@@ -71,7 +72,7 @@ class Examination(Shown):
         """The findings on assumptions of the model where the log is silent."""
         return tuple(finding for finding in self.findings if finding.code in ASSUMPTIONS)
 
-    @property
+    @cached_property
     def warnings(self) -> tuple[Remark, ...]:
         """The findings that can make results wrong."""
         return tuple(finding for finding in self.findings if finding.level == "warning")

@@ -16,8 +16,8 @@ import numpy as np
 
 from vftcli.doctor.signals import effort_of
 from vftcli.doctor.windows import spread, trapezoids
-from vftcli.robots import Robot
 from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask, root_mean_squares
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, on_joints, warning

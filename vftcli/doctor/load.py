@@ -6,8 +6,8 @@ import numpy as np
 
 from vftcli.doctor.causes import RANGE
 from vftcli.doctor.windows import Case, RobustFit, solve
-from vftcli.robots import Robot
 from vftcli.robots.friction import friction_factor, measured_temperature, steady_torque
+from vftcli.robots.robot import Robot
 from vftcli.robots.terms import gain_sd
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor.signals import TRAVEL
-from vftcli.robots import Robot
 from vftcli.robots.chain import link_poses
 from vftcli.robots.kernels import load_regressor, momentum_terms, usual_errors
+from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_mean_squares
 from vftcli.signals.estimation import inverse_of
 from vftcli.signals.recording import Recording

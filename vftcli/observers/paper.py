@@ -14,7 +14,7 @@ that jitters, `as_printed` the printed variants.
 
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -256,7 +256,7 @@ class KalmanObserver(BlockObserver):
                     "decay must not be negative"
                 )
 
-    @property
+    @cached_property
     def name(self) -> str:
         """kfo-fe or kfo-zoh."""
         return f"kfo-{self.discretisation}"

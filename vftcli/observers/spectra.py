@@ -76,12 +76,12 @@ class Spectra:
     def __post_init__(self) -> None:
         seal(self, "frequency", "free", "loaded")
 
-    @property
+    @cached_property
     def joints(self) -> int:
         """Number of joints n."""
         return int(self.free.shape[1])
 
-    @property
+    @cached_property
     def width(self) -> float:
         """Distance of two frequencies. [Hz]"""
         return float(self.frequency[1] - self.frequency[0])

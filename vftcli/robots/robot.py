@@ -179,7 +179,7 @@ class Robot(Shown):
         _, *rows = self._rows()
         return pl.DataFrame(rows, kinds, orient="row").fill_nan(None)
 
-    @property
+    @cached_property
     def joints(self) -> int:
         """Number of joints n."""
         return self.chain.joints

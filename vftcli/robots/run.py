@@ -43,22 +43,22 @@ class Run(Shown):
     #: Whether `terms` come from the paper's numeric method; equal to a millionth.
     literal: bool = False
 
-    @property
+    @cached_property
     def name(self) -> str:
         """The recording's name in tables and messages."""
         return self.recording.name
 
-    @property
+    @cached_property
     def t(self) -> Array:
         """Clock. (T,) [s]"""
         return self.recording.t
 
-    @property
+    @cached_property
     def q(self) -> Array:
         """Joint positions. (T, n) [rad]"""
         return self.recording.q
 
-    @property
+    @cached_property
     def dq(self) -> Array:
         """Joint velocities. (T, n) [rad/s]"""
         return self.recording.require("dq")

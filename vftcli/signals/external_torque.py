@@ -85,12 +85,12 @@ class DynamicsTerms(Shown):
         """The last sample, which is the one before the next block's first."""
         return Instant(self.t[-1], self.p[-1], self.mu[-1])
 
-    @property
+    @cached_property
     def joints(self) -> int:
         """Number of joints n."""
         return int(self.p.shape[1])
 
-    @property
+    @cached_property
     def samples(self) -> int:
         """Number of samples T."""
         return len(self.t)
@@ -153,7 +153,7 @@ class ExternalTorque(TimeSeries):
             if values is not None:
                 yield from per_joint(f"{kind}/{self.name}", values[rows])
 
-    @property
+    @cached_property
     def joints(self) -> int:
         """Number of joints n."""
         return int(self.tau.shape[1])

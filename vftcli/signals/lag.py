@@ -124,15 +124,8 @@ def bridge_unknown(t: Array, x: Array) -> Array:
     return np.column_stack(columns)
 
 
-class Offset(NamedTuple):
-    """Lag of one series behind another."""
-
-    lag: float  #: Time by which the first is late. [s]
-    correlation: float  #: Correlation without that lag.
-
-
-def time_offset(t: Array, late: Array, early: Array) -> Offset:
-    """The lag of `late` behind `early` at which they correlate best.
+def time_offset(t: Array, late: Array, early: Array) -> tuple[float, float]:
+    """The lag of `late` behind `early` where they correlate best [s], and how well.
 
     All columns (T, k) count by size: give a wrench in one unit. Unknown samples are bridged.
     """
@@ -147,7 +140,7 @@ def time_offset(t: Array, late: Array, early: Array) -> Offset:
     best = int(value.argmax())
     inside = 0 < best < len(at) - 1
     shift = parabola(*value[best - 1 : best + 2]) if inside else 0.0
-    return Offset(lag=(at[best] + shift) * step, correlation=value[best])
+    return (at[best] + shift) * step, value[best]
 
 
 class LagFit(NamedTuple):

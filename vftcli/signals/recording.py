@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import field, replace
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -212,34 +213,34 @@ class Recording(TimeSeries):
             split = per_axis if name == "wrench" else per_joint
             yield from split(COLUMN_NAMES.get(name, name), getattr(self, name)[rows])
 
-    @property
+    @cached_property
     def joints(self) -> int:
         """Number of joints n."""
         return int(self.q.shape[1])
 
-    @property
+    @cached_property
     def samples(self) -> int:
         """Number of samples T."""
         return len(self.t)
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Time from the first to the last sample. [s]"""
         return float(self.t[-1] - self.t[0])
 
-    @property
+    @cached_property
     def median_step(self) -> float:
         """Median time between samples, the nominal sample time. [s]"""
         if self.samples < 2:
             raise ClockError(f"{self.name}: one sample has no sample time")
         return median_step(self.t)
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Its name in tables and messages: its label, unique within a command."""
         return self.source.label or "recording"
 
-    @property
+    @cached_property
     def signals(self) -> tuple[str, ...]:
         """Names of the signals this log has, in a fixed order."""
         return tuple(name for name in MEANINGS if getattr(self, name) is not None)

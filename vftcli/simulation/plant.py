@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots import JointFriction, Robot
+from vftcli.robots.robot import JointFriction, Robot
 from vftcli.robots.robot_file import out_of_bounds
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
+from vftcli.robots.robot import Robot
 from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import Array, Indices, resample_columns, summed
 from vftcli.signals.errors import ParameterError

@@ -171,7 +171,7 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
     fits = {name: fit_axes(force, given) for name, force in forces.items()}
     frame, fit = max(fits.items(), key=lambda item: item[1].correlation)
     turned = forces[frame] @ fit.matrix.T
-    lag = time_offset(t, given, turned).lag
+    lag, _ = time_offset(t, given, turned)
     moved = resample_columns(t - lag, t, bridge_unknown(t, turned))
     axes = fit_axes(np.where(usable, moved, np.nan) @ fit.matrix, given)
     if not axes.correlation > RESEMBLES:
@@ -232,21 +232,14 @@ class Drift(NamedTuple):
         )
 
 
-def null_space_limit(wrench: Wrench, free: Mask) -> float | None:
-    """`MARGIN` times the largest null-space torque of the free part (T,). [N·m]"""
-    if (torque := wrench.null_space) is None:
-        return None
-    known = torque[free & np.isfinite(torque)]
-    # The largest, not a quantile: all of a free part is error.
-    return MARGIN * known.max() if len(known) else None
-
-
 def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
     """A remark where no wrench at the tip explains the torque of over six joints."""
-    limit = null_space_limit(wrench, free)
-    if limit is None or wrench.null_space is None:
+    torque = wrench.null_space
+    if torque is None or not len(known := torque[free & np.isfinite(torque)]):
         return ()
-    share = np.mean(np.nan_to_num(wrench.null_space) > limit)
+    # The largest of the free part (T,), not a quantile: all of it is error.
+    limit = MARGIN * known.max()
+    share = np.mean(np.nan_to_num(torque) > limit)
     if not share > LEAST_SHARE:
         return ()
     return (caution("contact-elsewhere", Where(wrench.name), share=share, threshold_Nm=limit),)
@@ -306,9 +299,9 @@ def with_reference(
         reference = without_drift(reference, drift)
         remarks.append(drift.remark)
     for wrench in reading.wrenches:
-        offset = time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
-        where, values = Where(wrench.name), {"correlation": offset.correlation}
-        remarks.append(fact("lag-behind-sensor", where, lag_ms=offset.lag * 1e3, **values))
+        lag, fit = time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
+        where = Where(wrench.name)
+        remarks.append(fact("lag-behind-sensor", where, lag_ms=lag * 1e3, correlation=fit))
     return replace(reading, reference=reference, remarks=tuple(remarks))
 
 

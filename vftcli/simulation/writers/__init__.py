@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.robots import Robot
+from vftcli.robots.robot import Robot
 from vftcli.robots.terms import gravity_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
