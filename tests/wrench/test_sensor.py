@@ -15,6 +15,7 @@ from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.wrench import FIT, WrenchChoice, ZeroChoice
 from vftcli.wrench.sensor import (
+    DERIVED,
     MARGIN,
     Drift,
     SensorReading,
@@ -238,8 +239,8 @@ def test_any_order_and_sign_of_axes_is_recognised(seed: int) -> None:
     fit = fit_axes(ours, theirs)
     np.testing.assert_array_equal(fit.matrix, P)
     assert fit.gain == pytest.approx(1.7, rel=0.01)  # 0.2 N of noise over 400 samples of 20 N
-    assert not fit_axes(ours, ours + rng.standard_normal(ours.shape)).derived
-    assert fit_axes(ours, 2.0 * ours @ P.T).derived
+    assert fit_axes(ours, ours + rng.standard_normal(ours.shape)).correlation < DERIVED
+    assert fit_axes(ours, 2.0 * ours @ P.T).correlation >= DERIVED
 
 
 PUSHES = pushes()

@@ -2,7 +2,7 @@
 
 The raw disturbance d is the external torque less the model's error, d = τ_ext − A δx. The
 columns A are the inertial parameters of every link, the rotor inertias, the drive
-constants and the friction of every joint. Each δx has mean zero and a standard deviation
+constants and the friction of every joint. Each δx has mean zero and an SD
 by the robot's own numbers: a maker's table is good to some percent, friction to a fifth.
 """
 

@@ -13,6 +13,7 @@ from vftcli.bias import AUTOMATIC
 from vftcli.bias.baseline import Baseline, Baselines, FreeReading, free_reading
 from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.bias.whole_log import stride_of
+from vftcli.free_motion.free_motion import SIGN_SPEED
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, Spectra, error_band, free_error
 from vftcli.observers.table import BEST
@@ -26,7 +27,6 @@ from vftcli.signals.shown import Shown, record
 
 #: The cause that no sum holds: friction hidden at rest.
 STICTION = "stiction at rest"
-SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
 
 
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:

@@ -1,6 +1,6 @@
 """The model's error from a whole log: normal equations, robust fit, fold tests.
 
-All columns are times their standard deviations: the prior is the unit matrix, the
+All columns are times their SDs: the prior is the unit matrix, the
 solution minimises Σ w (d + A u)² + Σ u². A joint's row has its own columns, a slow load
 only its two knots about a sample: sums go block by block.
 
@@ -56,11 +56,6 @@ class SlowLoads(NamedTuple):
         numbers = np.arange(self.torque.shape[2] * self.knots)
         flange, along = np.split(numbers, [WRENCH * self.knots])
         return np.hstack([flange.reshape(self.knots, -1), along.reshape(self.knots, -1)])
-
-    @property
-    def none(self) -> "SlowLoads":
-        """No load at all along the same samples."""
-        return SlowLoads(self.torque[:, :, :0], np.zeros_like(self.knot), self.share, 1)
 
     def torque_of(self, values: Array) -> Array:
         """Columns times values in the order of `numbers`. (S, n) [N·m]"""
@@ -258,7 +253,8 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
 
     So many samples count as one; the scale (n,) is at `least` (n,). [N·m]
     """
-    rows, residual = replace(rows, loads=rows.loads.none), rows.d
+    held = SlowLoads(rows.loads.torque[:, :, :0], 0 * rows.loads.knot, rows.loads.share, 1)
+    rows, residual = replace(rows, loads=held), rows.d
     quiet = np.quantile(abs(residual), QUIET_SHARE, axis=0)
     scale = np.maximum(SD_PER_MEDIAN * quiet / QUIET_QUANTILE, least)
     threshold = np.inf

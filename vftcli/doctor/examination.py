@@ -57,8 +57,7 @@ class Examination(Shown):
     def refusals(self, *, fitting: bool = True) -> tuple[Remark, ...]:
         """The findings that make every result meaningless.
 
-        Args:
-            fitting: Whether the arm must be the model's; identification makes it so.
+        With `fitting` the arm must be the model's; identification makes it so.
         """
         codes = REFUSING if fitting else REFUSING - NO_FIT
         # Half of the joints' effort or more was not measured, if all efforts agree.
@@ -84,7 +83,7 @@ class Examination(Shown):
 
     @property
     def load(self) -> tuple[float, float] | None:
-        """Mass and standard deviation of a load that the model lacks, or None. [kg]"""
+        """Mass and SD of a load that the model lacks, or None. [kg]"""
         loads = (r.values for r in self.findings if "load_kg" in r.values)
         return next(((load["load_kg"], load["sd_kg"]) for load in loads), None)
 
@@ -106,10 +105,8 @@ def examine(
 ) -> Examination:
     """Examine a log; it is not changed.
 
-    Args:
-        recording: The log.
-        robot: The arm, its payload mounted; None for the log's own, or a search.
-        in_stretches: Whether to examine `stretches` of a long log, and its whole clock.
+    The arm has its payload mounted; None for the log's own, or a search. Examined
+    `in_stretches` are those of a long log, and its whole clock.
     """
     part = stretches(recording) if in_stretches else recording
     if unusable := tuple(unusable_findings(part)):
@@ -146,10 +143,8 @@ BLOCK = 1 << 14
 class Examiner:
     """Loads the robots of a command and examines its logs, each once.
 
-    Args:
-        anyway: Whether to continue despite a finding that makes results meaningless.
-        fitting: Whether the robot must be the log's; identification makes it so.
-        tell: Called at once with every examination that refuses nothing.
+    With `anyway` findings that make results meaningless stop nothing; `fitting` is as of
+    `Examination.refusals`; `tell` hears of every examination that refuses nothing.
     """
 
     def __init__(

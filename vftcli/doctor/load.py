@@ -25,7 +25,7 @@ SAME = 0.02  #: Scatter of one joint size's constants between firmwares.
 #: Loads in a note, and in a warning: hands weigh .5–1.1, constants 3 % off seem .3 on a
 #: UR10e. [kg]
 HAND, LOAD = 0.4, 1.2
-SURE = 4.0  #: Least load in standard deviations by the scatter.
+SURE = 4.0  #: Least load in SDs by the scatter.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
 #: Share of the misfit that a changing load may leave (sound logs .7 and more, 1.5 kg picked
 #: up half-way .2–.6), and its least change. [-, kg]

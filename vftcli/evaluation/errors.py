@@ -116,12 +116,8 @@ def evaluate(
 ) -> pl.DataFrame:
     """One row per observer and joint, over the samples where the reference is known.
 
-    A sample without an answer counts as the answer 0.
-
-    Args:
-        recording: The log's name, for the first column.
-        estimates: The observers' estimates, on the reference's clock.
-        reference: The reference torque; its `floor` is written beside every error.
+    A sample without an answer counts as the answer 0. All are on the reference's clock;
+    its `floor` is beside every error, the log's name in the first column.
 
     Raises:
         ShapeError: If an estimate and the reference have different shapes.

@@ -70,10 +70,7 @@ class Score(NamedTuple):
     def of(cls, estimate: ExternalTorque, truth: Array, inside: Mask) -> Self:
         """Sums of an estimate with bands of ±1.96 `error_sd` over at least one sample.
 
-        Args:
-            estimate: The estimate on the truth's clock.
-            truth: External torque on the robot. (T, n) [N·m]
-            inside: The samples that count. (T,)
+        The truth is on its clock (T, n) [N·m], `inside` the samples that count. (T,)
         """
         t, tau, sd = estimate.t, estimate.tau[inside], estimate.error_sd
         known, y = np.isfinite(tau), truth[inside]

@@ -13,12 +13,12 @@ import numpy as np
 
 from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
 from vftcli.robots.run import Run, signal_edge
-from vftcli.signals.arrays import Array, Mask, empty_series, resample_columns, summed
+from vftcli.robots.terms import GAP
+from vftcli.signals.arrays import Array, Mask, empty_series, gaps_of, resample_columns, summed
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 from vftcli.signals.remarks import Remark, fact
 
-GAP = 5.5  #: A gap of more than this many median steps is not interpolated across.
 FARTHEST = 0.1  #: How far phase may lie from the clock's word, as the low-passed shift. [s]
 #: Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]
 PHASE_CUTOFF = 8.0
@@ -56,9 +56,8 @@ def pair_with_run(t: Array, free: Run, shift: float, rate: float = 1.0) -> Pairi
 
 def in_gap(clock: Array, times: Array) -> Mask:
     """Whether an instant lies in a gap of a clock. (T,)"""
-    steps = np.diff(clock)
-    at = np.clip(clock.searchsorted(times) - 1, 0, len(steps) - 1)
-    return steps[at] > GAP * np.median(steps)
+    before = np.clip(clock.searchsorted(times) - 1, 0, len(clock) - 2)
+    return np.isin(before, gaps_of(clock, GAP))
 
 
 def by_phase(motion: Run, pairing: Pairing) -> Pairing:
@@ -224,12 +223,6 @@ class ErrorModel(NamedTuple):
         used = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, moving, True)
         return rms(x[self.known], used)
 
-    @property
-    def floor_standing(self) -> Array:
-        """RMS of `sd` at rest, NaN if never at rest. (n,) [N·m]"""
-        standing = self.standing & self.known[:, None]
-        return np.where(standing.any(axis=0), rms(self.sd, standing), np.nan)
-
 
 class Rung(NamedTuple):
     """One way of alignment."""
@@ -318,8 +311,7 @@ def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
 def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
     """The difference of least expected error, the simpler of equals; floors of all.
 
-    By the mean over trusted joints of expected error in motion, relative to the lowest
-    rung's. Only the best so far is kept: all of a long log need too much room.
+    By the mean over trusted joints of expected error in motion, over the lowest rung's.
     """
     steps = iter(made)
     chosen = next(steps)

@@ -191,9 +191,10 @@ def floor_remarks(chosen: Difference, measured: Array | None, change: Array) -> 
     if measured is not None:
         remarks = [fact("floor-measured", ratio=measured)]
     share, error = chosen.error.standing_share, chosen.error
+    stiction = rms(error.sd, error.standing & error.known[:, None])
     for j in np.flatnonzero(share > 0.02):
         code = "joint-stands" if share[j] > 1.0 - TRUSTED_SHARE else "joint-stands-at-times"
-        values = {"share": float(share[j]), "stiction_Nm": float(error.floor_standing[j])}
+        values = {"share": float(share[j]), "stiction_Nm": float(stiction[j])}
         remarks.append(caution(code, on_joints([int(j)]), **values))
     changed = change != 0.0
     if changed.any():

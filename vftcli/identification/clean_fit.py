@@ -17,7 +17,7 @@ from vftcli.signals.estimation import NormalEquations, folds, normal_equations, 
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints, warning
 from vftcli.signals.rest import SLIDES, slower
 
-TOUCH = 7.0  #: Residual of a contact, in robust standard deviations.
+TOUCH = 7.0  #: Residual of a contact, in robust SDs.
 TOUCH_TIME = 0.15  #: Time it must last. [s]
 TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
 #: Least share of the torque's variation that profile links and friction explain in heavy
@@ -154,15 +154,13 @@ def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
     """Weighted RMS of each joint over all logs; 0 without weight. (n,) [N·m]"""
     weights = data.joined("weights")
     square = np.sum(weights * np.concatenate(residual) ** 2, axis=0)
-    value: Array = np.sqrt(square / np.maximum(weights.sum(axis=0), 1e-12))
-    return value
+    return np.asarray(np.sqrt(square / np.maximum(weights.sum(axis=0), 1e-12)))
 
 
 def heavy_joints(data: Training) -> Mask:
     """Joints that move and carry the arm's weight. (n,)"""
     spread = data.joined("load").std(axis=0)
-    heavy: Mask = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.moves
-    return heavy
+    return np.asarray((spread > HEAVY * spread.max()) & (spread > LIGHT) & data.moves)
 
 
 def model_doubts(data: Training, fits: Mapping[int, JointFit]) -> Iterator[Remark]:

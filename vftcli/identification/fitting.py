@@ -62,7 +62,7 @@ NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
 SLOWNESS = 0.1  #: Time that makes a velocity difference a distance. [s]
 #: Share of a log's samples on another's trajectory from which it repeats it.
 REPEATED = 0.8
-#: One row a number: value, standard deviation, the profile's.
+#: One row a number: value, SD, the profile's.
 PARAMETERS = pl.Schema(get_type_hints(Number))
 #: One row a friction candidate: its cross-validated error.
 SHAPE_CHOICES = pl.Schema({"joint": int, "friction": str, "cv_rms_Nm": float, "chosen": bool})
@@ -223,12 +223,8 @@ def identify(
 ) -> Identification:
     """Identify a robot from logs of free motion, a load from logs that carry it.
 
-    Args:
-        logs: Training logs; for a payload the logs that carry the load, or the pair.
-        robot: The profile to start from.
-        task: What to identify.
-        held_out: Logs to score on.
-        free: The motion without the load.
+    For a payload the logs are those that carry it, or the pair, and `free` the motion
+    without it; held-out logs are only scored.
 
     Raises:
         IdentificationError: If the logs do not determine it, or contradict the robot.

@@ -59,7 +59,7 @@ LENGTH_MARGIN = 1.02
 LIGHT = 1.0  #: Least spread of gravity torque that shows growth with load. [N·m]
 #: Share of a fit's error below which the profile's friction stays.
 KEPT = 0.85
-#: Largest relative standard deviation of a drive constant from free motion.
+#: Largest relative SD of a drive constant from free motion.
 CONSTANT_KNOWN = 0.02
 
 

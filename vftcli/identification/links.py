@@ -40,7 +40,7 @@ DOUBTFUL = 0.3
 #: Weights of the distance to the profile, from hardly any pull to the profile itself.
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
 MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
-#: Pull of a maker's table with masses of 5 % standard deviation: the distance of
+#: Pull of a maker's table with masses of 5 % SD: the distance of
 #: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0
 STEPS = 100  #: Newton steps at most; a dozen or two are usual.
@@ -128,7 +128,7 @@ def triangulate(
 def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
     """Least squares R x ≈ rest in directions with data (truncated SVD).
 
-    Step, standard deviation for unit equations, share in directions without data. (k,) each
+    Step, SD for unit equations, share in directions without data. (k,) each
     """
     scale = np.linalg.norm(R, axis=0)
     scale[scale == 0.0] = 1.0

@@ -53,9 +53,9 @@ UNITS = {
     "mass": "kg",
     **dict.fromkeys(("com_x", "com_y", "com_z"), "m"),
 }
-#: Largest relative standard deviation of a determined number.
+#: Largest relative SD of a determined number.
 DETERMINED = 0.3
-#: Standard deviations from a profile's rotor inertia to its replacement.
+#: SDs from a profile's rotor inertia to its replacement.
 REFUTED = 3.0
 #: Ratio of measured to expected torque below which a current does not follow it.
 LEAST_SLOPE = 0.05
@@ -67,7 +67,7 @@ class Number(NamedTuple):
     joint: int  #: Joint, from 1; the last one for a load on the flange.
     parameter: str  #: Its key in the robot file, one of `UNITS`.
     value: float  #: The estimate.
-    sd: float  #: Its standard deviation.
+    sd: float  #: Its SD.
     unit: str  #: Unit of value, sd and profile.
     profile: float  #: The profile's number, NaN without one.
     determined: bool  #: Whether the logs determine it; if not, it is not written.

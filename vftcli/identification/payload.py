@@ -55,7 +55,7 @@ MOST_NAMED = 4  #: Logs called by name; episodes may be thousands.
 STRETCHES = 12  #: Independent stretches of a motion.
 REACH = 1.0  #: Farthest centre of mass from the flange. [m]
 LOOKED_AT = 400  #: Most samples of a motion among which poses are counted.
-#: Shortest motion: the masses of a UR10e and a UR3 scatter by .7 of their standard deviation
+#: Shortest motion: the masses of a UR10e and a UR3 scatter by .7 of their SD
 #: over 9 stretches of 10 s, by 1.6 over those of 5 s, by 2.4 of 2.5 s. [s]
 LONG = 10.0
 #: Weighings with the load on the arm: a third moves mass and centre by less than .1 %.
@@ -79,7 +79,7 @@ class LoadFit(NamedTuple):
     """An identified load."""
 
     payload: Payload  #: The load, a point mass.
-    mass_sd: float  #: Standard deviation of the mass. [kg]
+    mass_sd: float  #: SD of the mass. [kg]
     com_sd: Array  #: Those of its centre in flange axes. (3,) [m]
     residual: Array  #: RMS torque left in each joint. (n,) [N·m]
     loaded: tuple[Recording, ...]  #: The logs with the load.
@@ -159,8 +159,8 @@ class JointsFit(NamedTuple):
         # Each joint's torque adds its part to the solution.
         shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse
         together = shares.sum(axis=0)
-        covariance: Array = 0.5 * gain**2 * (np.outer(together, together) + shares.T @ shares)
-        return covariance
+        both = np.outer(together, together) + shares.T @ shares
+        return np.asarray(0.5 * gain**2 * both)
 
 
 def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
@@ -248,7 +248,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     """A load from poses at rest, by torque beyond the robot's own gravity.
 
     The model's errors and the drives' day are alike in all poses of a log: the difference of
-    several logs is part of the standard deviations, of one what the links may be wrong by.
+    several logs is part of the SDs, of one what the links may be wrong by.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))

@@ -58,7 +58,7 @@ STEADY = 5e-3  #: Largest relative change of the target current in a rest.
 
 
 class Estimate(NamedTuple):
-    """A number, its standard deviation, and whether the log determines it."""
+    """A number, its SD, and whether the log determines it."""
 
     value: float
     sd: float

@@ -364,5 +364,4 @@ class KalmanObserver(BlockObserver):
         # (I − F z⁻¹) x = L p: the inverse's second row times L.
         determinant = (1.0 - f11 * back) * (1.0 - f22 * back) - f12 * f21 * back**2
         second = (f21 * back * gains.l1 + (1.0 - f11 * back) * gains.l2) / determinant
-        response: Complex = second / (1j * omega)
-        return response
+        return np.asarray(second / (1j * omega))

@@ -147,8 +147,8 @@ def neighbour_mean(spectrum: Array) -> Array:
     reach = (NEIGHBOURS * bins).astype(int)
     reach = np.minimum(reach, len(spectrum) - 1 - bins)
     total = summed(spectrum)
-    mean: Array = (total[bins + reach + 1] - total[bins - reach]) / (2 * reach + 1)[:, None]
-    return mean
+    sums = total[bins + reach + 1] - total[bins - reach]
+    return np.asarray(sums / (2 * reach + 1)[:, None])
 
 
 def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
@@ -233,7 +233,7 @@ def error_band(
     """Deviation of an estimate's error, by the module's equation. (T, n) [N·m]
 
     `missed` is `Spectra.missed` (n,) [(N·m)²], `resting` where a joint rests (T, n), and
-    `correction_sd` the standard deviation of a correction of the model. (T, n) [N·m]
+    `correction_sd` the SD of a correction of the model. (T, n) [N·m]
     """
     variance = np.where(resting, free.resting + missed, free.moving + missed)
     if correction_sd is not None:

@@ -331,14 +331,14 @@ REPEATED_STOP = 0.13
 
 #: What an observer reads on a joint at rest, rms: on real UR10e logs .31 to .61 of F_c.
 HELD = 0.45
-#: Standard deviation of the wrench smoother's model error at rest, by the same logs.
+#: SD of the wrench smoother's model error at rest, by the same logs.
 REST_SHARE = 0.5
 #: For contacts: added at rest to what was learned, the least that these logs show, and for
 #: the wrench too where a joint turns round; and drawn anew where a joint comes to rest.
 CREEP_SHARE, STOP_SHARE = 0.3, 0.7
 #: For a joint that rests under a contact, which re-settles it.
 PUSHED_SHARE = 0.6
-#: Standard deviation of a momentum observer near a rest: .6 of F_c are the 95 % bound.
+#: SD of a momentum observer near a rest: .6 of F_c are the 95 % bound.
 NEAR_REST_SHARE = 0.6 / 1.96
 
 

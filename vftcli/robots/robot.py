@@ -85,7 +85,7 @@ class Limits(PerJoint):
 
 @record
 class SensorNoise(PerJoint):
-    """Standard deviations of the joint measurements; NaN where unknown."""
+    """SDs of the joint measurements; NaN where unknown."""
 
     current: Array  #: Motor current. (n,) [A]
     tau: Array  #: Joint torque. (n,) [N·m]

@@ -186,8 +186,7 @@ GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch re
 def raw_disturbance(terms: DynamicsTerms) -> Array:
     """The unfiltered external torque d of every sample but the first. (T−1, n) [N·m]
 
-    d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times: a sample's mean of
-    the external torque and of all else that the model leaves unexplained.
+    d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) by the log's own sample times.
     """
     d = np.diff(terms.p, axis=0) / np.diff(terms.t)[:, None]
     d -= 0.5 * (terms.mu[1:] + terms.mu[:-1])

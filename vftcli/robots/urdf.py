@@ -139,8 +139,7 @@ class UrdfPart(NamedTuple):
         # An axis is normalised: shorter, it is rounding, longer, its square overflows.
         if not 1e-9 < abs(vector).max() < 1e9:
             self.refuse(f"axis is {axis.get('xyz')!r}; it must point somewhere")
-        unit: Array = vector / np.linalg.norm(vector)
-        return unit
+        return np.asarray(vector / np.linalg.norm(vector))
 
     def origin(self, parent: ET.Element) -> Pose:
         """The pose of <origin>; both of its keys may be missing."""

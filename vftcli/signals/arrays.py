@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 #: True or false, sample by sample or joint by joint, named for what is true.
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]  #: Numbers of rows or samples, counted from 0.
-Z_95 = 1.96  #: Half width of a 95 % band, in standard deviations.
+Z_95 = 1.96  #: Half width of a 95 % band, in SDs.
 
 
 def frozen(value: ArrayLike, kind: type = float) -> Array:

@@ -110,7 +110,7 @@ class ExternalTorque(TimeSeries):
     name: str  #: Short name of the observer or the reference, as in tables and columns.
     t: Array  #: Time on the recording's clock. (T,) [s]
     tau: Array  #: External torque; NaN where it is not known. (T, n) [N·m]
-    #: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]
+    #: One SD of `tau` by the estimator's own account. (T, n) [N·m]
     sd: Array | None = None
     #: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
     floor: Array | None = None

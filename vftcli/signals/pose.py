@@ -174,5 +174,4 @@ def matrix_quaternion(matrix: Array) -> Array:
     product[..., 1:, 0] = turn
     best = np.diagonal(product, axis1=-2, axis2=-1).argmax(axis=-1)
     longest = np.take_along_axis(product, best[..., None, None], axis=-2)[..., 0, :]
-    unit: Array = longest / np.linalg.norm(longest, axis=-1, keepdims=True)
-    return unit
+    return np.asarray(longest / np.linalg.norm(longest, axis=-1, keepdims=True))

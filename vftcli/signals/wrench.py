@@ -104,7 +104,7 @@ class Wrench(TimeSeries):
     #: Force, then moment, even where the pose leaves them open: see `known`. (T, 6) [N, N·m]
     values: Array
     frame: str  #: Axes and reference point: a key of `vftcli.wrench.solvers.FRAMES`.
-    sd: Array | None = None  #: One standard deviation of `values`. (T, 6) [N, N·m]
+    sd: Array | None = None  #: One SD of `values`. (T, 6) [N, N·m]
     #: Least singular value of J, angular rows × .3 m; None: no J. (T,) [m]
     sigma_min: Array | None = None
     masked: Mask | None = None  #: Samples in which the pose cannot tell the wrench. (T,)
@@ -137,7 +137,7 @@ class Wrench(TimeSeries):
             yield axis, unit_of(axis), *(f() if f and sure.any() else None for f in figures)
 
     def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
-        """Every axis, as ``wrench/best/fx``, and its standard deviation."""
+        """Every axis, as ``wrench/best/fx``, and its SD."""
         for kind, values in {"wrench": self.values, "wrench_sd": self.sd}.items():
             if values is not None:
                 known = np.where(self.hidden[rows, None], np.nan, values[rows])
@@ -166,12 +166,11 @@ class Wrench(TimeSeries):
     @property
     def size(self) -> Array:
         """|F|, NaN where unknown. (T,) [N]"""
-        size: Array = np.linalg.norm(self.force, axis=1)
-        return size
+        return np.asarray(np.linalg.norm(self.force, axis=1))
 
     @property
     def size_sd(self) -> Array | None:
-        """Standard deviation of |F|, the axes independent. (T,) [N]
+        """SD of |F|, the axes independent. (T,) [N]
 
         Without a force it is the largest of the axes', since F may point anywhere.
         """

@@ -157,14 +157,10 @@ class Arm:
         ddq_d: Array | None = None,
         forward: Array | None = None,
     ) -> None:
-        """Make one inner step.
+        """Make one inner step to commanded positions. (n,) [rad]
 
-        Args:
-            q_d: Commanded positions. (n,) [rad]
-            dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
-            ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
-            forward: Feed-forward torque; if not given the servo's own, with positions
-                brought to the joint limits. (n,) [N·m]
+        Velocities and accelerations not given are zero. Feed-forward torque (n,) [N·m] not
+        given is the servo's own, with positions brought to the joint limits.
         """
         rest = np.zeros_like(q_d)
         dq_d, ddq_d = rest if dq_d is None else dq_d, rest if ddq_d is None else ddq_d
@@ -233,7 +229,7 @@ class Arm:
 
 
 def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
-    """Normal deviates of standard deviation `size`, cut at two standard deviations."""
+    """Normal deviates of SD `size`, cut at two SDs."""
     return size * rng.standard_normal(shape).clip(-2.0, 2.0)
 
 

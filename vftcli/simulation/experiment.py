@@ -124,10 +124,8 @@ def simulate(
 ) -> Simulation:
     """Run an experiment: one scenario and seed give one result on a platform.
 
-    Args:
-        scenario: The experiment.
-        seed: Seed of everything drawn; the scenario's own if not given.
-        noise_seed: Seed of the sensors alone, for another log of the same arm and contacts.
+    The seed is of everything drawn, the scenario's own if not given; that of the noise, of
+    the sensors alone, is for another log of the same arm and contacts.
 
     Raises:
         ParameterError: If the scenario is impossible.

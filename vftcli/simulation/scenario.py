@@ -72,7 +72,7 @@ class FrictionSpec(Spec):
 
 
 class MismatchSpec(Spec):
-    """Relative standard deviations of the arm from its profile.
+    """Relative SDs of the arm from its profile.
 
     Each is drawn by the seed, a normal deviate cut at two deviations. 0 keeps the profile.
     """
@@ -110,8 +110,8 @@ class ForceSensorSpec(Spec):
     tool_com: Vector = (0.0, 0.0, 0.03)  #: Its centre of mass in sensor axes. (3,) [m]
     #: Zero offset. (6,) [N, N·m]
     bias: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    noise_force: float = 0.0  #: Standard deviation of a force sample. [N]
-    noise_torque: float = 0.0  #: Standard deviation of a torque sample. [N·m]
+    noise_force: float = 0.0  #: SD of a force sample. [N]
+    noise_torque: float = 0.0  #: SD of a torque sample. [N·m]
     drift_force: float = 0.0  #: Drift of the force zero. [N/s]
     drift_torque: float = 0.0  #: Drift of the torque zero. [N·m/s]
     known: bool = False  #: Whether the controller knows its weight.
@@ -125,12 +125,12 @@ class SensingSpec(Spec):
     noise: float = (
         1.0  #: Factor on the profile's noise of position, velocity, current and torque.
     )
-    #: Standard deviation of the current in place of the profile's. [A]
+    #: SD of the current in place of the profile's. [A]
     current_noise: float | None = None
     position_step: float = 5e-6  #: Quantisation of positions. [rad]
     dropped: float = 0.0  #: Share of samples lost.
     repeated: float = 0.0  #: Share of rows that repeat the row before.
-    jitter: float = 0.0  #: Standard deviation of the time stamps. [s]
+    jitter: float = 0.0  #: SD of the time stamps. [s]
     clock_drift: float = 0.0  #: Relative rate error of the log's clock (0.003: 0.3 % fast).
     vendor_cutoff: float = 5.0  #: Cut-off of the vendor's own external-force estimate. [Hz]
     start: float = 100.0  #: The first time stamp on the controller's clock. [s]
@@ -239,10 +239,8 @@ def scenario_names() -> tuple[str, ...]:
 def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """A built-in scenario or a user's TOML file, with `key=value` overrides applied.
 
-    Args:
-        name: Name of a built-in scenario, or a file.
-        overrides: As ``servo.stiffness=soft`` or ``contacts.hand.style=taps``; values are TOML, a
-            bare word is a string.
+    Overrides are as ``servo.stiffness=soft`` or ``contacts.hand.style=taps``: values are
+    TOML, a bare word is a string.
 
     Raises:
         ParameterError: If there is no such scenario, key or kind, or a value has the wrong type.

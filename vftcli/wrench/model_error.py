@@ -31,7 +31,7 @@ from vftcli.robots.friction import (
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
-from vftcli.signals.arrays import Array, Mask, grown, median, near, runs_of
+from vftcli.signals.arrays import Array, Mask, grown, median, near, runs_of, summed
 from vftcli.signals.estimation import SPIKE, LinearModel, filtered, robust_sd
 from vftcli.signals.rest import NEAR_REST
 from vftcli.wrench.solvers import TORQUE_SD
@@ -313,8 +313,7 @@ def error_process(
     rests, length = blocks.rests, np.median(blocks.length)
     # Share of the `RECENT` blocks before each in which a joint moved.
     count, k = max(round(RECENT / length), 1), np.arange(len(rests))
-    total = np.vstack([np.zeros((1, rests.shape[1])), np.cumsum(~rests, axis=0)])
-    first = np.maximum(k - count, 0)
+    total, first = summed(~rests), np.maximum(k - count, 0)
     moved = (total[:-1] - total[first]) / np.maximum(k - first, 1)[:, None]
     process = steady_process(noise, blocks, touched, ~rests & (moved < 1.0))
     stops, anew = rests & (moved > 0.5), (STOP_SHARE * noise.dry) ** 2

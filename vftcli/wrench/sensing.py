@@ -241,7 +241,7 @@ def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
 
 
 OWN = "own"  #: The word for the observers' own covariance as the torque error.
-#: Observer → standard deviation, (n,) or (T, n), none of those without a band [N·m]; and
+#: Observer → SD, (n,) or (T, n), none of those without a band [N·m]; and
 #: its source, or why there is none.
 TorqueError = tuple[dict[str, Array], list[Remark]]
 

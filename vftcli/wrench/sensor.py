@@ -110,11 +110,6 @@ class AxesFit(NamedTuple):
     correlation: float  #: Their correlation, all axes together.
 
     @property
-    def derived(self) -> bool:
-        """Whether theirs is computed from the same torques, not measured."""
-        return self.correlation >= DERIVED
-
-    @property
     def words(self) -> str:
         """Their axes in ours, as "+x +z −y"."""
         places = abs(self.matrix).argmax(axis=1)
@@ -189,7 +184,7 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
             correlation=axes.correlation,
         )
     )
-    if axes.derived:
+    if axes.correlation >= DERIVED:  # computed from the same torques, not measured
         remarks.append(caution("log-wrench-derived", correlation=DERIVED))
     return remarks
 
@@ -363,7 +358,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     """The span at the start with the wrench at its first level, None if short. [s]
 
     That level is the median of the first half second after `SETTLING`; the span ends
-    where a median over 0.1 s departs by `SPREADS` robust standard deviations and at least
+    where a median over 0.1 s departs by `SPREADS` robust SDs and at least
     `STEPS`. A load from the first sample on looks like drift.
     """
     t = wrench.t - wrench.t[0]

@@ -361,7 +361,7 @@ class VirtualSensor(Shown):
     ) -> tuple[Wrench, ...]:
         """The wrench of each estimate at q (T, n) [rad], about flange, tool or sensor.
 
-        An estimate without a standard deviation of its torques, (n,) or (T, n) [N·m] by its
+        An estimate without an SD of its torques, (n,) or (T, n) [N·m] by its
         name, has no band.
         """
         samples, n = q.shape
