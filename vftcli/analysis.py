@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -89,12 +90,12 @@ class Analysis(Shown):
         """The wrench of the first observer with one: `best` if contacts are listed."""
         return next(iter(self.wrenches), None)
 
-    @property
+    @cached_property
     def recording(self) -> Recording:
         """The log."""
         return self.motion.log.recording
 
-    @property
+    @cached_property
     def robot(self) -> Robot:
         """The arm as it was used."""
         return self.motion.log.robot

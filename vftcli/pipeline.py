@@ -16,7 +16,7 @@ from vftcli.doctor.examination import Examiner, stretches
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.observers import ObserverChoice
-from vftcli.observers.observer import BlockObserver
+from vftcli.observers.paper import BlockObserver
 from vftcli.observers.table import BEST, OBSERVERS, LogSpectra
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import Library

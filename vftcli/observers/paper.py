@@ -15,7 +15,7 @@ that jitters, `as_printed` the printed variants.
 from abc import abstractmethod
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -42,18 +42,47 @@ from vftcli.observers.kalman_model import (
     steady,
     update,
 )
-from vftcli.observers.observer import BlockObserver, Complex, Tuning, angular
+from vftcli.observers.observer import Complex, Tuning
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array, one_each
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, one_sample_earlier
-from vftcli.signals.parsing import check_known
+from vftcli.signals.parsing import check_kind, check_known
 from vftcli.signals.remarks import caution, on_joints, warning
-from vftcli.signals.shown import record
+from vftcli.signals.shown import Shown, record
 from vftcli.signals.steady_filter import recursion, steady_filter
 
 GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 #: Weights of the external torque in a Kalman filter's two states. (2, 1)
 TORQUE = np.array([[0.0], [1.0]])
+
+
+class BlockObserver(Shown):
+    """An observer that continues after the last block; a log is one block."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Its name at the command line."""
+
+    @abstractmethod
+    def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
+        """Estimate of a block, and the observer's state after; None at a log's start."""
+
+    def estimate(self, terms: Any) -> ExternalTorque:  # noqa: ANN401 - DynamicsTerms, or a Run
+        """The estimate of a whole log, from rest, by its terms or its run."""
+        found = getattr(terms, "terms", terms)
+        check_kind(found, DynamicsTerms, "run", "Run(recording=…, robot=…)")
+        return self.run(found)[0]
+
+    def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
+        """An estimate (T, n) [N·m] under the observer's name, its array handed over."""
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), **more)
+
+
+def angular(frequency: Array) -> Array:
+    """ω of frequencies [Hz], nearly zero at 0 Hz, for limits. (F, 1) [rad/s]"""
+    omega = 2.0 * np.pi * np.asarray(frequency, float)[:, None]
+    return np.where(omega == 0.0, 1e-9, omega)
 
 
 class FirstOrderState(NamedTuple):

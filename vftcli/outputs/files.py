@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
-from vftcli.signals.packages import installed, remedy
+from vftcli.signals.packages import PACKAGES, installed
 from vftcli.signals.parsing import whole
 
 if TYPE_CHECKING:
@@ -320,7 +320,7 @@ def check_letters(path: Path) -> None:
 def left_out(names: Iterable[str]) -> list[str]:
     """Files not written for want of a package, a line each."""
     return [
-        f"{name} {what}: {remedy(module)}"
+        f"{name} {what}: {PACKAGES[module][1]}"
         for name in dict.fromkeys(names)
         for end, module, what in (
             (".rrd", "rerun", "not written"),

@@ -20,9 +20,6 @@ by joint size. Friction stated at a temperature T₀ is multiplied with s(T)/s(T
 with target current and target torque follow it within 1 % on unloaded joints, at 28 to 38
 °C; the numbers were measured for friction at 44 to 45 °C.
 
-A joint at rest holds an unknown torque within its dry friction ±F_c; the file states which
-shares of F_c are allowed for it.
-
 References:
     A. Visintin, "Differential Models of Hysteresis", Springer, 1994, Ch. III, for play and stop;
     F. Al-Bender, J. Swevers, "Characterization of friction force dynamics", IEEE Control Systems

@@ -154,8 +154,7 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
     r"""P, Cᵀq̇ and g as the paper prints them, (7)–(16), from inverse dynamics alone.
 
     It takes n + 3 calls of RNEA a sample and is good to about 5e-6 N·m, as (11)
-    differentiates numerically. It is an oracle without code of the kernels, the
-    ``--as-printed`` path, and the baseline of the benchmark.
+    differentiates numerically.
 
     p = rnea(q, 0, q̇, 0) (8); Ṁq̇ ≈ Σᵢ [rnea(q+Δqᵢ, 0, q̇, 0) − p]/Δq · q̇ᵢ (11);
     Cq̇ = rnea(q, q̇, 0, 0) (12); Cᵀq̇ = Ṁq̇ − Cq̇ (14); G = rnea(q, 0, 0, g₀) (16).

@@ -32,11 +32,6 @@ def installed(module: str) -> bool:
     return find_spec(module) is not None
 
 
-def remedy(module: str) -> str:
-    """The command to install a module's package."""
-    return PACKAGES[module][1]
-
-
 def check_installed(module: str, what: str) -> None:
     """See whether the package that something needs is there; it is not loaded."""
     if not installed(module):
