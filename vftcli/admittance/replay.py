@@ -162,7 +162,7 @@ def replay_release(
 ) -> Replay:
     """Motions after release at rest at `x` (6,) [m, rad] from pose `start` (n,) [rad].
 
-    `duration` [s] is None for as long as it takes; else as `replay`.
+    `duration` [s] is None for as long as it takes.
     """
     if not x.any():
         raise ParameterError(

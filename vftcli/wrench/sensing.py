@@ -193,7 +193,7 @@ def smooth_all(
 
 
 def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) -> SmoothedWrench:
-    """The smoothed wrench of one log; the arguments as of `smooth_all`.
+    """The smoothed wrench of one log.
 
     A corrected model error is used where the wrench comes and goes. If the uncorrected log
     implies one steady load it is left out, since load and model error look alike.

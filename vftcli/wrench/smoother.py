@@ -189,7 +189,7 @@ def block_model(
     gate: Sequence[tuple[float, float]] | None,
     seconds: float,
 ) -> BlockModel:
-    """A log in blocks of a length [s]; the other arguments as of `smooth_wrench`."""
+    """A log in blocks of a length. [s]"""
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     noise = torque_noise(blocks, free, run.robot, seconds)
     jacobian = flange_jacobian(run.robot.chain, blocks.q)
