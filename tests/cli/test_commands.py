@@ -215,9 +215,6 @@ def test_a_refusal_leaves_no_file_and_what_exists_stays(refused, excitation, her
 
 # inspect and convert at the command line.
 
-KEYS = {"format", "joints", "samples", "duration_s", "rate_hz", "max_gap_s", "duplicates",
-        "repairs", "warnings"}  # fmt: skip
-
 
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
@@ -228,25 +225,14 @@ def table(tmp_path: Path) -> Path:
     return path
 
 
-def test_inspect_as_json(run, table: Path) -> None:
-    code, out, _ = run("inspect", table, "--json")
-    reported = json.loads(out)
-    assert code == 0
-    assert set(reported) >= KEYS
-    assert reported["format"] == "table"
-    assert (reported["joints"], reported["samples"], reported["duplicates"]) == (1, 400, 1)
-    assert reported["duration_s"] == pytest.approx(3.99)
-    assert reported["rate_hz"] == pytest.approx(100)
-    assert reported["max_gap_s"] == pytest.approx(0.01)
-    assert isinstance(reported["repairs"], list)
-    assert isinstance(reported["warnings"], list)
-
-
 def test_inspect_in_words_and_strict_fails_on_warnings(run, table: Path) -> None:
     code, out, _ = run("inspect", table)
     assert code == 0
     assert "400 of 401 rows" in out
     assert "no-profile" in out
+    reported = json.loads(run("inspect", table, "--json")[1])
+    assert (reported["format"], reported["duplicates"]) == ("table", 1)
+    assert reported["warnings"]
     for logs, said in (
         ([table], "1 warning (--strict)\n"),
         ([table] * 2, "2 warnings (--strict)\n"),
