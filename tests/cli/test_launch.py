@@ -199,6 +199,22 @@ def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(command: str, tmp_
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
+def test_a_recording_is_written_without_pandas(tmp_path: Path) -> None:
+    """Pyarrow imports it for others wherever it is installed, as beside most notebooks."""
+    script = (
+        "import atexit, sys\n"
+        "atexit.register(lambda: print('rerun' in sys.modules, 'pandas' in sys.modules))\n"
+        "from vftcli.cli import launch\n"
+        "launch()\n"
+    )
+    words = ("report", CIRCLE, "--robot", "ur5", "--interval", "0:4", "-o", tmp_path / "out")
+    done = launched(*words, begin=("-c", script))
+    assert done.stdout.endswith("True False\n")
+    assert "Warning" not in done.stderr
+    assert (tmp_path / "out" / "recording.rrd").stat().st_size
+
+
 # How much is said and to whom: -v, -q, colours, stages; a bad log of several is left out.
 
 OF_TAPS = f"file:{TAPS}.truth.parquet"

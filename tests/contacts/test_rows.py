@@ -11,12 +11,11 @@ from vftcli.contacts.listing import list_contacts
 from vftcli.contacts.rows import (
     ContactLocation,
     force_course,
-    quiet_error,
     sensor_force,
     shows_force,
     vendor_force,
 )
-from vftcli.contacts.windows import PointFit
+from vftcli.contacts.windows import PointFit, quiet_error
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
@@ -49,7 +48,7 @@ def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
     d = drawn(60, np.random.default_rng(8))
     log = blocks(d, np.full_like(d, 0.5))
     hidden = (np.arange(60) > 20) & (np.arange(60) < 30)
-    mean, variance = quiet_error(d, error_process(noise(), log), hidden)
+    mean, variance = quiet_error(d, error_process(noise(), log).hiding(hidden))
     known = ~hidden
     prior = 0.25 * np.exp(-np.abs(log.t[:, None] - log.t) / 0.4)
     S = prior[known][:, known] + 0.01 * np.eye(known.sum())

@@ -5,10 +5,18 @@ import pytest
 from drawn_blocks import B
 
 from vftcli.contacts.search import split_at_turns, split_run
-from vftcli.contacts.windows import START, WindowWrench, contact_lanes, learn_prior, smooth_lanes
+from vftcli.contacts.windows import (
+    START,
+    WindowWrench,
+    contact_lanes,
+    learn_prior,
+    likelihoods,
+    smooth_lanes,
+)
 from vftcli.robots.terms import Blocks
-from vftcli.wrench.model_error import TorqueNoise, error_process
-from vftcli.wrench.smoother import BlockLog, in_blocks
+from vftcli.signals.arrays import covered
+from vftcli.wrench.model_error import ErrorProcess, TorqueNoise, error_process
+from vftcli.wrench.smoother import BlockLog, Lane, in_blocks
 
 
 @pytest.mark.parametrize(
@@ -62,11 +70,45 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
     # A dozen pushes of 1.6 correlation times and three axes: some 60 numbers, 10 %; two of these.
     assert abs(prior.force / 30.0 - 1.0) < 0.25
     assert abs(prior.moment / 3.0 - 1.0) < 0.25
-    lanes = contact_lanes(log, [in_blocks(jacobian)] * len(runs), runs, [prior] * len(runs))
-    for run, course in zip(runs, smooth_lanes(log, lanes), strict=True):
+    lanes = contact_lanes(log, runs, in_blocks(jacobian))
+    for run, course in zip(runs, smooth_lanes(lanes, [prior] * len(runs)), strict=True):
         inside = course.within(run)
         sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
         assert np.mean(np.abs(inside.values - true[slice(*run)]) < 1.96 * sd) > 0.85
+
+
+def test_two_blocks_say_what_all_quiet_ones_beside_a_contact_do() -> None:
+    """Evidence and wrench are those of the window with every block of it."""
+    rng = np.random.default_rng(4)
+    count, runs = 160, [(0, 12), (50, 70), (84, 92), (140, 160)]
+    d = 0.3 * rng.standard_normal((count, 6)).cumsum(axis=0)
+    d[50:70] += 20.0
+    rests = np.where(rng.random((count, 6)) < 0.3, 0.0, 0.5)
+    blocks = Blocks(
+        t=B * (np.arange(count) + 0.5), length=np.full(count, B), d=d,
+        q=np.zeros_like(d), velocity=rests, known=rng.random(count) > 0.05,
+    )  # fmt: skip
+    noise = TorqueNoise(
+        white=np.full(6, 0.01), variance=np.full(6, 0.04), time=np.full(6, 0.5),
+        dry=np.ones(6), seen=np.ones(6, dtype=bool),
+        at_rest=np.full(6, 0.09), pushed=np.full(6, 0.36),
+    )  # fmt: skip
+    log = BlockLog(blocks, error_process(noise, blocks))
+    jacobian = in_blocks(rng.standard_normal((count, 6, 6)))
+    for run, lane in zip(runs, contact_lanes(log, runs, jacobian), strict=True):
+        first, last = blocks.t.searchsorted(blocks.t[[run[0], run[1] - 1]] + [-1.0, 1.0 + 1e-9])
+        gate = covered([run], count, 1)
+        hidden = covered(runs, count, 1) & ~gate
+        some = slice(first, last)
+        own = ErrorProcess(*(x[some] for x in log.process.hiding(hidden)))
+        whole = Lane(BlockLog(blocks.part(some), own), (first, last), gate[some], jacobian, None)
+        each = [lane, whole]
+        touched = [one._replace(prior=START) for one in each]
+        bare, nats = ([likelihoods([one])[0] for one in lanes] for lanes in (each, touched))
+        assert nats[0] - bare[0] == pytest.approx(nats[1] - bare[1], rel=1e-8, abs=1e-6)
+        short, long = (one.within(run) for one in smooth_lanes(each, [START] * 2))
+        np.testing.assert_allclose(short.values, long.values, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(short.covariance, long.covariance, rtol=1e-6, atol=1e-7)
 
 
 def test_pushes_from_different_sides_are_two_contacts() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from made_urdfs import two_armed, written
 
-from vftcli.robots import PROFILES, JointFriction, Payload, RobotChoice, load_robot
+from vftcli.robots import NAMES, PROFILES, JointFriction, Payload, RobotChoice, load_robot
 from vftcli.robots.chain import link_poses, unphysical
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.profile import robot_toml
@@ -331,6 +331,10 @@ def test_without_either_the_fitting_profiles_are_listed() -> None:
     ):
         with pytest.raises(RobotError, match=words):
             RobotChoice().load(log(joints))
+
+
+def test_the_number_of_joints_is_known_without_the_file() -> None:
+    assert {name: load_robot(name).joints for name in PROFILES} == NAMES
 
 
 def test_friction_can_be_left_away() -> None:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Collection
 from contextlib import suppress
 from importlib import import_module
+from importlib.abc import MetaPathFinder
 from types import FrameType
 from typing import Annotated, Any
 
@@ -82,9 +83,9 @@ def main() -> None:
         fail(str(error))
     except MemoryError:
         fail("out of memory; use --interval to take a part of the log")
+    except BrokenPipeError:
+        raise SystemExit(1) from None
     except OSError as error:
-        if isinstance(error, BrokenPipeError):
-            raise SystemExit(1) from None
         where = f": {error.filename}" if error.filename else ""
         fail(f"{error.strerror or error}{where}")
 
@@ -94,6 +95,7 @@ def launch() -> None:
 
     Taking the interpreter apart costs as much as reading a large log.
     """
+    sys.meta_path.insert(0, NoPandas())
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             # A signal ignored by the caller, as by nohup, stays ignored.
@@ -114,6 +116,15 @@ def launch() -> None:
         with suppress(OSError, ValueError, AttributeError):
             stream.flush()
     os._exit(code if isinstance(code, int) else int(code is not None))
+
+
+class NoPandas(MetaPathFinder):
+    """Finds no pandas, which pyarrow imports for .3 s wherever it is; no table here is its."""
+
+    def find_spec(self, fullname: str, *_: object) -> None:
+        """Raise for it, as if it were not installed."""
+        if fullname == "pandas":
+            raise ModuleNotFoundError
 
 
 #: Address space that the libraries reserve [B]: with two processors the report of 10 s at

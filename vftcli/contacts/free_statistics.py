@@ -37,7 +37,13 @@ from vftcli.wrench.model_error import (
     infer_noise,
     learn_noise,
 )
-from vftcli.wrench.smoother import BlockLog, BlockSpan, WrenchPrior, contact_block, in_blocks
+from vftcli.wrench.smoother import (
+    BlockLog,
+    WrenchPrior,
+    contact_block,
+    deviations,
+    in_blocks,
+)
 
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
@@ -228,21 +234,23 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
     for blocks in blocks_of(free.free, free.seconds):
         # Runs of known blocks, half as much around each.
         long = max(round(PSEUDO / np.median(blocks.length)), 1)
-        half, made_up = (long + 1) // 2, list[BlockSpan]()
-        for start, stop in runs_of(blocks.known):
-            starts = range(start + half, stop - long - half + 1, long)
-            made_up += [(k, k + long) for k in starts]
-        if not (made_up := made_up[:: max(len(made_up) // each, 1)][:each]):
-            continue
+        half = (long + 1) // 2
+        made_up = [
+            (k, k + long)
+            for start, stop in runs_of(blocks.known)
+            for k in range(start + half, stop - long - half + 1, long)
+        ]
+        made_up = made_up[:: max(len(made_up) // each, 1)][:each]
         process = error_process(free.noise, blocks, covered(made_up, len(blocks.t), 1))
         log = BlockLog(blocks, process)
-        J = [in_blocks(flange_jacobian(free.log.robot.loaded_chain, blocks.q))]
+        J = in_blocks(flange_jacobian(free.log.robot.loaded_chain, blocks.q))
         # Each alone: nobody touches the others.
-        lanes = [contact_lanes(log, J, [run], [prior])[0] for run in made_up]
-        for run, wrench in zip(made_up, smooth_lanes(log, lanes), strict=True):
+        lanes = (lane for run in made_up for lane in contact_lanes(log, [run], J))
+        wrenches = smooth_lanes(lanes, [prior] * len(made_up))
+        for run, wrench in zip(made_up, wrenches, strict=True):
             inside = wrench.within(run)
-            sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
-            shares.append(abs(inside.values) / np.maximum(sd, 1e-12))
+            sd = np.maximum(deviations(inside.covariance), 1e-12)
+            shares.append(abs(inside.values) / sd)
             forces.append(inside.size)
     if not forces:
         return PseudoContactTest(np.ones(6), float("nan"))

@@ -21,15 +21,15 @@ from vftcli.contacts.windows import (
     jacobian_of,
     learn_prior,
     point_fits,
+    quiet_error,
     smooth_lanes,
     times_of,
 )
 from vftcli.robots.chain import link_poses, points_on
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Z_95, Array, Mask, covered, resample_columns
-from vftcli.signals.estimation import smoothed
+from vftcli.signals.arrays import Z_95, Array, covered, resample_columns
 from vftcli.signals.remarks import Remark, caution
-from vftcli.wrench.model_error import ErrorProcess, error_model, error_process
+from vftcli.wrench.model_error import error_process
 from vftcli.wrench.smoother import BENT, BlockLog, JacobianIn, WrenchPrior, hidden_by_blocks
 
 #: Factors on the model's deviations of force and moment: friction's errors are not
@@ -116,8 +116,6 @@ class ContactMeasurement:
     log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
     prior: WrenchPrior  #: Prior of the contacts' wrench.
     test: PseudoContactTest  #: Errors of a wrench in free motion.
-    #: Mean and variance of the model error. (K, n) [N·m], [(N·m)²]
-    quiet: tuple[Array, Array]
     bent: float  #: Share of a peak's bend that may be hidden.
     tail: float = 0.0  #: How long a push may act before and after its blocks. [s]
 
@@ -133,11 +131,17 @@ class ContactMeasurement:
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = covered(found.runs, len(blocks.t), 1)
         process = error_process(free.noise, blocks, gate)._replace(white=found.log.process.white)
-        log, quiet = BlockLog(blocks, process), quiet_error(blocks.d, process, gate)
+        log = BlockLog(blocks, process)
         if like is None:
             prior = learn_prior(log, J, found.runs, found.prior, rounds=2 if found.runs else 0)
-            return cls(free.log, found, log, prior, self_test(free, prior), quiet, bent)
-        return cls(free.log, found, log, like.prior, like.test, quiet, bent, like.tail)
+            return cls(free.log, found, log, prior, self_test(free, prior), bent)
+        return cls(free.log, found, log, like.prior, like.test, bent, like.tail)
+
+    @cached_property
+    def quiet(self) -> tuple[Array, Array]:
+        """Mean and variance of the model error beside contacts. (K, n) [N·m], [(N·m)²]"""
+        d, touched = self.log.blocks.d, covered(self.found.runs, len(self.log.blocks.d), 1)
+        return quiet_error(d, self.log.process.hiding(touched))
 
     @cached_property
     def priors(self) -> list[WrenchPrior]:
@@ -149,8 +153,7 @@ class ContactMeasurement:
     def wrenches(self) -> list[WindowWrench]:
         """The wrench of every contact at the flange."""
         runs, J = self.found.runs, self.found.places[0].jacobian
-        lanes = contact_lanes(self.log, [J] * len(runs), runs, self.priors, tail=self.tail)
-        return smooth_lanes(self.log, lanes)
+        return smooth_lanes(contact_lanes(self.log, runs, J, tail=self.tail), self.priors)
 
     @cached_property
     def locations(self) -> list[ContactLocation]:
@@ -163,16 +166,19 @@ class ContactMeasurement:
         chain, q = self.run.robot.loaded_chain, self.log.blocks.q
         locations = self.locations if locations is None else locations
         moved = {
-            i: jacobian_of(chain, q, where.fits[0].link, where.fits[0].share)
+            i: jacobian_of(lambda a, b: link_poses(chain, q[a:b]), *where.fits[0][:2])
             for i, where in enumerate(locations)
             if not where.on_wrist
         }
-        if moved:
-            points = [self.priors[i]._replace(moment=POINT_MOMENT) for i in moved]
-            some = [runs[i] for i in moved]
-            lanes = contact_lanes(self.log, [*moved.values()], some, points, tail=self.tail)
-            for i, wrench in zip(moved, smooth_lanes(self.log, lanes), strict=True):
-                wrenches[i] = wrench
+        points = [self.priors[i]._replace(moment=POINT_MOMENT) for i in moved]
+        lanes = zip(
+            contact_lanes(self.log, [runs[i] for i in moved], J, tail=self.tail),
+            moved,
+            strict=True,
+        )
+        there = (lane._replace(jacobian=moved[i]) for lane, i in lanes)
+        for i, wrench in zip(moved, smooth_lanes(there, points), strict=True):
+            wrenches[i] = wrench
         each = enumerate(zip(wrenches, locations, strict=True))
         return [self.row(i, *pair, moved.get(i, J)) for i, pair in each]
 
@@ -271,12 +277,6 @@ def shows_force(row: Contact, smallest: float) -> bool:
     """Whether a force exceeds its band, or is sure and reaches `smallest`. [N]"""
     force, sure = row.peak_force or 0.0, (row.evidence or 0.0) >= LEAST_IN_MOTION
     return force > (row.place_band or 0.0) or (sure and not force < smallest)
-
-
-def quiet_error(d: Array, process: ErrorProcess, hidden: Mask) -> tuple[Array, Array]:
-    """Mean and variance of b given d (K, n) outside hidden blocks (K,). (K, n)"""
-    mean, covariance = smoothed(error_model(d, process.hiding(hidden)))
-    return mean[..., 0], covariance[..., 0, 0]
 
 
 def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:

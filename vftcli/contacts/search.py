@@ -132,8 +132,8 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     log = BlockLog(blocks, ahead._replace(white=white))
     if not runs:
         return Candidates(log, options, [], np.zeros((0, len(options))), [], START)
-    prior, count = learn_prior(log, flange, runs, START, rounds=1), len(runs)
-    wrenches = smooth_lanes(log, contact_lanes(log, [flange] * count, runs, [prior] * count))
+    prior = learn_prior(log, flange, runs, START, rounds=1)
+    wrenches = smooth_lanes(contact_lanes(log, runs, flange), [prior] * len(runs))
     pairs = zip(wrenches, runs, strict=True)
     pieces = [piece for pair in pairs for piece in split_run(blocks.t, *pair, J)]
     passed = [any(a < stop and b > start for a, b in beyond) for start, stop in pieces]
@@ -210,67 +210,57 @@ def filtered_odds(
     The arrays are (K, S, n): d, decay, added, white and spikes of b, the variance of a
     contact's torque; dt (K, S, 1) is the time from the block before.
     """
-    blocks, count, n = d.shape
-    time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
-    kept = np.exp(-dt[..., 0] / time)[..., None]
+    count, n = d.shape[1:]
+    time, lasts = np.tile(np.transpose(SEARCHES), count // len(SEARCHES))
+    kept = np.exp(-dt / time[:, None])
     # Behind a long gap exactly 1 leaves 0/0.
     begins, ends = (np.minimum(-np.expm1(-dt[..., 0] / s), 1.0 - 1e-9) for s in (BETWEEN, lasts))
+    turns = np.stack([1.0 - begins, begins], axis=1), np.stack([ends, 1.0 - ends], axis=1)
     often = np.log(spikes) - 0.5 * np.log(SPIKE), np.log1p(-spikes)
     # A stretch begins with what b is like anywhere.
     added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
-    nought, first = np.zeros((count, n)), np.full(count, np.log(AT_FIRST / (1.0 - AT_FIRST)))
-    both = np.zeros((2, count, n))
-    state = ImmState(both, nought, both, nought, variance[0].copy(), first)
-    odds = np.empty((blocks, count))
-    for k in range(blocks):
-        moves = decay[k], added[k], kept[k]
-        state = imm_predict(state, begins[k], ends[k], moves, variance[k])
-        state = imm_update(state, d[k], white[k], (often[0][k], often[1][k]))
-        odds[k] = state.odds
-    return odds
+    both, first = np.zeros((2, count, n)), np.full(count, np.log(AT_FIRST / (1.0 - AT_FIRST)))
+    state, odds = ImmState(both, both[0], both, both[0], variance[0], first), []
+    ahead = zip(*turns, decay, added, kept, variance, strict=True)
+    for moves, here in zip(ahead, zip(d, white, *often, strict=True), strict=True):
+        state = imm_update(imm_predict(state, *moves), *here)
+        odds.append(state.odds)
+    return np.array(odds)
 
 
 def imm_predict(
-    state: ImmState,
-    begins: Array,
-    ends: Array,
-    moves: tuple[Array, Array, Array],
-    variance: Array,
+    state: ImmState, free: Array, held: Array, f: Array, added: Array, g: Array, variance: Array
 ) -> ImmState:
     """The states of each mode a block later, moments matched.
 
+    From mode 0 probability goes to each mode by `free`, from mode 1 by `held`. (2, S)
     State b keeps the share f and gains variance; x keeps g, its variance is stationary.
     """
-    f, added, g = moves
-    p1 = 1.0 / (1.0 + np.exp(-state.odds))
-    p0 = 1.0 - p1
-    ahead0, ahead1 = p0 * (1.0 - begins) + p1 * ends, p0 * begins + p1 * (1.0 - ends)
+    come = np.exp(state.odds) * held
+    ahead = free + come
     # Share of the contact mode in what each mode begins with. (2, S, 1)
-    w = np.stack([p1 * ends / ahead0, p1 * (1.0 - ends) / ahead1])[:, :, None]
-    apart = state.b[1] - state.b[0]
-    b = state.b[0] + w * apart
-    spread = w * (1.0 - w)
-    bb = (1.0 - w) * state.bb[0] + w * state.bb[1] + spread * apart * apart
-    w1, s1 = w[1], spread[1]
-    xx = w1 * state.xx + (1.0 - w1) * variance + s1 * state.x * state.x
-    bx = w1 * state.bx + s1 * apart * state.x
-    xx = g * g * xx + variance * (1.0 - g * g)
-    odds = np.log(ahead1 / ahead0)
-    return ImmState(f * b, g * w1 * state.x, f * f * bb + added, f * g * bx, xx, odds)
+    w = (come / ahead)[:, :, None]
+    rest, apart, x = 1.0 - w, state.b[1] - state.b[0], state.x
+    b = f * (state.b[0] + w * apart)
+    bb = state.bb[0] + w * (state.bb[1] - state.bb[0] + rest * (apart * apart))
+    stays, aside = g * w[1], rest[1] * x
+    xx = variance + g * stays * (state.xx - variance + aside * x)
+    bx = f * stays * (state.bx + aside * apart)
+    return ImmState(b, stays * x, f * f * bb + added, bx, xx, np.log(ahead[1] / ahead[0]))
 
 
-def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Array]) -> ImmState:
-    """The states updated by a block's disturbance; a spike counts a 40th."""
+def imm_update(state: ImmState, d: Array, white: Array, spike: Array, none: Array) -> ImmState:
+    """The states updated by a block's disturbance; a spike, by its log rate, counts a 40th."""
     own = state.bx + state.xx
     # Covariance of b, as each mode has it, with d. (2, S, n)
-    cross = np.stack([state.bb[0], state.bb[1] + state.bx])
-    S = cross + white
+    cross = state.bb.copy()
+    cross[1] += state.bx
+    S, nu = cross + white, d - state.b
     S[1] += own
-    nu = d - state.b
     nu[1] -= state.x
     square = nu * nu / S
-    usual = often[1] - 0.5 * square
-    spiked = often[0] - 0.5 * square / SPIKE
+    usual = none - 0.5 * square
+    spiked = spike - 0.5 / SPIKE * square
     likely = np.logaddexp(usual, spiked) - 0.5 * np.log(S)
     odds = state.odds + (likely[1] - likely[0]).sum(axis=1)
     S = np.where(spiked > usual, SPIKE * S, S)
@@ -281,7 +271,7 @@ def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Arra
         state.bb - K * cross,
         state.bx - K[1] * own,
         state.xx - Kx * own,
-        odds.clip(-MOST_ODDS, MOST_ODDS),
+        np.minimum(np.maximum(odds, -MOST_ODDS), MOST_ODDS),
     )
 
 

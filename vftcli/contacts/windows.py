@@ -11,8 +11,9 @@ flange, and a force and moment on each link, by the smoother's forward pass with
 Jacobian of the place. The best place counts.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
+from itertools import product
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -21,8 +22,16 @@ from vftcli.robots.chain import Chain, link_jacobian, link_poses, points_on
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, covered
 from vftcli.signals.estimation import SPIKE, LinearModel, log_likelihood, smoothed
+from vftcli.signals.pose import Pose
 from vftcli.wrench.model_error import UNKNOWN, ErrorProcess, error_model, innovations
-from vftcli.wrench.smoother import BlockLog, BlockSpan, JacobianIn, Lane, WrenchPrior, assembled
+from vftcli.wrench.smoother import (
+    BlockLog,
+    BlockSpan,
+    JacobianIn,
+    Lane,
+    WrenchPrior,
+    assembled,
+)
 
 ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
 POINTS = 10  #: Points along each link that a force is tried at.
@@ -46,22 +55,18 @@ class ContactPlace(NamedTuple):
 
 def places(chain: Chain, q: Array) -> list[ContactPlace]:
     """The flange, and the middle of every link from the second on, at q (K, n)."""
-    at, n = link_poses(chain, q[:1]).translation[0], chain.joints
-    found = [ContactPlace(0, LEAST_LEVER, jacobian_of(chain, q, n, 1.0))]
+    poses = lru_cache(MOST_LANES)(lambda first, last: link_poses(chain, q[first:last]))
+    at, n = poses(0, 1).translation[0], chain.joints
+    found = [ContactPlace(0, LEAST_LEVER, jacobian_of(poses, n, 1.0))]
     for link in range(FIRST_LINK, n + 1):
         lever = max(LEAST_LEVER, 0.5 * float(np.linalg.norm(at[link] - at[link - 1])))
-        found.append(ContactPlace(link, lever, jacobian_of(chain, q, link, 0.5)))
+        found.append(ContactPlace(link, lever, jacobian_of(poses, link, 0.5)))
     return found
 
 
-def jacobian_of(chain: Chain, q: Array, link: int, share: float) -> JacobianIn:
-    """J of a point along a link at q (K, n), window by window: a long log's would not fit."""
-
-    @lru_cache(MOST_LANES)
-    def jacobian(first: int, last: int) -> Array:
-        return link_jacobian(link_poses(chain, q[first:last]), link, share)
-
-    return jacobian
+def jacobian_of(poses: Callable[[int, int], Pose], link: int, share: float) -> JacobianIn:
+    """J of a point along a link, window by window: a long log's would not fit."""
+    return lru_cache(MOST_LANES)(lambda *window: link_jacobian(poses(*window), link, share))
 
 
 def arm_parts(joints: int) -> dict[int, ArmPart]:
@@ -121,6 +126,7 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
 
 MARGIN = 1.0  #: Length of a window beyond its contacts on either side. [s]
 NEAR = 0.4  #: That length where only the prior is learned. [s]
+CERTAIN = 1e-30  #: Least variance of the model error. [(N·m)²]
 MOST_LANES = 96  #: Lanes that are worked on at once.
 START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
@@ -158,12 +164,6 @@ class WindowWrench(NamedTuple):
         return np.asarray(np.linalg.norm(self.values[:, :3], axis=1))
 
 
-def window_of(t: Array, run: BlockSpan, margin: float = MARGIN) -> BlockSpan:
-    """The blocks within `margin` of a run of them."""
-    first = t.searchsorted(t[run[0]] - margin)
-    return first, t.searchsorted(t[run[1] - 1] + margin, side="right")
-
-
 def times_of(blocks: Blocks, run: BlockSpan) -> Array:
     """When a run of blocks begins and ends. (2,) [s]"""
     ends = [run[0], run[1] - 1]
@@ -172,27 +172,68 @@ def times_of(blocks: Blocks, run: BlockSpan) -> Array:
 
 def contact_lanes(
     log: BlockLog,
-    jacobians: Sequence[JacobianIn],
     runs: Sequence[BlockSpan],
-    priors: Sequence[WrenchPrior | None],
+    jacobian: JacobianIn,
     margin: float = MARGIN,
     tail: float = 0.0,
-) -> list[Lane]:
-    """A lane for every run of blocks, the others hidden; its gate is `tail` [s] wider."""
-    t, own = log.blocks.t, {}
-    every, more = covered(runs, len(t), 1), round(tail / np.median(log.blocks.length))
-    for run in set(runs):
-        first, last = window = window_of(t, run, margin + tail)
-        inside, blocks = [(run[0] - first, run[1] - first)], last - first
-        hidden = every[first:last] & ~covered(inside, blocks, 1)
-        own[run] = window, covered(inside, blocks, 1 + more) & ~hidden, hidden
-    lanes = zip(runs, jacobians, priors, strict=True)
-    return [Lane(*own[run], jacobian, prior) for run, jacobian, prior in lanes]
+) -> Iterator[Lane]:
+    """A lane without prior for every run: its blocks, one and `tail` [s] more on either side.
+
+    That one says of the model error b what all quiet blocks there do, so far as `margin`. Before
+    the run they leave b with mean m and variance p, as d = 2m of variance 2p does with a prior
+    of 2p. Behind it they make N(m, p) of N(0, v), as d = mR/p of variance R = 1/(1/p − 1/v) does;
+    v is the least R, for which no digit is lost.
+    """
+    if not runs:
+        return
+    t, (start, stop) = log.blocks.t, np.transpose(runs)
+    reach, more = margin + tail, 1 + round(tail / np.median(log.blocks.length))
+    first, last = t.searchsorted(t[start] - reach), t.searchsorted(t[stop - 1] + reach, "right")
+    # No gate goes into another contact.
+    free_from, free_to = np.append(0, stop[:-1] + 1), np.append(start[1:] - 1, len(t))
+    start, stop = (
+        np.maximum(np.maximum(start - more, np.minimum(free_from, start - 1)), first),
+        np.minimum(np.minimum(stop + more, np.maximum(free_to, stop + 1)), last),
+    )
+    begin, length = np.append(first, stop), np.append(start - first, last - stop)
+    number = np.arange(length.max(initial=1))[:, None]
+    at, inside = np.minimum(begin + number, len(t) - 1), (number < length)[..., None]
+    quiet = log.process.hiding(covered(runs, len(t), 1))
+    d, decay, added, white = (x[at] for x in (log.blocks.d, *quiet[:3]))
+    behind, least = slice(len(runs), None), log.process.white.min(axis=0)
+    added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
+    decay[0], added[0, behind] = 0.0, least
+    decay *= inside
+    process = ErrorProcess(decay, added, np.where(inside, white, UNKNOWN), d)
+    mean, variance = quiet_error(d, process)
+    last_before = np.maximum(start - first, 1) - 1, np.arange(len(runs))
+    m, p = 2.0 * mean[last_before], 2.0 * variance[last_before]
+    weight = np.maximum(1.0 / variance[0, behind] - 1.0 / least, 1.0 / UNKNOWN)
+    known = mean[0, behind] / variance[0, behind] / weight
+    for i, (a, b) in enumerate(np.transpose([start, stop]).tolist()):
+        window = a - (a > first[i]), b + (b < last[i])
+        some = slice(*window)
+        d, decay, added, white, spikes = (x[some].copy() for x in (log.blocks.d, *log.process))
+        if window[0] < a:
+            d[0], decay[0], added[0], white[0] = m[i], 0.0, p[i], p[i]
+        if window[1] > b:
+            d[-1], white[-1] = known[i], 1.0 / weight[i]
+        process = ErrorProcess(decay, added, white, spikes)
+        piece = BlockLog(log.blocks.part(some)._replace(d=d), process)
+        yield Lane(
+            piece, window, covered([(a - window[0], b - window[0])], len(d)), jacobian, None
+        )
+
+
+def quiet_error(d: Array, process: ErrorProcess) -> tuple[Array, Array]:
+    """Mean and variance of b given the d that are not hidden. (K, …, n) each"""
+    mean, covariance = smoothed(error_model(d, process))
+    return mean[..., 0], np.maximum(covariance[..., 0, 0], CERTAIN)
 
 
 def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
     """Numbers of lanes of about equal length, so that little is padded."""
-    length = np.array([stop - start for start, stop in (lane.window for lane in lanes)])
+    length = np.array([len(lane.gate) for lane in lanes])
     left = length.argsort(kind="stable")
     while left.size:
         alike = length[left[:MOST_LANES]] <= 1.5 * length[left[0]] + 20
@@ -200,11 +241,12 @@ def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
         yield batch.tolist()
 
 
-def smooth_lanes(log: BlockLog, lanes: Sequence[Lane]) -> list[WindowWrench]:
-    """The smoothed wrench of every lane along its window."""
+def smooth_lanes(lanes: Iterable[Lane], priors: Sequence[WrenchPrior]) -> list[WindowWrench]:
+    """The smoothed wrench of every lane along its window, by its prior."""
+    lanes = [lane._replace(prior=prior) for lane, prior in zip(lanes, priors, strict=True)]
     found = dict[int, WindowWrench]()
     for batch in batches(lanes):
-        mean, covariance = smoothed(assembled(log, [lanes[i] for i in batch]))
+        mean, covariance = smoothed(assembled([lanes[i] for i in batch]))
         for place, i in enumerate(batch):
             first, last = lanes[i].window
             span = slice(last - first), place, slice(6)
@@ -212,7 +254,7 @@ def smooth_lanes(log: BlockLog, lanes: Sequence[Lane]) -> list[WindowWrench]:
     return [found[i] for i in range(len(lanes))]
 
 
-def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
+def likelihoods(lanes: Sequence[Lane]) -> Array:
     """Log likelihood ln p(d) of every lane, comparable within one window. [nats]
 
     Without prior nothing touches, and an innovation in the gate may be a spike.
@@ -220,23 +262,22 @@ def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
     found = np.empty(len(lanes))
     for batch in batches(lanes):
         some = [lanes[i] for i in batch]
-        model = assembled(log, some)
+        model = assembled(some)
         bare = some[0].prior is None
-        nats = untouched_likelihood(log, some, model) if bare else log_likelihood(model)
+        nats = untouched_likelihood(some, model) if bare else log_likelihood(model)
         # Less the blocks behind the shorter lanes.
-        length = np.array([lane.window[1] - lane.window[0] for lane in some])
-        padding = 0.5 * (length.max() - length) * log.blocks.d.shape[1] * np.log(UNKNOWN)
+        length = np.array([len(lane.gate) for lane in some])
+        padding = 0.5 * (length.max() - length) * model.d.shape[-1] * np.log(UNKNOWN)
         found[batch] = nats + padding
     return found
 
 
-def untouched_likelihood(log: BlockLog, lanes: Sequence[Lane], model: LinearModel) -> Array:
+def untouched_likelihood(lanes: Sequence[Lane], model: LinearModel) -> Array:
     """Log likelihood of untouched lanes, each joint for itself. (L,) [nats]"""
     often = np.zeros_like(model.d)
     for place, lane in enumerate(lanes):
-        span = slice(*lane.window)
-        inside = lane.gate[:, None] & log.blocks.known[span, None]
-        often[: span.stop - span.start, place] = inside * log.process.spikes[span]
+        inside = (lane.gate & lane.log.blocks.known)[:, None]
+        often[: len(inside), place] = inside * lane.log.process.spikes
     process = ErrorProcess(model.decay[..., 6:], model.added[..., 6:], model.white, often)
     square, S = innovations(error_model(model.d, process), often)
     with np.errstate(divide="ignore"):
@@ -253,15 +294,15 @@ def learn_prior(
     rounds: int,
 ) -> WrenchPrior:
     """The prior by expectation and maximisation: τ_w by likelihood, σ by the mean."""
+    own = [*contact_lanes(log, runs, jacobian, NEAR)]
     for _ in range(rounds):
-        priors = [prior._replace(time=time) for time in TIMES for _ in runs]
-        each = [jacobian] * len(priors)
-        lanes = contact_lanes(log, each, [*runs] * len(TIMES), priors, NEAR)
-        best = likelihoods(log, lanes).reshape(len(TIMES), -1).sum(axis=1).argmax()
-        wrenches = smooth_lanes(log, lanes[best * len(runs) : (best + 1) * len(runs)])
+        priors = [prior._replace(time=time) for time in TIMES]
+        lanes = [lane._replace(prior=each) for each in priors for lane in own]
+        best = likelihoods(lanes).reshape(len(TIMES), -1).sum(axis=1).argmax()
+        wrenches = smooth_lanes(own, [priors[best]] * len(runs))
         inside = [wrench.within(run) for wrench, run in zip(wrenches, runs, strict=True)]
-        values = np.concatenate([wrench.values for wrench in inside])
-        covariance = np.concatenate([wrench.covariance for wrench in inside])
+        _, *each = zip(*inside, strict=True)
+        values, covariance = map(np.concatenate, each)
         power = (values**2 + np.diagonal(covariance, axis1=1, axis2=2)).mean(axis=0)
         moment = np.sqrt(power[3:].mean())
         sds = np.clip(np.sqrt(power[:3].mean()), *FORCES), np.clip(moment, *MOMENTS)
@@ -275,16 +316,14 @@ def evidence(
     """Evidence of the best size: ln p(d | contact) − ln p(d). (C, places) [nats]"""
     force, time = max(prior.force, LEAST_FORCE), min(prior.time, LONGEST_TIME)
     moving = [(time, size * force) for size in SIZES]
-    owners, priors = [], []
+    bare = [*contact_lanes(log, runs, places[0].jacobian)]
+    each, owners, touched = np.full((len(runs), len(places)), -np.inf), [], []
     for i, (start, stop) in enumerate(runs):
         lasts = log.blocks.t[stop - 1] - log.blocks.t[start] > LASTING
         tried = [*moving, (STEADY_TIME, force)] if lasts else moving
-        for k, place in enumerate(places):
-            owners += [(i, k)] * len(tried)
-            priors += [WrenchPrior(T, sd, place.lever * sd) for T, sd in tried]
-    jacobians = [places[k].jacobian for _, k in owners]
-    touched = contact_lanes(log, jacobians, [runs[i] for i, _ in owners], priors)
-    each = np.full((len(runs), len(places)), -np.inf)
-    np.maximum.at(each, tuple(np.transpose(owners)), likelihoods(log, touched))
-    bare = contact_lanes(log, [places[0].jacobian] * len(runs), runs, [None] * len(runs))
-    return each - likelihoods(log, bare)[:, None]
+        for (k, place), (own, sd) in product(enumerate(places), tried):
+            owners.append((i, k))
+            prior = WrenchPrior(own, sd, place.lever * sd)
+            touched.append(bare[i]._replace(jacobian=place.jacobian, prior=prior))
+    np.maximum.at(each, tuple(np.transpose(owners)), likelihoods(touched))
+    return each - likelihoods(bare)[:, None]

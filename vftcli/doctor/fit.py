@@ -26,7 +26,7 @@ from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import load_remarks
 from vftcli.doctor.signals import efforts_of, inverted_effort
 from vftcli.doctor.windows import Case, Windows, windows_of
-from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.robots import NAMES, PROFILES, Robot, load_robot, profiles_of
 from vftcli.robots.run import paired
 from vftcli.signals.arrays import root_mean_square
 from vftcli.signals.errors import RobotError
@@ -100,17 +100,17 @@ def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMat
 
     A measured effort settles nothing: friction and loads leave too much open.
     """
-    fits = ranking(recording, map(load_robot, PROFILES))
+    fits = ranking(recording)
     if not fits or not fits[0].by_maker or fits[0].misfit > GUESSED:
         return None, fits
     close = any(fit.misfit < APART * fits[0].misfit for fit in fits[1:2])
     return None if close else fits[0], fits
 
 
-def ranking(recording: Recording, robots: Iterable[Robot]) -> tuple[RobotMatch, ...]:
-    """Robots with as many joints as the log, best fit first."""
+def ranking(recording: Recording) -> tuple[RobotMatch, ...]:
+    """Profiles with as many joints as the log, best fit first."""
     fits = []
-    for robot in robots:
+    for robot in map(load_robot, profiles_of(recording.joints)):
         with suppress(RobotError):  # joints of other names are another arm's
             fits.append(match_of(paired(recording, robot), robot))
     found = sorted(filter(None, fits), key=by_fit)
@@ -196,8 +196,9 @@ def arm_findings(
     heavy = case.carries_load and case.loaded.values[0] > GENERATION
     refuted = cause is not None and cause.code != "effort-offset"
     if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
-        arms = (other for other in map(load_robot, PROFILES) if other.path != robot.path)
-        others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
+        names = (n for n in profiles_of(recording.joints) if PROFILES[n] != robot.path)
+        each = (match_of(recording, load_robot(name)) for name in names)
+        others = sorted(filter(None, each), key=by_fit)
         # If the profile of the same name fits best, the file is rough, the arm right.
         if others and others[0].robot != robot.name and is_rather(others[0], own, diagnosis):
             best, *more = others
@@ -254,9 +255,9 @@ def explained(diagnosis: Diagnosis, robots: Sequence[RobotMatch]) -> Iterator[Re
 
 def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
     """Findings on a log of an unknown arm: by the profile that fits, or why none does."""
-    fits = ranking(recording, map(load_robot, PROFILES))
+    fits = ranking(recording)
     if not fits:
-        counts = sorted({load_robot(name).joints for name in PROFILES})
+        counts = sorted(set(NAMES.values()))
         if recording.joints in counts:
             return ArmFindings()
         return ArmFindings((warning("no-profile", joint_count=recording.joints, counts=counts),))

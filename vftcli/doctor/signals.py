@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Indices, Mask, runs_of
+from vftcli.signals.arrays import Array, Indices, Mask, integral, runs_of
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.rest import HELD, NONZERO
@@ -206,7 +206,7 @@ def stuck_stretches(recording: Recording, name: str) -> Iterator[tuple[int, int,
     for j, first, last in long_repeats(recording, name):
         rows, column = slice(first, last + 1), value[:, j]
         time, turned, speed = t[rows], recording.q[rows, j], dq[rows, j]
-        way = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(time)))
+        way = integral(time, speed)
         if name == "q":
             steps = abs(np.diff(column))
             least = 3 * steps[steps > 0].min() if steps.any() else 0.0

@@ -18,7 +18,14 @@ from vftcli.doctor.signals import TRAVEL
 from vftcli.robots.chain import link_poses
 from vftcli.robots.kernels import load_regressor, momentum_terms, usual_errors
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_mean_squares
+from vftcli.signals.arrays import (
+    Array,
+    Indices,
+    Mask,
+    integral,
+    root_mean_square,
+    root_mean_squares,
+)
 from vftcli.signals.estimation import inverse_of
 from vftcli.signals.recording import Recording
 
@@ -92,7 +99,7 @@ def solve(target: Array, *by: Terms) -> RobustFit:
         values[wrong] = 0.0
         rest = target - columns @ values
         left = np.einsum("wn,wn->w", rest, rest)
-        kept = left <= np.quantile(left, KEPT)
+        kept = left <= np.sort(left)[int(KEPT * (len(left) - 1))]
     sd = np.zeros(len(used))
     sd[used] = np.sqrt(np.diag(inverse()) * OVERLAP * np.mean(rest[kept] ** 2))
     return RobustFit(values, sd, rest, kept)
@@ -218,8 +225,7 @@ def trapezoids(t: Array) -> Array:
 
 def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
     """Mean of a signal from some samples to others, by trapezoids. (W, n)"""
-    rise = (value[1:] + value[:-1]) / 2 * np.diff(t)[:, None]
-    area = np.vstack([np.zeros(value.shape[1]), rise.cumsum(axis=0)])
+    area = integral(t, value)
     return np.asarray((area[last] - area[first]) / (t[last] - t[first])[:, None])
 
 

@@ -4,6 +4,7 @@ Paired draws show whether one observer is better than another or was lucky.
 """
 
 from collections.abc import Sequence
+from functools import cache
 from itertools import combinations
 from math import lgamma
 from typing import NamedTuple
@@ -111,6 +112,7 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
 
 
+@cache
 def student_quantile(p: float, freedom: int) -> float:
     """Quantile of Student's t for a share p > 0.5.
 

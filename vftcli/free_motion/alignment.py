@@ -8,10 +8,10 @@ from vftcli.signals.arrays import (
     Array,
     Mask,
     covered,
+    integral,
     intervals,
     resample_columns,
     root_mean_square,
-    summed,
 )
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.estimation import robust_sd
@@ -133,9 +133,8 @@ def pace(recording: Recording) -> float | None:
     if recording.dq is None or "dq" in recording.source.derived:
         return None
     t = recording.t
-    steps = 0.5 * (recording.dq[1:] + recording.dq[:-1]) * np.diff(t)[:, None]
-    ends = t.searchsorted(np.arange(t[0], t[-1], TRAVEL))
-    by_position, by_velocity = (np.diff(x[ends], axis=0) for x in (recording.q, summed(steps)))
+    ends, way = t.searchsorted(np.arange(t[0], t[-1], TRAVEL)), integral(t, recording.dq)
+    by_position, by_velocity = (np.diff(x[ends], axis=0) for x in (recording.q, way))
     power = np.sum(by_position**2)
     along = np.sum(by_position * by_velocity)
     return along / power if power > 0.0 and along > 0.0 else None

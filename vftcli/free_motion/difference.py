@@ -14,7 +14,14 @@ import numpy as np
 from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
 from vftcli.robots.run import Run, signal_edge
 from vftcli.robots.terms import GAP
-from vftcli.signals.arrays import Array, Mask, empty_series, gaps_of, resample_columns, summed
+from vftcli.signals.arrays import (
+    Array,
+    Mask,
+    around,
+    empty_series,
+    gaps_of,
+    resample_columns,
+)
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 from vftcli.signals.remarks import Remark, fact
@@ -458,11 +465,7 @@ def rms(x: Array, where: Mask) -> Array:
 
 def local_rms(x: Array, step: float) -> Array:
     """RMS over a tenth of a second around each sample. (T, n)"""
-    width = max(1, round(0.05 / step))
-    here = np.arange(len(x))
-    first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))
     out = empty_series(*x.shape)
     for column, mean in zip(x.T, out.T, strict=True):
-        total = summed(column**2)
-        np.sqrt((total[last] - total[first]) / (last - first), out=mean)
+        np.sqrt(np.divide(*around(column**2, max(1, round(0.05 / step)))), out=mean)
     return out

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, median_step, root_mean_squares
+from vftcli.signals.arrays import Array, integral, median_step, root_mean_squares
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark
 
@@ -278,8 +278,7 @@ def _is_derivative(t: Array, x: Array, dx: Array) -> bool:
 
     Compared is what the integral leaves of the change over some rows.
     """
-    areas = (dx[1:] + dx[:-1]) / 2 * np.diff(t)[:, None]
-    left = x - np.vstack([np.zeros(x.shape[1]), np.cumsum(areas, axis=0)])
+    left = x - integral(t, dx)
     own = np.full(x.shape[1], False)
     for step in STEPS:
         rest, change = (np.sum(np.diff(each[::step], axis=0) ** 2, axis=0) for each in (left, x))

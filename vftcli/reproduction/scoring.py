@@ -39,7 +39,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.robots.terms import effort_name
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, summed
 from vftcli.signals.errors import LogError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -281,7 +281,7 @@ def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, An
     """The `WORST` seconds with the largest Σ w e², and their joint."""
     t, answer = torque.t, np.where(torque.known, torque.tau, 0.0)
     squares = np.where(scored[:, None], weights(t)[:, None] * (answer - truth) ** 2, 0.0)
-    total = np.concatenate([[0.0], squares.sum(axis=1).cumsum()])
+    total = summed(squares.sum(axis=1))
     ends = np.searchsorted(t, t + WORST)
     first = int(np.argmax(total[ends] - total[:-1]))
     part = slice(first, int(ends[first]))

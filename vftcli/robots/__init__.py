@@ -18,11 +18,14 @@ if TYPE_CHECKING:
 else:
     __getattr__ = door(__name__, "chain", "robot")
 
-#: The built-in profiles, maker by maker.
-NAMES = (
-    *("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"),
-    *("panda", "fr3", "iiwa7", "iiwa14", "gen3", "xarm6", "xarm7", "m1013"),
-)
+#: The built-in profiles, maker by maker, with their number of joints.
+NAMES = {
+    **dict.fromkeys(("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"), 6),
+    **dict.fromkeys(("panda", "fr3", "iiwa7", "iiwa14", "gen3"), 7),
+    "xarm6": 6,
+    "xarm7": 7,
+    "m1013": 6,
+}
 #: Built-in profile name → its file.
 PROFILES = {name: Path(__file__).parent / "profiles" / f"{name}.toml" for name in NAMES}
 
@@ -43,6 +46,11 @@ def built_in(path: Path) -> "Robot":
     from vftcli.robots.profile import load_profile
 
     return load_profile(path)
+
+
+def profiles_of(joints: int) -> list[str]:
+    """The built-in profiles of arms with so many joints; no file is read."""
+    return [name for name, count in NAMES.items() if count == joints]
 
 
 #: Between a xacro and its arguments, as ROS has them: ``ur.xacro ur_type:=ur5e``.
@@ -158,9 +166,9 @@ class RobotChoice(Choice):
 
 def choices_for(recording: "Recording") -> str:
     """Robots for ``--robot`` that fit a log, in words."""
-    fitting = [p for p in PROFILES if load_robot(p).joints == recording.joints]
+    fitting = profiles_of(recording.joints) or PROFILES
     return (
-        f"choose one with --robot: {', '.join(fitting) or ', '.join(PROFILES)}, or a FILE.toml or "
+        f"choose one with --robot: {', '.join(fitting)}, or a FILE.toml or "
         f"FILE.urdf of {recording.joints} joints"
     )
 

@@ -228,13 +228,16 @@ def kinematics(
     return [end @ start for end, start in zip(after, [*before, tip], strict=True)], after[1:]
 
 
-def along(R: Array, vector: Array) -> Array:
-    """R v for R (3, 3, T) and v (3,), rounded alike whatever T is. (3, T)
+POSES = 4096  #: Samples at a time, whose matrices stay in the processor's memory.
+
+
+def along(R: Array, columns: Array) -> Array:
+    """R M for R (3, 3, T) and M (3, k), rounded alike whatever T is. (3, k, T)
 
     A product of BLAS rounds by the length: a log in pieces would have other last digits.
     """
-    x, y, z = vector
-    return np.asarray(x * R[:, 0] + y * R[:, 1] + z * R[:, 2])
+    x, y, z = columns[:, :, None]
+    return np.asarray(x * R[:, :1] + y * R[:, 1:2] + z * R[:, 2:])
 
 
 def link_poses(chain: Chain, q: Array) -> Pose:
@@ -244,15 +247,20 @@ def link_poses(chain: Chain, q: Array) -> Pose:
     samples, n = np.shape(q)
     # Time is the last axis: every entry of a matrix is one row of the memory.
     rotation, translation = np.empty((n + 1, 3, 3, samples)), np.empty((n + 1, 3, samples))
-    R, o = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, samples)), np.zeros((3, samples))
-    cosine, sine = np.cos(q.T), np.sin(q.T)
-    for j, (turn, offset) in enumerate(zip(chain.rotation, chain.translation, strict=True)):
-        o = o + along(R, offset)
-        x, y, z = (along(R, column) for column in turn.T)
-        R = np.stack([cosine[j] * x + sine[j] * y, cosine[j] * y - sine[j] * x, z], axis=1)
-        rotation[j], translation[j] = R, o
-    translation[n] = o + along(R, chain.flange_translation)
-    rotation[n] = np.stack([along(R, column) for column in chain.flange_rotation.T], axis=1)
+    turns = np.concatenate([chain.rotation, chain.flange_rotation[None]])
+    shifts = np.vstack([chain.translation, chain.flange_translation])
+    frames = np.concatenate([turns, shifts[:, :, None]], axis=2)
+    q = np.column_stack([q, np.zeros(samples)])  # no angle turns the flange
+    for start in range(0, samples, POSES):
+        span = slice(start, start + POSES)
+        cosine, sine = np.cos(q[span].T), np.sin(q[span].T)
+        R, o = np.eye(3)[:, :, None], 0.0
+        for j, frame in enumerate(frames):
+            x, y, z, step = along(R, frame).swapaxes(0, 1)
+            R, o = rotation[j, :, :, span], o + step
+            R[:, 0], R[:, 2] = cosine[j] * x + sine[j] * y, z
+            R[:, 1] = cosine[j] * y - sine[j] * x
+            translation[j, :, span] = o
     return Pose(rotation.transpose(3, 0, 1, 2), translation.transpose(2, 0, 1))
 
 

@@ -280,11 +280,10 @@ def load_wrench(chain: Chain, q: Array) -> Array:
 
     A mass m at c in flange axes pulls with m g₀ and turns by R m c × g₀ about the flange.
     """
-    gravity = chain.gravity
     wrench = np.zeros((len(q), 6, 4))
-    wrench[:, :3, 0] = gravity
+    wrench[:, :3, 0] = chain.gravity
     # v × g₀ = −[g₀]× v
-    wrench[:, 3:, 1:] = -skew(gravity) @ link_poses(chain, q).rotation[:, -1]
+    wrench[:, 3:, 1:] = -skew(chain.gravity) @ link_poses(chain, q).rotation[:, -1]
     return wrench
 
 

@@ -7,6 +7,7 @@ need no case of their own.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ class Operation(NamedTuple):
     @property
     def reads(self) -> set[int]:
         """The rows that it reads."""
-        return {row for row in (self.a, self.b) if isinstance(row, int)}
+        return {self.a, self.b} if isinstance(self.b, int) else {self.a}
 
 
 class Tape:
@@ -80,8 +81,8 @@ class Tape:
 
     def plus(self, a: Value, b: Value) -> Value:
         """The sum a + b. Zero costs nothing."""
-        if ZERO in (a, b):
-            return b if a == ZERO else a
+        if not (a.factor and b.factor):
+            return a if a.factor else b
         if a.row is None:
             a, b = b, a
         if a.row is None:
@@ -97,7 +98,8 @@ class Tape:
         """The product u·v."""
         total = ZERO
         for a, b in zip(u, v, strict=True):
-            total = self.plus(total, self.times(a, b))
+            if a.factor and b.factor:
+                total = self.plus(total, self.times(a, b))
         return total
 
     def map(self, M: Array, v: Sequence[Value]) -> Vector:
@@ -107,9 +109,7 @@ class Tape:
 
     def add(self, *vectors: Vector) -> Vector:
         """The sum of vectors."""
-        x, y, z = vectors[0]
-        for a, b, c in vectors[1:]:
-            x, y, z = self.plus(x, a), self.plus(y, b), self.plus(z, c)
+        x, y, z = (reduce(self.plus, each) for each in zip(*vectors, strict=True))
         return x, y, z
 
     def cross(self, u: Vector, v: Vector) -> Vector:
@@ -129,7 +129,7 @@ class Tape:
 
 def constants(values: Array) -> Vector:
     """A vector of constants. (3,)"""
-    x, y, z = (Value(float(value)) for value in values)
+    x, y, z = map(Value, values.tolist())
     return x, y, z
 
 
@@ -150,11 +150,11 @@ class Program:
         wanted, needed = set(rows), list[Operation]()
         for operation in reversed(tape.operations):
             if operation.out in wanted:
-                wanted |= operation.reads
-                needed.insert(0, operation)
+                wanted.update(operation.reads)
+                needed.append(operation)
         self._inputs = slice(len(outputs), len(outputs) + tape.inputs)
         self._constants = {k: v.factor for k, v in enumerate(outputs) if v.row is None}
-        self._operations, self._rows = in_few_rows(needed, tape.inputs, rows)
+        self._operations, self._rows = in_few_rows(needed[::-1], tape.inputs, rows)
         self._memory = empty_rows(self._rows, 0)
         self._samples, self._calls = 0, []  # type: tuple[int, list[tuple[Any, ...]]]
 

@@ -244,8 +244,18 @@ def summed(x: Array | Mask) -> Array:
     return total
 
 
+def integral(t: Array, x: Array) -> Array:
+    """The integral of each column from the first sample on, by trapezoids. (T, …)"""
+    return summed(((x[1:] + x[:-1]).T / 2 * np.diff(t)).T)
+
+
+def around(x: Array | Mask, count: int) -> tuple[Array, Array]:
+    """The sum of all rows within `count` rows of each, and their number. (T, …), (T,)"""
+    total, k = summed(x), np.arange(len(x))
+    first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(x))
+    return total[last] - total[first], (last - first).astype(float)
+
+
 def near(mask: Mask, count: int) -> Mask:
     """Samples within `count` samples of a true one, column by column. (T, n)"""
-    total, k = summed(mask), np.arange(len(mask))
-    first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(mask))
-    return total[last] > total[first]
+    return np.asarray(around(mask, count)[0] > 0)

@@ -19,11 +19,11 @@ from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
 from vftcli.signals.arrays import (
     Array,
     Mask,
+    around,
     covered,
     median_step,
     resample_columns,
     runs_of,
-    summed,
 )
 from vftcli.signals.errors import RobotError
 from vftcli.signals.estimation import LinearModel, beside_errors, log_likelihood, smoothed
@@ -126,39 +126,39 @@ def in_blocks(jacobian: Array) -> JacobianIn:
 class Lane(NamedTuple):
     """One hypothesis on one window."""
 
-    window: BlockSpan  #: Its blocks.
-    gate: Mask  #: Its blocks in which a wrench may act. (k,)
-    hidden: Mask  #: Its blocks that say nothing. (k,)
+    log: BlockLog  #: The blocks of its window. (k)
+    window: BlockSpan  #: Which of the log they are.
+    gate: Mask  #: Those in which a wrench may act. (k,)
     jacobian: JacobianIn  #: J along the log.
     prior: WrenchPrior | None  #: Prior of the wrench; None without contact.
 
 
-def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
+def assembled(lanes: Sequence[Lane]) -> LinearModel:
     """Wrench w and model error b of lanes: d = Jᵀw + b + noise. (K, L, 6 + n)
 
-    Shorter lanes end in hidden blocks. Outside its gate the wrench is zero; the first block
-    inside starts it with the prior's variance, independent of before.
+    Shorter lanes end in hidden blocks, to which no b goes on. Outside its gate the wrench is
+    zero; the first block inside starts it with the prior's variance, independent of before.
     """
-    n, step, process = log.blocks.d.shape[1], steps(log.blocks), log.process
-    longest, count = max(lane.window[1] - lane.window[0] for lane in lanes), len(lanes)
+    n, longest, count = (
+        lanes[0].log.blocks.d.shape[1],
+        max(len(x.gate) for x in lanes),
+        len(lanes),
+    )
     # Arrays alike in all lanes are held once: G priors of a long log would not fit.
     alike = all(a is b for lane in lanes for a, b in zip(lane[:4], lanes[0][:4], strict=True))
     each = 1 if alike else count
     d, jacobian = np.zeros((longest, each, n)), np.zeros((longest, each, 6, n))
     white = np.full((longest, each, n), UNKNOWN)
-    decay, added = np.ones((longest, count, 6 + n)), np.zeros((longest, count, 6 + n))
-    decay[:, :, :6] = 0.0
-    for i, lane in enumerate(lanes):
-        span, prior = slice(*lane.window), lane.prior
-        own = slice(span.stop - span.start), i
-        decay[*own, 6:], added[*own, 6:] = process.decay[span], process.added[span]
+    decay, added = np.zeros((2, longest, count, 6 + n))
+    for i, ((blocks, process), window, gate, jacobian_in, prior) in enumerate(lanes):
+        own = slice(len(gate)), i
+        decay[*own, 6:], added[*own, 6:] = process.decay, process.added
         if prior is not None:
-            decay[*own, :6], added[*own, :6] = prior.process(lane.gate, step[span])
+            decay[*own, :6], added[*own, :6] = prior.process(gate, steps(blocks))
         if i < each:
-            d[own] = log.blocks.d[span]
-            white[own] = np.where(lane.hidden[:, None], UNKNOWN, process.white[span])
+            d[own], white[own] = blocks.d, process.white
             if prior is not None:
-                jacobian[own] = lane.jacobian(*lane.window)
+                jacobian[own] = jacobian_in(*window)
     # A window begins with the stationary b.
     added[0, :, 6:] /= np.maximum(1.0 - decay[0, :, 6:] ** 2, 1e-9)
     decay[0, :, 6:] = 0.0
@@ -178,9 +178,9 @@ class BlockModel(NamedTuple):
         # With the whole log a contact, a push and its re-settling look alike.
         touched = None if self.inside.all() else self.inside
         process = steady_process(self.noise, self.blocks, touched)
-        whole = (0, len(self.inside)), self.inside, ~self.blocks.known, in_blocks(self.jacobian)
-        lanes = [Lane(*whole, prior) for prior in priors]
-        return assembled(BlockLog(self.blocks, process), lanes)
+        log, jacobian = BlockLog(self.blocks, process), in_blocks(self.jacobian)
+        whole = log, (0, len(self.inside)), self.inside, jacobian
+        return assembled([Lane(*whole, prior) for prior in priors])
 
 
 def block_model(
@@ -379,14 +379,12 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     backward = v[::-1], kept[::-1], half
     behind, nothing = (coasted(each[::-1], *backward)[::-1] for each in (quiet, v))
     known = 1.0 / coasted(quiet, v, kept, half) + 1.0 / behind - 1.0 / nothing
-    first = np.maximum(np.arange(count) - half, 0)
-    last = np.minimum(np.arange(count) + half + 1, count)
-    total = summed(known)
-    known = (total[last] - total[first]) / (last - first)[:, None]
+    total, number = around(known, half)
+    known = total / number[:, None]
     # Nothing is known in a gap of the clock.
     weight = blocks.known[:, None] / (1.0 / known + R * min(length / UNLISTED, 1.0))
     information = (J * weight[:, None, :]) @ J.swapaxes(1, 2) + np.diag(1.0 / prior.variance)
-    return np.linalg.inv(information)
+    return np.asarray(np.linalg.inv(information))
 
 
 def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
