@@ -123,14 +123,6 @@ def test_coverage_is_the_share_within_1_96_deviations() -> None:
     assert row_of(torque("gmo", 0.0), torque("x", 0.0))["coverage_95"] is None
 
 
-def test_coverage_counts_samples_in_motion_only() -> None:
-    """Ten samples in motion without error, the others at rest with a huge one: coverage 1."""
-    moving = np.arange(len(T))[:, None] < 10
-    tau = np.where(moving[:, 0], 0.0, 99.0)
-    estimate = torque("gmo", tau, error_sd=np.ones((len(T), 1)), moving=moving)
-    assert row_of(estimate, torque("x", 0.0))["coverage_95"] == 1.0
-
-
 @pytest.mark.parametrize(("count", "share"), [(9, None), (10, 1.0), (11, 1.0)])
 def test_a_coverage_rests_on_ten_samples(count: int, share: float | None) -> None:
     moving = np.arange(len(T))[:, None] < count
@@ -156,12 +148,6 @@ def test_rmse_skips_unknown_samples_joint_by_joint() -> None:
     assert np.isnan(rmse(np.full((3, 1), np.nan), np.zeros((3, 1))))[0]
 
 
-def test_a_reference_of_zero_tells_no_lag() -> None:
-    noise = np.random.default_rng(0).standard_normal(len(T))
-    row = row_of(torque("gmo", noise), torque("zero", np.zeros_like(T)))
-    assert (row["lag_s"], row["correlation"]) == (None, None)
-
-
 # The one mean over joints: only of those with a reference to be trusted
 
 
@@ -179,18 +165,6 @@ def test_a_joint_whose_reference_rests_is_left_out_and_named() -> None:
     assert means.floor == 2.0  # of J1 and J3
     assert means.left_out == " without J2"
     assert means.least == ("b", 0.5)
-
-
-def test_where_no_joint_can_be_trusted_all_count() -> None:
-    means = joint_means(table(("a", 1, 1.0, False), ("a", 2, 3.0, False)))
-    assert (means.errors, means.left_out) == ({"a": 2.0}, "")
-
-
-def test_nothing_known_has_no_mean() -> None:
-    means = joint_means(table(("a", 1, None, True)).with_columns(reference_floor_Nm=pl.lit(None)))
-    assert means.errors == {}
-    assert means.least is None
-    assert np.isnan(means.floor)
 
 
 # Logs as one experiment: what is pooled is weighed by samples, and never over two arms
@@ -216,19 +190,6 @@ def test_pooled_rows_weigh_samples() -> None:
     assert row["rmse_Nm"] == pytest.approx(np.sqrt((1500.0 + 9.0 * 500.0) / 2000.0))
     assert row["bias_Nm"] == pytest.approx(1.5)
     assert row["reference_floor_Nm"] == pytest.approx(np.sqrt((1500.0 + 4.0 * 500.0) / 2000.0))
-
-
-def test_a_pool_of_one_log_twice_has_its_rmse_and_a_narrower_interval() -> None:
-    rng = np.random.default_rng(0)
-    noisy = [
-        PoolMember("ur5", [torque("fdo", WAVE + rng.standard_normal(len(T)))], torque("x", WAVE))
-        for _ in range(4)
-    ]
-    pooled = pooled_row(*noisy)
-    alone = evaluate("log", noisy[0].estimates, noisy[0].reference).row(0, named=True)
-    width = [row["rmse_high_Nm"] - row["rmse_low_Nm"] for row in (pooled, alone)]
-    # Four logs: half the width, known to some 20 % by the bootstrap of each.
-    assert width[0] / width[1] == pytest.approx(0.5, rel=0.3)
 
 
 def test_logs_of_two_arms_are_not_pooled() -> None:

@@ -102,15 +102,6 @@ def test_an_interval_does_not_depend_on_who_else_is_asked() -> None:
     assert evaluate("log", both, zero).select(ends).row(0) == alone
 
 
-def test_white_noise_has_the_textbook_interval() -> None:
-    """RMSE of N white samples: relative standard deviation 1/√(2N)."""
-    squares = np.random.default_rng(3).standard_normal((20_000, 1)) ** 2
-    drawn = drawn_from(squares)
-    low, high = interval(float(squares.mean()), drawn.draws[:, 0], drawn.blocks)
-    width = (high - low) / np.sqrt(squares.mean())
-    assert width == pytest.approx(2.0 * 1.96 / np.sqrt(2.0 * 20_000), rel=0.15)
-
-
 def pair(first: Array, second: Array) -> tuple[list[ExternalTorque], ExternalTorque]:
     t = STEP * np.arange(len(first))
     make = [
@@ -195,26 +186,6 @@ def test_students_quantile_is_scipys(p: float, freedom: int) -> None:
     assert student_quantile(p, freedom) == pytest.approx(stdtrit(freedom, p), rel=1e-10)
 
 
-@pytest.mark.parametrize("decay", [0.0, 0.9, 0.98])
-def test_correlation_time_of_a_known_process(decay: float) -> None:
-    """(1 + a)/(1 − a) of a first-order process, 1 of white noise; cut where ρ falls below 0.05."""
-    x = autoregressive(np.random.default_rng(0), 200_000, decay)[:, None]
-    cut = 1.0 - 2.0 * 0.05 / (1.0 + decay) if decay else 1.0
-    # 200 000 samples of correlation time 100 tell it to some per cent.
-    assert correlation_time(x)[0] == pytest.approx(cut * (1 + decay) / (1 - decay), rel=0.15)
-
-
-def test_a_resampled_series_closes_to_a_ring() -> None:
-    """Each sample is in as many blocks as any other: one large last square counts like a first."""
-    rng = np.random.default_rng(8)
-    noise = rng.standard_normal((2000, 1)) ** 2
-    last, first = noise.copy(), np.roll(noise, 1, axis=0)
-    last[-1], first[0] = 500.0, 500.0
-    # 1000 draws of a mean of ~1.25 with a scatter of .25: known to .008, four times that allowed.
-    assert drawn_from(last).draws.mean() == pytest.approx(last.mean(), abs=0.035)
-    assert drawn_from(first).draws.mean() == pytest.approx(first.mean(), abs=0.035)
-
-
 # Pairs of observers: every pair once, its sign, and p between its bounds
 
 
@@ -234,13 +205,6 @@ def test_every_pair_of_observers_on_every_joint() -> None:
     for row in table.iter_rows(named=True):
         assert row["low_Nm"] < row["high_Nm"]
         assert 1e-3 <= row["p"] <= 1.0
-
-
-def test_the_difference_is_the_first_less_the_second() -> None:
-    two = [estimate("a", np.full(500, 3.0)), estimate("b", np.full(500, -2.0))]
-    row = paired_significance("log", two, estimate("zero", np.zeros(500))).row(0, named=True)
-    assert row["difference_Nm"] == pytest.approx(1.0)
-    assert row["p"] == 1e-3  # certain: one over the number of draws
 
 
 def test_a_joint_without_two_known_samples_has_no_row() -> None:

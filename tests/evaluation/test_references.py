@@ -119,21 +119,6 @@ def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> Non
     np.testing.assert_allclose(wrench.values, WRENCH, atol=1e-9)
 
 
-def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) -> None:
-    choice = write(tmp_path / "truth.parquet", wrench=WRENCH)
-    tau = make_reference(MOTION, choice).torque.tau
-    J = flange_jacobian(ROBOT.chain, Q)
-    np.testing.assert_allclose(tau[7], J[7].T @ WRENCH[7], atol=1e-12)
-
-
-def test_a_file_may_say_that_nobody_touched_the_arm(tmp_path) -> None:
-    """Zero throughout is a truth; of a log's own wrench it means that nothing was measured."""
-    zero = np.zeros((300, 6))
-    both = make_reference(MOTION, write(tmp_path / "x.parquet", wrench=zero, tau_ext=zero))
-    assert not both.torque.tau.any()
-    assert not both.wrench.values.any()
-
-
 def test_torques_of_a_file_go_before_its_wrench(tmp_path) -> None:
     tau = RNG.standard_normal((300, 6))
     choice = write(tmp_path / "truth.parquet", wrench=WRENCH, tau_ext=tau)
@@ -152,15 +137,6 @@ def test_samples_beyond_the_file_are_unknown_half_a_sample_allowed(tmp_path) -> 
     known = np.isfinite(tau).all(axis=1)
     np.testing.assert_array_equal(np.flatnonzero(known), np.arange(50, 200))
     np.testing.assert_allclose(tau[51:200, 0], T[51:200], atol=1e-12)  # linear between stamps
-
-
-@pytest.mark.parametrize("what", ["tau_ext", "wrench"])
-def test_a_clock_of_another_day_is_refused(tmp_path, what) -> None:
-    path = tmp_path / "truth.parquet"
-    choice = write(path, wrench=WRENCH) if what == "wrench" else write(path, tau_ext=WRENCH)
-    pl.read_parquet(path).with_columns(pl.col("t") + 1e6).write_parquet(path)
-    with pytest.raises(ReferenceTorqueError, match="does not overlap the log's"):
-        make_reference(MOTION, choice)
 
 
 def test_a_file_of_another_arm_is_refused(tmp_path) -> None:
@@ -321,22 +297,6 @@ def test_two_planted_torques_are_where_they_were_planted() -> None:
     assert 0.0 <= begin - found[0].stop < 0.1
     assert 0.0 <= found[1].start - end < 0.1
     assert [round(float(x), 1) for x in (begin, end)] == [begin, end]
-
-
-def test_the_worst_contact_is_the_largest_for_its_joint_s_quiet_level() -> None:
-    """Half of a sine of 7 N·m on J2 is above 4.9: 60 N·m there are less than 30 of 2 on J5."""
-    free = FIXTURE.between(0.0, 4.0)
-    torque = np.zeros_like(free.q)
-    torque[:, 1] = 7.0 * np.sin(2.0 * np.pi * free.t / 2.0)
-    torque[(free.t > 0.4) & (free.t < 0.9), 1] += 60.0
-    torque[(free.t > 3.0) & (free.t < 3.4), 4] += 30.0
-    current = free.require("current") - torque / UR5.torque_constant
-    log = Run(recording=replace(free, current=current), robot=UR5)
-    assert [touch.joint for touch in touches(log)] == [1, 4]
-    assert touches(log)[0].quiet > 4.0
-    (warned,) = touched_remarks(log)
-    assert warned.where.joints == (5,)
-    assert warned.values["torque_Nm"] == pytest.approx(30.0, rel=0.15)
 
 
 def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -> None:
