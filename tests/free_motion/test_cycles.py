@@ -93,15 +93,6 @@ def test_way_in_rests_and_start_amid_a_cycle(repeated: Make) -> None:
     assert cycles.end == pytest.approx(3.0 + 3.4 * 3.7, abs=0.1)
 
 
-def test_missing_samples(repeated: Make) -> None:
-    """A tenth of the samples lost at random, and half a second in one piece."""
-    log = repeated(rate=125.0)
-    keep = np.random.default_rng(1).random(log.samples) > 0.1
-    keep[600:660] = False
-    kept = replace(log, t=log.t[keep], q=log.q[keep], dq=log.dq[keep])
-    assert find_period(kept).seconds == pytest.approx(3.7, rel=WITHIN)
-
-
 def test_one_and_a_third_cycles_are_enough(repeated: Make) -> None:
     log = repeated(cycles=1.33)
     cycles = segment(log, find_period(log))

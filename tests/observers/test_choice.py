@@ -177,21 +177,6 @@ def test_a_load_that_was_there_all_the_time_shows_at_once(name, step):
     np.testing.assert_array_equal(found.t, still.t)
 
 
-@pytest.mark.parametrize("name", ["gmo", "kfo-zoh"])
-def test_only_the_start_differs(name):
-    """Both forget: the difference to a start at zero is that of the starts times what is left."""
-    step, own = 1 / 25, terms(1 / 25, -2.0)
-    one = observer(name, step)
-    led, plain = estimate_from_rest(one, own), one.estimate(own)
-    settled = settling_samples(one, step, 7)
-    apart = np.abs(led.tau - plain.tau).max(axis=1)
-    # τ̂⁰ = 2 N·m against 0, of which 1 % is left after `settled` samples
-    assert apart[0] == pytest.approx(2.0, rel=0.6)
-    assert apart[settled + 1 :].max() < 0.03
-    assert apart[60:].max() < 1e-9
-    assert (led.sd is None) == (plain.sd is None)
-
-
 def test_a_first_order_observer_settles_in_the_time_of_its_gain_and_a_smoother_at_once():
     """(1−a)/(1+a) = 1/3 a sample at K = 10, Ts = .1: 3⁻⁵ = .4 % is the first below 1 %."""
     assert settling_samples(MomentumObserver(gain=10.0), 0.1, 7) in {4, 5}
@@ -199,13 +184,6 @@ def test_a_first_order_observer_settles_in_the_time_of_its_gain_and_a_smoother_a
     # the lead is bounded
     assert lead_samples(MomentumObserver(gain=10.0), 0.1, 7) == LEAD
     assert lead_samples(MomentumObserver(gain=1e-6), 1e-3, 7) == LONGEST
-
-
-def test_the_choice_runs_an_observer_from_where_it_is_to_start():
-    own, one = terms(1 / 25, -2.0), observer("gmo", 1 / 25)
-    assert ObserverChoice(names=("gmo",)).run(one, own).tau[0].tolist() == [0.0] * 7
-    led = ObserverChoice(names=("gmo",), from_rest=True).run(one, own)
-    np.testing.assert_allclose(led.tau[0], 2.0, atol=1e-12)
 
 
 # Where observer parameters come from: the command line, the robot file, a file of gains, and what

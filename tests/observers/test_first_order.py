@@ -24,51 +24,10 @@ def clock(samples: int) -> np.ndarray:
     return np.arange(samples) / RATE
 
 
-def constant_torque(tau: np.ndarray, t: np.ndarray) -> DynamicsTerms:
-    """A constant external torque and nothing else: p grows linearly."""
-    return DynamicsTerms(t=t, p=0.7 + np.outer(t, tau), mu=np.zeros((len(t), len(tau))))
-
-
 def with_gaps(pieces: int, samples: int = 50) -> DynamicsTerms:
     """4 N·m on so many pieces of a clock that begin every two seconds."""
     t = np.concatenate([k * 2.0 + np.arange(samples) / RATE for k in range(pieces)])
     return DynamicsTerms(t=t, p=np.outer(t, [4.0]), mu=np.zeros((len(t), 1)))
-
-
-@pytest.mark.parametrize("jitter", [0.0, 0.05])
-def test_bilinear_fdo_is_the_momentum_observer_of_equal_gain(jitter: float) -> None:
-    """From a moving start, on an even and on an uneven clock."""
-    terms = random_walk(3000, jitter)
-    fdo = FilteredDynamicsObserver(omega=10.0).estimate(terms).tau
-    gmo = MomentumObserver(gain=10.0).estimate(terms).tau
-    # an identity in exact arithmetic; the FDO's terms are of the size of ωp and cancel
-    assert np.max(np.abs(fdo - gmo)) <= 1e-12 * np.max(np.abs(10.0 * terms.p))
-
-
-def test_step_response_is_the_bilinear_first_order_one() -> None:
-    """r_k = τ(1 − ((1−a)/(1+a))^k), the exact answer of the trapezoidal rule to a ramp of p."""
-    tau, gain = np.array([3.0, -0.5]), np.array([5.0, 60.0])
-    a = gain / RATE / 2
-    expected = tau * (1 - ((1 - a) / (1 + a)) ** np.arange(500)[:, None])
-    found = MomentumObserver(gain=gain).estimate(constant_torque(tau, clock(500))).tau
-    np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
-def test_fdo_follows_the_continuous_filter() -> None:
-    """Against τ̂ = ω/(s+ω)·τ_ext of a smooth torque, solved exactly."""
-    omega, w = 10.0, 2 * np.pi * 0.5
-    t = clock(2500)
-    tau = 8.0 * np.sin(w * t)
-    p = 8.0 / w * (1 - np.cos(w * t))
-    gain = omega / np.hypot(omega, w)
-    phase = np.arctan2(w, omega)
-    transient = 8.0 * omega * w / (omega**2 + w**2) * np.exp(-omega * t)
-    exact = 8.0 * gain * np.sin(w * t - phase) + transient
-    terms = DynamicsTerms(t=t, p=p[:, None], mu=np.zeros((len(t), 1)))
-    estimate = FilteredDynamicsObserver(omega=omega).estimate(terms).tau[:, 0]
-    # bilinear transform: (wTs)²/12 of 8 N·m at w = π, Ts = 8 ms is 4e-4; 2e-3 is the issue's bound
-    assert np.max(np.abs(estimate - exact)) <= 2e-3
-    assert np.max(np.abs(tau)) == pytest.approx(8.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -124,13 +83,6 @@ def test_a_slow_clock_that_jitters_has_no_gaps(episode: int, samples: Path) -> N
     ].to_numpy()
     # Every observer has .14 to .15 N·m there; with 78 restarts it was .30.
     assert np.sqrt(np.mean((estimate.tau[:, 5] - truth) ** 2)) <= 0.17
-
-
-def test_a_short_gap_is_bridged_without_a_restart() -> None:
-    terms = constant_torque(np.array([4.0]), np.delete(clock(1000), [400, 401]))
-    estimate = MomentumObserver(gain=10.0).estimate(terms)
-    assert estimate.remarks == ()
-    np.testing.assert_allclose(estimate.tau[399:], 4.0, rtol=1e-9)
 
 
 def test_as_printed_fdo_leaks_momentum() -> None:

@@ -120,13 +120,6 @@ def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_samp
     assert 1e3 * printed.delay[0] == pytest.approx(135.506, abs=0.001)
 
 
-def test_euler_and_hold_share_a_and_b_exactly() -> None:
-    fe, zoh = paper("fe").model(STEP, 6), paper("zoh").model(STEP, 6)
-    for name in ("a12", "a22", "step"):
-        np.testing.assert_array_equal(getattr(fe, name), getattr(zoh, name))
-    assert np.any(fe.q12 != zoh.q12)
-
-
 @pytest.mark.parametrize("decay", [0.0, 1e-3, 0.5, 1.0, 10.0, 50.0])
 @pytest.mark.parametrize("step", [0.001, 0.008, 0.1])
 def test_hold_is_van_loans_matrix_exponential(decay: float, step: float) -> None:
@@ -210,13 +203,6 @@ def test_a_decaying_model_loses_gain_at_rest(decay: float, gain: float) -> None:
     tuning = observer.tuning(STEP, 6)
     np.testing.assert_allclose(answer, tuning.dc_gain, rtol=1e-6)
     assert tuning.dc_gain[0] == pytest.approx(gain, abs=1e-3)  # printed digits
-
-
-def test_the_density_convention_does_not_change_with_the_rate() -> None:
-    slow, fast = paper("zoh").tuning(0.008, 6), paper("zoh").tuning(0.001, 6)
-    np.testing.assert_allclose(slow.omega_n, fast.omega_n, rtol=1e-12)
-    # what is left is the half sample by which a coarser clock sees the momentum earlier
-    np.testing.assert_allclose(slow.delay, fast.delay, atol=(0.008 - 0.001) / 2)
 
 
 def test_forward_euler_refuses_a_decay_it_cannot_hold() -> None:

@@ -72,35 +72,6 @@ def test_a_constant_torque_is_known_from_the_first_sample_to_the_last(
     assert np.all(np.abs(estimate.tau[0] - truth) < 1.96 * estimate.sd[0])
 
 
-def test_a_ramp_is_recovered_without_bias() -> None:
-    t = np.arange(4000) * STEP
-    p = 0.5 * t**2
-    log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((4000, 2)))
-    estimate = smoother("zoh").estimate(log).tau
-    middle = slice(1500, 2500)
-    # Forward Euler would lead a ramp by half a sample, for want of the hold's Q₁₂. Either end
-    # is 12 s away, more than a hundred time constants of 0.1 s.
-    np.testing.assert_allclose(estimate[middle], np.repeat(t[middle, None], 2, 1), rtol=1e-9)
-
-
-def test_it_is_symmetric_in_time() -> None:
-    """A torque turned round in time gives the estimate turned round: no delay, no lead."""
-    samples = 4001
-    t = np.arange(samples) * STEP
-    tau = np.exp(-0.5 * ((t - t[2000]) / 0.15) ** 2) * (1.0 + 0.5 * np.tanh((t - t[2000]) / 0.05))
-    answers = []
-    for series in (tau, tau[::-1]):
-        p = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (series[1:] + series[:-1]))])
-        log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((samples, 2)))
-        answers.append(smoother("zoh").estimate(log))
-    ahead, back = answers
-    assert ahead.sd is not None
-    assert back.sd is not None
-    # At either end too: neither side of a log is known.
-    np.testing.assert_allclose(ahead.tau, back.tau[::-1], atol=1e-9)
-    np.testing.assert_allclose(ahead.sd, back.sd[::-1], rtol=1e-9)
-
-
 def test_frequency_response_is_that_of_the_two_sided_filter() -> None:
     samples, f = 8000, 1.5
     t = np.arange(samples) * 0.001

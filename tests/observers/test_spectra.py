@@ -54,19 +54,6 @@ def test_white_noise_has_a_flat_spectrum_of_the_known_height() -> None:
     assert found.external.sum() < 0.1 * found.loaded.sum()
 
 
-def test_an_uneven_clock_has_the_spectrum_of_its_median_step() -> None:
-    rng = np.random.default_rng(11)
-    t = np.cumsum(STEP * rng.uniform(0.9, 1.1, 6000))
-    torque = 3.0 * np.sin(2 * np.pi * 2.0 * t)[:, None]
-    terms = momentum_of(t, torque)
-    half = np.arange(len(t)) < 3000
-    found = spectra_of(samples_of(terms, ~half), [samples_of(terms, half)])
-    peak = found.frequency[np.argmax(found.loaded[:, 0])]
-    assert peak == pytest.approx(2.0, abs=found.width)
-    # 4.5 by Parseval; the resampling averages over a step, sinc²(2 Hz · 8 ms) = 0.999
-    assert found.loaded.sum() * found.width == pytest.approx(4.5, rel=0.03)
-
-
 def test_a_part_too_short_for_a_spectrum_is_refused() -> None:
     terms = momentum_of(STEP * np.arange(100), np.zeros((100, 1)))
     few = np.arange(100) < 20
@@ -239,13 +226,6 @@ def test_few_samples_are_spoken_for_by_all() -> None:
     whole = np.mean(read**2, axis=0)
     np.testing.assert_allclose(found.moving, whole + (UNSEEN * FRICTION) ** 2)
     np.testing.assert_array_equal(found.unseen, [True, True])
-
-
-def test_what_is_not_known_does_not_count() -> None:
-    read = np.full((200, 2), 2.0)
-    read[:100, 1] = np.nan
-    found = free_error(read, np.zeros((200, 2), dtype=bool), FRICTION)
-    np.testing.assert_allclose(found.moving, [4.0, 4.0])
 
 
 def test_variances_add_sample_by_sample() -> None:
