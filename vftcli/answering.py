@@ -137,10 +137,10 @@ class FoundGains(NamedTuple):
     """Gains for a goal, and their basis."""
 
     run: Run  #: The log and its arm.
-    goal: "Goal"  #: Their goal.
+    goal: "Goal"
     tuned: "Sequence[Tuned]"  #: The gains of every observer.
     spectra: "Spectra"  #: Spectra that show every gain's error.
-    remarks: tuple[Remark, ...]  #: Their limits.
+    remarks: tuple[Remark, ...]
     examinations: "tuple[Examination, ...]"  #: Findings on the log and its free runs.
 
 

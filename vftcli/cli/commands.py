@@ -47,9 +47,7 @@ JOURNEYS = {
         "reproduce": "reproduce:reproduce",
         "benchmark": "benchmark:benchmark",
     },
-    "Look up": {
-        "help": "help:show_help",
-    },
+    "Look up": {"help": "help:show_help"},
 }
 #: Name → the command.
 COMMANDS = {
@@ -67,7 +65,7 @@ former = partial(tables_beside, __file__, "former.toml")
 
 
 def with_command(words: list[str]) -> list[str]:
-    """The words of a call with its command, also if a log or options come first."""
+    """The words of a call with its command."""
     if not words or words[0] in COMMANDS or words[0] in OF_PROGRAM:
         return words
     first = words[0]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vftcli.evaluation.references import JacobianJudgement
     from vftcli.outputs.files import OutputFolder
 
-MORE = "Intervals, lags, pairs of observers: --details"  #: Left out of screens.
+MORE = "Intervals, lags, pairs of observers: --details"
 
 
 def figure_folder(figures: str | None, output: Path | None, force: bool) -> "OutputFolder | None":

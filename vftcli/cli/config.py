@@ -136,7 +136,7 @@ def entry(
     owner: str,
     choices: Sequence[type[Choice]],
 ) -> Table:
-    """One key of a file as an option, or its settings by dotted names, as texts."""
+    """One key of a file as an option, or as settings by dotted names."""
     if key not in known and not isinstance(value, dict):
         key, value = key_now(path, key, value)
     if isinstance(value, dict):
@@ -155,7 +155,7 @@ def entry(
 
 
 def key_now(path: Path, key: str, value: Any) -> tuple[str, Any]:  # noqa: ANN401 - of TOML
-    """A former key as today's option or setting, with a note; others unchanged."""
+    """A former key as today's, with a note; others unchanged."""
     text = next(words_in(value), "")
     now = None if key in TYPED or isinstance(value, list) else now_of(f"--{key}", text)
     # An argument, of a command or of a xacro, has no key.

@@ -52,7 +52,7 @@ PARTS = frozenset({"episode-chosen", "episode-chosen-first", "arm-side-chosen"})
 
 
 def command_line() -> str:
-    """The command for `run.json` and the report, with words of a file of options."""
+    """The command line, with words of a file of options."""
     return printable(shlex.join(["vftcli", *WORDS.get()]))
 
 

@@ -107,7 +107,7 @@ class JourneyGroup(TyperGroup):
         formatter.write("\n".join([*lines, "", *two_columns(rows)]) + "\n")
 
     def parse_args(self, ctx: Click, args: list[str]) -> Click:
-        """Parse the words: the default command if none, today's for former words."""
+        """Parse the words, with a command and today's for former ones."""
         words = with_command(args)
         if not ctx.resilient_parsing and words and (command := self.commands.get(words[0])):
             there = [name for param in command.params for name in param.opts]

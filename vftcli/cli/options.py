@@ -237,7 +237,7 @@ def typed_as(what: Any, option: Option) -> Any:  # noqa: ANN401 - annotations
 
 
 def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
-    """Every file and folder in the options but the output: protected inputs."""
+    """Every file and folder in the options but the output."""
     for name, value in values.items():
         for word in value if isinstance(value, list | tuple) else (value,):
             path = Path(word.removeprefix(FILE)) if isinstance(word, str) else word

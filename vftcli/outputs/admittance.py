@@ -46,7 +46,7 @@ from vftcli.signals.wrench import per_axis
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TITLE = "The same force through every controller"  #: Of the comparison.
+TITLE = "The same force through every controller"
 
 
 def number_form(form: str) -> Callable[[float], str]:
@@ -165,7 +165,7 @@ def latex_text(replay: Replay) -> str:
 
 
 FILES = ("index.html", "motion.parquet", "comparison.csv", "comparison.json", SEAL)
-REPLAY_FIGURES = ("release",)  #: Name of its figure.
+REPLAY_FIGURES = ("release",)
 CONVENTIONS = {
     "deviation": "X̃ of the flange point from the target pose X_d, base axes; rotation as the "
     "vector log(R R_dᵀ)",

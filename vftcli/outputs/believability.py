@@ -74,7 +74,7 @@ class Ground(NamedTuple):
 
     standing: Standing  #: Its effect on the answer.
     subject: str  #: Its subject, in one to three words.
-    sentence: str  #: The facts.
+    sentence: str
     remedy: str | None = None  #: A command that mends it, or None.
     #: Whether it was found in this log, and is not true of every log like it.
     of_log: bool = True

@@ -164,11 +164,7 @@ class Grid:
 
 
 def keyed_grid(
-    columns: Mapping[str, Any],
-    rows: Iterable[Record],
-    title: str = "",
-    *,
-    swatches: bool = False,
+    columns: Mapping[str, Any], rows: Iterable[Record], title: str = "", *, swatches: bool = False
 ) -> Grid:
     """A table of rows, with the values of these keys as columns."""
     entries = [[*map(row.get, columns)] for row in rows]

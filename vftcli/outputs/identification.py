@@ -40,7 +40,7 @@ from vftcli.robots.profile import robot_toml
 from vftcli.signals.errors import OutputError
 from vftcli.signals.parsing import counted
 
-IDENTIFICATION_FIGURES = ("torque", "residuals")  #: Names of its figures.
+IDENTIFICATION_FIGURES = ("torque", "residuals")
 #: Key of an identified number → its column.
 COLUMNS = {
     "parameter": "number",

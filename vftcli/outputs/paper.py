@@ -107,10 +107,7 @@ def figure_files(form: str | None, names: Sequence[str], before: str = "figures/
 
 
 def write_figures(
-    folder: OutputFolder,
-    drawings: Mapping[str, Drawing],
-    form: str,
-    before: str = "figures/",
+    folder: OutputFolder, drawings: Mapping[str, Drawing], form: str, before: str = "figures/"
 ) -> None:
     """Write figures in both widths, without date, for equal bytes."""
     maker = f"vftcli {VERSION}"

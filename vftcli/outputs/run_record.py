@@ -119,10 +119,7 @@ def log_entry(recording: Recording, found: Record | None = None) -> Record:
 
 
 def seal(
-    folder: OutputFolder,
-    name: str,
-    record: Record,
-    files: Mapping[str, str] | None = None,
+    folder: OutputFolder, name: str, record: Record, files: Mapping[str, str] | None = None
 ) -> str:
     """Write a run's record last, with every file's digest; its text without digests.
 

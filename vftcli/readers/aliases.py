@@ -214,7 +214,7 @@ class NamedColumns:
 def picks_by_alias(
     table: Table, stated: Sequence[Item], layout: LogFormat, names: Names
 ) -> tuple[Picks, Names]:
-    """The picks of a headed table by its columns' names, and the joints' names."""
+    """The picks of a headed table by its names, and the joints' names."""
     columns = NamedColumns(table, layout)
     own = {pick.field: pick for pick in map(columns.stated, stated)}
     picks = own | {pick.field: pick for pick in columns.others(own)}
@@ -263,7 +263,7 @@ def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
 
 
 def wrench_pick(table: Table) -> Item | None:
-    """The six columns of a wrench or its column of lists; None if incomplete."""
+    """The six columns of a wrench or its column of lists, or None."""
     there = enumerate(table.names)
     names = ["" if column in table.lists else name.lower() for column, name in there]
     for text in WRENCHES:

@@ -160,7 +160,7 @@ BINARY_TYPES = {
 
 
 def binary_table(file: LogFile) -> ArrayTable:
-    """The table of a UR binary file: two lines of text, then big-endian records."""
+    """The table of a UR binary file: two lines, big-endian records."""
     first, second, *_ = [*bytes(file.content[: 1 << 20]).split(b"\n", 2), b"", b""]
     names, types = first.decode("ascii", errors="replace").split(), second.split()
     if len(names) != len(types) or not names:
@@ -222,7 +222,7 @@ def _is_clock(name: str) -> bool:
 
 
 def _matlab_73(file: LogFile) -> Columns:
-    """The variables of numbers of a file of version 7.3, as MATLAB shows them."""
+    """The variables of numbers of a file of version 7.3."""
     with opened(file) as content:
         table = table_of(file.path, content, fewest_rows=1)
         names = {
@@ -258,7 +258,7 @@ def _matlab_5(file: LogFile) -> Columns:
 
 
 def _check_matlab(file: LogFile) -> None:
-    """Check what the packed variables of a file unpack to, before any is kept."""
+    """Check what the packed variables of a file unpack to."""
     content, place, total = file.content, HEADER, 0
     limit = unpacked_limit(len(content))
     order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"

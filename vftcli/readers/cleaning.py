@@ -23,7 +23,7 @@ def in_parts(signals: Mapping[str, NDArray[Any]]) -> Iterator[dict[str, NDArray[
 
 
 def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:
-    """The log with some of its rows only, and what is to be said of the others."""
+    """The log with some of its rows, and remarks on the others."""
     rows = np.arange(len(raw.stamps)) if raw.rows is None else raw.rows
     if isinstance(keep, slice):
         signals = {name: value[keep] for name, value in raw.signals.items()}
@@ -265,7 +265,7 @@ SEGMENT_ROWS = 20
 
 
 def _restarts(raw: RawLog, path: Path, *, examining: bool) -> list[int]:
-    """Rows before each restart of the clock; a ClockError unless only examined."""
+    """Rows before restarts of the clock, an error unless examining."""
     restarts = np.flatnonzero(np.diff(raw.stamps) < 0) + 1
     if not restarts.size:
         return []

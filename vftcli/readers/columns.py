@@ -287,7 +287,7 @@ def _is_derivative(t: Array, x: Array, dx: Array) -> bool:
 
 
 def _efforts(parts: Sequence[Array], dq: Array) -> tuple[tuple[str, ...] | None, str]:
-    """Names of the blocks behind the velocities, None if unclear; and the reason."""
+    """Names of the blocks behind the velocities, or None; the reason."""
     if len(parts) != 3:
         return (None if parts else ()), ""
     current, target, torque = parts
@@ -306,7 +306,7 @@ def _efforts(parts: Sequence[Array], dq: Array) -> tuple[tuple[str, ...] | None,
 
 
 def _driven(torque: Array, current: Array, dq: Array) -> tuple[float, list[float]]:
-    """Misfit of a current to a torque, infinite without one; and drive constants."""
+    """Misfit of a current to a torque, and drive constants."""
     constants, left = list[float](), list[float]()
     sizes = root_mean_squares(current)
     for x, y, speed, size in zip(torque.T, current.T, dq.T, sizes, strict=True):

@@ -109,7 +109,7 @@ class TextTable(Table):
             yield {c: _numbers(found[c], self.file.path) for c in columns}
 
     def words(self, column: int) -> Names:
-        """The different texts that a column holds, in the order in which they come."""
+        """The different texts that a column holds, in order."""
         parts = (found[column] for found in self._parsed({column: "String"}))
         each = (part.unique(maintain_order=True) for part in parts)
         words = dict.fromkeys(str(word or "").strip() for part in each for word in part)
@@ -118,7 +118,7 @@ class TextTable(Table):
         return tuple(words)
 
     def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Series]]:
-        """The columns of each piece of the text; `kinds` has the polars type of each."""
+        """The columns of each piece of the text, by their polars types."""
         for text in self._pieces():
             # Most texts parse as they are; mending copies them, so it waits for a
             # failure, but for doubled blanks, between which polars sees cells.
@@ -173,7 +173,7 @@ class TextTable(Table):
         return re.sub(rb"\n\s*\n", b"\n", text.lstrip(b"\n "))
 
     def _start(self) -> int:
-        """Where the first row begins, behind comments, blank lines and the names."""
+        """Where the first row begins."""
         pattern = rb"(\xef\xbb\xbf)?([ \t]*(#[^\r\n]*)?[\r\n]+)*"
         pattern += rb"[^\r\n]*[\r\n]*" if self.is_headed else b""
         match = re.match(pattern, self.file.content)

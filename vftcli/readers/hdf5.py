@@ -75,7 +75,7 @@ MOST_OBJECTS, DEEPEST = 100_000, 32
 
 @contextmanager
 def opened(file: LogFile) -> Iterator[Any]:
-    """The file as h5py opens it, its errors turned into one that names the file."""
+    """The file as h5py opens it; its errors name the file."""
     h5py = needed("h5py", f"{file.path}: an HDF5 file", error=LogError)
     with (
         naming_damage(file.path, "a damaged HDF5 file"),
@@ -92,7 +92,7 @@ class Hdf5Table(ArrayTable):
     """
 
     def within(self, group: str, *, top: bool = False) -> "Hdf5Table":
-        """The datasets below a group, by their paths from there on, and those of no group."""
+        """The datasets below a group, by paths from there, or of no group."""
         each = self.columns.items()
         own = {n: d for n, d in each if n.startswith(group) or (top and "/" not in n)}
         return Hdf5Table(self.path, {n.removeprefix(group): d for n, d in own.items()})
@@ -113,7 +113,7 @@ class Hdf5Table(ArrayTable):
 
 
 def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
-    """The datasets of numbers with some rows in an open file, each under one path."""
+    """The datasets of numbers with some rows in an open file."""
     import h5py
 
     found, looked_at = {}, itertools.count(1)
@@ -231,7 +231,7 @@ def layout_of(table: Hdf5Table) -> tuple[str, dict[int, str]]:
 
 
 def numbers_of(groups: Sequence[str]) -> Sequence[int]:
-    """The episodes' numbers: those their groups' names end with, else counted from 0."""
+    """The episodes' numbers: ends of their groups' names, else from 0."""
     numbers = [int(end) for group in groups for end in re.findall(r"(\d{1,9})\D*$", group)]
     rising = numbers == sorted(set(numbers)) and len(numbers) == len(groups)
     return numbers if rising else range(len(groups))
@@ -247,7 +247,7 @@ def recognises(file: LogFile, _: LogFormat) -> bool:
 
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
-    """The logs of an HDF5 file or of DROID's folder, with their places if several."""
+    """The logs of an HDF5 file or of DROID's folder."""
     if file.is_folder:
         # By the names of their folders, which is the order in which they are walked.
         paths = sorted(file.path.rglob(TRAJECTORY), key=lambda path: path.parent.parts)

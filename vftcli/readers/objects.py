@@ -155,7 +155,7 @@ ALLOWED = {
 
 
 def dtype_of(kind: Data) -> np.dtype[Any] | None:
-    """The type of an array's plain numbers, letters or booleans; None for any other."""
+    """The type of an array's numbers, letters or booleans, or None."""
     code = kind.arguments[0] if isinstance(kind, Stub) and kind.name == "dtype" else "O"
     if not isinstance(code, str) or re.search(r"O|object", code):
         raise Refused("an array of objects")
@@ -258,7 +258,7 @@ PICKLE_LIMIT = 512 * 1024 * 1024
 
 
 def load_arrays_only(file: LogFile) -> Data:
-    """Load a pickle that holds only arrays, numbers, strings, lists and dictionaries."""
+    """Load a pickle that holds only arrays, numbers, texts, lists, dicts."""
     content = bytes(file.content)
     if len(content) > PICKLE_LIMIT:
         raise LogError(

@@ -56,7 +56,7 @@ DAMAGE = (
 def naming_damage(
     path: Path, what: str, *own: type[Exception], remedy: str = ""
 ) -> Iterator[None]:
-    """Turn a library's errors, and those of `own` kinds, into one naming the file."""
+    """Turn a library's errors, and `own` kinds, into one naming the file."""
     errors: tuple[type[Exception], ...] = (*DAMAGE, *own)
     try:
         yield
@@ -87,7 +87,7 @@ class LogFile:
 
     @property
     def direct(self) -> Path | None:
-        """The path, where other libraries can open it: a plain file with a name in UTF-8."""
+        """The path, if it is a plain file with a name in UTF-8."""
         try:
             str(self.path).encode("utf-8")
         except UnicodeEncodeError:
@@ -128,7 +128,7 @@ class LogFile:
 
     @cached_property
     def lines(self) -> list[bytes]:
-        """The non-empty lines of the head, without their ends; [] if the head is not text."""
+        """The non-empty lines of the head; [] if it is no text."""
         # No text in UTF-8 or an eight-bit encoding holds one of these.
         if any(bytes([c]) in self.head for c in (*range(7), *range(14, 20), 127)):
             return []

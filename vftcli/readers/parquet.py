@@ -48,7 +48,7 @@ def guarded(path: Path) -> Iterator[None]:
 
 
 class ColumnarTable(Table):
-    """A file of columns; only those asked for are decoded, and nothing is ever mended."""
+    """A file of columns; only those asked for are decoded."""
 
     def __init__(self, file: LogFile) -> None:
         self.path: Path = file.path
@@ -227,7 +227,7 @@ def claims(content: Arrow) -> Iterator[tuple[int, int]]:
 
 
 def fields_at(data: memoryview, place: int) -> dict[int, int]:
-    """Places of the fields of a flatbuffer's table, in which Arrow describes a batch."""
+    """Places of the fields of a flatbuffer's table."""
     start = place + COUNT.unpack_from(data, place)[0]
     own = start - struct.unpack_from("<i", data, start)[0]
     if own < 0:
@@ -256,5 +256,5 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
 
 
 def episodes_of(numbers: Column) -> tuple[int, ...]:
-    """The numbers of a table's episodes, rising; one, 0, of a table that counts none."""
+    """The numbers of a table's episodes, rising; 0 of one without."""
     return tuple(int(number) for number in np.unique(numbers)) or (0,)

@@ -78,7 +78,7 @@ class LogFormat(NamedTuple):
         return replace(raw, part=part, remarks=(*remarks, *raw.remarks))
 
     def numbers(self, file: LogFile) -> tuple[int, ...]:
-        """The numbers of a file's episodes; of a format that holds one recording none."""
+        """The numbers of a file's episodes, none of one recording."""
         if not self.episodes:
             return ()
         with self._module.episodes(file) as each:
@@ -151,7 +151,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
 
 
 def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
-    """The numbers of the episodes that a file holds, rising; none of one recording."""
+    """The numbers of a file's episodes, rising; none of one recording."""
     file = open_log(Path(path))
     reader = _reader(file, choice)
     if choice.episode == ALL and not reader.episodes:
@@ -243,7 +243,7 @@ class Library:
         return len(self._labels)
 
     def open(self, path: str | Path | Recording, choice: ReadChoice | None = None) -> Recording:
-        """Read a log once unless it is read, and return the part of it that is chosen."""
+        """Read a log once; return the part of it that is chosen."""
         choice = choice or ReadChoice()
         if isinstance(path, Recording):
             return choice.within(choice.with_stated_effort(path))

@@ -145,15 +145,10 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     signals = kept(raw, inside).signals
     # Revolute axes have length 1: the other rows are those of the velocity, which go first.
     stored = signals["jacobian"].reshape(-1, 6, n)
-    jacobian = next(
-        (
-            J
-            for J in (stored, np.roll(stored, 3, axis=1))
-            if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT)
-        ),
-        None,
-    )
-    if jacobian is None:
+    for jacobian in (stored, np.roll(stored, 3, axis=1)):
+        if np.all(np.abs(np.linalg.norm(jacobian[:, 3:], axis=1) - 1) < UNIT):
+            break
+    else:
         raise LogError(
             f"{path}: no three rows of the Jacobian are axes of revolute joints, of length 1."
         )
@@ -184,7 +179,7 @@ def estimates_columns(path: Path, observer: str) -> str | None:
 
 
 def stored_observers(path: Path) -> list[str]:
-    """The observers that a file holds estimates of, none if it is not one of ours."""
+    """The observers of a file of our estimates, none of another."""
     try:
         file = open_log(path)
         names = ParquetTable(file).names if file.head.startswith(b"PAR1") else ()

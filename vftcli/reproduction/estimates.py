@@ -11,7 +11,6 @@ from vftcli.admittance import ControlChoice
 from vftcli.admittance.motion import SHARES, Drag, return_time
 from vftcli.admittance.replay import Replay, replay, stored_force
 from vftcli.analysis import Analysis
-from vftcli.doctor.examination import Examiner
 from vftcli.evaluation import ReferenceChoice
 from vftcli.evaluation.errors import correlation, joint_means
 from vftcli.free_motion import FreeChoice
@@ -63,16 +62,10 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         "zero removed": (hard, OBSERVERS[CORRECTED], ((start, stop),)),
         "soft servo": (soft, OBSERVERS[CORRECTED], ()),
     }
-    examiner = Examiner()
+    compared = AnalysisChoice(contacts=False, reference=ReferenceChoice(name="sensor"))
     for variant, (run, observers, spans) in asked.items():
         wrench = WrenchChoice(sensor_pose=sensor_pose, zero=ZeroChoice(spans=spans))
-        choice = AnalysisChoice(
-            examiner=examiner,
-            observers=observers,
-            contacts=False,
-            wrench=wrench,
-            reference=ReferenceChoice(name="sensor"),
-        )
+        choice = replace(compared, observers=observers, wrench=wrench)
         made = analyse(run_of(run.recording, load_robot("ur5"), choice), choice)
         for row in error_rows(made, "axis"):
             force, moment = row["rmse_N"], row["rmse_Nm"]
@@ -117,13 +110,11 @@ def assembled_bearing(
 ) -> Iterator[Given]:
     """Zero drift, the bearing's weight, errors by phase, controllers' results."""
     run = simulate(load_scenario("panda-bearing", ()), seed)
-    recording, robot, examiner = run.recording, load_robot("panda"), Examiner()
-    vendor = stored_force(recording, robot, WrenchChoice(frame="base"), "libfranka").wrench
+    recording, robot, asked = run.recording, load_robot("panda"), WrenchChoice(frame="base")
+    vendor = stored_force(recording, robot, asked, "libfranka").wrench
+    choice = AnalysisChoice(contacts=False, wrench=asked)
     for variant, observers in OBSERVERS.items():
-        asked = WrenchChoice(frame="base")
-        choice = AnalysisChoice(
-            examiner=examiner, observers=observers, contacts=False, wrench=asked
-        )
+        choice = replace(choice, observers=observers)
         made = analyse(run_of(recording, robot, choice), choice)
         (wrench,) = made.wrenches
         drift = mean_of(wrench, unloaded)
@@ -233,17 +224,13 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
 def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]:
     """Errors by joint, lags, free rms, and numbers of the guidelines."""
     recording = simulate(load_scenario(scenario, ()), seed).recording
-    robot, examiner = load_robot("ur5"), Examiner()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.
-    choice_of_free = FreeChoice(period=period, alignment="period", low_pass=None)
+    free = FreeChoice(period=period, alignment="period", low_pass=None)
+    reference, robot = ReferenceChoice(name="two-cycle"), load_robot("ur5")
+    choice = AnalysisChoice(contacts=False, free=free, reference=reference)
     for variant, chosen in VARIANTS.items():
-        choice = AnalysisChoice(
-            examiner=examiner,
-            observers=ObserverChoice.parsed(observer=PAPER, **chosen),
-            free=choice_of_free,
-            contacts=False,
-            reference=ReferenceChoice(name="two-cycle"),
-        )
+        observers = ObserverChoice.parsed(observer=PAPER, **chosen)
+        choice = replace(choice, observers=observers)
         made = analyse(run_of(recording, robot, choice), choice)
         rows = error_rows(made, "joint")
         for row in rows:
@@ -252,12 +239,8 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]
             yield FLOOR, key, row["reference_floor_Nm"]
         # Free rms and lag are means of joints 1 to 3.
         for estimate in made.estimates:
-            free = (estimate.t > 1.0) & (estimate.t < period)
-            yield (
-                variant,
-                f"free/{estimate.name}",
-                float(rms_of_known(estimate.tau[free, :3].ravel())),
-            )
+            tau = estimate.tau[(estimate.t > 1.0) & (estimate.t < period), :3]
+            yield variant, f"free/{estimate.name}", float(rms_of_known(tau.ravel()))
             own = (r["lag_s"] for r in rows if r["observer"] == estimate.name and r["joint"] <= 3)
             if lags := [lag for lag in own if lag is not None]:
                 yield variant, f"lag/{estimate.name}", np.mean(lags)

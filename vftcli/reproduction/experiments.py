@@ -54,7 +54,7 @@ class Job(NamedTuple):
 
     paper: str
     experiment: str
-    seed: int  #: Of everything drawn.
+    seed: int
 
 
 #: A job's results by variant and key.

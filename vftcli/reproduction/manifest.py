@@ -66,7 +66,7 @@ class BenchmarkLog:
     scenario: str = ""  #: Name of a simulated log's scenario.
     seed: int = 1
     changes: tuple[str, ...] = ()  #: Keys of the scenario, as ``duration=12``.
-    sha256: str = ""  #: Of the file.
+    sha256: str = ""
     source: str = ""  #: Where it is had.
     licence: str = ""
     truth_file: str = ""  #: Where the truth is, "" for the log's own file.

@@ -60,7 +60,7 @@ class PaperItem:
     why: str  #: Why ours differs, or why nothing can be compared, in a sentence.
     verdict: str  #: Whether it is reproduced, in a few words.
     experiments: Sequence[str] = ()  #: Those that it shows; none for a picture.
-    lines: Sequence[PrintedLine] = ()  #: Its table.
+    lines: Sequence[PrintedLine] = ()
     #: Columns of ours between the print and the floor.
     variants: Sequence[str] = (AS_PRINTED, CORRECTED)
     #: The column of ours beside the print in the overview.
