@@ -269,12 +269,12 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 51_204,
+    "lines of Python": 50_866,
     "files": 210,
-    "functions": 2734,
+    "functions": 2718,
     "functions over 60 lines": 9,
-    "names, operators, numbers": 366_267,
-    "characters a line that is not blank": 50.21,
+    "names, operators, numbers": 365_907,
+    "characters a line that is not blank": 50.19,
     "noqa": 70,
     "lines of TOML, JavaScript, CSS": 7392,
 }
