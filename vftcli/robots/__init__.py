@@ -50,7 +50,7 @@ def built_in(path: Path) -> "Robot":
 
 def profiles_of(joints: int) -> list[str]:
     """The built-in profiles of arms with so many joints; no file is read."""
-    return [name for name, count in NAMES.items() if count == joints]
+    return [name for name in PROFILES if NAMES[name] == joints]
 
 
 #: Between a xacro and its arguments, as ROS has them: ``ur.xacro ur_type:=ur5e``.
