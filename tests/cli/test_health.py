@@ -234,6 +234,19 @@ def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run) -> None:
     assert "400 samples" in stderr
 
 
+@pytest.mark.parametrize("samples", [2, 3])
+def test_an_arm_that_jumps_in_a_few_samples_is_no_motion_to_fit(
+    tmp_path: Path, run, samples: int
+) -> None:
+    """Samples 12 s apart, the errors of the doctor overruled: time enough, samples too few."""
+    rows = [[12.0 * k, *[0.5 * k] * 6, *[0.1] * 6, *[0.0] * 6] for k in range(samples)]
+    log = saved(tmp_path / "log.csv", [[str(x) for x in row] for row in rows])
+    words = ("--robot", "ur5", "--columns", "t,q:6,dq:6,current:6", "--anyway", "--details")
+    code, _, stderr = run("estimate", log, *words, "-o", tmp_path / "out")
+    assert code == 0
+    assert "too few samples" in " ".join(stderr.split())
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_an_unwritable_folder_is_one_line(tmp_path: Path, refused) -> None:
     locked = tmp_path / "locked"

@@ -22,6 +22,7 @@ from vftcli.bias.model_error import (
     without_waits,
 )
 from vftcli.bias.robust_fit import (
+    FEWEST,
     Guarded,
     Rows,
     WholeLogFit,
@@ -114,7 +115,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
     run = run.steadied
     terms = run.terms
     span, refused = motion_of(run)
-    if refused is not None:
+    if refused:
         return untouched(terms, refused)
     expected = (expected_error if span >= LEAST_MOTION else friction_alone)(run.robot)
     # What no arm does overflows, and is refused.
@@ -157,6 +158,8 @@ def motion_of(run: Run) -> tuple[float, Remark | None]:
     if duration < LEAST_FRICTION:
         short = caution("whole-log-too-short", duration_s=duration, least_s=LEAST_FRICTION)
         return duration, short
+    if len(t) < FEWEST:
+        return duration, caution("whole-log-without-solution")
     # noise is no motion
     moves = faster(zero_phase(t, dq, CUTOFF)).any(axis=1)
     moving = np.count_nonzero(moves) * median_step(t)

@@ -61,7 +61,7 @@ def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
 
 def derivative(t: Array, signals: Array) -> Array:
     """Central differences, of second order also on uneven clocks. (T, m)"""
-    return np.gradient(signals, t, axis=0, edge_order=2)
+    return np.gradient(signals, t, axis=0, edge_order=2 if len(t) > 2 else 1)
 
 
 def band_pass(t: Array, x: Array, low: float, high: float) -> Array:
