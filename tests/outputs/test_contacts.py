@@ -154,6 +154,7 @@ def test_a_row_names_size_range_and_places() -> None:
     rows = [contact(where="cannot tell", places=each) for each in ((2, 3, 6), (0, 3, 6), (2,))]
     grid = contact_grid([BY_PLACE, *rows])
     assert grid.rows[0][2:4] == ["unknown", "20–248"]
+    assert contact_grid(contact_list(WIDE)).rows[0][2] == "unknown"  # 88 ± 170 N is no size
     places = [row[-2].text for row in grid.cells]
     assert places == ["wrist", "link 2 … link 6", "link 3 … flange", "link 2"]
     assert contact_grid([BARE]).columns[2].heading == "joint torque [N·m]"

@@ -119,7 +119,7 @@ class Contact(Shown):
         """|F| at the peak with its band or range; joint torques without a force."""
         if self.peak_force is None:
             return f"{joined(self.joint_torque)} N·m"
-        if self.place_unknown and self.anywhere is not None:
+        if self.place_unknown and self.anywhere:
             return f"{self.anywhere[0]:.0f} to {self.anywhere[1]:.0f} N"
         return f"{self.peak_force:.0f} ± {self.peak_band:.0f} N"
 
@@ -315,7 +315,7 @@ class ContactList(Shown):
         Without a joint's effort every row is a candidate.
         """
         carried, rows, others = self.load, self.contacts, self.candidates
-        if carried is not None and load is not None:
+        if carried and load:
             carried = carried._replace(mass=load[0], sd=load[1])
         if doubts:
             why = caution("size-in-doubt")

@@ -171,12 +171,9 @@ class ContactMeasurement:
             if not where.on_wrist
         }
         points = [self.priors[i]._replace(moment=POINT_MOMENT) for i in moved]
-        lanes = zip(
-            contact_lanes(self.log, [runs[i] for i in moved], J, tail=self.tail),
-            moved,
-            strict=True,
-        )
-        there = (lane._replace(jacobian=moved[i]) for lane, i in lanes)
+        lanes = contact_lanes(self.log, [runs[i] for i in moved], J, tail=self.tail)
+        pairs = zip(lanes, moved.values(), strict=True)
+        there = (lane._replace(jacobian=own) for lane, own in pairs)
         for i, wrench in zip(moved, smooth_lanes(there, points), strict=True):
             wrenches[i] = wrench
         each = enumerate(zip(wrenches, locations, strict=True))

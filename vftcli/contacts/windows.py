@@ -218,11 +218,10 @@ def contact_lanes(
             d[0], decay[0], added[0], white[0] = m[i], 0.0, p[i], p[i]
         if window[1] > b:
             d[-1], white[-1] = known[i], 1.0 / weight[i]
-        process = ErrorProcess(decay, added, white, spikes)
-        piece = BlockLog(log.blocks.part(some)._replace(d=d), process)
-        yield Lane(
-            piece, window, covered([(a - window[0], b - window[0])], len(d)), jacobian, None
-        )
+        blocks = log.blocks.part(some)._replace(d=d)
+        piece = BlockLog(blocks, ErrorProcess(decay, added, white, spikes))
+        gate = covered([(a - window[0], b - window[0])], len(d))
+        yield Lane(piece, window, gate, jacobian, None)
 
 
 def quiet_error(d: Array, process: ErrorProcess) -> tuple[Array, Array]:

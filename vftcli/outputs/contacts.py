@@ -95,7 +95,7 @@ def answer(found: ContactList) -> str:
 
 def list_words(found: ContactList) -> str:
     """The contacts in one or two sentences."""
-    if found.unexplained is not None:
+    if found.unexplained:
         torque, joint, at = found.unexplained
         return (
             f"Largest unexplained torque: {torque:.2g} N·m on J{joint} at {at:.1f} s: a contact or "
@@ -115,7 +115,7 @@ def list_words(found: ContactList) -> str:
         return what
     if not hardest.size_known:
         how = f"How hard is unknown: below {most_force(hardest)}."
-        if hardest.place_unknown and hardest.anywhere is not None:
+        if hardest.place_unknown and hardest.anywhere:
             how = f"Its size depends on where it touched, unknown: {force_size(hardest)}."
         return f"{what} {how}"
     where = "" if hardest.where == "cannot tell" else f" on the {hardest.where}"
@@ -229,7 +229,7 @@ def forces_along(contacts: Sequence[Contact], t: Array) -> tuple[Array, Array]:
     """|F| of contacts along a log, and its 95 % band, else NaN. 2 × (T,) [N]"""
     force, half = np.full((2, len(t)), np.nan)
     for contact in contacts:
-        if (course := contact.course) is not None:
+        if course := contact.course:
             inside = (t >= course.t[0]) & (t <= course.t[-1])
             force[inside] = np.interp(t[inside], course.t, course.force)
             half[inside] = np.interp(t[inside], course.t, course.band)
@@ -298,9 +298,9 @@ def contact_grid(contacts: Sequence[Contact]) -> Grid:
     rows = []
     for contact in contacts:
         row = [str(contact.number), f"{contact.start:6.2f} – {contact.stop:6.2f}"]
-        if known and contact.wrench is not None and contact.anywhere is not None:
+        if known and contact.wrench is not None and contact.anywhere:
             force = banded(contact.peak_force, contact.peak_band, unit="")
-            row.append("unknown" if contact.place_unknown else force)
+            row.append(force if contact.size_known else "unknown")
             row += [ranged(*contact.anywhere, unit=""), direction(contact.wrench[:3])]
         else:
             row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
@@ -338,7 +338,7 @@ def stored_list(record: Record) -> ContactList:
     """A list from its record, without its free motion."""
     model, torque, load = record["model"], record["largest_unexplained"], record["load"]
     prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
-    if load is not None:
+    if load:
         mass = load["mass_kg"], load["mass_sd_kg"]
         load = CarriedLoad(*mass, load["robot"], load["payload"], tuple(load["span_s"]))
     return ContactList(
