@@ -203,7 +203,7 @@ def test_the_cost_of_the_papers_gains_is_measured_beside_the_best(
     assert paper_gap(errors.with_columns(rmse_Nm=none), tunings) == ()
 
 
-# A log's free part and spectra: what counts as free, and whose gains they are
+# A log's free part and spectra: what counts as free, and for which observer the gains are
 
 
 LOG = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")

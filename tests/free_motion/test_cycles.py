@@ -187,7 +187,7 @@ def test_a_log_that_is_nearly_all_gap_is_refused(repeated: Make) -> None:
         find_period(replace(log, t=log.t + 1e6 * late))
 
 
-# Which cycles are taken to be free: the one with the least residual, and those like it
+# Which cycles count as free: the one with the least residual, and those like it
 
 
 T = 0.01 * np.arange(1200)

@@ -1,4 +1,4 @@
-"""The alignment ladder: what a difference is on each rung, and which one is taken."""
+"""The alignment ladder: what a difference is on each rung, and which rung is used."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
 
-# The alignment ladder: what a difference is on each rung, and which one is taken
+# The alignment ladder: what a difference is on each rung, and which rung is used
 
 
 Make = Callable[..., Run]

@@ -228,7 +228,7 @@ def kinematics(
     return [end @ start for end, start in zip(after, [*before, tip], strict=True)], after[1:]
 
 
-POSES = 4096  #: Samples at a time, whose matrices stay in the processor's memory.
+POSES = 4096  #: Samples at a time: their matrices stay in the processor's memory.
 
 
 def along(R: Array, columns: Array) -> Array:

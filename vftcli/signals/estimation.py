@@ -210,7 +210,7 @@ class FilteredBlock(NamedTuple):
     covariance: Array  #: (…, N, N)
     predicted: Array  #: Covariance before the block's own d is used. (…, N, N)
     square: Array  #: νᵀS⁻¹ν of the innovation, as if it were no spike. (…)
-    spread: Array  #: Its covariance S, likewise. (…, n, n)
+    spread: Array  #: Its covariance S, as if it were no spike. (…, n, n)
 
 
 def beside_errors(H: Array) -> Array:

@@ -278,7 +278,7 @@ class SensorReading(Shown):
 
     @property
     def zero_span(self) -> tuple[float, float] | None:
-        """The span whose mean was removed, None if none was. [s]"""
+        """The span that the removed mean is of, None if none was removed. [s]"""
         return next((drift.span for drift in self.drifts if drift.removed), None)
 
 
@@ -289,7 +289,7 @@ def with_reference(
     if not of_sensor:
         return replace(reading, reference=reference)
     remarks = list(reading.remarks)
-    if reading.zero_span is not None:
+    if reading.zero_span:
         drift = zero_drift(reference, reading.zero_span)._replace(removed=True)
         reference = without_drift(reference, drift)
         remarks.append(drift.remark)
