@@ -1,6 +1,7 @@
 """The developers' bars can be measured: every part runs, on a log far too short to time."""
 
 import importlib.util
+import math
 from pathlib import Path
 
 import pytest
@@ -30,4 +31,5 @@ def test_every_ratio_of_the_core_is_measured(monkeypatch: pytest.MonkeyPatch) ->
 def test_every_ratio_of_a_wide_log_is_measured() -> None:
     ratios = bench.log_ratios(UR5, samples=300, rounds=1)
     assert ratios.keys() < bench.RATIOS.keys()
-    assert all(value > 0.0 for value in ratios.values())
+    # Differences of commands of a second: of so short a log even the sign is chance.
+    assert all(math.isfinite(value) for value in ratios.values())
