@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -38,6 +40,7 @@ from vftcli.wrench.model_error import (
     learn_noise,
 )
 from vftcli.wrench.smoother import (
+    BLOCK,
     BlockLog,
     WrenchPrior,
     contact_block,
@@ -46,6 +49,8 @@ from vftcli.wrench.smoother import (
 )
 
 GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
+#: Block of short contacts: longer ones cut the peak. [s]
+FINE = 0.008
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: SDs of a joint's torque beyond which it is touched.
 #: Least length of a touch, and the pause that joins two. [s]
@@ -62,7 +67,8 @@ LEAST_CYCLES = 2
 PSEUDO, MOST_PSEUDO = 0.6, 48
 
 
-class FreeStatistics(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class FreeStatistics:
     """Noise and level of motion that nobody touched, as a list of contacts needs them."""
 
     noise: TorqueNoise  #: Noise and model error.
@@ -81,6 +87,18 @@ class FreeStatistics(NamedTuple):
     def seconds(self) -> float:
         """Length of a block. [s]"""
         return contact_block(self.log.t)
+
+    @cached_property
+    def fine(self) -> "tuple[FreeStatistics, Blocks] | None":
+        """Its noise in finer blocks, and the log in these; None if none are finer."""
+        seconds, run = max(FINE, self.log.step), self.log
+        # On a clock that jitters blocks are as short as they may be.
+        if not seconds < 0.7 * self.seconds <= 0.7 * BLOCK:
+            return None
+        noise = noise_of(run, self.free, seconds, known=self.basis == "free motion")
+        if noise is None:
+            return None
+        return replace(self, noise=noise), disturbance_blocks(run.terms, run.q, seconds)
 
 
 def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | None:

@@ -24,7 +24,6 @@ from vftcli.contacts.free_statistics import (
     free_part,
     free_statistics,
     inferred_statistics,
-    noise_of,
     observed,
 )
 from vftcli.contacts.rows import (
@@ -40,7 +39,6 @@ from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places, tim
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
-from vftcli.robots.terms import disturbance_blocks
 from vftcli.signals.arrays import Z_95, Array, covered
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
@@ -48,7 +46,6 @@ from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.wrench.model_error import UNSEEN_SHARE, error_process
 from vftcli.wrench.smoother import (
-    BLOCK,
     DRIVES,
     BlockLog,
     BlockSpan,
@@ -56,8 +53,6 @@ from vftcli.wrench.smoother import (
     smooth_wrench,
 )
 
-#: Block of short contacts: longer ones cut the peak. [s]
-FINE = 0.008
 SHORTEST = 0.5  #: No contact is listed in a log shorter than this. [s]
 SLOWEST = 10.0  #: Rate below which a push of tenths of a second may go unseen. [Hz]
 #: Evidence over that of any row in the log's own free part.
@@ -206,28 +201,21 @@ def fine_rows(
     free: FreeStatistics, brief: Sequence[int], measurement: ContactMeasurement
 ) -> list[Contact]:
     """Rows of short contacts from finer blocks; none if no finer ones exist."""
-    run, found = free.log, measurement.found
-    seconds, usual = max(FINE, run.step), free.seconds
-    # On a clock that jitters blocks are as short as they may be.
-    if not seconds < 0.7 * usual <= 0.7 * BLOCK:
+    if free.fine is None:
         return []
-    noise = noise_of(run, free.free, seconds, known=free.basis == "free motion")
-    if noise is None:
-        return []
-    blocks = disturbance_blocks(run.terms, run.q, seconds)
+    found, (fine, blocks) = measurement.found, free.fine
     ends = [times_of(found.log.blocks, run) for run in found.runs]
     spans = [(a, b) for a, b in blocks.t.searchsorted(ends).tolist()]
     others = [span for k, span in enumerate(spans) if k not in brief]
-    process = error_process(noise, blocks).hiding(covered(others, len(blocks.t), 1))
+    process = error_process(fine.noise, blocks).hiding(covered(others, len(blocks.t), 1))
     some = found.kept(brief)._replace(
         log=BlockLog(blocks, process),
-        places=places(run.robot.loaded_chain, blocks.q),
+        places=places(free.log.robot.loaded_chain, blocks.q),
         runs=[spans[k] for k in brief],
     )
     # The place needs no peak: longer blocks show it best.
     locations = [measurement.locations[k] for k in brief]
-    fine_free = free._replace(noise=noise)
-    return ContactMeasurement.of(some, fine_free, measurement, BENT_SHORT).rows(locations)
+    return ContactMeasurement.of(some, fine, measurement, BENT_SHORT).rows(locations)
 
 
 def false_rows(free: FreeStatistics) -> int:
