@@ -20,7 +20,6 @@ from vftcli.wrench.model_error import (
     LEAST_TIME,
     UNKNOWN,
     UNSEEN_SHARE,
-    error_model,
     error_process,
     fit_spectrum,
     infer_noise,
@@ -228,8 +227,8 @@ def test_reversals_are_bridged_in_a_straight_line() -> None:
 def test_the_filter_of_the_error_agrees_with_a_dense_solve() -> None:
     """Σ ν²/S is dᵀ C⁻¹ d with the dense covariance of the model."""
     log = blocks(drawn(40, np.random.default_rng(3)), np.full((40, 1), 0.5))
-    model = error_model(log.d, error_process(noise(), log))
-    squares = innovations(model, np.full((40, 1), 1e-300))[0]
+    process = error_process(noise(), log)._replace(spikes=np.full((40, 1), 1e-300))
+    squares = innovations(log.d, process)[0]
     lag = np.abs(log.t[:, None] - log.t)
     covariance = 0.25 * np.exp(-lag / 0.4) + 0.01 * np.eye(40)
     # Rounding of a 40×40 solve.

@@ -181,29 +181,12 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
 
 
 def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list[Contact]:
-    """The rows of a measurement, those of short contacts from finer blocks."""
-    rows = measurement.rows()
-    if brief := [k for k, seconds in enumerate(measurement.found.lasts) if seconds < SHORT]:
-        for k, row in zip(brief, fine_rows(free, brief, measurement), strict=False):
-            rows[k] = row
-    return rows
-
-
-def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
-    """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
-    t = found.log.blocks.t
-    first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
-    speed = abs(run.dq[first:last])
-    return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
-
-
-def fine_rows(
-    free: FreeStatistics, brief: Sequence[int], measurement: ContactMeasurement
-) -> list[Contact]:
-    """Rows of short contacts from finer blocks; none if no finer ones exist."""
-    if free.fine is None:
-        return []
-    found, (fine, blocks) = measurement.found, free.fine
+    """The rows of a measurement, those of short contacts from finer blocks if these exist."""
+    found, rows = measurement.found, measurement.rows()
+    brief = [k for k, seconds in enumerate(found.lasts) if seconds < SHORT]
+    if not brief or free.fine is None:
+        return rows
+    fine, blocks = free.fine
     ends = [times_of(found.log.blocks, run) for run in found.runs]
     spans = [(a, b) for a, b in blocks.t.searchsorted(ends).tolist()]
     others = [span for k, span in enumerate(spans) if k not in brief]
@@ -215,7 +198,18 @@ def fine_rows(
     )
     # The place needs no peak: longer blocks show it best.
     locations = [measurement.locations[k] for k in brief]
-    return ContactMeasurement.of(some, fine, measurement, BENT_SHORT).rows(locations)
+    measured = ContactMeasurement.of(some, fine, measurement, BENT_SHORT).rows(locations)
+    for k, row in zip(brief, measured, strict=True):
+        rows[k] = row
+    return rows
+
+
+def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
+    """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
+    t = found.log.blocks.t
+    first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
+    speed = abs(run.dq[first:last])
+    return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
 
 
 def false_rows(free: FreeStatistics) -> int:

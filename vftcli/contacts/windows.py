@@ -278,7 +278,7 @@ def untouched_likelihood(lanes: Sequence[Lane], model: LinearModel) -> Array:
         inside = (lane.gate & lane.log.blocks.known)[:, None]
         often[: len(inside), place] = inside * lane.log.process.spikes
     process = ErrorProcess(model.decay[..., 6:], model.added[..., 6:], model.white, often)
-    square, S = innovations(error_model(model.d, process), often)
+    square, S = innovations(model.d, process)
     with np.errstate(divide="ignore"):
         usual, spiked = np.log1p(-often), np.log(often) - 0.5 * np.log(SPIKE)
     either = np.logaddexp(usual - 0.5 * square, spiked - 0.5 * square / SPIKE)

@@ -163,7 +163,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
     each = []
     for piece in pieces:
         process = error_process(noise, piece)._replace(white=noise.white + 0.0 * piece.d)
-        each.append(innovations(error_model(piece.d, process), process.spikes)[0])
+        each.append(innovations(piece.d, process)[0])
     squares = np.concatenate(each)
     asked = [np.quantile(squares, share, axis=0) / value for share, value in QUANTILES]
     factor = np.maximum(np.max(asked, axis=0), 1.0)
@@ -340,9 +340,9 @@ def spike_limit(spikes: Array) -> Array:
     return np.asarray((np.log(SPIKE) - 2.0 * odds) / (1.0 - 1.0 / SPIKE))
 
 
-def innovations(model: LinearModel, spikes: Array) -> tuple[Array, Array]:
+def innovations(d: Array, process: ErrorProcess) -> tuple[Array, Array]:
     """ν²/S of every joint's own model, and S, by the rate of spikes. (K, …, n) each"""
-    blocks = filtered(model, spike_limit(spikes))
+    blocks = filtered(error_model(d, process), spike_limit(process.spikes))
     each = [(block.square, block.spread[..., 0, 0]) for block in blocks]
     squares, spreads = (np.array(series) for series in zip(*each, strict=True))
     return squares, spreads
@@ -350,6 +350,6 @@ def innovations(model: LinearModel, spikes: Array) -> tuple[Array, Array]:
 
 def spiked_white(d: Array, process: ErrorProcess) -> Array:
     """R of every block, spikes included, for d (K, n). (K, n) [(N·m)²]"""
-    squares, spreads = innovations(error_model(d, process), process.spikes)
+    squares, spreads = innovations(d, process)
     spiked = squares > spike_limit(process.spikes)
     return process.white + np.where(spiked, (SPIKE - 1.0) * spreads, 0.0)
