@@ -28,5 +28,5 @@ def request_() -> AnalysisChoice:
 
 
 @pytest.fixture(scope="session")
-def worked_up(request_: AnalysisChoice) -> Analysis:
+def worked_up(request_) -> Analysis:
     return analyse_log(FIXTURE, request_)

@@ -36,7 +36,7 @@ def codes(analysis: Analysis) -> set[str]:
 
 
 @pytest.mark.slow
-def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None:
+def test_the_band_covers_the_truth_on_moving_joints(worked_up):
     rows = worked_up.errors.filter(pl.col("joint").is_in([j + 1 for j in MOVING]))
     for observer in ("kfo-auto", "rts-auto"):
         share = rows.filter(pl.col("observer") == observer)["coverage_95"].mean()
@@ -46,7 +46,7 @@ def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None
 
 
 @pytest.mark.slow
-def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
+def test_the_band_is_what_the_equation_says(worked_up):
     found = worked_up.refinement
     spectra = found.baselines.plain.spectra
     for observer, estimate in zip(worked_up.observers, worked_up.estimates, strict=True):
@@ -66,7 +66,7 @@ def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
         assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.error_sd[7])
 
 
-def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None:
+def test_what_limits_the_log_is_said_joint_by_joint(worked_up):
     found = worked_up.refinement
     budget = found.budgets[-1]
     limits = found.remarks[-1]
@@ -79,7 +79,7 @@ def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None
     np.testing.assert_allclose(parts, read, rtol=1e-9)
 
 
-def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
+def test_a_log_that_is_free_throughout_tunes_nothing():
     """Two free cycles of one log: the part is no quieter than the rest."""
     once = Library().open(FIXTURE, ReadChoice(interval=(0.0, 4.0)))
     twice = Recording(
@@ -95,7 +95,7 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
 
 
 @pytest.mark.slow
-def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: AnalysisChoice) -> None:
+def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_):
     """Its quietest cycle is pushed too: hand-set gains, no bands, both said."""
     always = replace(request_, read=ReadChoice(interval=(4.3, 20.0)), observers=DENSITIES)
     analysis = analyse_log(FIXTURE, always)
@@ -126,7 +126,7 @@ def asked() -> AnalysisChoice:
 
 
 @pytest.fixture(scope="module")
-def automatic(asked: AnalysisChoice) -> Analysis:
+def automatic(asked) -> Analysis:
     return analyse_log(FIXTURE, asked)
 
 
@@ -138,7 +138,7 @@ def rmse(analysis: Analysis, name: str) -> float:
 
 
 @pytest.mark.slow
-def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
+def test_the_bias_is_off_for_the_best_alone(automatic):
     """Measured .27 and .60 N·m, seed 1: .46; a prototype had .37 of it in the mean of four."""
     found = automatic.refinement.baselines
     best = found.of("best")
@@ -158,9 +158,7 @@ def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
 
 
 @pytest.mark.slow
-def test_whole_log_is_off_for_everyone_and_none_for_no_one(
-    asked: AnalysisChoice, automatic: Analysis
-) -> None:
+def test_whole_log_is_off_for_everyone_and_none_for_no_one(asked, automatic):
     everyone = analyse_log(FIXTURE, replace(asked, refinement=RefinementChoice(bias="whole-log")))
     nobody = analyse_log(FIXTURE, replace(asked, refinement=RefinementChoice(bias="none")))
     best, gmo, auto = (e.tau for e in everyone.estimates)
@@ -175,9 +173,7 @@ def test_whole_log_is_off_for_everyone_and_none_for_no_one(
 
 
 @pytest.mark.slow
-def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
-    asked: AnalysisChoice,
-) -> None:
+def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(asked):
     """From 4.3 s on every cycle is pushed, so that none is believed to be free."""
     pushed = replace(asked, read=ReadChoice(interval=(4.3, 20.0)))
     analysis = analyse_log(FIXTURE, pushed)
@@ -192,7 +188,7 @@ def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
 
 
 @pytest.mark.slow
-def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(asked: AnalysisChoice) -> None:
+def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(asked):
     """0.1 s are 13 samples, and a spectrum needs 32."""
     given = replace(asked, free=FreeChoice(spans=((0.0, 0.1),)))
     analysis = analyse_log(FIXTURE, given)
@@ -202,7 +198,7 @@ def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(asked: AnalysisCh
 
 
 @pytest.mark.slow
-def test_a_short_log_takes_what_is_left(asked: AnalysisChoice) -> None:
+def test_a_short_log_takes_what_is_left(asked):
     """6 s tell friction alone, the free part tunes. 1.5 s tell nothing: the robot file's gains.
 
     The band of the best is there in any case, at rest no narrower than what stiction holds.
@@ -230,9 +226,7 @@ def test_a_short_log_takes_what_is_left(asked: AnalysisChoice) -> None:
 
 
 @pytest.mark.slow
-def test_a_fit_that_fails_is_said_and_costs_nothing_else(
-    asked: AnalysisChoice, automatic: Analysis, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fit_that_fails_is_said_and_costs_nothing_else(asked, automatic, monkeypatch):
     def fails(_run: object) -> None:
         raise MissingSignalError("no current")
 

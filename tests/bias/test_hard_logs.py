@@ -164,7 +164,7 @@ FAULTS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("row", [925, 1700])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_bad_sample_stays_within_the_band(fault, row) -> None:
+def test_a_bad_sample_stays_within_the_band(fault, row):
     """Elsewhere; and on the other joints there too."""
     signal, joint, value = FAULTS[fault]
     log = sound(FIXTURE, "ur5")[0]
@@ -175,7 +175,7 @@ def test_a_bad_sample_stays_within_the_band(fault, row) -> None:
 
 
 @pytest.mark.slow
-def test_a_bad_sample_is_said() -> None:
+def test_a_bad_sample_is_said():
     log, arm, choice, _ = sound(FIXTURE, "ur5")
     bad = replace(log, **with_sample(log, "dq", 925, 1, lambda _: 5.0))
     remarks = analyse(Run(recording=bad, robot=arm), choice).remarks
@@ -188,7 +188,7 @@ REAL = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["free_12harm", "free_14harm"])
-def test_an_hour_without_samples_stays_within_the_band(logs: Path, name: str) -> None:
+def test_an_hour_without_samples_stays_within_the_band(logs, name):
     """No free motion is given or repeats: the model's error comes from all of the log."""
     path = logs / "ur10e" / f"{name}.csv"
     log = sound(path, "ur10e", REAL)[0]

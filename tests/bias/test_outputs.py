@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from vftcli.analysis import Analysis
 from vftcli.outputs.page.log_charts import (
     observer_styles,
     spectra_chart,
@@ -13,7 +12,7 @@ from vftcli.outputs.page.pages import render
 from vftcli.outputs.rerun_recording import plot_groups
 
 
-def test_ribbons_curve_and_spectra_are_charts(worked_up: Analysis) -> None:
+def test_ribbons_curve_and_spectra_are_charts(worked_up):
     halves = {s.name: s.half for s in torque_chart(worked_up).series if s.half is not None}
     assert set(halves) == {e.name for e in worked_up.estimates}
     band = worked_up.estimates[-1].error_sd
@@ -25,7 +24,7 @@ def test_ribbons_curve_and_spectra_are_charts(worked_up: Analysis) -> None:
     assert "Error budget in N·m rms" in render(worked_up)
 
 
-def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) -> None:
+def test_the_recording_shows_both_edges_of_the_last_band(worked_up):
     plot = next(iter(plot_groups(worked_up)["Joint torques"]))
     lines = {line.name: line.values[:, 0] for line in plot.series}
     upper, lower = (lines[f"rts-auto 95 % {edge}"] for edge in ("upper", "lower"))

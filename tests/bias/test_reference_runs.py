@@ -3,7 +3,6 @@
 import gzip
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -66,7 +65,7 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
 
 
 @pytest.mark.statistical
-def test_reference_runs_reach_their_ratios_and_coverage() -> None:
+def test_reference_runs_reach_their_ratios_and_coverage():
     """Five seeds each of taps, mixed and slow pushes, of an arm whose joints stick.
 
     Measured means: smoother .287/.549 of KFO density/discrete, tuned .259/.500; the tuned filter at
@@ -80,7 +79,7 @@ def test_reference_runs_reach_their_ratios_and_coverage() -> None:
 
 
 @pytest.mark.slow
-def test_mujoco_ur5e(logs: Path) -> None:
+def test_mujoco_ur5e(logs):
     """An independent engine: the tuned smoother at most 0.6 of GMO(30). Measured .53."""
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
@@ -95,7 +94,7 @@ def test_mujoco_ur5e(logs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
+def test_libfranka_simulation(logs, tmp_path):
     """Behind Franka's own protocol; the log repeats nothing, so its free part is stated.
 
     Measured .39 of GMO(30).
@@ -118,7 +117,7 @@ def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_ur10e_payload(logs: Path) -> None:
+def test_ur10e_payload(logs):
     """Real: at most the error of the best causal observer. Measured .92: friction is in all."""
     folder = logs / "ur10e"
     request = AnalysisChoice(
@@ -134,7 +133,7 @@ def test_ur10e_payload(logs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_ur10e_pushes_between_which_stiction_is_named(logs: Path) -> None:
+def test_ur10e_pushes_between_which_stiction_is_named(logs):
     """Real: a held pose; what is left between pushes is stiction, and is said to be."""
     request = AnalysisChoice(
         free=FreeChoice(spans=((0.0, 2.0),)),

@@ -55,7 +55,7 @@ def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Base
     return replace(found, correction=off)
 
 
-def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
+def test_a_correction_adds_its_own_variance(found):
     reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
     known = found.part.own
     plain, wider = (with_band(corrected(found, known, sd), reading).error_sd for sd in (0.0, 0.7))
@@ -63,7 +63,7 @@ def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
     np.testing.assert_allclose(wider, np.hypot(plain, 0.7), rtol=1e-6)
 
 
-def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
+def test_without_spectra_or_free_samples_there_is_none(found):
     reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
     assert with_band(replace(found, spectra=None), reading).error_sd is None
     nothing = reading._replace(samples=reading.samples[:0], resting=reading.resting[:0])
@@ -72,7 +72,7 @@ def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
     assert [r.code for r in said] == ["no-band"]
 
 
-def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Baseline) -> None:
+def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found):
     reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
     quiet = np.arange(found.of(found.motion.log).terms.samples) % 7 == 0
     rests = found.motion.log.rests
@@ -89,7 +89,7 @@ def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Ba
     np.testing.assert_array_equal(with_band(corrected(found, few), reading).error_sd, stated)
 
 
-def test_a_slow_load_that_the_fit_believes_in_is_no_error(found: Baseline) -> None:
+def test_a_slow_load_that_the_fit_believes_in_is_no_error(found):
     reading = free_reading(found, GMO, GMO.estimate(found.of(found.motion.log).terms))
     pushed = reading._replace(estimate=replace(reading.estimate, tau=reading.estimate.tau + 5.0))
     known, alone = found.part.own, replace(found, by_fit=True)
@@ -100,9 +100,7 @@ def test_a_slow_load_that_the_fit_believes_in_is_no_error(found: Baseline) -> No
     )
 
 
-def test_the_band_holds_on_a_real_arm_with_planted_pushes(
-    logs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_band_holds_on_a_real_arm_with_planted_pushes(logs, monkeypatch):
     """Every joint at least .88 of its samples, and no wider than 2.6 × the RMSE; seed 1."""
     monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "accuracy"))
     from planted_pushes import planted
@@ -129,7 +127,7 @@ RNG = np.random.default_rng(8)
 DQ = RNG.uniform(-1.0, 1.0, (4000, 2))
 
 
-def test_friction_beside_another_error_is_its_share_of_the_power() -> None:
+def test_friction_beside_another_error_is_its_share_of_the_power():
     """tanh has a mean square of nearly 1, the other error `size`²; 4000 samples tell 3 %."""
     size = 4.0
     other = size * RNG.standard_normal(DQ.shape)
@@ -153,7 +151,7 @@ def budget() -> Budget:
     )
 
 
-def test_the_largest_cause_of_each_joint_is_named() -> None:
+def test_the_largest_cause_of_each_joint_is_named():
     np.testing.assert_allclose(budget().total, [5.0, np.sqrt(0.31)])  # stiction is no part of it
     free = limits_remark(budget(), np.array([False, False]))
     assert free.values["causes"] == ["friction", "bandwidth"]
@@ -173,9 +171,7 @@ def test_the_largest_cause_of_each_joint_is_named() -> None:
 @pytest.mark.parametrize(
     ("error", "code"), [(3.0, "paper-gains-measured"), (0.7, "paper-gains-measured-level")]
 )
-def test_the_cost_of_the_papers_gains_is_measured_beside_the_best(
-    error: float, code: str
-) -> None:
+def test_the_cost_of_the_papers_gains_is_measured_beside_the_best(error, code):
     rows = [
         ("best", 1, 0.5),
         ("best", 2, 1.5),
@@ -209,7 +205,7 @@ def test_the_cost_of_the_papers_gains_is_measured_beside_the_best(
 LOG = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
 
 
-def test_a_log_without_a_free_part_says_why() -> None:
+def test_a_log_without_a_free_part_says_why():
     own = Run(recording=LOG.between(4.5, 6.0), robot=load_robot("ur5"))
     found = baseline_of(FreeMotion(log=own))
     assert (found.part, found.spectra, found.pieces) == (None, None, ())
@@ -218,7 +214,7 @@ def test_a_log_without_a_free_part_says_why() -> None:
     assert found.remarks == (found.missing,)
 
 
-def test_gains_come_from_the_spectra_where_they_are_asked_for() -> None:
+def test_gains_come_from_the_spectra_where_they_are_asked_for():
     own = Run(recording=LOG.between(0.0, 10.0), robot=load_robot("ur5"))
     found = baseline_of(FreeMotion(log=own, choice=FreeChoice(spans=((0.0, 4.0),))))
     blind = replace(found, spectra=None)
@@ -230,7 +226,7 @@ def test_gains_come_from_the_spectra_where_they_are_asked_for() -> None:
 # RefinementChoice: which bias comes off what
 
 
-def test_the_whole_log_s_bias_comes_off_for_everyone_if_asked_for() -> None:
+def test_the_whole_log_s_bias_comes_off_for_everyone_if_asked_for():
     """Else the observers ask for it: `best` runs on what the whole log allows."""
     assert RefinementChoice.parsed() == RefinementChoice(bias=AUTOMATIC)
     words = {word: RefinementChoice.parsed(settings={"bias.method": word}) for word in REMOVALS}

@@ -10,7 +10,6 @@ from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import Recording
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
@@ -18,9 +17,7 @@ UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 """Columns of the UR10e logs."""
 
 
-def motion(
-    recording: Recording, robot: str, free: str | None = None, run: Recording | None = None
-) -> FreeMotion:
+def motion(recording, robot, free=None, run=None) -> FreeMotion:
     """A log with what is known of its free motion: a span of its own, or another log."""
     arm = load_robot(robot)
     log = Run(recording=recording, robot=arm)

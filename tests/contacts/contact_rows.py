@@ -20,7 +20,7 @@ def contact(**changed: object) -> Contact:
         "evidence": 412.0, "joint_torque": np.arange(6.0), "joint_torque_sd": np.ones(6),
         "at_rest": False,
     }  # fmt: skip
-    return Contact(**(values | changed))  # type: ignore[arg-type]
+    return Contact(**(values | changed))
 
 
 def contact_list(*contacts: Contact, **changed: object) -> ContactList:
@@ -35,4 +35,4 @@ def contact_list(*contacts: Contact, **changed: object) -> ContactList:
         ),
         "remarks": (caution("arm-stopped-abruptly", at_s=17.9),),
     }  # fmt: skip
-    return ContactList(**(values | changed))  # type: ignore[arg-type]
+    return ContactList(**(values | changed))

@@ -43,7 +43,7 @@ def best_of(analysis: Analysis) -> Wrench:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_the_wrench_of_best_is_that_of_the_rows_and_holds_the_truth(name: str) -> None:
+def test_the_wrench_of_best_is_that_of_the_rows_and_holds_the_truth(name):
     """Both are of the log less the bias of the whole log; the list has finer blocks and places.
 
     Both bands are of 95 %: of a dozen peaks one may lie beyond. Those of `best` hold .97 to 1.00 of
@@ -66,7 +66,7 @@ def test_the_wrench_of_best_is_that_of_the_rows_and_holds_the_truth(name: str) -
 
 
 @pytest.mark.slow
-def test_a_wrench_that_comes_after_the_answer_is_that_of_one_go() -> None:
+def test_a_wrench_that_comes_after_the_answer_is_that_of_one_go():
     """A command prints its screen in between; what was asked for is there before it."""
     choice = AnalysisChoice(observers=ObserverChoice(names=("best",)))
     first = replace(choice, answers_first=True)
@@ -81,7 +81,7 @@ def test_a_wrench_that_comes_after_the_answer_is_that_of_one_go() -> None:
 
 
 @pytest.mark.slow
-def test_a_load_nobody_reported_is_in_the_wrench_of_best() -> None:
+def test_a_load_nobody_reported_is_in_the_wrench_of_best():
     """2 kg at 5 cm in the drives of 14 s of the circle: 19.6 N, of which best had none.
 
     Measured 1.2 N rms along z, .97 to 1.00 of the samples in the band; without the load in it

@@ -16,7 +16,7 @@ from vftcli.contacts.search import (
 from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.estimation import SPIKE
-from vftcli.wrench.model_error import ErrorProcess, error_process
+from vftcli.wrench.model_error import error_process
 
 
 def joints_of(d: Array) -> tuple[Blocks, Array]:
@@ -40,7 +40,7 @@ def pushed(count: int, seed: int) -> Array:
 
 
 @pytest.mark.parametrize("push", [3.4, 3.5])
-def test_a_contact_is_what_is_99_percent_sure(push: float) -> None:
+def test_a_contact_is_what_is_99_percent_sure(push):
     """72 ms of a push in no noise; in the middle both directions know the same.
 
     3.4 N·m are 98.8 % sure, 3.5 N·m 99.2 %.
@@ -55,9 +55,7 @@ def test_a_contact_is_what_is_99_percent_sure(push: float) -> None:
     assert touched_blocks(log, jacobian).any() == (1.0 / (1.0 + np.exp(-odds)) > 0.99)
 
 
-def textbook_odds(
-    d: Array, process: ErrorProcess, size: Array, time: float, lasts: float
-) -> Array:
+def textbook_odds(d, process, size, time, lasts) -> Array:
     """Log odds of contact after each block: Blom and Bar-Shalom's cycle, in matrices. (K,)
 
     The state of a joint is (b, x); the mode "free" does not see x, which is as it may be there.
@@ -100,7 +98,7 @@ def textbook_odds(
     return odds
 
 
-def test_the_odds_are_those_of_the_textbook_filter() -> None:
+def test_the_odds_are_those_of_the_textbook_filter():
     """Two joints with a push on one, a slow start on the other: for taps and for leans."""
     rng = np.random.default_rng(6)
     d = np.hstack([drawn(150, rng), drawn(150, rng)])
@@ -119,9 +117,7 @@ def test_the_odds_are_those_of_the_textbook_filter() -> None:
 
 
 @pytest.mark.slow
-def test_a_long_log_is_searched_in_stretches_as_if_in_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_long_log_is_searched_in_stretches_as_if_in_one(monkeypatch):
     d = pushed(2000, 5)
     d[1200:1300] += 5.0
     log, _ = joints_of(d)
@@ -136,7 +132,7 @@ def test_a_long_log_is_searched_in_stretches_as_if_in_one(
             assert np.mean(np.sign(a) != np.sign(b)) < 0.002
 
 
-def test_behind_a_gap_of_an_hour_the_odds_are_those_of_a_log_that_begins() -> None:
+def test_behind_a_gap_of_an_hour_the_odds_are_those_of_a_log_that_begins():
     """Contacts come every 30 s: by then one is there as often as not, and that is no 0/0."""
     log, _ = joints_of(drawn(300, np.random.default_rng(8)))
     log = log._replace(t=log.t + np.where(np.arange(300) < 150, 0.0, 3600.0))

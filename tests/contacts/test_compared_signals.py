@@ -29,13 +29,13 @@ def ur5() -> Run:
     return Run(recording=read(FIXTURES / "ur5_circle.csv"), robot=load_robot("ur5"))
 
 
-def test_the_robots_own_estimate_is_what_it_compares(panda: Run) -> None:
+def test_the_robots_own_estimate_is_what_it_compares(panda):
     found = compared_signals(panda)
     np.testing.assert_array_equal(found.torque, panda.recording.tau_ext)
     assert (found.of_vendor, found.logged_wrench) == (True, False)
 
 
-def test_without_one_a_momentum_observer_of_ten_stands_for_it(ur5: Run) -> None:
+def test_without_one_a_momentum_observer_of_ten_stands_for_it(ur5):
     bare = replace(ur5.recording, tau_ext=None, wrench=None, wrench_frame=None)
     run = Run(recording=bare, robot=ur5.robot)
     found = compared_signals(run)
@@ -47,12 +47,12 @@ def test_without_one_a_momentum_observer_of_ten_stands_for_it(ur5: Run) -> None:
     assert (found.of_vendor, found.logged_wrench) == (False, False)
 
 
-def test_a_log_of_another_arm_is_refused(panda: Run, ur5: Run) -> None:
+def test_a_log_of_another_arm_is_refused(panda, ur5):
     with pytest.raises(RobotError, match="7 joints but robot 'ur5' has 6"):
         compared_signals(Run(recording=panda.recording, robot=ur5.robot))
 
 
-def test_an_estimate_that_is_zero_throughout_is_none(panda: Run) -> None:
+def test_an_estimate_that_is_zero_throughout_is_none(panda):
     zeros = replace(panda.recording, tau_ext=np.zeros(panda.recording.q.shape))
     found = compared_signals(Run(recording=zeros, robot=panda.robot))
     assert not found.of_vendor
@@ -60,7 +60,7 @@ def test_an_estimate_that_is_zero_throughout_is_none(panda: Run) -> None:
 
 
 @pytest.mark.parametrize(("axes", "own"), [("base", True), ("tool", True), ("sensor", False)])
-def test_a_sensors_wrench_is_no_robots(panda: Run, axes: str, own: bool) -> None:
+def test_a_sensors_wrench_is_no_robots(panda, axes, own):
     values = np.random.default_rng(1).normal(size=(panda.recording.samples, 6))
     frame = WrenchFrame(axes, "flange" if axes == "base" else axes)
     recording = replace(panda.recording, wrench=values, wrench_frame=frame)

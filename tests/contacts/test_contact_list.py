@@ -32,25 +32,25 @@ from vftcli.signals.remarks import caution
         ({"anywhere": (39.0, 91.0)}, "fair"),
     ],
 )
-def test_trust_goes_by_evidence_band_and_remarks(changed: dict[str, object], trust: str) -> None:
+def test_trust_goes_by_evidence_band_and_remarks(changed, trust):
     assert contact(**changed).trust == trust
 
 
 @pytest.mark.parametrize("doubt", ["velocity-late", "stuck-effort"])
-def test_no_size_in_doubt_is_good(doubt: str) -> None:
+def test_no_size_in_doubt_is_good(doubt):
     found = contact_list(contact(), contact(number=2))
     assert [row.trust for row in found.weighed(None, set())] == ["good", "good"]
     assert [row.trust for row in found.weighed(None, {doubt})] == ["weak", "weak"]
 
 
-def test_a_load_is_as_heavy_as_the_examination_says() -> None:
+def test_a_load_is_as_heavy_as_the_examination_says():
     fitted = CarriedLoad(2.5, 0.4, "ur10e", None, (1.0, 9.0))
     found = replace(contact_list(), load=fitted)
     assert found.weighed((2.88, 0.09), set()).load == fitted._replace(mass=2.88, sd=0.09)
     assert found.weighed(None, set()).load == fitted
 
 
-def test_beside_a_joint_without_effort_every_row_is_a_candidate() -> None:
+def test_beside_a_joint_without_effort_every_row_is_a_candidate():
     """In the order of time, each with the reason; nothing is claimed, nor called untouched."""
     late, early = (
         contact(number=1, start=9.0, stop=9.5),
@@ -63,7 +63,7 @@ def test_beside_a_joint_without_effort_every_row_is_a_candidate() -> None:
     assert not found.tells_untouched
 
 
-def test_the_hardest_has_the_largest_force_of_those_beyond_their_band() -> None:
+def test_the_hardest_has_the_largest_force_of_those_beyond_their_band():
     soft, hard = contact(peak_force=10.0), contact(number=2, peak_force=80.0)
     wide = contact(peak_force=88.0, peak_band=170.0)
     assert contact_list(soft, hard, wide).hardest is hard
@@ -72,7 +72,7 @@ def test_the_hardest_has_the_largest_force_of_those_beyond_their_band() -> None:
     assert (wide.size_known, hard.size_known) == (False, True)
 
 
-def test_a_size_that_depends_on_an_unknown_place_is_unknown() -> None:
+def test_a_size_that_depends_on_an_unknown_place_is_unknown():
     by_place = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
     unknown = contact(remarks=(by_place,), peak_force=70.0)
     assert not unknown.size_known
@@ -83,14 +83,12 @@ def test_a_size_that_depends_on_an_unknown_place_is_unknown() -> None:
 
 
 @pytest.mark.parametrize(("least", "told"), [(6.5, 6.5), (3473.0, None), (None, None)])
-def test_a_pose_that_is_blind_along_an_axis_tells_no_least_force(
-    least: float | None, told: float | None
-) -> None:
+def test_a_pose_that_is_blind_along_an_axis_tells_no_least_force(least, told):
     assert contact_list(smallest_force=least).detectable_force == told
     assert contact_list(smallest_force=float("nan")).detectable_force is None
 
 
-def test_a_row_of_a_table_has_a_column_for_each_number() -> None:
+def test_a_row_of_a_table_has_a_column_for_each_number():
     remark = caution("free-part-rests", least_N=12.0)
     row = contact(remarks=(remark,)).row()
     assert [row[f"force_N_{axis}"] for axis in "xyz"] == [0.4, 51.9, -38.8]
@@ -101,7 +99,7 @@ def test_a_row_of_a_table_has_a_column_for_each_number() -> None:
     assert row["remarks"] == str(remark)
 
 
-def test_a_list_is_a_sequence_of_its_rows_and_a_table() -> None:
+def test_a_list_is_a_sequence_of_its_rows_and_a_table():
     rows = contact(), contact(number=2, is_load=True, peak_force=80.0)
     found = contact_list(*rows)
     assert (len(found), found[1], list(found)) == (2, rows[1], list(rows))
@@ -118,7 +116,7 @@ def test_a_list_is_a_sequence_of_its_rows_and_a_table() -> None:
     assert (found.tells_untouched, contact_list(rows[0]).tells_untouched) == (False, True)
 
 
-def test_a_size_is_a_range_where_the_place_is_unknown_and_torques_where_no_force_is() -> None:
+def test_a_size_is_a_range_where_the_place_is_unknown_and_torques_where_no_force_is():
     by_place = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
     assert "57 to 78 N" in repr(contact(remarks=(by_place,)))
     bare = contact_list(contact(), candidates=(contact(number=2),)).without_forces()
@@ -132,7 +130,7 @@ def test_a_size_is_a_range_where_the_place_is_unknown_and_torques_where_no_force
     ("mass", "sd", "name"),
     [(2.8, 0.1, "gripper"), (2.5, 0.2, "gripper"), (2.5, 0.1, None), (1.2, 0.02, "camera")],
 )
-def test_a_load_is_the_payload_that_weighs_as_much(mass: float, sd: float, name: str) -> None:
+def test_a_load_is_the_payload_that_weighs_as_much(mass, sd, name):
     """2.8 kg or 1.1 kg, within a tenth of the load or two of its standard deviations."""
     payloads = {
         key: Payload(mass=m, com=np.zeros(3), inertia=np.zeros((3, 3)))

@@ -31,7 +31,7 @@ from vftcli.signals.recording import Recording
 LOG = read(FIXTURES / "ur5_circle.csv")
 
 
-def test_a_named_span_or_another_log_is_the_free_part() -> None:
+def test_a_named_span_or_another_log_is_the_free_part():
     part = free_part(motion(LOG, "ur5", "0.3:4"))
     (piece,) = part.pieces
     t = LOG.t[piece.inside]
@@ -45,7 +45,7 @@ def test_a_named_span_or_another_log_is_the_free_part() -> None:
     assert part.remarks[0].code == "free-log"
 
 
-def test_what_repeats_nothing_has_no_free_part() -> None:
+def test_what_repeats_nothing_has_no_free_part():
     short = read(FIXTURES / "ur5_taps_ur_rtde.csv")
     bare = motion(short, "ur5")
     assert free_statistics(bare, whole_log_bias(bare.log)) is None
@@ -56,7 +56,7 @@ def test_what_repeats_nothing_has_no_free_part() -> None:
         free_part(replace(bare, choice=cycles))
 
 
-def test_cycles_of_which_none_was_recorded_are_no_free_part() -> None:
+def test_cycles_of_which_none_was_recorded_are_no_free_part():
     """A pause of the recorder of one whole cycle: no sample of the quietest has a partner."""
     t = LOG.t - LOG.t[0]
     keep = (t < 4.79) | (t > 8.79)
@@ -64,7 +64,7 @@ def test_cycles_of_which_none_was_recorded_are_no_free_part() -> None:
     assert free_part(motion(kept, "ur5")) is None
 
 
-def test_the_level_is_that_of_the_free_samples_that_move() -> None:
+def test_the_level_is_that_of_the_free_samples_that_move():
     """2 N·m while J1 moves, 9 at rest, 20 in the first .1 s, in which the observer settles.
 
     Its gain of 30 1/s leaves 18 e^(−30 · .2) N·m of that after .3 s, .05.
@@ -80,7 +80,7 @@ def test_the_level_is_that_of_the_free_samples_that_move() -> None:
     np.testing.assert_allclose(level, np.array([2.0, 9.0, 9.0, 9.0, 9.0, 9.0]) / 1.96, rtol=0.02)
 
 
-def test_a_threshold_takes_what_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_threshold_takes_what_lasts(monkeypatch):
     """Beyond 8 N·m of a joint without friction; of one with 20 N·m beyond 16, 24.5 near rest."""
     torque, dq = np.zeros((400, 2)), np.ones((400, 2))
     torque[10:20, 0] = 9.0  # while the observer settles
@@ -93,11 +93,11 @@ def test_a_threshold_takes_what_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_statistics_room, "observed", lambda _: torque)
     monkeypatch.setattr(free_statistics_room, "dry_torques", lambda _: np.array([0.0, 20.0]))
     run = SimpleNamespace(t=0.01 * np.arange(400), dq=dq, robot=None)
-    found = beyond_threshold(run, np.array([2.0, 2.0]))  # type: ignore[arg-type]
+    found = beyond_threshold(run, np.array([2.0, 2.0]))
     assert runs_of(found) == [(100, 130), (320, 330)]
 
 
-def test_a_load_in_the_free_part_is_no_noise() -> None:
+def test_a_load_in_the_free_part_is_no_noise():
     """2.8 kg that the model lacks, in every sample: said, and off the noise and the log alike."""
     plain = motion(LOG, "ur5", "0.3:4")
     load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, moment_sd=np.zeros(3), share=0.5)
@@ -115,9 +115,7 @@ def test_a_load_in_the_free_part_is_no_noise() -> None:
     assert np.abs(left).mean() < 0.2 * np.abs(load.torque(plain.log)).mean()
 
 
-def test_the_noise_is_that_of_the_observer_whatever_touches(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_noise_is_that_of_the_observer_whatever_touches(monkeypatch):
     """White noise behind the observer's 30 1/s, and a push of .8 s a joint every 40 s.
 
     Twice its time apart samples still share e⁻² = .135: of 6 σ² there are 6 − 8·.135 + 2·.135².
@@ -128,13 +126,13 @@ def test_the_noise_is_that_of_the_observer_whatever_touches(
     noise = lfilter([np.sqrt(1.0 - kept**2)], [1.0, -kept], sigma * white, axis=0)
     push = 20.0 * np.maximum(np.sin(np.pi * (t % 40.0) / 0.8) * (t % 40.0 < 0.8), 0.0)
     monkeypatch.setattr(free_statistics_room, "observed", lambda _: noise + push[:, None])
-    found = observer_noise(SimpleNamespace(t=t))  # type: ignore[arg-type]
+    found = observer_noise(SimpleNamespace(t=t))
     # A push is in 2.7 % of the bends, which widens their median by 0 to 3.4 %; chance is 1 %.
     np.testing.assert_allclose(found / sigma, 0.909 * 1.017, rtol=0.03)
 
 
 @pytest.mark.slow
-def test_the_quietest_of_cycles_that_are_all_touched_is_not_free() -> None:
+def test_the_quietest_of_cycles_that_are_all_touched_is_not_free():
     """Pushes of 22 N to 86 N in each of three cycles; as free motion the quietest hid two."""
     log = vft.simulate("ur5-circle", seed=77)
     truth = log.truth

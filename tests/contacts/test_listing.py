@@ -35,9 +35,7 @@ Lister = Callable[..., ContactList]
         ("ur5_table1.csv", "ur5", "0.3:4", 6.0, 13),
     ],
 )
-def test_every_push_of_a_fixture_is_one_row(
-    listed: Lister, name: str, robot: str, free: str, rms: float, count: int
-) -> None:
+def test_every_push_of_a_fixture_is_one_row(listed, name, robot, free, rms, count):
     found = listed(name, robot, free)
     scored = score(found.contacts, true_contacts(*true_wrench(name)))
     assert (len(scored.pairs), scored.rows, len(scored.false)) == (count, count, 0)
@@ -54,7 +52,7 @@ def test_every_push_of_a_fixture_is_one_row(
 
 
 @pytest.mark.slow
-def test_a_bearing_and_two_knocks_are_three_contacts(listed: Lister) -> None:
+def test_a_bearing_and_two_knocks_are_three_contacts(listed):
     found = listed("panda_bearing.csv", "panda", "0.3:3.9")
     scored = score(found.contacts, true_contacts(*true_wrench("panda_bearing.csv")))
     assert len(scored.pairs) == 3
@@ -65,7 +63,7 @@ def test_a_bearing_and_two_knocks_are_three_contacts(listed: Lister) -> None:
     assert found[0].stop > 16.0
 
 
-def test_free_cycles_are_found_where_nothing_is_said(listed: Lister) -> None:
+def test_free_cycles_are_found_where_nothing_is_said(listed):
     found = listed("ur5_circle.csv", "ur5")
     assert found.basis == "free motion"
     assert found.free
@@ -87,7 +85,7 @@ def part(recording: Recording, chosen: np.ndarray) -> Recording:
 
 
 @pytest.mark.slow
-def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks(listed: Lister) -> None:
+def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks(listed):
     whole = read(FIXTURES / "ur5_circle.csv")
     k = np.arange(whole.samples)
     kept = k[~((k > 1100) & (k < 1125)) & ~((k > 300) & (k < 330))]
@@ -98,7 +96,7 @@ def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks(listed: Lister)
     assert max(near) < 0.1
 
 
-def test_at_15_hz_the_pushes_are_still_reported() -> None:
+def test_at_15_hz_the_pushes_are_still_reported():
     whole = read(FIXTURES / "ur5_circle.csv")
     rows = list_contacts(motion(part(whole, np.arange(0, whole.samples, 8)), "ur5", "0.3:4"))
     true = true_contacts(*true_wrench("ur5_circle.csv"))
@@ -109,7 +107,7 @@ def test_at_15_hz_the_pushes_are_still_reported() -> None:
     assert [row.number for row in rows.contacts] == [*range(1, len(rows.contacts) + 1)]
 
 
-def test_numbers_that_are_not_finite_are_refused() -> None:
+def test_numbers_that_are_not_finite_are_refused():
     whole = read(FIXTURES / "ur5_circle.csv")
     current = np.array(whole.current)
     current[700:705] = np.nan
@@ -129,13 +127,13 @@ def ur10e(logs: Path, name: str) -> Recording:
         (slice(None, None, 125), r"has 1 samples a second; below 10 a contact"),
     ],
 )
-def test_few_samples_do_not_say_that_nothing_touched(chosen: slice, said: str) -> None:
+def test_few_samples_do_not_say_that_nothing_touched(chosen, said):
     whole = read(FIXTURES / "ur5_circle.csv")
     with pytest.raises(ParameterError, match=said):
         list_contacts(motion(part(whole, np.arange(whole.samples)[chosen]), "ur5"))
 
 
-def test_four_hands_on_a_held_pose_with_free_motion_and_without(logs: Path) -> None:
+def test_four_hands_on_a_held_pose_with_free_motion_and_without(logs):
     free, push = ur10e(logs, "free_14harm.csv"), ur10e(logs, "push_pose.csv")
     alone, found = (list_contacts(motion(push, "ur10e", run=run)) for run in (None, free))
     # The pushes by eye, from the joint torques.
@@ -150,7 +148,7 @@ def test_four_hands_on_a_held_pose_with_free_motion_and_without(logs: Path) -> N
     assert "wrist" not in (third.where, fourth.where)
 
 
-def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
+def test_a_payload_hung_on_a_moving_arm_is_one_load():
     """The free circle of 4 s four times over, with 2.8 kg from 4.1 s on, at 31 Hz."""
     whole, robot = read(FIXTURES / "ur5_circle.csv"), load_robot("ur5")
     rows = np.tile(np.arange(0, 500, 4), 4)
@@ -177,7 +175,7 @@ def test_a_payload_hung_on_a_moving_arm_is_one_load() -> None:
     assert row.vendor_force == pytest.approx(2.8 * 9.81, rel=1e-4)
 
 
-def test_a_payload_nobody_reported_is_one_load(logs: Path) -> None:
+def test_a_payload_nobody_reported_is_one_load(logs):
     free = ur10e(logs, "free_14harm.csv")
     found = list_contacts(motion(ur10e(logs, "load_14harm.csv"), "ur10e", run=free))
     (row,) = found.contacts
@@ -190,7 +188,7 @@ def test_a_payload_nobody_reported_is_one_load(logs: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["free_12harm.csv", "free_10harm.csv.gz", "free_repeat_b.csv"])
-def test_free_motion_lists_nothing(logs: Path, name: str) -> None:
+def test_free_motion_lists_nothing(logs, name):
     free = ur10e(logs, "free_14harm.csv")
     found = list_contacts(motion(ur10e(logs, name), "ur10e", run=free))
     assert not found.contacts
@@ -203,7 +201,7 @@ def test_free_motion_lists_nothing(logs: Path, name: str) -> None:
     ["free_12harm.csv", "free_10harm.csv.gz", "free_repeat_a.csv", "jointwise_2.csv",
      "load_14harm.csv"],
 )  # fmt: skip
-def test_motion_of_which_nothing_is_named_lists_nothing(logs: Path, name: str) -> None:
+def test_motion_of_which_nothing_is_named_lists_nothing(logs, name):
     found = list_contacts(motion(ur10e(logs, name), "ur10e"))
     assert found.basis in {"whole log", "friction"}
     assert not found.contacts
@@ -215,12 +213,12 @@ def test_motion_of_which_nothing_is_named_lists_nothing(logs: Path, name: str) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["identification", "repeat_a", "repeat_b"])
-def test_another_arm_that_nobody_touches_lists_nothing(logs: Path, name: str) -> None:
+def test_another_arm_that_nobody_touches_lists_nothing(logs, name):
     recording = read(logs / "ur3" / f"{name}.bag", columns="-tau")
     assert not list_contacts(motion(recording, "ur3")).contacts
 
 
-def test_without_friction_and_free_motion_no_contact_is_listed() -> None:
+def test_without_friction_and_free_motion_no_contact_is_listed():
     """Inverse dynamics by Pinocchio, friction of 8 N·m that the model lacks, nobody touches."""
     _, log = moving_arm(6, friction=8.0)
     found = list_contacts(FreeMotion(log=log))
@@ -230,7 +228,7 @@ def test_without_friction_and_free_motion_no_contact_is_listed() -> None:
 
 
 @pytest.mark.slow
-def test_inferred_rows_are_never_good_unless_something_checks_them() -> None:
+def test_inferred_rows_are_never_good_unless_something_checks_them():
     plain = motion(read(FIXTURES / "ur5_sensor.parquet"), "ur5")
     found = list_contacts(plain)
     assert len(found.contacts) == 5
@@ -256,7 +254,7 @@ def moving_arm(joints: int, friction: float = 0.0) -> tuple[Robot, Run]:
     return robot, Run(recording=recording, robot=robot)
 
 
-def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
+def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons():
     """12 N·m on joint 2 from 6 to 7 s."""
     robot, log = moving_arm(3)
     recording = log.recording
@@ -277,7 +275,7 @@ def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
 
 
 @pytest.mark.slow
-def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
+def test_a_load_that_stays_to_the_end_of_the_log_is_listed():
     """The bearing of 9.2 N hangs from 4 s on; its mean is within its band.
 
     A wrench that wanders within a second pays for every block of a load that lasts 5 s.
@@ -293,7 +291,7 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
 
 
 @pytest.mark.slow
-def test_pushes_whose_ends_the_models_error_hides_keep_their_size() -> None:
+def test_pushes_whose_ends_the_models_error_hides_keep_their_size():
     """Slow pushes, nothing free named: between their listed ends alone they look 10 % smaller.
 
     Of 590 rows of other seeds and arms .985 hold the truth: of these six one may not.
@@ -311,7 +309,7 @@ def test_pushes_whose_ends_the_models_error_hides_keep_their_size() -> None:
     )
 
 
-def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
+def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap():
     """Every second sample of a log at 125 Hz."""
     whole = read(FIXTURES / "ur5_taps_ur_rtde.csv")
     slow = list_contacts(motion(part(whole, np.arange(0, whole.samples, 2)), "ur5", "0.3:4"))
@@ -324,7 +322,7 @@ def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
 
 
 @pytest.mark.parametrize("name", ["press_1", "press_4"])
-def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs: Path, name: str) -> None:
+def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs, name):
     """Pressed for most of the log, with free motion before and behind."""
     columns = "t=t,q=q{i},dq=dq{i},tau=tau{i},tau_ext=tau_ext{i}"
     recording = read(logs / "panda_press" / f"{name}.csv.gz", columns=columns)
@@ -333,9 +331,7 @@ def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs: Path, name: s
 
 
 @pytest.mark.slow
-def test_an_arm_whose_friction_is_unknown_lists_pushes_and_nothing_below_what_shows(
-    logs: Path,
-) -> None:
+def test_an_arm_whose_friction_is_unknown_lists_pushes_and_nothing_below_what_shows(logs):
     """Three pushes of 15 to 25 N by a joint friction of 1.1 N·m that `fr3` does not have."""
     log = read(logs / "libfranka_sim" / "pushes.csv.gz")
     found = list_contacts(motion(log, "fr3"))
@@ -348,7 +344,7 @@ def test_an_arm_whose_friction_is_unknown_lists_pushes_and_nothing_below_what_sh
         assert row.peak_force >= min(found.smallest_force, row.place_band)
 
 
-def test_a_row_without_a_size_belongs_to_the_one_that_it_adjoins() -> None:
+def test_a_row_without_a_size_belongs_to_the_one_that_it_adjoins():
     """The tail of a push reads 13 ± 29 N; two pushes of different directions both have a size."""
     hard, tail = contact(), contact(peak_force=13.0, peak_band=29.0)
     runs = [(10, 40), (41, 80), (90, 120)]

@@ -54,9 +54,7 @@ def aside(degrees: float) -> np.ndarray:
         ([(0.98, 19.0)], [DOWN], True),
     ],
 )
-def test_a_load_is_one_force_for_most_of_the_motion(
-    spans: list[tuple[float, float]], forces: list[np.ndarray], expected: bool
-) -> None:
+def test_a_load_is_one_force_for_most_of_the_motion(spans, forces, expected):
     rows = tuple(
         replace(contact(), start=start, stop=stop, mean_force=force)
         for (start, stop), force in zip(spans, forces, strict=True)
@@ -65,7 +63,7 @@ def test_a_load_is_one_force_for_most_of_the_motion(
 
 
 @pytest.mark.parametrize(("start", "is_one"), [(0.98, True), (1.02, False)])
-def test_a_push_may_begin_with_the_log(start: float, is_one: bool) -> None:
+def test_a_push_may_begin_with_the_log(start, is_one):
     """The arm rests until 4 s."""
     t = 0.01 * np.arange(2000)
     dq = np.where(t > 4.0, 0.3, 0.0)[:, None]

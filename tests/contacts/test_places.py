@@ -11,7 +11,7 @@ Q = np.array([0.3, -1.2, 1.6, -1.9, -1.4, 0.5])
 
 
 @pytest.mark.parametrize("link", [2, 3, 4])
-def test_a_points_jacobian_is_how_it_moves(link: int) -> None:
+def test_a_points_jacobian_is_how_it_moves(link):
     """Against Pinocchio's Jacobian of a frame at the same point."""
     import pinocchio as pin
 
@@ -28,7 +28,7 @@ def test_a_points_jacobian_is_how_it_moves(link: int) -> None:
     )
 
 
-def test_every_link_belongs_to_a_part() -> None:
+def test_every_link_belongs_to_a_part():
     assert [arm_parts(6)[k] for k in range(7)] == [
         "wrist", "upper arm", "upper arm", "forearm", "wrist", "wrist", "wrist",
     ]  # fmt: skip
@@ -37,7 +37,7 @@ def test_every_link_belongs_to_a_part() -> None:
     ]  # fmt: skip
 
 
-def test_a_force_on_the_forearm_is_distinct_from_one_on_the_flange() -> None:
+def test_a_force_on_the_forearm_is_distinct_from_one_on_the_flange():
     chain = load_robot("ur5").chain
     force = np.array([20.0, -40.0, 30.0])
     for link, share in ((3, 0.5), (6, 1.0)):
@@ -53,7 +53,7 @@ def test_a_force_on_the_forearm_is_distinct_from_one_on_the_flange() -> None:
     assert parts == {"wrist"}
 
 
-def test_a_force_and_its_band_are_drawn_to_zero_by_the_prior_of_100_N() -> None:
+def test_a_force_and_its_band_are_drawn_to_zero_by_the_prior_of_100_N():
     """Against least squares with three more rows, 0 = F/100, for torques of 30 N·m sd."""
     chain, sd = load_robot("ur5").chain, 30.0
     torque = np.array([10.0, -60.0, -30.0, 20.0, 5.0, 0.0])

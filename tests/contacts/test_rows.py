@@ -38,13 +38,13 @@ from vftcli.wrench.smoother import hidden_by_blocks
     ],
 )
 def test_a_force_within_its_band_needs_sure_evidence_and_what_shows(
-    force: float, evidence: float | None, smallest: float, shows: bool
-) -> None:
+    force, evidence, smallest, shows
+):
     row = contact(peak_force=force, peak_band=90.0, place_band=30.0, evidence=evidence)
     assert shows_force(row, smallest) == shows
 
 
-def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
+def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does():
     d = drawn(60, np.random.default_rng(8))
     log = blocks(d, np.full_like(d, 0.5))
     hidden = (np.arange(60) > 20) & (np.arange(60) < 30)
@@ -63,11 +63,11 @@ def still(**signals: object) -> Run:
     """A UR5 that holds a pose for a second, with further signals."""
     t = 0.01 * np.arange(100)
     q = np.tile([0.3, -1.2, 1.6, -1.9, -1.4, 0.5], (100, 1))
-    recording = Recording(t=t, q=q, dq=np.zeros_like(q), torque=np.zeros_like(q), **signals)  # type: ignore[arg-type]
+    recording = Recording(t=t, q=q, dq=np.zeros_like(q), torque=np.zeros_like(q), **signals)
     return Run(recording=recording, robot=load_robot("ur5"))
 
 
-def test_the_logs_own_torque_and_wrench_are_forces_beside_a_row() -> None:
+def test_the_logs_own_torque_and_wrench_are_forces_beside_a_row():
     plain = still()
     J = flange_jacobian(plain.robot.chain, plain.recording.q)[0]
     torque = np.tile(J.T @ [3.0, 4.0, 12.0, 0.0, 0.0, 0.0], (100, 1))
@@ -80,7 +80,7 @@ def test_the_logs_own_torque_and_wrench_are_forces_beside_a_row() -> None:
     assert sensor_force(still(wrench=0.0 * wrench), 0.5) is None
 
 
-def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
+def test_a_row_on_a_link_has_its_moment_about_the_flange():
     """A fixture's rows: what joints 1 to 6 feel is Jᵀ of the wrench at the flange."""
     recording = read(FIXTURES / "ur5_taps_ur_rtde.csv")
     truth = pl.read_parquet(FIXTURES / "ur5_taps_ur_rtde.csv.truth.parquet")
@@ -121,7 +121,7 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
     assert 5.0 < tap.peak_band < 12.0
 
 
-def test_a_size_is_as_sure_as_its_place() -> None:
+def test_a_size_is_as_sure_as_its_place():
     def fit(link: int, size: float, score: float, share: float = 0.5) -> PointFit:
         force = np.array([size, 0.0, 0.0])
         return PointFit(link=link, share=share, misfit=0.0, score=score, force=force, band=1.0)
@@ -139,7 +139,7 @@ def test_a_size_is_as_sure_as_its_place() -> None:
     assert less.spread(40.0) == pytest.approx(20.0 * np.sqrt(np.exp(-2) / (1 + np.exp(-2))))
 
 
-def test_where_no_point_force_fits_the_links_are_those_that_a_moment_may_have_touched() -> None:
+def test_where_no_point_force_fits_the_links_are_those_that_a_moment_may_have_touched():
     """A χ² beyond 20 is no point force: its size at other places says nothing either."""
     force = np.array([60.0, 0.0, 0.0])
     odd = PointFit(link=3, share=0.5, misfit=21.0, score=30.0, force=force, band=1.0)
@@ -150,7 +150,7 @@ def test_where_no_point_force_fits_the_links_are_those_that_a_moment_may_have_to
     assert (fits.links, fits.sizes(40.0, 5.0)) == ((3,), (35.0, 61.0))
 
 
-def test_a_course_bears_the_band_along_its_force() -> None:
+def test_a_course_bears_the_band_along_its_force():
     t = np.array([1.0, 2.0])
     force = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
     covariance = np.tile(np.diag([4.0, 9.0, 25.0]), (2, 1, 1))

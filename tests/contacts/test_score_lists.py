@@ -94,7 +94,7 @@ def reached(name: str, seeds: tuple[int, ...] = SEEDS) -> Figures:
 
 
 @pytest.mark.statistical
-def test_simulated_pushes_are_listed_one_by_one_and_hardly_ever_placed_elsewhere() -> None:
+def test_simulated_pushes_are_listed_one_by_one_and_hardly_ever_placed_elsewhere():
     nine = [reached(name) for name in NINE]
     true, found = sum(each["true"] for each in nine), sum(each["found"] for each in nine)
     assert found >= 0.97 * true
@@ -125,7 +125,7 @@ def test_simulated_pushes_are_listed_one_by_one_and_hardly_ever_placed_elsewhere
         ("ur5-drag", "false", 1),
     ],
 )
-def test_a_list_errs_by_no_more_than_its_bar(name: str, figure: str, bar: float) -> None:
+def test_a_list_errs_by_no_more_than_its_bar(name, figure, bar):
     assert reached(name)[figure] <= bar
 
 
@@ -134,7 +134,7 @@ def test_a_list_errs_by_no_more_than_its_bar(name: str, figure: str, bar: float)
     ("name", "bar"),
     [("ur5-circle", 0.93), ("ur5-table1", 0.95), ("taps", 0.88), ("panda-bearing", 0.80)],
 )
-def test_a_peak_lies_in_its_band(name: str, bar: float) -> None:
+def test_a_peak_lies_in_its_band(name, bar):
     assert reached(name)["held"] >= bar
 
 
@@ -150,12 +150,12 @@ def test_a_peak_lies_in_its_band(name: str, bar: float) -> None:
         ("ur5-sensor", slice(3), 0.80),
     ],
 )
-def test_bands_of_best_hold_in_contact(name: str, axes: slice, bar: float) -> None:
+def test_bands_of_best_hold_in_contact(name, axes, bar):
     assert np.all(reached(name)["axes"][axes] >= bar)
 
 
 @pytest.mark.statistical
-def test_knocks_shorter_than_the_blocks_keep_most_of_their_peaks_and_a_band() -> None:
+def test_knocks_shorter_than_the_blocks_keep_most_of_their_peaks_and_a_band():
     """Knocks of 40 to 120 ms: blocks of 24 ms lost a fifth of the peak, and held one in five."""
     knocked = reached("knocks", (51,))
     assert knocked["peak_mean"] > -13.0
@@ -163,6 +163,6 @@ def test_knocks_shorter_than_the_blocks_keep_most_of_their_peaks_and_a_band() ->
 
 
 @pytest.mark.statistical
-def test_drags_a_tenth_of_a_second_apart_are_rows_of_their_own() -> None:
+def test_drags_a_tenth_of_a_second_apart_are_rows_of_their_own():
     """Beside a free part at rest, from different sides: 12 of 15; they were six rows."""
     assert reached("ur5-sensor")["found"] >= 12

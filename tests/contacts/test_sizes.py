@@ -28,9 +28,7 @@ from vftcli.wrench.smoother import BlockLog, Lane, in_blocks
         (6, 10.0, 20.0, 0.0, [(0, 26)]),  # noise hides the force
     ],
 )
-def test_two_pushes_are_split_where_force_and_torque_pause(
-    pause: int, force: float, sd: float, felt: float, pieces: list[tuple[int, int]]
-) -> None:
+def test_two_pushes_are_split_where_force_and_torque_pause(pause, force, sd, felt, pieces):
     """Ten blocks of 30 N and ten of 40 N along x; joint 1 feels the force, joint 4 so much more."""
     size = [30.0] * 10 + [force] * pause + [40.0] * 10
     count = len(size)
@@ -41,7 +39,7 @@ def test_two_pushes_are_split_where_force_and_torque_pause(
     assert found == pieces
 
 
-def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
+def test_a_drawn_wrench_is_measured_and_its_prior_learned():
     """Twelve pushes drawn with σ_f = 30 N, a random well-posed Jacobian, little noise."""
     rng = np.random.default_rng(7)
     count, runs = 900, [(start, start + 20) for start in range(50, 850, 66)]
@@ -77,7 +75,7 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
         assert np.mean(np.abs(inside.values - true[slice(*run)]) < 1.96 * sd) > 0.85
 
 
-def test_two_blocks_say_what_all_quiet_ones_beside_a_contact_do() -> None:
+def test_two_blocks_say_what_all_quiet_ones_beside_a_contact_do():
     """Evidence and wrench are those of the window with every block of it."""
     rng = np.random.default_rng(4)
     count, runs = 160, [(0, 12), (50, 70), (84, 92), (140, 160)]
@@ -111,7 +109,7 @@ def test_two_blocks_say_what_all_quiet_ones_beside_a_contact_do() -> None:
         np.testing.assert_allclose(short.covariance, long.covariance, rtol=1e-6, atol=1e-7)
 
 
-def test_pushes_from_different_sides_are_two_contacts() -> None:
+def test_pushes_from_different_sides_are_two_contacts():
     t = B * np.arange(200)
     force = np.zeros((200, 3))
     force[:100, 0] = 40.0 * np.sin(np.pi * np.arange(100) / 100)

@@ -19,9 +19,7 @@ def log(speed: Array) -> Recording:
     return Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, torque=np.zeros_like(dq))
 
 
-def braked(
-    left: float = 0.0, speed: float = 0.3, after: float = 2.0, again: float = 9.0
-) -> Array:
+def braked(left=0.0, speed=0.3, after=2.0, again=9.0) -> Array:
     """A joint's speed: a brake at 2 s leaves it to ring with so much; it may start again."""
     ringing = left * np.cos(np.pi * 50.0 * T)
     return np.where((after > T) | (again < T), speed, ringing)
@@ -61,13 +59,11 @@ def braked(
         (braked(), -0.2, 0.2, False),
     ],
 )
-def test_a_brief_row_where_the_arm_comes_to_rest_is_a_stop(
-    speed: Array, start: float, lasts: float, stops: bool
-) -> None:
+def test_a_brief_row_where_the_arm_comes_to_rest_is_a_stop(speed, start, lasts, stops):
     assert follows_stop(log(speed), (start, start + lasts), 0.05) is stops
 
 
-def test_a_joint_that_moves_on_is_no_stop() -> None:
+def test_a_joint_that_moves_on_is_no_stop():
     stopped = log(braked())
     both = np.column_stack([stopped.require("dq")[:, 0], np.full(400, 0.3), 0.0 * T])
     moving = Recording(t=T, q=stopped.q, dq=both, torque=stopped.torque)
@@ -88,9 +84,7 @@ def test_a_joint_that_moves_on_is_no_stop() -> None:
         (4.81, 5.5, 0.3, False),
     ],
 )
-def test_an_arm_rests_around_a_contact_from_3_to_4_s(
-    start: float, stop: float, speed: float, rests: bool
-) -> None:
+def test_an_arm_rests_around_a_contact_from_3_to_4_s(start, stop, speed, rests):
     """One joint moves from `start` to `stop`, the other never."""
     t = 0.01 * np.arange(700)
     moving = np.where((t >= start) & (t < stop), speed, 0.0)
@@ -98,4 +92,4 @@ def test_an_arm_rests_around_a_contact_from_3_to_4_s(
     nothing = np.zeros((300, 2))
     found = SimpleNamespace(log=SimpleNamespace(blocks=blocks(nothing, nothing)))
     span = round(3.0 / B), round(4.0 / B)
-    assert rests_around(run, found, span) is rests  # type: ignore[arg-type]
+    assert rests_around(run, found, span) is rests

@@ -11,7 +11,7 @@ from vftcli.contacts.thresholds import BLOCK, SETTLING, block_maxima, events, ta
 from vftcli.signals.errors import ParameterError
 
 
-def test_the_interval_holds_the_analytic_level_as_often_as_it_says() -> None:
+def test_the_interval_holds_the_analytic_level_as_often_as_it_says():
     """300 quarters of an hour (k = 30): .95 ± .025 by count, less what u's own error takes."""
     rng, held = np.random.default_rng(2), 0
     for _ in range(300):
@@ -22,14 +22,14 @@ def test_the_interval_holds_the_analytic_level_as_often_as_it_says() -> None:
     assert 0.88 <= held / 300 <= 0.99
 
 
-def test_few_maxima_tell_a_fifth_of_them_and_four_tell_nothing() -> None:
+def test_few_maxima_tell_a_fifth_of_them_and_four_tell_nothing():
     assert tail_of(np.arange(4.0)) is None
     tail = tail_of(np.arange(60.0))
     # The twelve largest of 0 … 59 lie 1 … 12 beyond the next, 47.
     assert (tail.size, tail.start, tail.excess) == (12, 47.0, 6.5)
 
 
-def test_the_lower_end_of_one_maximum_is_the_level_it_lies_beyond() -> None:
+def test_the_lower_end_of_one_maximum_is_the_level_it_lies_beyond():
     tail = tail_of(np.array([1.0, 1.0, 2.0, 3.0, 5.0]))
     assert tail.size == 1
     value, (low, high) = tail.threshold(tail.rate / np.e)
@@ -38,7 +38,7 @@ def test_the_lower_end_of_one_maximum_is_the_level_it_lies_beyond() -> None:
     assert high == pytest.approx(5.0 + 1.96 * 2.0, rel=1e-12)
 
 
-def test_what_happens_more_often_than_the_tail_is_read_off_the_maxima() -> None:
+def test_what_happens_more_often_than_the_tail_is_read_off_the_maxima():
     """Of 3600 maxima 0 … 3599 the level 100 an hour is the hundredth largest, 3500."""
     tail = tail_of(np.arange(3600.0))
     with pytest.raises(ParameterError, match="at most 1800"):
@@ -52,7 +52,7 @@ def test_what_happens_more_often_than_the_tail_is_read_off_the_maxima() -> None:
     assert few.threshold(2.0 / few.hours) == (3.0, (1.0, 5.0))
 
 
-def test_block_maxima_are_those_of_a_loop() -> None:
+def test_block_maxima_are_those_of_a_loop():
     """A jittering clock of 50 Hz with a gap of 3 s and a stretch that is not known."""
     rng = np.random.default_rng(3)
     t = np.cumsum(rng.uniform(0.015, 0.025, 1000))
@@ -70,7 +70,7 @@ def test_block_maxima_are_those_of_a_loop() -> None:
     assert len(block_maxima(t[:60], level[:60])) == 0  # it ends while it settles
 
 
-def test_passages_less_than_half_a_second_apart_are_one_event() -> None:
+def test_passages_less_than_half_a_second_apart_are_one_event():
     t = np.arange(0.0, 10.0, 0.1)
     level = np.zeros(100)
     # At 1 s it still settles; 4.0 and 4.4 s are one, 5.0 s is another; what is not known is none.

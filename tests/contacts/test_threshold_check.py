@@ -62,7 +62,7 @@ def truth() -> tuple[ExternalTorque, Wrench]:
     )
 
 
-def test_every_contact_is_detected_or_missed_with_its_delay_and_force() -> None:
+def test_every_contact_is_detected_or_missed_with_its_delay_and_force():
     """J2 at 10 N·m tells 20 and 12.5 N·m and not 5; each begins a lag of .1 s after the truth."""
     check = check_contacts(estimated(), limits(10.0, 1e3), *truth())
     assert [c.by for c in check.contacts] == ["J2", "", "J2"]
@@ -77,26 +77,26 @@ def test_every_contact_is_detected_or_missed_with_its_delay_and_force() -> None:
     assert check.reference == "file:truth"
 
 
-def test_an_axis_tells_what_no_joint_does() -> None:
+def test_an_axis_tells_what_no_joint_does():
     check = check_contacts(estimated(), limits(1e3, 20.0), *truth())
     assert [c.by for c in check.contacts] == ["fz", "", "fz"]
 
 
-def test_an_alarm_where_nothing_touches_is_false() -> None:
+def test_an_alarm_where_nothing_touches_is_false():
     spike = np.where(np.abs(T - 12.0) < 0.05, 99.0, 0.0)
     check = check_contacts(estimated(spike), limits(10.0, 1e3), *truth())
     assert check.false_alarms == 1
     assert [c.by for c in check.contacts] == ["J2", "", "J2"]
 
 
-def test_without_a_wrench_the_force_is_not_known() -> None:
+def test_without_a_wrench_the_force_is_not_known():
     torque, _ = truth()
     check = check_contacts(estimated(), limits(10.0, 1e3), torque, None)
     assert np.isnan(check.smallest_detected)
     assert len(check.detected) == 2
 
 
-def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated() -> None:
+def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated():
     check = check_contacts(estimated(), limits(10.0, 1e3), None, None)
     assert [round(c.start, 6) for c in check.contacts] == [5.1, 14.1]
     assert [c.peak_force for c in check.contacts] == [40.0, 25.0]
@@ -106,7 +106,7 @@ def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated() -> None:
     assert [remark.code for remark in check.remarks] == ["check-without-truth"]
 
 
-def test_nothing_detected_and_nothing_there() -> None:
+def test_nothing_detected_and_nothing_there():
     check = check_contacts(estimated(), limits(1e3, 1e3), *truth())
     assert check.detected == ()
     assert np.isnan(check.median_delay)
@@ -114,7 +114,7 @@ def test_nothing_detected_and_nothing_there() -> None:
     assert check.largest_missed == 40.0
 
 
-def test_an_alarm_that_stays_on_detects_nothing_new() -> None:
+def test_an_alarm_that_stays_on_detects_nothing_new():
     """J1 stays at 99 N·m from the first push on, as a joint at rest keeps its stiction."""
     stays = np.where(T >= 5.2, 99.0, 0.0)
     check = check_contacts(estimated(stays), limits(1e2, 1e3), *truth())

@@ -16,15 +16,7 @@ RATE = 10.0
 """Samples a second. [Hz]"""
 
 
-def free_log(
-    name: str,
-    seconds: float,
-    scale: float = 1.0,
-    *,
-    seed: int = 0,
-    joints: int = 6,
-    axes: int = 6,
-) -> ComparedSignals:
+def free_log(name, seconds, scale=1.0, *, seed=0, joints=6, axes=6) -> ComparedSignals:
     """Joints and axes of exponential noise whose mean is `scale`. [N·m, N]"""
     rng = np.random.default_rng(seed)
     t = np.arange(round(seconds * RATE)) / RATE
@@ -49,7 +41,7 @@ def codes(thresholds: Thresholds) -> list[str]:
     return [remark.code for remark in thresholds.remarks]
 
 
-def test_every_signal_of_a_set_has_its_share_of_the_rate() -> None:
+def test_every_signal_of_a_set_has_its_share_of_the_rate():
     """An hour of exponential noise of 2 N·m: of rate 6, one an hour a joint, 2 ln 36 000 = 21.0.
 
     k = 60 of them know the distance from λ = 60 an hour, 2 ln 60, to 13 %; 3 sd are allowed.
@@ -65,7 +57,7 @@ def test_every_signal_of_a_set_has_its_share_of_the_rate() -> None:
 
 
 @pytest.mark.statistical
-def test_an_unseen_half_passes_the_thresholds_at_the_stated_rate() -> None:
+def test_an_unseen_half_passes_the_thresholds_at_the_stated_rate():
     """30 pairs of hours at 12 per hour: 360 are due; events nearer than .5 s hardly take any.
 
     Each count scatters by √12, each threshold by e-folds of ln(30)/√60 beside it: 360 ± 30 %.
@@ -80,7 +72,7 @@ def test_an_unseen_half_passes_the_thresholds_at_the_stated_rate() -> None:
     assert 250 <= counted <= 470
 
 
-def test_the_worst_day_counts_and_not_the_mean() -> None:
+def test_the_worst_day_counts_and_not_the_mean():
     calm, rough = free_log("calm", 600.0, 1.0), free_log("rough", 600.0, 3.0, seed=1)
     alone = find_thresholds([rough], 1.0)
     both = find_thresholds([calm, rough], 1.0)
@@ -88,7 +80,7 @@ def test_the_worst_day_counts_and_not_the_mean() -> None:
     assert {one.log for one in both.joints} == {"rough"}
 
 
-def test_a_short_log_beside_a_long_one_counts_by_its_largest_reading() -> None:
+def test_a_short_log_beside_a_long_one_counts_by_its_largest_reading():
     long, short = free_log("long", 600.0), free_log("short", 12.0, 40.0, seed=1)
     found = find_thresholds([long, short], 1.0)
     settled = short.t >= 2.0
@@ -98,14 +90,14 @@ def test_a_short_log_beside_a_long_one_counts_by_its_largest_reading() -> None:
     assert "free-log-too-short" in codes(found)
 
 
-def test_short_logs_alone_tell_a_guess_and_say_so() -> None:
+def test_short_logs_alone_tell_a_guess_and_say_so():
     found = find_thresholds([free_log("a", 12.0), free_log("b", 12.0, seed=1)], 60.0)
     assert "tail-of-few" in codes(found)
     assert all(one.tail is not None and one.tail.size == 2 for one in found.joints)
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(3602.0, True), (3 * 3600.0 + 2.1, False)])
-def test_a_log_shorter_than_three_false_alarms_extrapolates(seconds: float, said: bool) -> None:
+def test_a_log_shorter_than_three_false_alarms_extrapolates(seconds, said):
     found = find_thresholds([free_log("a", seconds, joints=2, axes=0)], 1.0)
     assert ("thresholds-extrapolated" in codes(found)) is said
     for remark in (r for r in found.remarks if r.code == "thresholds-extrapolated"):
@@ -113,7 +105,7 @@ def test_a_log_shorter_than_three_false_alarms_extrapolates(seconds: float, said
         assert rates == {"rate_per_h": 1.0, "own_rate_per_h": 0.5, "need_h": 3.0}
 
 
-def test_a_wrench_that_is_hardly_known_gives_no_axes_and_is_said() -> None:
+def test_a_wrench_that_is_hardly_known_gives_no_axes_and_is_said():
     log = free_log("a", 600.0)
     wrench = np.where(log.t[:, None] < 5.0, log.wrench, np.nan)
     found = find_thresholds([compared("a", log.t, log.torque, wrench)], 1.0)
@@ -121,7 +113,7 @@ def test_a_wrench_that_is_hardly_known_gives_no_axes_and_is_said() -> None:
     assert {"axes-unknown", "wrench-seldom-known"} <= set(codes(found))
 
 
-def test_an_axis_wider_than_its_value_is_no_threshold_and_says_how_much_more() -> None:
+def test_an_axis_wider_than_its_value_is_no_threshold_and_says_how_much_more():
     """A minute: k = 11 readings know e to 59 %; moments of 1 N·m ride on an offset, forces do not.
 
     From 1 an hour, 1/6 an axis, e ln(λ·6) = 8.2 e beyond u = 1.6 e + ln 10 e: 95 % is 9.7 e wide
@@ -142,7 +134,7 @@ def test_an_axis_wider_than_its_value_is_no_threshold_and_says_how_much_more() -
     assert not any(one.is_wide for one in more.axes)
 
 
-def test_every_log_is_counted_at_the_thresholds_of_the_others() -> None:
+def test_every_log_is_counted_at_the_thresholds_of_the_others():
     calm, rough = free_log("calm", 600.0), free_log("rough", 600.0, 3.0, seed=1)
     of_calm, of_rough = left_out([calm, rough], 60.0)
     assert (of_calm.log, of_calm.any_joint) == ("calm", 0)
@@ -166,14 +158,12 @@ LOG = free_log("a", 600.0)
         ([LOG, LOG._replace(of_vendor=False)], 1.0, "recorded alike"),
     ],
 )
-def test_what_tells_no_threshold_is_refused(
-    logs: list[ComparedSignals], rate: float, said: str
-) -> None:
+def test_what_tells_no_threshold_is_refused(logs, rate, said):
     with pytest.raises(ParameterError, match=said):
         find_thresholds(logs, rate)
 
 
-def test_a_joint_that_never_moved_alarms_at_whatever_it_reads() -> None:
+def test_a_joint_that_never_moved_alarms_at_whatever_it_reads():
     log = free_log("a", 600.0)
     still = compared("a", log.t, np.zeros(log.torque.shape), log.wrench)
     found = find_thresholds([still], 1.0)
@@ -182,6 +172,6 @@ def test_a_joint_that_never_moved_alarms_at_whatever_it_reads() -> None:
     assert np.all(found.level("joints", log) > 1.0)
 
 
-def test_an_arm_of_few_joints_has_no_axes() -> None:
+def test_an_arm_of_few_joints_has_no_axes():
     found = find_thresholds([free_log("a", 600.0, joints=4, axes=0)], 1.0)
     assert (len(found.joints), found.axes, found.force) == (4, (), ())

@@ -21,14 +21,7 @@ def carrying(robot: Robot, load: float) -> Robot:
     return robot.with_payload(Payload(mass=load, com=com, inertia=np.zeros((3, 3))))
 
 
-def moving(
-    name: str = "ur10e",
-    *,
-    load: float = 0.0,
-    seconds: float = 12.0,
-    up: Array | None = None,
-    seed: int = 0,
-) -> Recording:
+def moving(name="ur10e", *, load=0.0, seconds=12.0, up=None, seed=0) -> Recording:
     """An arm that moves by its own dynamics, with Coulomb friction, measured by its own signal.
 
     Torque by the momentum equation: ṗ by central differences of p, exact to the order of the step

@@ -1,14 +1,12 @@
 """Faults planted one at a time in sound logs, as plain tables of signals.
 
 A maker takes a `Table` and its own amounts and gives back the faulty one; it knows nothing of what
-the doctor looks for. `KINDS` says which codes name what it makes, and with which other amounts it
-is tried; `FAULTS` is the list of 34 that the doctor is held against.
+the doctor looks for. `FAULTS` is the list of 34 that the doctor is held against.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +17,9 @@ from scipy.signal import lfilter
 from vftcli.robots import Payload, Robot, load_robot
 from vftcli.robots.kernels import chain_parameters, momentum_terms, torque_regressor
 from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
+from vftcli.simulation import load_scenario, simulate
 
 Signals = ("q", "dq", "effort", "tau_ext")
 NEIGHBOURS = {"ur10e": "ur5", "ur5": "ur10e", "panda": "fr3"}
@@ -111,8 +112,8 @@ def edited(signal: Array, joint: int, values: Any) -> Array:
 # The arm, its order and its signs
 
 
-def wrong_robot(table: Table, given: str = "") -> Table:
-    return replace(table, given=given or NEIGHBOURS[table.robot])
+def wrong_robot(table: Table) -> Table:
+    return replace(table, given=NEIGHBOURS[table.robot])
 
 
 def turned(table: Table, signals: tuple[str, ...], joint: int = 2) -> Table:
@@ -159,14 +160,10 @@ def without_gravity(table: Table) -> Table:
     return replace(table, effort=torque, signal="tau")
 
 
-def mounted(table: Table, angle: float, about: float = 0.0) -> Table:
-    """The base turned by `angle` about a level axis `about` from x. [degrees]"""
-    chain = table.arm.chain
-    tilt, heading = np.deg2rad(angle), np.deg2rad(about)
-    axis = np.array([np.cos(heading), np.sin(heading), 0.0])
-    down = np.asarray(chain.gravity)
-    # Rodrigues; the axis is level and gravity upright, so their product along the axis is zero.
-    turned = np.cos(tilt) * down + np.sin(tilt) * np.cross(axis, down)
+def mounted(table: Table, angle: float) -> Table:
+    """The base turned by `angle` about x. [degrees]"""
+    tilt, down = np.deg2rad(angle), np.asarray(table.arm.chain.gravity)
+    turned = np.cos(tilt) * down + np.sin(tilt) * np.cross([1.0, 0.0, 0.0], down)
     more = gravity_torque(table, table.arm, turned) - gravity_torque(table, table.arm)
     return with_more_torque(table, more)
 
@@ -181,9 +178,7 @@ def acceleration(table: Table) -> Array:
     )
 
 
-def payload(
-    table: Table, mass: float = 2.8, com: tuple[float, float, float] = (0.0, 0.0, 0.05)
-) -> Table:
+def payload(table, mass=2.8, com=(0.0, 0.0, 0.05)) -> Table:
     """A load that nobody names, its weight and its inertia."""
     load = Payload(mass=mass, com=np.array(com), inertia=0.002 * mass * np.eye(3))
     chain = table.arm.loaded_chain
@@ -291,226 +286,102 @@ def nan_burst(table: Table, rows: int = 30) -> Table:
 
 
 Maker = Callable[[Table], Table]
+READER = ""
+"""Stands among the codes for a refusal by the reader, which names the fault in words."""
 
 
 class Fault(NamedTuple):
     """A fault that is planted."""
 
     plant: Maker
-    codes: tuple[str, ...]  # of the findings that name it; "" for a refusal by the reader
+    codes: tuple[str, ...]  # of the findings that name it
     joints: tuple[int, ...] = ()  # from 1, that a finding which tells joints has to tell
-    signal: str = ""  # the effort that a log must have, "" for any; or "tau_ext"
+    signal: str = ""  # the effort that a log must have, "" for any
 
-
-class Kind(NamedTuple):
-    """A kind of fault: its maker takes amounts."""
-
-    maker: Callable[..., Table]
-    codes: tuple[str, ...]
-    #: Amount → the values that are tried; with () every joint, some pairs of them, or every other
-    #: arm of as many joints.
-    amounts: Mapping[str, tuple[Any, ...]] = {}
-    signal: str = ""
-
-    def fault(self, **amounts: Any) -> Fault:
-        """The fault of some amounts; of joints that are among them a finding must tell."""
-        one = (amounts["joint"],) if "joint" in amounts else ()
-        joints = amounts.get("pair", one)
-        return Fault(partial(self.maker, **amounts), self.codes, joints, self.signal)
-
-
-READER = ""
-"""Stands among the codes for a refusal by the reader, which names the fault in words."""
-
-EACH: Mapping[str, tuple[Any, ...]] = {"joint": ()}
-PAIRS: Mapping[str, tuple[Any, ...]] = {"pair": ()}
-STUCK = {"joint": (), "start": (0.3, 0.7)}
-
-KINDS: Mapping[str, Kind] = {
-    "wrong robot": Kind(wrong_robot, ("other-robot", "no-robot-fits"), {"given": ()}),
-    "one sign": Kind(partial(turned, signals=("effort",)), ("joint-sign",), EACH),
-    "all signs": Kind(lambda t: replace(t, effort=-t.effort), ("effort-sign",)),
-    "effort swapped": Kind(partial(swapped, signals=("effort",)), ("effort-order",), PAIRS),
-    # On a plane circle both orders explain the same: either says which joints are swapped.
-    "all swapped": Kind(
-        partial(swapped, signals=Signals), ("joint-order", "effort-order"), PAIRS
-    ),
-    "velocity swapped": Kind(partial(swapped, signals=("dq",)), ("velocity-order",), PAIRS),
-    "velocity turned": Kind(
-        partial(turned, signals=("dq",)), ("velocity-mismatch", "velocity-sign"), EACH
-    ),
-    "position turned": Kind(
-        partial(turned, signals=("q",)), ("velocity-mismatch", "velocity-sign"), EACH
-    ),
-    "position and velocity turned": Kind(
-        partial(turned, signals=("q", "dq")), ("joint-sign",), EACH
-    ),
-    "degrees": Kind(
-        lambda t: positions_in_degrees(velocities_in_degrees(t)), ("degrees", READER)
-    ),
-    "positions in degrees": Kind(positions_in_degrees, ("degrees", "velocity-unit", READER)),
-    "velocities in degrees": Kind(velocities_in_degrees, ("velocity-unit", READER)),
-    "milliseconds": Kind(lambda t: replace(t, t=np.round(1e3 * t.t, 3)), ("time-unit",)),
-    "velocity lag": Kind(
-        partial(late, signal="dq"), ("velocity-lag",), {"samples": (2, 3, 5, 10, 20)}
-    ),
-    "velocity filtered": Kind(
-        velocity_filtered, ("velocity-filtered", "velocity-lag"), {"cut_off": (0.5, 1, 2, 5)}
-    ),
-    "velocity held": Kind(velocity_held, ("velocity-held",), {"samples": (4, 8, 16)}),
-    "effort lag": Kind(
-        partial(late, signal="effort"), ("effort-lag",), {"samples": (2, 5, 10, 20)}
-    ),
-    "load": Kind(payload, ("unmodelled-load",), {"mass": (0.5, 1, 2, 4, 8)}),
-    "gravity": Kind(without_gravity, ("torque-without-gravity", "current-without-gravity")),
-    "torque as current": Kind(
-        lambda t: replace(t, effort=t.torque), ("current-as-torque",), {}, "current"
-    ),
-    "current as torque": Kind(
-        lambda t: replace(t, signal="tau"), ("torque-as-current",), {}, "current"
-    ),
-    "mA": Kind(lambda t: replace(t, effort=1e3 * t.effort), ("milliamperes",), {}, "current"),
-    "clock": Kind(clock_skew, ("clock-rate",), {"share": (-0.2, -0.05, -0.02, 0.02, 0.1, 0.2)}),
-    "time reset": Kind(time_reset, ("time-reset", READER), {"start": (0.3, 0.7)}),
-    "tilt": Kind(
-        mounted,
-        ("tilted-base",),
-        {"angle": (15.0, 30.0, 60.0, 90.0), "about": (0.0, 90.0, 225.0)},
-    ),
-    "upside down": Kind(mounted, ("upside-down",), {"angle": (180.0,)}),
-    "offset": Kind(effort_offset, ("effort-offset",), {"joint": (), "share": (-0.2, 0.1, 0.5)}),
-    "zero effort": Kind(effort_zero, ("zero-effort",), EACH),
-    "saturated": Kind(
-        saturated, ("saturation",), {"joint": (1, 2, 3, 4), "share": (0.4, 0.6, 0.8)}
-    ),
-    "tau_ext": Kind(lambda t: replace(t, tau_ext=-t.tau_ext), ("vendor-sign",), {}, "tau_ext"),
-    "stuck position": Kind(partial(stuck, signal="q"), ("stuck-position",), STUCK),
-    "stuck velocity": Kind(partial(stuck, signal="dq"), ("stuck-velocity",), STUCK),
-    "stuck effort": Kind(partial(stuck, signal="effort"), ("stuck-effort",), STUCK),
-}
-
-
-def planted(kind: str, **amounts: Any) -> Fault:
-    return KINDS[kind].fault(**amounts)
+    def is_named_by(self, finding: Remark) -> bool:
+        """Whether a finding has a code of the fault and is about its joints, or about none."""
+        about = set(finding.where.joints)
+        return finding.code in self.codes and (
+            not about or not self.joints or about == set(self.joints)
+        )
 
 
 FAULTS: Mapping[str, Fault] = {
-    "wrong_robot": planted("wrong robot"),
-    "one_sign_J2": planted("one sign", joint=2),
-    "all_signs": planted("all signs"),
-    "degrees": planted("degrees"),
-    "positions_degrees_only": planted("positions in degrees"),
-    "time_ms": planted("milliseconds"),
-    "effort_swapped_J2_J3": planted("effort swapped", pair=(2, 3)),
-    "all_swapped_J2_J3": planted("all swapped", pair=(2, 3)),
-    "velocity_swapped_J2_J3": planted("velocity swapped", pair=(2, 3)),
-    "velocity_lag_3": planted("velocity lag", samples=3),
-    "velocity_1Hz_filtered": planted("velocity filtered", cut_off=1.0)._replace(
-        codes=("velocity-filtered",)
+    "wrong_robot": Fault(wrong_robot, ("other-robot", "no-robot-fits")),
+    "one_sign_J2": Fault(partial(turned, signals=("effort",)), ("joint-sign",), (2,)),
+    "all_signs": Fault(lambda t: replace(t, effort=-t.effort), ("effort-sign",)),
+    "degrees": Fault(
+        lambda t: positions_in_degrees(velocities_in_degrees(t)), ("degrees", READER)
     ),
-    "velocity_held_8": planted("velocity held", samples=8),
-    "effort_lag_5": planted("effort lag", samples=5),
-    "payload_2.8kg": planted("load", mass=2.8),
-    "gravity_compensated": planted("gravity"),
-    "torque_called_current": planted("torque as current"),
-    "current_called_torque": planted("current as torque"),
-    "current_mA": planted("mA"),
-    "clock_skew_5%": planted("clock", share=0.05),
+    "positions_degrees_only": Fault(positions_in_degrees, ("degrees", "velocity-unit", READER)),
+    "time_ms": Fault(lambda t: replace(t, t=np.round(1e3 * t.t, 3)), ("time-unit",)),
+    "effort_swapped_J2_J3": Fault(
+        partial(swapped, signals=("effort",)), ("effort-order",), (2, 3)
+    ),
+    # On a plane circle both orders explain the same: either says which joints are swapped.
+    "all_swapped_J2_J3": Fault(
+        partial(swapped, signals=Signals), ("joint-order", "effort-order"), (2, 3)
+    ),
+    "velocity_swapped_J2_J3": Fault(
+        partial(swapped, signals=("dq",)), ("velocity-order",), (2, 3)
+    ),
+    "velocity_lag_3": Fault(partial(late, signal="dq", samples=3), ("velocity-lag",)),
+    "velocity_1Hz_filtered": Fault(velocity_filtered, ("velocity-filtered",)),
+    "velocity_held_8": Fault(velocity_held, ("velocity-held",)),
+    "effort_lag_5": Fault(partial(late, signal="effort", samples=5), ("effort-lag",)),
+    "payload_2.8kg": Fault(payload, ("unmodelled-load",)),
+    "gravity_compensated": Fault(
+        without_gravity, ("torque-without-gravity", "current-without-gravity")
+    ),
+    "torque_called_current": Fault(
+        lambda t: replace(t, effort=t.torque), ("current-as-torque",), signal="current"
+    ),
+    "current_called_torque": Fault(
+        lambda t: replace(t, signal="tau"), ("torque-as-current",), signal="current"
+    ),
+    "current_mA": Fault(
+        lambda t: replace(t, effort=1e3 * t.effort), ("milliamperes",), signal="current"
+    ),
+    "clock_skew_5%": Fault(clock_skew, ("clock-rate",)),
     "dropped_5%": Fault(dropped, ("missing-samples",)),
     "dropped_1s": Fault(dropped_span, ("gaps",)),
     "duplicate_rows_10%": Fault(duplicate_rows, ("repeated-stamps",)),
     "stale_rows_10%": Fault(stale_rows, ("stale-rows",)),
-    "time_reset": planted("time reset", start=0.5),
-    "stuck_position_J4": planted("stuck position", joint=4),
-    "stuck_effort_J3": planted("stuck effort", joint=3),
-    "saturated_J2": planted("saturated", joint=2),
+    "time_reset": Fault(time_reset, ("time-reset", READER)),
+    "stuck_position_J4": Fault(partial(stuck, signal="q", joint=4), ("stuck-position",), (4,)),
+    "stuck_effort_J3": Fault(partial(stuck, signal="effort", joint=3), ("stuck-effort",), (3,)),
+    "saturated_J2": Fault(saturated, ("saturation",), (2,)),
     "quantised_1mrad": Fault(quantised, ("coarse-positions",)),
-    "ceiling_mount": planted("upside down", angle=180.0),
-    "wall_mount_30deg": planted("tilt", angle=-30.0),
+    "ceiling_mount": Fault(partial(mounted, angle=180.0), ("upside-down",)),
+    "wall_mount_30deg": Fault(partial(mounted, angle=-30.0), ("tilted-base",)),
     "NaN_burst": Fault(nan_burst, (READER,)),
-    "effort_zero_J5": planted("zero effort", joint=5),
-    "offset_J3_20pct": planted("offset", joint=3),
-    "tau_ext_inverted": planted("tau_ext"),
+    "effort_zero_J5": Fault(effort_zero, ("zero-effort",), (5,)),
+    "offset_J3_20pct": Fault(effort_offset, ("effort-offset",), (3,)),
+    "tau_ext_inverted": Fault(
+        lambda t: replace(t, tau_ext=-t.tau_ext), ("vendor-sign",), signal="tau"
+    ),
 }
 """Fault → how it is planted and what names it."""
 
 
-def variants(table: Table) -> dict[str, list[tuple[str, Fault]]]:
-    """Kind → its faults of all amounts in a log, each with what it is."""
-    n = table.joints
-    arms = (name for name in ("ur5", "ur5e", "ur10e", "panda", "fr3") if name != table.robot)
-    every: Mapping[str, tuple[Any, ...]] = {
-        "joint": tuple(range(1, n + 1)),
-        "pair": ((1, 2), (2, 3), (1, 3), (2, 4), (4, 5), (5, n)),
-        "given": tuple(name for name in arms if robot_named(name).joints == n),
-    }
-    found: dict[str, list[tuple[str, Fault]]] = {}
-    for name, kind in KINDS.items():
-        values = [some or every[amount] for amount, some in kind.amounts.items()]
-        found[name] = [
-            (" ".join(map(str, one)), kind.fault(**dict(zip(kind.amounts, one, strict=True))))
-            for one in product(*values)
-        ]
-    return found
+def simulated(scenario: str, seconds: float, robot: str) -> Table:
+    """A simulated log, a Panda's with the vendor's estimate."""
+    made = simulate(load_scenario(scenario, [f"duration={seconds:g}"]), seed=3).recording
+    return table_from(made, robot)
 
 
-OF_ROWS = frozenset(
-    {"dropped_5%", "dropped_1s", "duplicate_rows_10%", "stale_rows_10%", "quantised_1mrad"}
-)
-HARMLESS: Mapping[str, frozenset[str]] = {
-    "ur10e": OF_ROWS,
-    "ur5": OF_ROWS | {"stuck_position_J4"},
-    "panda": OF_ROWS | {"stuck_position_J4", "time_ms", "effort_lag_5", "effort_zero_J5"},
-}
-"""Log → faults that move its estimate by less than 0.1 N·m and 2 % of the effort."""
-
-
-def fits_log(fault: Fault, table: Table) -> bool:
-    """Whether a fault can be planted in a log."""
-    if fault.signal == "tau_ext":
-        return table.tau_ext is not None
-    return fault.signal in {"", table.signal}
-
-
-SCENARIOS: Mapping[str, tuple[str, float, str]] = {
-    "ur5": ("ur5-circle", 16.0, "current"),
-    "panda": ("panda-bearing", 14.0, "tau"),
-}
-"""Simulated log → its scenario, how much of it is run [s] and its effort."""
-
-SEED = 3
-
-
-def simulated(log: str, folder: Path) -> Table:
-    """A simulated log, made in `folder` unless it is there."""
-    from vftcli.simulation import load_scenario
-    from vftcli.simulation.experiment import simulate
-
-    scenario, seconds, signal = SCENARIOS[log]
-    path = folder / f"{log}.npz"
-    if not path.exists():
-        made = simulate(load_scenario(scenario, [f"duration={seconds:g}"]), SEED)
-        seen = made.recording
-        effort = seen.current if signal == "current" else seen.torque
-        assert effort is not None
-        signals = {"t": seen.t, "q": seen.q, "dq": seen.require("dq"), "effort": effort}
-        if signal == "tau":
-            signals["tau_ext"] = seen.require("tau_ext")
-        np.savez(path, **signals)
-    with np.load(path) as arrays:
-        return Table(**dict(arrays), signal=signal, robot=log, given=log)
-
-
-def ur10e_log(path: Path, start: float = 2.0, stop: float = 24.0) -> Table:
-    """A span of a real UR10e log without a header: t, q, dq, current and more. [s]"""
-    rows = np.loadtxt(path, delimiter=",")
-    table = Table(
-        t=rows[:, 0],
-        q=rows[:, 1:7],
-        dq=rows[:, 7:13],
-        effort=rows[:, 13:19],
-        signal="current",
-        robot="ur10e",
-        given="ur10e",
+def table_from(recording: Recording, robot: str) -> Table:
+    """The table of a recording; currents go before torques."""
+    signal, effort = "current", recording.current
+    if effort is None:
+        signal, effort = "tau", recording.torque
+    return Table(
+        t=recording.t,
+        q=recording.q,
+        dq=recording.dq,
+        effort=effort,
+        signal=signal,
+        tau_ext=recording.tau_ext if signal == "tau" else None,
+        robot=robot,
+        given=robot,
     )
-    return table.between(start, stop)

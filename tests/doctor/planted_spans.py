@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 import planted_faults as plant
-from fault_variants import robot_word, span_of, table_from, thinned
-from planted_faults import Maker, Table
-from sound_logs import LOGS
+from planted_faults import Maker, Table, table_from
+from sound_logs import UR10E
 
+from vftcli.readers.reading import read
 from vftcli.robots.chain import flange_jacobian
 from vftcli.signals.arrays import Array, Mask
 
@@ -203,6 +203,12 @@ def motor_side(table: Table) -> Table:
 # Slow logs
 
 
+def thinned(table: Table, rate: float) -> Table:
+    """The table at this rate at most. [Hz]"""
+    step = max(1, round(1 / (rate * float(np.median(np.diff(table.t))))))
+    return table.selected(np.arange(0, len(table.t), step))
+
+
 def interpolated(table: Table, rate: float) -> Table:
     """All signals on straight lines between samples of a lower rate. [Hz]"""
     few = thinned(table, rate)
@@ -226,21 +232,6 @@ def pushed(table: Table, count: int) -> Table:
     return plant.with_more_torque(table, -np.einsum("tki,tk->ti", jacobian, force))
 
 
-class SpanFault(NamedTuple):
-    """A fault that is planted.
-
-    Its row is that of the list of kinds: 1 bad samples, 2 velocities, 3 effort that is no drive's,
-    4 sessions, turns and stamps, 5 lateness, 6 arm and drives, 7 slow or standing logs, 8 free
-    motion that is none.
-    """
-
-    row: int
-    plant: Maker
-
-
-OF_THRESHOLDS = 8
-"""The row of what is given to `thresholds`; all else goes to `report`."""
-
 EFFORT, MEASURED = ("effort",), ("q", "dq", "effort")
 
 
@@ -253,80 +244,95 @@ class SpanLog(NamedTuple):
     free: bool = False  # whether nobody touches the arm
 
 
-PATHS: Mapping[str, tuple[str, float, float, str]] = {
-    "ur10e": ("ur10e/free_14harm.csv", 2.0, 20.0, "ur10"),
-    "mujoco": ("mujoco_ur5e/circle.csv", 0.0, 20.0, "ur5"),
-    "libfranka": ("libfranka_sim/pushes.csv.gz", 0.0, 28.0, "panda"),
+class Source(NamedTuple):
+    """A log of the folder VFT_LOGS, of which the first seconds are used."""
+
+    path: str
+    robot: str  # a profile, or a robot file of the folder
+    seconds: tuple[float, float]
+    other: str
+    columns: str | None = None
+
+
+SOURCES: Mapping[str, Source] = {
+    "ur10e": Source("ur10e/free_14harm.csv", "ur10e", (2.0, 20.0), "ur10", UR10E),
+    "mujoco": Source("mujoco_ur5e/circle.csv", "mujoco_ur5e/robot.toml", (0.0, 20.0), "ur5"),
+    "libfranka": Source(
+        "libfranka_sim/pushes.csv.gz", "libfranka_sim/robot.toml", (0.0, 28.0), "panda"
+    ),
 }
-"""Sound log → its file, the span of it that is used [s], and the arm's other generation. The first
-is real and free of contact, the others are an independent engine's and have five and three."""
+"""The first is real and free of contact, the others are an independent engine's and have contacts:
+five and three."""
 
 
 def span_log(name: str, folder: Path) -> SpanLog:
     """A sound log of the folder VFT_LOGS, at 125 Hz at most."""
-    path, start, stop, other = PATHS[name]
-    log = next(log for log in LOGS if log.path == path)
-    recording = span_of(log, folder, start, stop)
-    table = thinned(table_from(recording, robot_word(log, folder)), 125.0)
+    source = SOURCES[name]
+    log = read(folder / source.path, columns=source.columns)
+    log = log.between(*(float(log.t[0]) + second for second in source.seconds))
+    robot = source.robot
+    table = table_from(log, str(folder / robot) if robot.endswith(".toml") else robot)
+    table = thinned(table, 125.0)
     table = replace(table, tau_ext=None, sound_t=table.t)
-    rows = np.searchsorted(recording.t, table.t)
-    target = recording.target_current
-    return SpanLog(table, other, None if target is None else target[rows], free=name == "ur10e")
+    rows, target = np.searchsorted(log.t, table.t), log.target_current
+    target = None if target is None else target[rows]
+    return SpanLog(table, source.other, target, free=name == "ur10e")
 
 
-Sizes = tuple[int, str, str, Callable[..., Table], str, tuple[float, ...]]
+Sizes = tuple[str, str, Callable[..., Table], str, tuple[float, ...]]
 
 SIZED: tuple[Sizes, ...] = (
     # 240 N·m on J2 of a UR10e are 20 A, 12 000 N·m are 1000 A.
-    (1, "effort J2 one sample", "N·m", effort_sample, "torque", (240, 1200, 12000)),
-    (1, "effort J5 one sample", "N·m", partial(effort_sample, joint=5), "torque", (100, 500)),
-    (1, "effort J2 ±600 N·m share", "", effort_samples, "share", (0.002, 0.01, 0.04)),
-    (1, "effort -9999", "rows", partial(rows_of, signals=EFFORT, value=-9999.0), "count",
+    ("effort J2 one sample", "N·m", effort_sample, "torque", (240, 1200, 12000)),
+    ("effort J5 one sample", "N·m", partial(effort_sample, joint=5), "torque", (100, 500)),
+    ("effort J2 ±600 N·m share", "", effort_samples, "share", (0.002, 0.01, 0.04)),
+    ("effort -9999", "rows", partial(rows_of, signals=EFFORT, value=-9999.0), "count",
      (1, 3, 10)),
-    (1, "effort 0", "rows", partial(rows_of, signals=EFFORT, value=0.0), "count", (3, 10, 30)),
-    (1, "all 0", "rows", partial(rows_of, signals=MEASURED, value=0.0), "count", (1, 3, 10)),
-    (2, "dq in deg/s of joint", "", velocity_in_degrees, "joint", (1, 3, 5)),
-    (2, "dq of all times", "", velocity_times, "factor", (101,)),
-    (2, "dq J2 times", "", partial(velocity_times, joints=(2,)), "factor", (1.6, 3, 101)),
-    (3, "brakes", "s", brakes, "seconds", (2, 5, 8)),
-    (3, "effort gravity only", "s", gravity_only, "seconds", (3, 6)),
-    (4, "sessions glued over", "s", glued, "seconds", (1, 3, 6)),
-    (4, "wraps by 2π of joint", "", wrapped, "joint", (1, 4, 6)),
-    (4, "q3 one sample", "°", position_sample, "degrees", (2, 20, 360)),
-    (4, "stamps jump", "s", clock_jump, "seconds", (60, 3600, 86400)),
-    (5, "effort late", "s", effort_late, "seconds", (0.02, 0.06, 0.15)),
-    (5, "effort clock drifts by", "", effort_late, "drift", (0.001, 0.005, 0.02)),
-    (6, "drives times", "", drive_scale, "factor", (0.6, 0.8, 0.9)),
-    (6, "drive J2 times", "", partial(drive_scale, joints=(2,)), "factor", (0.6, 0.8, 1.25)),
-    (6, "picked up half-way", "kg", picked_up, "mass", (0.8, 1.5, 4)),
-    (6, "base tilted", "°", plant.mounted, "angle", (3, 7, 15)),
-    (6, "zero of J3 off", "°", zero_off, "degrees", (5, 20, 90)),
-    (6, "zero of J3 half-way off", "rad", rehomed, "radians", (0.01, 0.05, 0.2)),
-    (7, "thinned", "Hz", thinned, "rate", (1, 2, 5)),
-    (7, "frozen", "s", frozen, "seconds", (0.3, 1, 3)),
-    (7, "straight lines from", "Hz", interpolated, "rate", (5, 10, 20)),
-    (8, "thresholds given pushes", "", pushed, "count", (5, 15, 40)),
-    (2, "dq accelerations", "", accelerations, "", ()),
-    (2, "dq J3 acceleration", "", partial(accelerations, joints=(3,)), "", ()),
-    (3, "effort gravity only all", "", partial(gravity_only, seconds=np.inf), "", ()),
-    (6, "J5 turned", "", partial(plant.turned, signals=MEASURED, joint=5), "", ()),
-    (6, "J5 and J6 swapped", "", partial(plant.swapped, signals=plant.Signals, pair=(5, 6)),
+    ("effort 0", "rows", partial(rows_of, signals=EFFORT, value=0.0), "count", (3, 10, 30)),
+    ("all 0", "rows", partial(rows_of, signals=MEASURED, value=0.0), "count", (1, 3, 10)),
+    ("dq in deg/s of joint", "", velocity_in_degrees, "joint", (1, 3, 5)),
+    ("dq of all times", "", velocity_times, "factor", (101,)),
+    ("dq J2 times", "", partial(velocity_times, joints=(2,)), "factor", (1.6, 3, 101)),
+    ("brakes", "s", brakes, "seconds", (2, 5, 8)),
+    ("effort gravity only", "s", gravity_only, "seconds", (3, 6)),
+    ("sessions glued over", "s", glued, "seconds", (1, 3, 6)),
+    ("wraps by 2π of joint", "", wrapped, "joint", (1, 4, 6)),
+    ("q3 one sample", "°", position_sample, "degrees", (2, 20, 360)),
+    ("stamps jump", "s", clock_jump, "seconds", (60, 3600, 86400)),
+    ("effort late", "s", effort_late, "seconds", (0.02, 0.06, 0.15)),
+    ("effort clock drifts by", "", effort_late, "drift", (0.001, 0.005, 0.02)),
+    ("drives times", "", drive_scale, "factor", (0.6, 0.8, 0.9)),
+    ("drive J2 times", "", partial(drive_scale, joints=(2,)), "factor", (0.6, 0.8, 1.25)),
+    ("picked up half-way", "kg", picked_up, "mass", (0.8, 1.5, 4)),
+    ("base tilted", "°", plant.mounted, "angle", (3, 7, 15)),
+    ("zero of J3 off", "°", zero_off, "degrees", (5, 20, 90)),
+    ("zero of J3 half-way off", "rad", rehomed, "radians", (0.01, 0.05, 0.2)),
+    ("thinned", "Hz", thinned, "rate", (1, 2, 5)),
+    ("frozen", "s", frozen, "seconds", (0.3, 1, 3)),
+    ("straight lines from", "Hz", interpolated, "rate", (5, 10, 20)),
+    ("dq accelerations", "", accelerations, "", ()),
+    ("dq J3 acceleration", "", partial(accelerations, joints=(3,)), "", ()),
+    ("effort gravity only all", "", partial(gravity_only, seconds=np.inf), "", ()),
+    ("J5 turned", "", partial(plant.turned, signals=MEASURED, joint=5), "", ()),
+    ("J5 and J6 swapped", "", partial(plant.swapped, signals=plant.Signals, pair=(5, 6)),
      "", ()),
 )  # fmt: skip
-"""Row, name, unit, maker, what its size is called, and the sizes, none of what has no size."""
+"""Name, unit, maker, what its size is called, and the sizes, none of what has no size."""
 
 
-def span_faults(log: SpanLog) -> dict[str, SpanFault]:
+OF_FREE_MOTION = {f"pushes {count}": partial(pushed, count=count) for count in (5, 15, 40)}
+"""Name → what is planted in a log that `thresholds` is told to be free motion."""
+
+
+def span_faults(log: SpanLog) -> dict[str, Maker]:
     """Name → fault, of all that can be planted in a log; a name states the fault's size."""
-    found = {}
-    for row, name, unit, maker, key, sizes in SIZED:
-        if row != OF_THRESHOLDS or log.free:
-            sized = {f"{name} {size:g} {unit}".strip(): {key: size} for size in sizes}
-            for full, size in (sized or {name: {}}).items():
-                found[full] = SpanFault(row, partial(maker, **size))
-    of_log = {"other generation": SpanFault(6, lambda table: replace(table, given=log.other))}
+    found = dict(OF_FREE_MOTION) if log.free else {}
+    for name, unit, maker, key, sizes in SIZED:
+        sized = {f"{name} {size:g} {unit}".strip(): {key: size} for size in sizes}
+        found |= {full: partial(maker, **size) for full, size in (sized or {name: {}}).items()}
+    found["other generation"] = lambda table: replace(table, given=log.other)
     if log.target is not None:
-        of_log["target current"] = SpanFault(6, lambda table: replace(table, effort=log.target))
+        found["target current"] = lambda table: replace(table, effort=log.target)
     if log.table.joints == FRANKA_JOINTS:
-        of_log["motor side torque"] = SpanFault(6, motor_side)
-    return found | of_log
+        found["motor side torque"] = motor_side
+    return found

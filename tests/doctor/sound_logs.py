@@ -1,18 +1,6 @@
-"""The real and simulated logs that are sound, with what is truly odd about each.
+"""The real and simulated logs that are sound, with what is truly odd about each."""
 
-Run by hand it lists every warning and caution of doctor and reader on each log of VFT_LOGS, of the
-samples beside it and of the fixtures, whole, on its halves and its spans of 20 s; with `--all` also
-on its spans of 10 s and its rows thinned to 100, 50 and 25 Hz. A warning that nothing known of the
-log explains is a false alarm and marked `!`::
-
-    VFT_LOGS=/path/to/logs python tests/doctor/sound_logs.py
-    VFT_LOGS=/path/to/logs python tests/doctor/sound_logs.py --all ur10e fixtures
-"""
-
-import os
-import sys
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor import examine
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import read_chosen
 from vftcli.robots import Robot, load_robot
@@ -171,42 +158,10 @@ def parts(recording: Recording) -> Iterator[tuple[str, Recording]]:
             yield f"{rate} Hz", every(recording, step)
 
 
-def unexpected(
-    log: SoundLog, recording: Recording, findings: Sequence[Remark]
-) -> tuple[Remark, ...]:
+def unexpected(log, recording, findings) -> tuple[Remark, ...]:
     """The warnings that nothing known of a log explains."""
     slow = ("slow-rate",) if recording.median_step > 1 / 50 else ()  # thinned below the limit
     # In a part that rests long enough a load shows in the controller's own currents too.
     load = ("payload-mismatch",) if "unmodelled-load" in log.known else ()
     known = (*log.known, *slow, *load)
     return tuple(f for f in findings if f.level == "warning" and not f.code.startswith(known))
-
-
-def main(words: Sequence[str]) -> int:
-    """Print the survey; return 1 if there is a false alarm."""
-    folder, begun = Path(os.environ["VFT_LOGS"]), time.process_time()
-    names = [word for word in words if word != "--all"]
-    count, wrong = 0, 0
-    for log in LOGS:
-        if names and not any(name in log.path for name in names):
-            continue
-        robot, whole = robot_of(log, folder), recording_of(log, folder)
-        print(f"{log.path} for {robot.name if robot else 'any arm'}, {log.columns or 'as it is'}")
-        for part, recording in parts(whole):
-            if "--all" not in words and (part.endswith("Hz") or 9.9 < recording.duration < 10.1):
-                continue
-            findings = (*examine(recording, robot).findings, *recording.source.remarks)
-            false = unexpected(log, recording, findings)
-            count += 1
-            wrong += bool(false)
-            for finding in findings:
-                if finding.level != "fact":
-                    sign = "!" if finding in false else " "
-                    print(f"  {sign} {part:8} {finding.level}: {finding.code}: {finding}")
-    seconds = time.process_time() - begun
-    print(f"false alarms on {wrong} of {count} logs and parts; {seconds:.0f} s of processor time")
-    return min(wrong, 1)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

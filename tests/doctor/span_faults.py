@@ -11,8 +11,7 @@ does not have, or a note of reader or doctor) or silent; whether a gain ran to i
 nothing. It is harmful where gmo moves by more than 0.25 N·m or best by more than 0.6 N·m, the mean
 over joints of the rms over the samples that both logs have, or where a joint of either vanishes:
 HARM where that is silent or noted. A line says what gmo and best move by, the share of the rows
-that differ from the sound log's (`!` where so few are refused), the hardest new contact, how many
-true ones are lost, and the new codes.
+that differ from the sound log's (`!` where so few are refused), and the new codes.
 """
 
 import argparse
@@ -24,17 +23,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from planted_faults import Table
-from planted_spans import OF_THRESHOLDS, PATHS, SpanFault, SpanLog, span_faults, span_log
+from planted_faults import Maker, Table
+from planted_spans import OF_FREE_MOTION, SOURCES, SpanLog, span_faults, span_log
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import ContactList
 from vftcli.notebook import report, thresholds
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import VftError
 from vftcli.signals.remarks import Remark
-
-OBSERVERS = ("gmo", "best")
 
 HARM = {"gmo": 0.25, "best": 0.6, "thresholds": 0.6}
 """What an estimate moves by where a fault is harmful. [N·m]"""
@@ -58,17 +54,18 @@ class Answer(NamedTuple):
     t: Array = np.zeros(0)  # in the sound log's time (T,) [s]
     torques: Mapping[str, Array] = {}  # by observer; of thresholds one row (T, n) each [N·m]
     said: frozenset[tuple[str, str, tuple[int, ...]]] = frozenset()  # level, code, joints
-    contacts: tuple[tuple[float, float, float, str], ...] = ()  # each a `Span`
     refused: str = ""  # why there is nothing else
 
 
-def answer(table: Table, learns: bool, path: Path) -> Answer:
+def answer(table: Table, path: Path, learns: bool = False) -> Answer:
     """What `report` says of a table once it is a file, `thresholds` where it learns from it."""
     table.write(path)
     try:
         if learns:
-            return of_thresholds(path, table)
-        return of_report(report(path, table.given, observer=OBSERVERS), table)
+            found = thresholds(path, table.given)
+            level = np.array([[one.value for one in found.joints]])
+            return Answer(np.zeros(1), {"thresholds": level}, kinds(found.remarks))
+        return of_report(report(path, table.given, observer=("gmo", "best")), table)
     except VftError as error:
         return Answer(refused=str(error).removeprefix(f"{path.name}: "))
     except Exception as error:  # noqa: BLE001 - a cell that breaks is a result
@@ -77,46 +74,21 @@ def answer(table: Table, learns: bool, path: Path) -> Answer:
         path.unlink()
 
 
-def of_thresholds(path: Path, table: Table) -> Answer:
-    found = thresholds(path, table.given)
-    level = np.array([[one.value for one in found.joints]])
-    return Answer(np.zeros(1), {"thresholds": level}, kinds(found.remarks))
-
-
 def of_report(made: Analysis, table: Table) -> Answer:
-    """The estimates and contacts of an analysis, at the sound log's times."""
-    assert table.sound_t is not None
+    """The estimates of an analysis, at the sound log's times."""
     t = table.sound_t
     if len(made.t) != len(t):  # rows were left out; the others keep their stamps
         t = t[nearest(table.t, made.recording.source.t0 + made.t)]
     findings = [finding for one in made.examinations for finding in one.findings]
-    of_log = (*findings, *made.recording.source.remarks)
     doubts = [remark for remark in made.remarks if remark.level != "fact"]
-    return Answer(
-        t,
-        {one.name: one.tau for one in made.estimates},
-        kinds((*of_log, *doubts)),
-        tuple(spans(made.contacts, made.t, t)) if made.contacts is not None else (),
-    )
+    said = kinds((*findings, *made.recording.source.remarks, *doubts))
+    return Answer(t, {one.name: one.tau for one in made.estimates}, said)
 
 
 def nearest(grid: Array, values: Array) -> Array:
     """Index of the grid's point that is nearest to each value."""
     right = np.clip(np.searchsorted(grid, values), 1, len(grid) - 1)
     return right - (values - grid[right - 1] < grid[right] - values)
-
-
-Span = tuple[float, float, float, str]
-"""First and last time [s], size [N] and words of a contact."""
-
-
-def spans(contacts: ContactList, t: Array, sound_t: Array) -> Iterator[Span]:
-    """Span in the sound log's time, size and words of each contact."""
-    for one in contacts.contacts:
-        within = sound_t[(t >= one.start) & (t <= one.stop)]
-        within = within[np.isfinite(within)]
-        first, last = (within.min(), within.max()) if len(within) else (-np.inf, -np.inf)
-        yield first, last, one.peak_force or 0.0, f"{one._size} {one.trust}"
 
 
 def kinds(remarks: Iterable[Remark]) -> frozenset[tuple[str, str, tuple[int, ...]]]:
@@ -130,37 +102,35 @@ class Cell(NamedTuple):
 
     log: str
     fault: str
-    row: int  # of the list of kinds
     verdict: str
     harmful: bool  # an estimate moves or vanishes; False where the log is refused
     moved: dict[str, float]  # by observer [N·m]
     vanished: list[str]  # joints that are nowhere known though the sound log's are
     codes: list[str]  # new warnings, else new notes; or why it is refused
     bad: float  # share of the rows
-    contact: tuple[float, str, int]  # the hardest new one [N], its words; true ones lost
 
     @property
     def counts_against(self) -> bool:
         return self.harmful and self.verdict in {"silent", "noted"}
 
+    @property
+    def refused_for_few(self) -> bool:
+        return self.verdict == "refused" and 0 < self.bad < FEW
+
     def __str__(self) -> str:
         moved = " ".join(f"{self.moved[n]:8.3g}" for n in HARM if n in self.moved).rjust(17)
         harm = "HARM" if self.counts_against else "harm" if self.harmful else ""
-        few = "!" if self.verdict == "refused" and 0 < self.bad < FEW else " "
-        size, words, lost = self.contact
-        new = f"new {size:.0f} N ({words}) " if words else ""
-        gone = f"{lost} lost " if lost else ""
-        broken = "".join(f"{word} vanishes " for word in self.vanished)
+        gone = "".join(f"{word} vanishes " for word in self.vanished)
         return (
-            f"{self.row} {self.fault:32} {self.log:9} {self.verdict:7}{few} {harm:4} {moved} "
-            f"{100 * self.bad:5.1f} %  {new}{gone}{broken}{' '.join(self.codes)[:150]}"
+            f"{self.fault:32} {self.log:9} {self.verdict:7}{'!' * self.refused_for_few:1} "
+            f"{harm:4} {moved} {100 * self.bad:5.1f} %  {gone}{' '.join(self.codes)[:150]}"
         )
 
 
-def cell(log: str, name: str, fault: SpanFault, base: SpanLog, sound: Answer, path: Path) -> Cell:
+def cell(log: str, name: str, fault: Maker, base: SpanLog, sound: Answer, path: Path) -> Cell:
     """Plant a fault and judge what comes of it."""
-    table = fault.plant(base.table)
-    made = answer(table, fault.row == OF_THRESHOLDS, path)
+    table = fault(base.table)
+    made = answer(table, path, name in OF_FREE_MOTION)
     new = sorted(made.said - sound.said)
     warned = [shown(code, joints) for level, code, joints in new if level == "warning"]
     noted = [shown(code, joints) for level, code, joints in new if level != "warning"]
@@ -169,22 +139,13 @@ def cell(log: str, name: str, fault: SpanFault, base: SpanLog, sound: Answer, pa
     )
     moved, vanished = moves(made, sound)
     harmful = any(moved[n] > HARM[n] for n in moved) or bool(vanished)
-    fresh = [c for c in made.contacts if not any(meet(c, known) for known in sound.contacts)]
-    hardest = max(fresh, key=lambda one: one[2], default=(0.0, 0.0, 0.0, ""))
-    lost = sum(not any(meet(c, known) for c in made.contacts) for known in sound.contacts)
-    return Cell(
-        log, name, fault.row, verdict, harmful and not made.refused, moved, vanished,
-        [made.refused] if made.refused else warned or noted, bad_share(table, base.table),
-        (hardest[2], hardest[3], 0 if made.refused else lost),
-    )  # fmt: skip
+    codes = [made.refused] if made.refused else warned or noted
+    bad = bad_share(table, base.table)
+    return Cell(log, name, verdict, harmful, moved, vanished, codes, bad)
 
 
 def shown(code: str, joints: tuple[int, ...]) -> str:
     return code + (f"[{','.join(f'J{j}' for j in joints)}]" if joints else "")
-
-
-def meet(one: Span, other: Span) -> bool:
-    return one[0] <= other[1] and other[0] <= one[1]
 
 
 def moves(made: Answer, sound: Answer) -> tuple[dict[str, float], list[str]]:
@@ -209,7 +170,6 @@ def moves(made: Answer, sound: Answer) -> tuple[dict[str, float], list[str]]:
 
 def bad_share(table: Table, sound: Table) -> float:
     """Share of a table's rows whose values or step of time differ from the sound log's."""
-    assert table.sound_t is not None
     rows = np.searchsorted(
         sound.t, np.where(np.isfinite(table.sound_t), table.sound_t, sound.t[0])
     )
@@ -222,58 +182,38 @@ def bad_share(table: Table, sound: Table) -> float:
 
 def sums(cells: Sequence[Cell]) -> Iterator[str]:
     """What the cells come to, each share beside its bar."""
-    count = len(cells)
-    against = [one for one in cells if one.counts_against]
     refused = [one for one in cells if one.verdict == "refused"]
-    for name, found in (("silent and harmful", against), ("refused", refused)):
-        bar = BARS[name]
-        yield (
-            f"{name}: {len(found)} of {count} cells, {len(found) / count:.1%} (bar {bar:.0%}"
-            f"{', missed' if len(found) > bar * count else ''})"
-        )
-    for verdict in ("warned", "noted", "silent"):
-        of_it = [one for one in cells if one.verdict == verdict]
-        yield f"{verdict}: {len(of_it)}, {sum(one.harmful for one in of_it)} of them harmful"
-    few = [one for one in cells if 0 < one.bad < FEW]
-    wrong = [f"; {one.fault} in {one.log}" for one in few if one.verdict == "refused"]
-    yield f"below {FEW:.0%} bad rows: {len(wrong)} of {len(few)} refused{''.join(wrong)}"
+    against = [one for one in cells if one.counts_against]
+    for (name, bar), found in zip(BARS.items(), (against, refused), strict=True):
+        share = len(found) / len(cells)
+        missed = ", missed" if share > bar else ""
+        yield f"{name}: {len(found)} of {len(cells)} cells, {share:.1%} (bar {bar:.0%}{missed})"
+    few = [f"{one.fault} in {one.log}" for one in cells if one.refused_for_few]
+    yield f"below {FEW:.0%} bad rows refused: {len(few)} {'; '.join(few)}"
     without = [one for one in refused if "--anyway" not in one.codes[0]]
     broken = [one for one in refused if one.codes[0].startswith(BROKEN)]
     yield f"refusals that do not name --anyway: {len(without)}; tracebacks: {len(broken)}"
-    yield f"estimates of which a joint vanishes: {sum(bool(one.vanished) for one in cells)}"
-    fresh = [one.contact[0] for one in cells if one.contact[1]]
-    lost = sum(one.contact[2] > 0 for one in cells)
-    hardest = f", the hardest {max(fresh):.0f} N" if fresh else ""
-    yield f"new contacts in {len(fresh)} cells{hardest}; true ones lost in {lost}"
-    for row in sorted({one.row for one in cells}):
-        own = [one for one in cells if one.row == row]
-        yield f"row {row}: {sum(o.counts_against for o in own)} of {len(own)} silent and harmful"
 
 
 def main(words: Sequence[str]) -> int:
     """Print the cells and their sums; exit 1 where a bar is missed."""
     parser = argparse.ArgumentParser(description="plant bad samples and spans in sound logs")
-    parser.add_argument("--log", action="append", choices=list(PATHS), help="only this log")
+    parser.add_argument("--log", action="append", choices=list(SOURCES), help="only this log")
     parser.add_argument("--only", action="append", help="only faults with this in their name")
     choice = parser.parse_args(words)
     cells: list[Cell] = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "planted.csv"
-        for log in choice.log or PATHS:
+        for log in choice.log or SOURCES:
             base = span_log(log, Path(os.environ["VFT_LOGS"]))
-            faults = {
-                name: fault
-                for name, fault in span_faults(base).items()
-                if not choice.only or any(word in name for word in choice.only)
-            }
-            kinds_of = {fault.row == OF_THRESHOLDS for fault in faults.values()}
-            sound = {learns: answer(base.table, learns, path) for learns in kinds_of}
+            sound = {learns: answer(base.table, path, learns) for learns in {False, base.free}}
             for said in sound.values():
                 assert not said.refused, f"the sound log {log} is refused: {said.refused}"
-            for name, fault in faults.items():
-                known = sound[fault.row == OF_THRESHOLDS]
-                cells.append(cell(log, name, fault, base, known, path))
-                print(cells[-1], flush=True)
+            for name, fault in span_faults(base).items():
+                if not choice.only or any(word in name for word in choice.only):
+                    known = sound[name in OF_FREE_MOTION]
+                    cells.append(cell(log, name, fault, base, known, path))
+                    print(cells[-1], flush=True)
     print(*sums(cells), sep="\n")
     return int(any(line.endswith("missed)") for line in sums(cells)))
 

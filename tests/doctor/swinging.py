@@ -37,7 +37,7 @@ TORQUE = torque_of(Q)
 def log_of(**changes: Array | None) -> Recording:
     """The log with some signals changed; its torque goes with its positions."""
     signals = {"t": T, "q": Q, "dq": DQ, **changes}
-    return Recording(**{"torque": torque_of(signals["q"]), **signals})  # type: ignore[arg-type]
+    return Recording(**{"torque": torque_of(signals["q"]), **signals})
 
 
 def said_of(log: Recording) -> dict[str, Remark]:

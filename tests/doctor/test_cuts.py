@@ -103,13 +103,7 @@ def examined(recording: Recording) -> tuple[Recording, dict[str, Any]]:
         (changed("current", 375, lambda x: 0 * x + x[0]), "frozen-effort", 374, (1, 2, 3, 4, 6)),
     ],
 )
-def test_bad_samples_are_cut_out_and_said_once(
-    circle: Recording,
-    plant: Callable[[Signals], None],
-    code: str,
-    rows: int,
-    joints: tuple[int, ...] | None,
-) -> None:
+def test_bad_samples_are_cut_out_and_said_once(circle, plant, code, rows, joints):
     bad = planted(circle, plant)
     sound, found = examined(bad)
     assert set(found) == {code}
@@ -123,7 +117,7 @@ def test_bad_samples_are_cut_out_and_said_once(
 
 @pytest.mark.parametrize("rows", [1, 9999], ids=["one sample", "from then on"])
 @pytest.mark.parametrize("turns", [1, -2])
-def test_a_count_that_begins_anew_is_unwrapped(circle: Recording, rows: int, turns: int) -> None:
+def test_a_count_that_begins_anew_is_unwrapped(circle, rows, turns):
     bad = planted(circle, changed("q", rows, lambda x: x + 2 * np.pi * turns, 6))
     sound, found = examined(bad)
     assert (found, sound.samples) == ({}, circle.samples)
@@ -132,7 +126,7 @@ def test_a_count_that_begins_anew_is_unwrapped(circle: Recording, rows: int, tur
     np.testing.assert_allclose(sound.q, circle.q, rtol=0, atol=1e-14)
 
 
-def test_brakes_are_cut_out_with_the_half_second_beside() -> None:
+def test_brakes_are_cut_out_with_the_half_second_beside():
     """An arm that rests half of the time; its drives are off for five seconds of it."""
     t = 0.008 * np.arange(5000)
     moves = (t > 10) & (t < 30)
@@ -156,7 +150,7 @@ def test_brakes_are_cut_out_with_the_half_second_beside() -> None:
     assert Examiner().read_as(bare, ROBOT, ReadChoice()).source.cuts == ()
 
 
-def test_a_blow_is_no_bad_sample(circle: Recording) -> None:
+def test_a_blow_is_no_bad_sample(circle):
     """As large and as short as a bad sample, but the arm's speed changes with it."""
     blow = [
         changed("current", 1, lambda x: x + 12, 3),
@@ -165,7 +159,7 @@ def test_a_blow_is_no_bad_sample(circle: Recording) -> None:
     assert "isolated-effort" not in examined(planted(circle, *blow))[1]
 
 
-def test_no_sample_is_cut_out_of_another_unit(circle: Recording) -> None:
+def test_no_sample_is_cut_out_of_another_unit(circle):
     """mA called A are beyond every drive in most samples: that is a unit."""
     sound, found = examined(planted(circle, changed("current", 0, lambda x: x)))
     assert (sound.samples, found) == (circle.samples, {})
@@ -176,7 +170,7 @@ def test_no_sample_is_cut_out_of_another_unit(circle: Recording) -> None:
 
 
 @pytest.mark.slow
-def test_one_bad_sample_is_no_contact(circle: Recording) -> None:
+def test_one_bad_sample_is_no_contact(circle):
     """One sample of 1000 A read 3302 N, good: the list is that of the log without the sample."""
     touched = contacts(circle, ROBOT)[0]
     row = int(np.searchsorted(circle.t, touched.peak))
@@ -190,17 +184,16 @@ def test_one_bad_sample_is_no_contact(circle: Recording) -> None:
     assert "samples-cut-inside" in [remark.code for remark in near.remarks]
 
 
-def test_rows_of_the_file_know_their_samples(circle: Recording) -> None:
+def test_rows_of_the_file_know_their_samples(circle):
     """Row 3 is cut out: what is written back to it is unknown, and the next is sample 3."""
     rows = np.arange(circle.samples) == 3
     twice = circle.without(rows).between(circle.t[2], circle.t[6])
     samples = twice.source.row_samples
-    assert samples is not None
     assert samples[:8].tolist() == [-1, -1, 0, -1, 1, 2, 3, -1]
 
 
 @pytest.mark.slow
-def test_a_log_that_waits_a_minute_is_listed_like_one_that_does_not(circle: Recording) -> None:
+def test_a_log_that_waits_a_minute_is_listed_like_one_that_does_not(circle):
     """A cycle that lies in the gap has no residual, and no mode is certain behind it."""
     later = np.where(np.arange(circle.samples) > AT, 60.0, 0.0)
     made = contacts(replace(circle, t=circle.t + later), ROBOT)

@@ -27,7 +27,7 @@ def turned(log: Recording) -> Recording:
     return replace(log, torque=-log.require("torque"))
 
 
-def test_a_log_is_examined_once_for_an_arm() -> None:
+def test_a_log_is_examined_once_for_an_arm():
     examiner, log = Examiner(), excited()
     first = examiner.examine(log, UR5E)
     assert examiner.examine(log, UR5E) is first
@@ -35,7 +35,7 @@ def test_a_log_is_examined_once_for_an_arm() -> None:
     assert examiner.examinations[0] is first
 
 
-def test_several_refusals_are_one_line() -> None:
+def test_several_refusals_are_one_line():
     refuse("log", [])
     others = [warning("too-short", samples=1), warning("no-velocity"), warning("no-velocity")]
     with pytest.raises(ExaminationError) as error:
@@ -44,7 +44,7 @@ def test_several_refusals_are_one_line() -> None:
     assert " Also: too-short, no-velocity. " in str(error.value)
 
 
-def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it() -> None:
+def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it():
     """No other profile comes near a log whose target torques are one's own."""
     examiner, log = Examiner(), excited()
     reported = RobotChoice(name="ur5e")
@@ -67,16 +67,14 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it() ->
         examiner.robot(replace(log, torque=None), RobotChoice())
 
 
-def test_the_payload_of_one_log_is_not_that_of_another() -> None:
+def test_the_payload_of_one_log_is_not_that_of_another():
     examiner, log = Examiner(), replace(excited(), payload_mass=1.5, payload_com=(0.0, 0.0, 0.1))
     choice = RobotChoice(name="ur5e", payload="log")
     first, second = (examiner.robot(replace(log, payload_mass=m), choice) for m in (1.5, 2.0))
-    assert first.payload is not None
-    assert second.payload is not None
     assert (first.payload.mass, second.payload.mass) == (1.5, 2.0)
 
 
-def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
+def test_an_open_effort_is_taken_for_what_the_model_explains():
     """The sign that was turned is turned back; a log that says the truth stays as it is."""
     examiner, log = Examiner(), excited()
     auto = ReadChoice(effort="auto")
@@ -88,14 +86,11 @@ def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
     assert not Examiner().examine(healed, UR5E).refusals()
 
 
-def test_the_unit_of_the_effort_is_what_the_last_tenth_of_a_long_log_says(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_unit_of_the_effort_is_what_the_last_tenth_of_a_long_log_says(monkeypatch):
     """An arm that stands upright needs no current; then it moves, on currents in mA."""
     monkeypatch.setattr("vftcli.doctor.examination.EXAMINED", 4000)
     monkeypatch.setattr("vftcli.doctor.examination.STRETCH", 400)
     motion, constant = excited(40.0), UR5E.torque_constant
-    assert constant is not None
     still, noise = np.zeros((9 * motion.samples, 6)), np.random.default_rng(2)
     upright = np.array([0.0, -0.5 * np.pi, 0.0, -0.5 * np.pi, 0.0, 0.0])
     current = 1e3 * motion.require("torque") / constant

@@ -1,6 +1,5 @@
 """An effort that is late by a known time is found by that alone, not by what else may be odd."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -12,7 +11,6 @@ from vftcli.doctor import examine
 from vftcli.doctor.lateness import effort_lag
 from vftcli.robots import load_robot
 from vftcli.robots.kernels import chain_parameters, torque_regressor
-from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 
@@ -23,14 +21,7 @@ RATES = 0.9 + 0.3 * np.arange(6)
 """Every joint turns round every one to three seconds. [rad/s]"""
 
 
-def log_of(
-    late: float = 0.0,
-    push: float = 0.0,
-    scale: float = 1.0,
-    *,
-    rate: float = 0.0,
-    clock: Array = T,
-) -> Recording:
+def log_of(late=0.0, push=0.0, scale=1.0, *, rate=0.0, clock=T) -> Recording:
     """20 s of motion under the arm's own torque, friction and noise of 0.3 N·m.
 
     Args:
@@ -121,20 +112,18 @@ CASES = [
 
 
 @pytest.mark.parametrize(("log", "said"), CASES)
-def test_a_late_effort_is_reported_with_its_lag_or_drift(
-    log: Callable[[], Recording], said: Said
-) -> None:
+def test_a_late_effort_is_reported_with_its_lag_or_drift(log, said):
     found = reported(log())
     said.check(found)
     if "effort-lag" in found:
         assert found["effort-lag"].values["ratio"] > 1.45
 
 
-def test_an_arm_of_other_joints_tells_nothing() -> None:
+def test_an_arm_of_other_joints_tells_nothing():
     assert not list(effort_lag(log_of(0.06), load_robot("panda")))
 
 
-def test_an_effort_beside_late_velocities_is_not_called_early() -> None:
+def test_an_effort_beside_late_velocities_is_not_called_early():
     """Whichever is late, it is reported once: by the velocity, which the position judges."""
     log = log_of()
     late = log.require("dq")[np.maximum(np.arange(2000) - 6, 0)]

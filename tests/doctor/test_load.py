@@ -8,7 +8,6 @@ import pytest
 from vftcli.doctor import examine, in_words
 from vftcli.doctor.load import controller_findings, temperature_findings
 from vftcli.robots import Robot, load_robot
-from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
@@ -47,16 +46,14 @@ def mismatches(still: Recording) -> list[Remark]:
     ],
 )
 @pytest.mark.parametrize("constant", [0.0, 5.0, 20.0])
-def test_two_heavy_joints_tell_a_load(
-    torques: tuple[float, ...], joints: tuple[int, ...] | None, constant: float
-) -> None:
+def test_two_heavy_joints_tell_a_load(torques, joints, constant):
     """Each of more than 4 N·m; an unknown constant is taken for a large drive's, 10 N·m/A."""
     still = log(*(np.array(torques) / (constant or 10.0)))
     found = mismatches(with_constants(still, constant) if constant else still)
     assert [remark.where.joints for remark in found] == ([] if joints is None else [joints])
 
 
-def test_the_numbers_of_a_mismatch() -> None:
+def test_the_numbers_of_a_mismatch():
     still = with_constants(log(0, 1.0, -2.0, 0.1, 0, 0), 10.0)
     for payload in (None, 0.0):
         (finding,) = mismatches(replace(still, payload_mass=payload))
@@ -82,12 +79,7 @@ def test_the_numbers_of_a_mismatch() -> None:
         ((9e-3, 0.0), (-11e-3, 0.0)),
     ],
 )
-def test_a_mismatch_needs_twenty_samples_at_rest(
-    samples: int,
-    reported: bool,
-    rest: tuple[float, float | None],
-    motion: tuple[float, float | None],
-) -> None:
+def test_a_mismatch_needs_twenty_samples_at_rest(samples, reported, rest, motion):
     """Speeds at rest and in motion: measured, and commanded if there is any. [rad/s]"""
     rests = (np.arange(400) < samples)[:, None] & np.ones(6, bool)
     still = replace(log(0, 1, 1, 0, 0, 0), dq=np.where(rests, rest[0], motion[0]))
@@ -97,13 +89,11 @@ def test_a_mismatch_needs_twenty_samples_at_rest(
 
 
 @pytest.mark.parametrize("name", ["current", "target_current", "dq"])
-def test_a_mismatch_needs_both_currents_and_a_rest(name: str) -> None:
+def test_a_mismatch_needs_both_currents_and_a_rest(name):
     assert not mismatches(replace(log(0, 1, 1, 0, 0, 0), **{name: None}))
 
 
-def constants_found(
-    constants: Array, current: Array | float | None = None, **changes: Array | None
-) -> list[Remark]:
+def constants_found(constants, current=None, **changes) -> list[Remark]:
     """What is reported of a controller of these constants beside the UR10e profile's."""
     if current is None:
         # slowly changing loads of 1 to 3 A, as in a series of held poses
@@ -119,7 +109,7 @@ OTHER = np.array([11.976, 11.976, 9.839, 7.7, 7.7, 7.7])
 """The UR10e's, its wrists with the constants of a smaller joint. [N·m/A]"""
 
 
-def test_constants_are_the_controller_s_torque_per_current() -> None:
+def test_constants_are_the_controller_s_torque_per_current():
     (found,) = constants_found(OTHER)
     assert found.where.joints == (4, 5, 6)
     assert found.values["found_Nm_A"] == pytest.approx([7.7] * 3, rel=1e-12)
@@ -128,20 +118,18 @@ def test_constants_are_the_controller_s_torque_per_current() -> None:
 
 
 @pytest.mark.parametrize(("current", "known"), [(0.019, False), (0.021, True), (-0.021, True)])
-def test_constants_need_a_fiftieth_of_an_ampere(current: float, known: bool) -> None:
+def test_constants_need_a_fiftieth_of_an_ampere(current, known):
     assert bool(constants_found(OTHER, current)) == known
 
 
 @pytest.mark.parametrize(("samples", "known"), [(9, False), (10, True)])
-def test_constants_need_ten_samples(samples: int, known: bool) -> None:
+def test_constants_need_ten_samples(samples, known):
     current = np.where(np.arange(400) < samples, 1.0, 0.0)[:, None]
     assert bool(constants_found(OTHER, current)) == known
 
 
 @pytest.mark.parametrize(("noise", "known"), [(0.04, True), (0.06, False)])
-def test_constants_need_torques_that_are_proportional_to_the_currents(
-    noise: float, known: bool
-) -> None:
+def test_constants_need_torques_that_are_proportional_to_the_currents(noise, known):
     """Up to a twentieth of the torque, as with an offset or friction that the drive model adds."""
     wave = np.where(np.arange(400) % 2, 1 + noise, 1 - noise)[:, None]
     found = constants_found(OTHER, 1.0, target_torque=OTHER * wave)
@@ -150,7 +138,7 @@ def test_constants_need_torques_that_are_proportional_to_the_currents(
         assert found[0].values["found_Nm_A"] == pytest.approx([7.7] * 3)
 
 
-def test_constants_come_from_resting_samples_only() -> None:
+def test_constants_come_from_resting_samples_only():
     moves = (np.arange(400) >= 200)[:, None] * np.ones(6)
     (found,) = constants_found(
         OTHER, 1.0, dq=0.5 * moves, target_torque=np.where(moves > 0, 3.0, 1.0) * OTHER
@@ -161,7 +149,7 @@ def test_constants_come_from_resting_samples_only() -> None:
 @pytest.mark.parametrize(
     ("wrist", "reported"), [(10.9, False), (7.7, True), (7.6, True), (8.5, False)]
 )
-def test_constants_of_another_joint_size_are_reported(wrist: float, reported: bool) -> None:
+def test_constants_of_another_joint_size_are_reported(wrist, reported):
     """Of UR's sizes 7.7 N·m/A is one, 10.9 the UR10e's own to 2 %, and 8.5 is none."""
     found = constants_found(np.where(np.arange(6) == 4, wrist, PROFILE))
     assert len(found) == reported
@@ -175,14 +163,14 @@ def test_constants_of_another_joint_size_are_reported(wrist: float, reported: bo
         }
 
 
-def test_no_constants_are_compared_without_a_robot_that_has_them() -> None:
+def test_no_constants_are_compared_without_a_robot_that_has_them():
     arm = with_constants(log(0, 0, 0, 0, 0, 0), 10.0)
     assert list(controller_findings(arm, None)) == []
     assert list(controller_findings(arm, replace(UR10E, torque_constant=None))) == []
 
 
 @pytest.mark.slow
-def test_a_load_is_off_by_its_deviation() -> None:
+def test_a_load_is_off_by_its_deviation():
     """Simulated UR5s with links 5 % wrong, as their scenarios state.
 
     Of four normal errors the root mean square is beyond 1.8 deviations once in a hundred.
@@ -224,7 +212,7 @@ def found(recording: Recording, robot: Robot = UR5E) -> list[Remark]:
 
 
 @pytest.mark.parametrize("temperature", [5.0, 20.0, 60.0, 80.0])
-def test_where_the_law_holds_there_is_nothing_to_say(temperature: float) -> None:
+def test_where_the_law_holds_there_is_nothing_to_say(temperature):
     if 15.0 < temperature < 65.0:
         assert found(warm_log(temperature)) == []
         return
@@ -233,7 +221,7 @@ def test_where_the_law_holds_there_is_nothing_to_say(temperature: float) -> None
     assert remark.values["seen_C"][0] == temperature
 
 
-def test_a_log_without_temperatures_is_reported_with_the_one_assumed() -> None:
+def test_a_log_without_temperatures_is_reported_with_the_one_assumed():
     (remark,) = found(warm_log(None))
     assert (remark.code, remark.level) == ("no-temperature", "fact")
     # s(25)/s(35) worked by hand: size 3 2.9177/2.5366, size 1 .64593/.52003
@@ -244,9 +232,8 @@ def test_a_log_without_temperatures_is_reported_with_the_one_assumed() -> None:
     assert same == remark
 
 
-def test_gaps_are_reported_with_their_share() -> None:
+def test_gaps_are_reported_with_their_share():
     recording = warm_log(30.0)
-    assert recording.temperature is not None
     gaps = recording.temperature.copy()
     gaps[:125, 2] = np.nan
     (remark,) = found(replace(recording, temperature=gaps))
@@ -254,7 +241,7 @@ def test_gaps_are_reported_with_their_share() -> None:
     assert remark.values["share_percent"] == 25.0
 
 
-def test_without_a_law_a_cold_log_is_reported_with_what_it_means() -> None:
+def test_without_a_law_a_cold_log_is_reported_with_what_it_means():
     (remark,) = found(warm_log(25.0), LAWLESS)
     assert (remark.code, remark.level) == ("far-temperature", "warning")
     assert remark.where.joints == (1, 2, 3, 4, 5)  # the sixth rests
@@ -264,20 +251,20 @@ def test_without_a_law_a_cold_log_is_reported_with_what_it_means() -> None:
     assert found(warm_log(30.0), LAWLESS) == []
 
 
-def test_a_log_that_warms_up_is_far_at_its_cold_end() -> None:
+def test_a_log_that_warms_up_is_far_at_its_cold_end():
     (remark,) = found(warm_log(26.0, changes=10.0), LAWLESS)
     # a twentieth of the samples lie below
     assert remark.values["seen_C"][0] == pytest.approx(26.5, abs=0.2)
 
 
-def test_a_temperature_that_nobody_stated_is_assumed() -> None:
+def test_a_temperature_that_nobody_stated_is_assumed():
     silent = tuple(replace(f, temperature=(), temperature_at=None) for f in UR5E.friction)
     (remark,) = found(warm_log(22.0), replace(UR5E, friction=silent))
     assert (remark.code, remark.level) == ("far-temperature-assumed", "caution")
     assert found(warm_log(27.0), replace(UR5E, friction=silent)) == []
 
 
-def test_an_arm_without_friction_and_another_arm_s_log_say_nothing() -> None:
+def test_an_arm_without_friction_and_another_arm_s_log_say_nothing():
     assert found(warm_log(None), UR5E.without_friction()) == []
     assert found(warm_log(5.0), UR5E.without_friction()) == []
     assert found(warm_log(5.0), load_robot("panda")) == []

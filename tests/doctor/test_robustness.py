@@ -70,7 +70,7 @@ def arm(joints: int) -> Robot:
 @example(log_of([1e-300 * k for k in range(30)]))
 @example(log_of([float(k) for k in range(30)], 0.0))
 @settings(max_examples=200)
-def test_every_recording_is_examined_and_what_is_said_is_json(recording: Recording) -> None:
+def test_every_recording_is_examined_and_what_is_said_is_json(recording):
     """pytest turns every warning into an error here, NumPy's of an overflow too."""
     robot = arm(recording.joints) if recording.joints in {6, 7} else None
     examination = examine(recording, robot)

@@ -12,7 +12,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import Remark
 
 
-def test_uneven_steps_shift_nothing() -> None:
+def test_uneven_steps_shift_nothing():
     """Steps of 4 to 16 ms, stamps as exact as the signals: the lag stays below 0.1 ms."""
     t = np.cumsum(np.random.default_rng(0).uniform(0.004, 0.016, 4001))
     t -= t[0]
@@ -21,7 +21,7 @@ def test_uneven_steps_shift_nothing() -> None:
     np.testing.assert_allclose(fit.lag, 0.0, atol=1e-4)
 
 
-def test_noise_of_the_positions_hides_no_lag() -> None:
+def test_noise_of_the_positions_hides_no_lag():
     """Noise of 1 mrad makes the derivative of the slope ten times as large as the motion's own."""
     q = Q + np.random.default_rng(0).normal(0, 1e-3, Q.shape)
     fit = velocity_fit(log_of(q=q, dq=speed_at(T - 0.03)))
@@ -29,7 +29,7 @@ def test_noise_of_the_positions_hides_no_lag() -> None:
     assert np.max(fit.lag_error) < 2e-3
 
 
-def test_the_standard_errors_are_the_scatter() -> None:
+def test_the_standard_errors_are_the_scatter():
     """Of 200 noises on a quarter turn to one and a half: 1/√400 = 5 % (one sigma)."""
     chance, short = np.random.default_rng(0), {"t": T[:250], "q": Q[:250]}
     fits = [
@@ -43,7 +43,7 @@ def test_the_standard_errors_are_the_scatter() -> None:
 
 
 @pytest.mark.parametrize("cut_off", [0.5, 1.0, 2.0])
-def test_a_filter_is_distinct_from_a_delay(cut_off: float) -> None:
+def test_a_filter_is_distinct_from_a_delay(cut_off):
     """A first-order low-pass takes 1/(2π f_c) and a part of the size, neither clock nor unit."""
     findings = found(dq=filtered(DQ, cut_off))
     assert set(findings) == {"velocity-filtered"}
@@ -65,9 +65,7 @@ def test_a_filter_is_distinct_from_a_delay(cut_off: float) -> None:
         ({"tau_ext": 1e300 * DQ, "q": 1e300 * Q, "torque": TORQUE}, ["absurd-values"] * 2),
     ],
 )
-def test_numbers_that_no_clock_and_no_robot_gives(
-    changes: dict[str, Array], codes: list[str]
-) -> None:
+def test_numbers_that_no_clock_and_no_robot_gives(changes, codes):
     """The limits are beyond every unit: 30 years in ns, steps from 0.1 ps to 300 years."""
     findings = examine(log_of(**changes)).findings
     assert [f.code for f in findings if f.code.startswith("absurd")] == codes
@@ -108,9 +106,7 @@ def by_work(**changes: Array | None) -> list[tuple[str, tuple[int, ...], Remark]
         (-0.9, (2, 3, 5), "effort-sign-of-some"),
     ],
 )
-def test_an_effort_that_takes_energy_is_inverted(
-    share: float, joints: tuple[int, ...], code: str
-) -> None:
+def test_an_effort_that_takes_energy_is_inverted(share, joints, code):
     said = by_work(torque=effort_of_share(share, *joints))
     assert [each[:2] for each in said] == ([(code, joints)] if code else [])
     for *_, finding in said:
@@ -119,7 +115,7 @@ def test_an_effort_that_takes_energy_is_inverted(
         )
 
 
-def test_joints_that_tell_nothing_are_not_judged() -> None:
+def test_joints_that_tell_nothing_are_not_judged():
     """Too little way, one direction only, no effort: each alone."""
     ways, turned = np.sum(np.abs(np.diff(Q, axis=0)), axis=0), -FRICTION
     for way, known in ((0.29, False), (0.31, True)):
@@ -131,7 +127,7 @@ def test_joints_that_tell_nothing_are_not_judged() -> None:
     assert not by_work(torque=turned, dq=None)
 
 
-def test_the_numbers_of_an_inverted_effort() -> None:
+def test_the_numbers_of_an_inverted_effort():
     turned = scaled(-3.0 * FRICTION, -1.0, 1)
     for name, unit, column in (("torque", "N·m", "tau"), ("current", "A", "current")):
         ((*_, finding),) = by_work(**{"torque": None, name: turned})
@@ -152,7 +148,7 @@ def test_the_numbers_of_an_inverted_effort() -> None:
 @pytest.mark.parametrize(
     ("judged", "least"), [(1, 2), (2, 2), (3, 2), (4, 2), (5, 3), (6, 4), (7, 4), (8, 5)]
 )
-def test_most_are_three_in_five_and_two_at_least(judged: int, least: int) -> None:
+def test_most_are_three_in_five_and_two_at_least(judged, least):
     """Of most joints less than half of the work tells the sign, of fewer it does not."""
     columns = np.arange(judged) % 6
     half = effort_of_share(-0.45, *ALL)[:, columns]

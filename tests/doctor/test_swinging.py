@@ -355,9 +355,7 @@ def wave(peak: float = 1.0, low: float = -1.0, run: int = 0) -> Array:
 
 
 def of_clipping() -> Iterator[Case]:
-    def clipped(
-        name: str, there: bool, effort: Array, speed: float = 1e-2, step: float = STEP
-    ) -> Case:
+    def clipped(name, there, effort, speed=1e-2, step=STEP) -> Case:
         """Whether an effort is clipped on a joint that goes so fast. [rad/s, s]"""
         t = step * np.arange(len(effort))
         q, dq = speed * t[:, None], np.full((len(t), 1), speed)
@@ -489,5 +487,5 @@ CASES = (*of_clock(), *of_rows(), *of_velocity(), *of_velocity_clock(), *of_velo
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_a_fault_is_said_beyond_its_limit_and_not_before(case: Case) -> None:
+def test_a_fault_is_said_beyond_its_limit_and_not_before(case):
     case.said.check(case.find())

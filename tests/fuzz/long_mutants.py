@@ -34,7 +34,8 @@ CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
 
 def long_seeds(folder: Path) -> Iterator[Seed]:
     """A log of a UR5 and of a Panda, and a dataset of three episodes."""
-    from fault_variants import table_from, thinned
+    from planted_faults import table_from
+    from planted_spans import thinned
 
     from vftcli.readers.reading import read
 
@@ -56,7 +57,7 @@ def long_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
         return table_mutant(seed, rng, path)
     faults = span_faults(SpanLog(seed.model, seed.model.robot, free=True))
     name = pick(rng, list(faults))
-    faults[name].plant(seed.model).write(path)
+    faults[name](seed.model).write(path)
     return Mutant(name)
 
 

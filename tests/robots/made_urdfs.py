@@ -1,6 +1,6 @@
 """Small URDFs of the shapes that users have, and Pinocchio's answer for them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,7 @@ from vftcli.signals.remarks import Remark
 TENSOR = (0.03, 0.001, 0.002, 0.028, -0.001, 0.025)
 
 
-def link(
-    name: str, mass: float = 1.0, tensor: Sequence[float] = TENSOR, rpy: str = "0 0 0"
-) -> str:
+def link(name, mass=1.0, tensor=TENSOR, rpy="0 0 0") -> str:
     """A link whose centre of mass lies off its frame; without inertia where its mass is zero."""
     if not mass:
         return f'<link name="{name}"/>'
@@ -28,15 +26,15 @@ def link(
 
 
 def joint(
-    name: str,
-    parent: str,
-    child: str,
-    kind: str = "revolute",
+    name,
+    parent,
+    child,
+    kind="revolute",
     *,
-    axis: str = "0 0 1",
-    xyz: str = "0.05 -0.02 0.2",
-    rpy: str = "0 0 0",
-    mimic: str = "",
+    axis="0 0 1",
+    xyz="0.05 -0.02 0.2",
+    rpy="0 0 0",
+    mimic="",
 ) -> str:
     """A joint; `mimic` holds the attributes of that element."""
     limit = '<limit lower="-2" upper="2" velocity="3" effort="50"/>' if kind != "fixed" else ""
@@ -183,9 +181,7 @@ def said(robot: Robot, code: str) -> Remark:
     return remark
 
 
-def reduced_model(
-    text: str, names: Sequence[str], angles: Mapping[str, float]
-) -> tuple[pin.Model, Array]:
+def reduced_model(text, names, angles) -> tuple[pin.Model, Array]:
     """Pinocchio's model of a URDF with all joints but these locked, and which of its q each is."""
     model = pin.buildModelFromXML(text)
     q = pin.neutral(model)

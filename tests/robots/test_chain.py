@@ -25,12 +25,12 @@ from vftcli.signals.pose import IDENTITY, Pose, rotation_about, rpy_matrix
         (1.0, (1, np.inf, 1), "not finite"),
     ],
 )
-def test_a_payload_that_no_body_can_be_is_refused(mass, moments, words) -> None:
+def test_a_payload_that_no_body_can_be_is_refused(mass, moments, words):
     with pytest.raises(RobotError, match=words):
         Payload(mass=mass, com=np.zeros(3), inertia=np.diag(moments))
 
 
-def test_the_nearest_tensor_is_valid_and_no_farther_than_it_must_be() -> None:
+def test_the_nearest_tensor_is_valid_and_no_farther_than_it_must_be():
     R = rotation_about("x", 0.4) @ rotation_about("z", -1.1)
     bad = R @ np.diag([1.0, 2.0, 4.0]) @ R.T
     assert "triangle" in unphysical(1.0, bad)
@@ -43,7 +43,7 @@ def test_the_nearest_tensor_is_valid_and_no_farther_than_it_must_be() -> None:
     assert nearest_tensor(plate) is plate
 
 
-def test_a_payload_is_merged_into_the_last_link_as_pinocchio_does() -> None:
+def test_a_payload_is_merged_into_the_last_link_as_pinocchio_does():
     chain = load_robot("ur5").chain
     com, tensor = np.array([0.02, -0.03, 0.11]), np.diag([0.02, 0.03, 0.01])
     load = Payload(mass=2.5, com=com, inertia=tensor)
@@ -73,7 +73,7 @@ def moved(x: float, z: float) -> Pose:
 
 
 @pytest.mark.parametrize("convention", ["standard-dh", "modified-dh"])
-def test_tables_are_the_textbooks(convention: str) -> None:
+def test_tables_are_the_textbooks(convention):
     """Distal Rz(q+θ) Tz(d) Tx(a) Rx(α), and Craig's proximal Rx(α) Tx(a) Rz(q+θ) Tz(d)."""
     document = {"flange_d": 0.15, "ee_xyz": [0.01, 0.02, 0.03], "ee_rpy": [0.1, 0.2, 0.3]}
     (*placements, tip), inertial = kinematics(convention, TABLE, document)
@@ -93,7 +93,7 @@ def test_tables_are_the_textbooks(convention: str) -> None:
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_poses_and_jacobian_agree_with_pinocchio(name: str) -> None:
+def test_poses_and_jacobian_agree_with_pinocchio(name):
     robot = load_robot(name)
     q = np.random.default_rng(0).uniform(-3, 3, (40, robot.joints))
     poses, jacobian = link_poses(robot.chain, q), flange_jacobian(robot.chain, q)

@@ -35,7 +35,7 @@ def beside(folder: Path, text: str, toml: str) -> Path:
     return written(folder, text)
 
 
-def test_the_toml_beside_says_which_arm_its_drives_and_gains(tmp_path: Path) -> None:
+def test_the_toml_beside_says_which_arm_its_drives_and_gains(tmp_path):
     """`[[joints]]` match by name; those of the other arm are left alone."""
     toml = """tip = "right_link7"
 torque_source = "current"
@@ -64,16 +64,14 @@ observers.gmo.gain = 12.0
     ],
     ids=["fingered", "clawed", "mobile"],
 )
-def test_what_is_locked_at_an_angle_is_where_pinocchio_holds_it(
-    text: str, angles: dict[str, float], tmp_path: Path
-) -> None:
+def test_what_is_locked_at_an_angle_is_where_pinocchio_holds_it(text, angles, tmp_path):
     table = ", ".join(f"{name} = {angle}" for name, angle in angles.items())
     found = load_robot(beside(tmp_path, text, f"lock = {{{table}}}\n"))
     agrees_with_pinocchio(text, found, angles)
     assert all(f"{name} at {angle:g}" in str(found.remarks[0]) for name, angle in angles.items())
 
 
-def test_a_joint_that_follows_a_locked_one_goes_with_it(tmp_path: Path) -> None:
+def test_a_joint_that_follows_a_locked_one_goes_with_it(tmp_path):
     """The URDF's multiplier −1 and offset 0.1."""
     found = load_robot(beside(tmp_path, knuckled(), "lock = {finger_joint = 0.3}\n"))
     followers = [
@@ -84,7 +82,7 @@ def test_a_joint_that_follows_a_locked_one_goes_with_it(tmp_path: Path) -> None:
     )
 
 
-def test_a_joint_of_the_arm_may_be_locked(tmp_path: Path) -> None:
+def test_a_joint_of_the_arm_may_be_locked(tmp_path):
     """A torso that the arm stands on, held."""
     text = robot(link("base"), arm(7))
     found = load_robot(beside(tmp_path, text, "lock = {joint1 = 0.4}\n"))
@@ -105,7 +103,7 @@ def test_a_joint_of_the_arm_may_be_locked(tmp_path: Path) -> None:
         ('[[joints]]\nname = "joint1"\nendless = 1', "endless is 1; it must be true or false"),
     ],
 )
-def test_a_toml_that_does_not_fit_is_refused(tmp_path: Path, toml: str, words: str) -> None:
+def test_a_toml_that_does_not_fit_is_refused(tmp_path, toml, words):
     with pytest.raises(RobotError, match=words):
         load_robot(beside(tmp_path, fingered(), toml))
 
@@ -122,7 +120,7 @@ def inverse_dynamics(robot: Robot, q: Array, v: Array, a: Array) -> Array:
     return np.array(pin.rnea(model, model.createData(), q, v, a))
 
 
-def test_a_tensor_that_no_body_has_is_projected_and_its_effect_said(tmp_path: Path) -> None:
+def test_a_tensor_that_no_body_has_is_projected_and_its_effect_said(tmp_path):
     """Principal moments 1, 2, 4 g·m²: second moments −.5 + … → (2.5, 1.5, 0), so 1.5, 2.5, 4."""
     text = flattened(robot(link("base"), arm(6)), "link4", (1e-3, 2e-3, 4e-3))
     found = load_robot(written(tmp_path, text))
@@ -143,13 +141,13 @@ def test_a_tensor_that_no_body_has_is_projected_and_its_effect_said(tmp_path: Pa
     assert "J4: the inertia of link4 is impossible" in str(remark)
 
 
-def test_a_file_that_gives_only_the_moment_about_the_axis_keeps_it(tmp_path: Path) -> None:
+def test_a_file_that_gives_only_the_moment_about_the_axis_keeps_it(tmp_path):
     text = flattened(robot(link("base"), arm(6)), "link1", (0.0, 0.0, 4e-3))
     moments = np.linalg.eigvalsh(load_robot(written(tmp_path, text)).chain.inertia[0])
     np.testing.assert_allclose(moments, [2e-3, 2e-3, 4e-3], rtol=1e-12)
 
 
-def test_a_negative_moment_is_refused(tmp_path: Path) -> None:
+def test_a_negative_moment_is_refused(tmp_path):
     text = flattened(robot(link("base"), arm(6)), "link2", (-1e-3, 2e-3, 2e-3))
     with pytest.raises(RobotError, match="joint 'joint2' is unphysical: inertia has the negat"):
         load_robot(written(tmp_path, text))
@@ -163,7 +161,7 @@ def without_inertia(urdf: str, *names: str) -> str:
     return urdf
 
 
-def test_an_arm_without_mass_is_refused(tmp_path: Path) -> None:
+def test_an_arm_without_mass_is_refused(tmp_path):
     """Three fingers without mass are a hand all the same."""
     bones = [f"{bone}{k}" for bone in ("finger", "fingertip") for k in (1, 2, 3)]
     text = without_inertia(clawed(), *(f"link{k}" for k in range(1, 7)), *bones)
@@ -171,7 +169,7 @@ def test_an_arm_without_mass_is_refused(tmp_path: Path) -> None:
         load_robot(written(tmp_path, text))
 
 
-def test_a_last_link_without_mass_is_said(tmp_path: Path) -> None:
+def test_a_last_link_without_mass_is_said(tmp_path):
     text = robot(link("base"), arm(6))
     at_the_end = load_robot(written(tmp_path, without_inertia(text, "link6")))
     assert said(at_the_end, "mass-matrix-singular")
@@ -179,7 +177,7 @@ def test_a_last_link_without_mass_is_said(tmp_path: Path) -> None:
     assert np.all(np.isfinite(terms.p))
 
 
-def test_a_small_arm_is_not_called_singular(tmp_path: Path) -> None:
+def test_a_small_arm_is_not_called_singular(tmp_path):
     """Lengths and masses a hundredth, moments a millionth: all of the mass matrix is as small."""
 
     def scaled(found: re.Match[str]) -> str:
@@ -193,7 +191,7 @@ def test_a_small_arm_is_not_called_singular(tmp_path: Path) -> None:
     assert "mass-matrix-singular" not in {remark.code for remark in found.remarks}
 
 
-def test_the_base_s_place_is_in_the_chain_and_gravity_is_said(tmp_path: Path) -> None:
+def test_the_base_s_place_is_in_the_chain_and_gravity_is_said(tmp_path):
     """A mount that the URDF tilts: gravity stays the root's; one that it does not know is given."""
     tilted = robot(link("world", 0.0), joint("mount", "world", "base", "fixed", rpy="1.2 0 0"),
                    link("base"), arm(5))  # fmt: skip
@@ -202,7 +200,7 @@ def test_the_base_s_place_is_in_the_chain_and_gravity_is_said(tmp_path: Path) ->
     assert said(load_robot(wall), "arm-used").values["gravity_m_s2"] == [0.0, -9.81, 0.0]
 
 
-def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
+def test_the_arm_that_was_found_is_what_is_written(tmp_path):
     """Where `tip` and `lock` chose it, and its endless joints, the chain says it all."""
     text = knuckled().replace('name="joint7" type="continuous"', 'name="joint7" type="revolute"')
     found = load_robot(beside(tmp_path, text, 'tip = "gripper"\nlock = {finger_joint = 0.3}\n'))
@@ -215,7 +213,7 @@ def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(inverse_dynamics(again, q, v, a), expected, atol=1e-11)
 
 
-def test_options_of_descriptions_are_refused_where_they_mean_nothing(tmp_path: Path) -> None:
+def test_options_of_descriptions_are_refused_where_they_mean_nothing(tmp_path):
     with pytest.raises(RobotError, match="--tip is for a URDF, xacro or MJCF; ur5 is a robot f"):
         load_robot("ur5", tip="tool0")
     with pytest.raises(RobotError, match="name:=ur is for a URDF, xacro or MJCF; ur5"):
@@ -247,7 +245,7 @@ def _xacro_installed() -> None:
 
 
 @pytest.mark.usefixtures("_xacro_installed")
-def test_a_xacro_is_expanded_with_its_arguments(tmp_path: Path) -> None:
+def test_a_xacro_is_expanded_with_its_arguments(tmp_path):
     path = written(tmp_path, xacro(), "arm.urdf.xacro")
     bare = load_robot(f"{path} name:=made")
     assert (bare.name, bare.joints, bare.chain.mass[0]) == ("made", 5, 1.0)
@@ -278,7 +276,7 @@ def test_a_xacro_is_expanded_with_its_arguments(tmp_path: Path) -> None:
 )
 def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
     text, arguments, words, tmp_path, capfd
-) -> None:
+):
     with pytest.raises(RobotError, match=words) as caught:
         load_robot(f"{written(tmp_path, text, 'arm.xacro')} {arguments}".strip())
     assert "\n" not in str(caught.value)
@@ -288,7 +286,7 @@ def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
 @pytest.mark.slow
 @pytest.mark.usefixtures("_xacro_installed")
 @pytest.mark.parametrize("name", ["arm.xacro", "arm.urdf"])
-def test_a_xacro_that_never_ends_is_ended(tmp_path, monkeypatch, name: str) -> None:
+def test_a_xacro_that_never_ends_is_ended(tmp_path, monkeypatch, name):
     """9^9^9 has 370 million digits: hours of a processor, in one step of the interpreter."""
     monkeypatch.setattr(described, "SECONDS", 1)
     path = written(tmp_path, xacro("${9**9**9}"), name)
@@ -298,8 +296,8 @@ def test_a_xacro_that_never_ends_is_ended(tmp_path, monkeypatch, name: str) -> N
 
 @pytest.mark.usefixtures("_xacro_installed")
 def test_a_maker_s_package_loads_its_tables_and_those_of_a_package_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     """As UR's description does: arguments name the files, a macro of another folder loads them.
 
     A package is found by its manifest, and what it includes may declare arguments.
@@ -333,7 +331,7 @@ def test_a_maker_s_package_loads_its_tables_and_those_of_a_package_beside_it(
     assert robot.chain.mass[-1] == pytest.approx(1.0 + 3.0 * 0.25)
 
 
-def test_without_the_package_the_line_that_expands_it_is_reported(tmp_path, monkeypatch) -> None:
+def test_without_the_package_the_line_that_expands_it_is_reported(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "xacro", None)
     path = written(tmp_path, xacro(), "arm.urdf.xacro")
     line = r"pip install 'vftcli\[xacro\]'.*xacro arm\.urdf\.xacro name:=made > arm\.urdf$"
@@ -341,7 +339,7 @@ def test_without_the_package_the_line_that_expands_it_is_reported(tmp_path, monk
         load_robot(f"{path} name:=made")
 
 
-def test_what_only_names_the_language_is_a_urdf(tmp_path: Path) -> None:
+def test_what_only_names_the_language_is_a_urdf(tmp_path):
     """Expanded files keep the declaration of its namespace."""
     text = robot(link("base"), arm(5)).replace("<robot", '<robot xmlns:xacro="http://xacro"', 1)
     assert load_robot(written(tmp_path, text)).joints == 5
@@ -369,6 +367,6 @@ BOMB = (
         ("<robot>\x00</robot>", "which is XML: "),
     ],
 )
-def test_a_hostile_text_is_refused(text: str, words: str, tmp_path: Path) -> None:
+def test_a_hostile_text_is_refused(text, words, tmp_path):
     with pytest.raises(RobotError, match=words):
         load_robot(written(tmp_path, text))

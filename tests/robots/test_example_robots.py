@@ -110,7 +110,7 @@ def key_of(path: Path) -> str:
 
 
 @pytest.mark.slow
-def test_every_robot_is_loaded_or_refused_by_the_rules() -> None:
+def test_every_robot_is_loaded_or_refused_by_the_rules():
     arms: dict[str, int] = {}
     refused = {}
     for name, path in files().items():
@@ -127,7 +127,7 @@ def test_every_robot_is_loaded_or_refused_by_the_rules() -> None:
 
 
 @pytest.mark.parametrize("name", TWO_ARMS)
-def test_each_of_two_arms_is_taken_by_its_tip(name: str) -> None:
+def test_each_of_two_arms_is_taken_by_its_tip(name):
     path = files()[name]
     left, right = TWO_ARMS[name]
     with pytest.raises(RobotError, match=f"--tip {left} or --tip {right}$"):
@@ -140,14 +140,14 @@ def test_each_of_two_arms_is_taken_by_its_tip(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(LOADED.keys() - {SHARED_NAME}))
-def test_every_arm_is_what_pinocchio_makes_of_the_file(name: str) -> None:
+def test_every_arm_is_what_pinocchio_makes_of_the_file(name):
     text = files()[name].read_text(encoding="utf-8")
     # Pinocchio takes a text without what says how it is encoded.
     text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
     agrees_with_pinocchio(text, load_robot(files()[name]))
 
 
-def test_an_empty_robot_is_said_to_be_empty() -> None:
+def test_an_empty_robot_is_said_to_be_empty():
     with pytest.raises(RobotError, match="the <robot> is empty: it has no link and no joint"):
         load_robot(files()["ur_description/urdf/ur3"])
 
@@ -160,7 +160,7 @@ def test_an_empty_robot_is_said_to_be_empty() -> None:
         ("xarm_description/urdf/xarm7", 8),
     ],
 )
-def test_meshes_are_found_in_a_package_that_only_its_folder_names(name: str, count: int) -> None:
+def test_meshes_are_found_in_a_package_that_only_its_folder_names(name, count):
     found = load_robot(files()[name])
     assert len(found.meshes) == count
     assert all(mesh.file for mesh in found.meshes)

@@ -62,7 +62,7 @@ LOGARITHMIC = joint("coulomb-logarithmic", coulomb=2.0, logarithmic=3.0, logarit
         (JointFriction(), 0.0),
     ],
 )
-def test_friction_at_half_a_radian_a_second_under_a_load(friction, expected) -> None:
+def test_friction_at_half_a_radian_a_second_under_a_load(friction, expected):
     """The same backwards and under the opposite load, none at rest; beside it a constant offset.
 
     tanh(50) of the smoothing is 1 to rounding.
@@ -80,7 +80,7 @@ def test_friction_at_half_a_radian_a_second_under_a_load(friction, expected) -> 
         np.testing.assert_allclose(friction_torque((off,), dq, load), torque + 0.2, rtol=1e-12)
 
 
-def test_joints_are_kept_apart_and_feel_their_own_load() -> None:
+def test_joints_are_kept_apart_and_feel_their_own_load():
     """A sigmoid is zero at rest and runs over its amplitude."""
     arm = (LOADED, JointFriction(), joint("sigmoid", **SIGMOID), points())
     dq = np.array([[1.0, 1.0, 1e3, 1.0], [-1.0, -1.0, -1e3, -1.0], [0.0] * 4])
@@ -94,7 +94,7 @@ def test_joints_are_kept_apart_and_feel_their_own_load() -> None:
         friction_torque((joint("sticky", x=1.0),), np.ones((2, 1)))
 
 
-def test_the_bent_line_runs_through_its_points_and_on() -> None:
+def test_the_bent_line_runs_through_its_points_and_on():
     """Between the points as `numpy.interp`, constant below, the last stretch's slope beyond."""
     speed = np.concatenate([np.linspace(0.001, 3.2, 400), SPEEDS, [4.0]])
     # the sign is there at .001 rad/s already
@@ -104,7 +104,7 @@ def test_the_bent_line_runs_through_its_points_and_on() -> None:
     assert torque[-1] == pytest.approx(18.72 + 0.8 * (18.72 - 13.58) / 1.7, rel=1e-14)
 
 
-def test_presliding_friction_holds_and_falls_nowhere() -> None:
+def test_presliding_friction_holds_and_falls_nowhere():
     values = {"coulomb": 2.0, "viscous": 1.0, "presliding": 3.0, "presliding_length": 1e-3}
     giving = joint("coulomb-viscous", **values)
     np.testing.assert_array_equal(dry_friction((giving,), 1), [5.0])  # a + b
@@ -114,7 +114,7 @@ def test_presliding_friction_holds_and_falls_nowhere() -> None:
     assert np.isfinite(falling_speed(falling, 2.0))
 
 
-def test_dry_friction_is_half_the_step_whatever_smooths_it() -> None:
+def test_dry_friction_is_half_the_step_whatever_smooths_it():
     """Taken at some low speed it was .46 of a sign smoothed over 0.1 rad/s, and viscous in part."""
     values = {"coulomb": 4.0, "viscous": 30.0, "smoothing": 0.2, "offset": 1.0}
     arm = (
@@ -141,7 +141,7 @@ def test_dry_friction_is_half_the_step_whatever_smooths_it() -> None:
         (1, TORQUES, 0.88 * 1.128, 44.6),
     ],
 )
-def test_profiles_rub_as_the_joint_test_says(name, number, points, scale, at) -> None:
+def test_profiles_rub_as_the_joint_test_says(name, number, points, scale, at):
     """The points carried to 35 °C, and on a UR5e back again at the temperature of the test."""
     friction = load_robot(name).friction[number]
     assert friction.speeds == SPEEDS
@@ -155,7 +155,7 @@ def test_profiles_rub_as_the_joint_test_says(name, number, points, scale, at) ->
         np.testing.assert_allclose(back[:, 0], share * np.array(points[1:]), rtol=5e-4)
 
 
-def test_loaded_joints_of_a_ur5e_rub_more() -> None:
+def test_loaded_joints_of_a_ur5e_rub_more():
     """By .067 of the torque on joint 2, .01 to .02 on joint 3."""
     robot = load_robot("ur5e")
     dq, carried = np.full((1, 6), 0.5), np.array([[0.0, 45.0, 20.0, 0.0, 0.0, 0.0]])
@@ -163,7 +163,7 @@ def test_loaded_joints_of_a_ur5e_rub_more() -> None:
     np.testing.assert_allclose(more, carried * [[0, 0.067, 0.015, 0, 0, 0]], atol=1e-12)
 
 
-def test_the_ur10e_profile_rubs_as_its_controller_does() -> None:
+def test_the_ur10e_profile_rubs_as_its_controller_does():
     """A line through points of the feed-forward read off real logs, and each curve's rms to it."""
     speeds = (0.01, 0.5, 1.5, 1.9)
     points = [(17.66, 29.59, 40.47, 44.2), (16.82, 28.75, 38.74), (6.61, 12.57, 20.06)]
@@ -180,7 +180,7 @@ def test_the_ur10e_profile_rubs_as_its_controller_does() -> None:
         assert found == pytest.approx(rms, abs=0.01)
 
 
-def test_a_parabola_turns_down_where_its_slope_is_zero() -> None:
+def test_a_parabola_turns_down_where_its_slope_is_zero():
     # wrist 1 of the UR10e as it was: 5.246 − 2·2.15 v = 0 at 1.22 rad/s
     down = joint("coulomb-viscous-quadratic", coulomb=2.95, viscous=5.246, quadratic=-2.15)
     step = np.pi / 500  # of the speeds looked at
@@ -204,7 +204,7 @@ def test_a_parabola_turns_down_where_its_slope_is_zero() -> None:
         (JointFriction(), False),
     ],
 )
-def test_what_falls_and_what_does_not(friction: JointFriction, falls: bool) -> None:
+def test_what_falls_and_what_does_not(friction, falls):
     assert np.isfinite(falling_speed(friction, 2.0)) == falls
 
 
@@ -220,7 +220,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("size", LAWS)
-def test_all_but_the_offset_follows_the_law_of_the_joint_s_size(size: str) -> None:
+def test_all_but_the_offset_follows_the_law_of_the_joint_s_size(size):
     """At 28 and 45 °C; where no temperature is measured, and at 35 °C, it is the reference's."""
     law, cold, hot = LAWS[size]
     values = {"coulomb": 2.0, "viscous": 1.0, "presliding": 1.0, "presliding_length": 1e-3}
@@ -241,7 +241,6 @@ def test_all_but_the_offset_follows_the_law_of_the_joint_s_size(size: str) -> No
     assert np.all(np.diff(warmth(law, np.linspace(1.0, 100.0, 500))) < 0.0)
     # a joint without a law keeps its friction
     factor = friction_factor((JointFriction(), warm), np.full((3, 2), 20.0))
-    assert factor is not None
     np.testing.assert_array_equal(factor[:, 0], 1.0)
     assert friction_factor((JointFriction(),), T) is None
 
@@ -269,7 +268,7 @@ def arm_with(friction: str, folder: Path) -> Path:
     return path
 
 
-def test_they_are_read_and_written_back(tmp_path: Path) -> None:
+def test_they_are_read_and_written_back(tmp_path):
     """Presliding and temperature stand beside any model."""
     robot = load_robot(arm_with(POINTS, tmp_path))
     values = {"load_coulomb": 0.067, "smoothing": 0.003, "offset": -0.2}
@@ -318,7 +317,7 @@ def test_they_are_read_and_written_back(tmp_path: Path) -> None:
         ("5.73, 9.32", "1e9, 9.32", r"torques is 1e\+09 N·m; on a robot it is"),
     ],
 )
-def test_what_no_joint_has_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
+def test_what_no_joint_has_is_refused(old, new, words, tmp_path):
     assert old in POINTS
     with pytest.raises(RobotError, match=words):
         load_robot(arm_with(POINTS.replace(old, new), tmp_path))
@@ -333,7 +332,7 @@ def wandering(samples: int, joints: int) -> np.ndarray:
     return np.cumsum(2e-4 * rng.standard_normal((samples, joints)), axis=0)
 
 
-def test_a_joint_that_turns_back_gives_before_it_slides() -> None:
+def test_a_joint_that_turns_back_gives_before_it_slides():
     """Worked by hand: 2 s₀ away from a turn the full torque holds the other way.
 
     It is the sign of a long motion, and holds at rest; the joint beside has none.
@@ -350,7 +349,7 @@ def test_a_joint_that_turns_back_gives_before_it_slides() -> None:
     assert play(np.zeros((0, 2)), 3e-4).state.shape == (0, 2)
 
 
-def test_the_terms_take_off_friction_by_load_temperature_and_what_was_before() -> None:
+def test_the_terms_take_off_friction_by_load_temperature_and_what_was_before():
     """More than two chunks, each joint with its own length; by the paper's method too."""
     robot = load_robot("ur5")
     q = wandering(2 * CHUNK + 100, 6)
@@ -405,7 +404,7 @@ def test_blocks_and_stretches_are_the_loop(samples):
         np.testing.assert_array_equal(second.centre, centre)
 
 
-def test_zeros_are_no_temperatures() -> None:
+def test_zeros_are_no_temperatures():
     still = np.zeros((10, 6))
     partly = np.full((10, 6), 30.0)
     partly[3, 2], partly[4, 1] = 0.0, 3000.0
@@ -415,5 +414,4 @@ def test_zeros_are_no_temperatures() -> None:
     assert measured_temperature(plain) is None
     assert measured_temperature(cold) is None
     found = measured_temperature(log)
-    assert found is not None
     assert np.argwhere(np.isnan(found)).tolist() == [[3, 2], [4, 1]]

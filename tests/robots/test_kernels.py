@@ -57,13 +57,13 @@ def agrees_with_pinocchio(chain: Chain, q: np.ndarray, dq: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_agrees_with_pinocchio_under_payload_and_tilted_base(name: str) -> None:
+def test_agrees_with_pinocchio_under_payload_and_tilted_base(name):
     robot = loaded(name)
     agrees_with_pinocchio(robot.loaded_chain, *states(robot, seed=1))
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_the_papers_literal_method_agrees_within_its_own_step(name: str) -> None:
+def test_the_papers_literal_method_agrees_within_its_own_step(name):
     robot = loaded(name)
     q, dq = states(robot, seed=2, samples=60)
     exact = momentum_terms(robot.loaded_chain, q, dq)
@@ -79,7 +79,7 @@ def test_the_papers_literal_method_agrees_within_its_own_step(name: str) -> None
     )
 
 
-def test_chunks_leave_no_seam_and_logs_may_be_short(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_leave_no_seam_and_logs_may_be_short(monkeypatch):
     robot = load_robot("panda")
     q, dq = states(robot, seed=4, samples=1000)
     whole = momentum_terms(robot.loaded_chain, q, dq)
@@ -101,7 +101,7 @@ def dense(robot: Robot, seed: int) -> Chain:
 
 
 @pytest.mark.parametrize("joints", [1, 6, 7])
-def test_general_rotations_agree_with_pinocchio(joints: int) -> None:
+def test_general_rotations_agree_with_pinocchio(joints):
     chain = dense(load_robot("panda" if joints == 7 else "ur5"), seed=9)
     if joints == 1:
         cut = {k: v[:1] for k, v in vars(chain).items() if k in PER_JOINT}
@@ -109,14 +109,14 @@ def test_general_rotations_agree_with_pinocchio(joints: int) -> None:
     agrees_with_pinocchio(chain, *np.random.default_rng(10).normal(0.0, 3.0, (2, 50, joints)))
 
 
-def test_what_is_zero_or_one_or_asked_by_nobody_costs_nothing() -> None:
+def test_what_is_zero_or_one_or_asked_by_nobody_costs_nothing():
     """Right angles and zeros of a table make no operations, and few rows are in use at once."""
     program = kernels.program_of(load_robot("ur5").chain, ("p", "bias"))
     assert len(program._operations) <= 321
     assert program._rows <= 65
 
 
-def test_a_constant_that_equals_the_number_of_a_row_is_a_constant() -> None:
+def test_a_constant_that_equals_the_number_of_a_row_is_a_constant():
     """4.0 is no row 4, though the two are equal."""
     tape = Tape(5)
     program = Program(tape, [tape.plus(tape.times(Value(1.0, 0), Value(4.0)), Value(1.0, 4))])
@@ -128,7 +128,7 @@ def test_a_constant_that_equals_the_number_of_a_row_is_a_constant() -> None:
     np.testing.assert_array_equal(results, [[12.0, 17.0, 22.0]])
 
 
-def test_bias_is_coriolis_less_gravity_and_programs_of_several_arms_do_not_mix() -> None:
+def test_bias_is_coriolis_less_gravity_and_programs_of_several_arms_do_not_mix():
     q, dq = states(load_robot("ur5"), seed=12)
     arms = [load_robot(name).chain for name in ("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e")]
     expected = [momentum_terms(chain, q, dq) for chain in arms]
@@ -140,7 +140,7 @@ def test_bias_is_coriolis_less_gravity_and_programs_of_several_arms_do_not_mix()
         np.testing.assert_allclose(bias, terms.coriolis_transpose_dq - terms.gravity, atol=1e-12)
 
 
-def test_threads_do_not_share_what_they_work_in() -> None:
+def test_threads_do_not_share_what_they_work_in():
     robot = load_robot("ur5")
     logs = [states(robot, seed=20 + k, samples=4000) for k in range(4)]
     alone = [momentum_terms(robot.chain, *log).p for log in logs]

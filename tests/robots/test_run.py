@@ -29,7 +29,7 @@ def swing(speed: float = 1.0) -> Recording:
     return Recording(t=T, q=q, dq=0.5 * slope * np.cos(phase), current=np.zeros_like(q))
 
 
-def test_the_model_s_torque_does_not_depend_on_the_currents() -> None:
+def test_the_model_s_torque_does_not_depend_on_the_currents():
     """It is what the motion takes; the drive's torque is what the currents say."""
     log = swing()
     quiet = Run(recording=log, robot=UR)
@@ -39,7 +39,7 @@ def test_the_model_s_torque_does_not_depend_on_the_currents() -> None:
     assert np.all(driven.drive_torque != 0.0)
 
 
-def test_a_joint_that_stands_is_marked() -> None:
+def test_a_joint_that_stands_is_marked():
     log = swing()
     dq = log.dq.copy()
     dq[500:800, 2] = 0.0
@@ -50,7 +50,7 @@ def test_a_joint_that_stands_is_marked() -> None:
 
 
 @pytest.mark.parametrize(("step", "edge", "path"), [(0.002, 12.0, 12.0), (0.05, 4.4, 4.0)])
-def test_smooth_series_end_below_half_the_rate(step: float, edge: float, path: float) -> None:
+def test_smooth_series_end_below_half_the_rate(step, edge, path):
     """At .22 and .2 of the rate of a slow log, so that its noise is left out."""
     log = replace(swing(), t=T * step / 0.002)
     run = Run(recording=log, robot=UR)
@@ -58,7 +58,7 @@ def test_smooth_series_end_below_half_the_rate(step: float, edge: float, path: f
     np.testing.assert_allclose(run.smooth_dq, low_pass(log.t, log.dq, path), atol=1e-9)
 
 
-def test_a_part_of_a_run_keeps_what_belongs_to_joints() -> None:
+def test_a_part_of_a_run_keeps_what_belongs_to_joints():
     run = Run(recording=swing(), robot=UR)
     part = run.part(slice(100, 300))
     for name in ("t", "q", "dq", *SERIES):
@@ -67,7 +67,7 @@ def test_a_part_of_a_run_keeps_what_belongs_to_joints() -> None:
     assert part.name == run.name
 
 
-def test_a_run_less_a_torque_is_a_run_whose_disturbance_is_less_by_it() -> None:
+def test_a_run_less_a_torque_is_a_run_whose_disturbance_is_less_by_it():
     """ṗ = μ + τ_ext: with μ larger by τ the disturbance is smaller by τ; the motion stays."""
     run, torque = Run(recording=swing(), robot=UR), np.linspace(0.0, 3.0, 12000).reshape(-1, 6)
     less = run.less(torque)
@@ -111,7 +111,7 @@ def log_of(names: tuple[str, ...]) -> Recording:
         (UR_NAMES, tuple(f"joint{j}" for j in range(1, 7)), (0, 1, 2, 3, 4, 5)),
     ],
 )
-def test_joints_are_found_by_name(logged, joints, expected) -> None:
+def test_joints_are_found_by_name(logged, joints, expected):
     assert places(logged, joints) == expected
 
 
@@ -127,11 +127,11 @@ def test_joints_are_found_by_name(logged, joints, expected) -> None:
         (tuple(f"{side}_{name}" for side in "lr" for name in UR_NAMES), UR.chain.names),
     ],
 )
-def test_names_that_do_not_tell_find_nothing(logged, joints) -> None:
+def test_names_that_do_not_tell_find_nothing(logged, joints):
     assert places(logged, joints) is None
 
 
-def test_every_joint_signal_follows_and_what_goes_is_said() -> None:
+def test_every_joint_signal_follows_and_what_goes_is_said():
     shuffled = ("finger", "elbow_joint", "wrist_1_joint", "shoulder_pan_joint", "wrist_3_joint",
                 "shoulder_lift_joint", "wrist_2_joint")  # fmt: skip
     log = paired(log_of(shuffled), UR)
@@ -146,7 +146,7 @@ def test_every_joint_signal_follows_and_what_goes_is_said() -> None:
     assert paired(log, UR) is log
 
 
-def test_names_that_do_not_cover_the_arm_are_refused_with_both_lists() -> None:
+def test_names_that_do_not_cover_the_arm_are_refused_with_both_lists():
     words = r"wrist_c.*are not named as.*shoulder_pan.*\[\[joints\]\]"
     with pytest.raises(RobotError, match=words):
         paired(log_of(NAMES), UR)
@@ -158,7 +158,7 @@ def test_names_that_do_not_cover_the_arm_are_refused_with_both_lists() -> None:
     assert paired(named, nameless) is named
 
 
-def test_a_log_of_the_motors_side_is_brought_to_the_joints_once() -> None:
+def test_a_log_of_the_motors_side_is_brought_to_the_joints_once():
     gear, efficiency = np.array([101.0, -50, 1, 1, 1, 1]), np.array([0.9, 1, 1, 1, 1, 1])
     robot = replace(UR, gear=gear, efficiency=efficiency)
     log = replace(log_of(NAMES), joint_names=(), current=np.ones((10, 6)))
@@ -171,14 +171,14 @@ def test_a_log_of_the_motors_side_is_brought_to_the_joints_once() -> None:
     assert paired(found, robot) is found
 
 
-def test_a_gear_is_read_from_the_robot_file(tmp_path) -> None:
+def test_a_gear_is_read_from_the_robot_file(tmp_path):
     text = UR.path.read_text("utf-8").replace("mass = 3.7\n", "mass = 3.7\ngear = -101.0\n", 1)
     found = load_robot(written(tmp_path, text, "geared.toml"))
     np.testing.assert_array_equal(found.gear, [-101, 1, 1, 1, 1, 1])
     assert found.efficiency is None
 
 
-def test_a_jump_of_a_turn_is_taken_back_and_said(tmp_path: Path) -> None:
+def test_a_jump_of_a_turn_is_taken_back_and_said(tmp_path):
     arm6 = load_robot(written(tmp_path, robot(link("base"), arm(6, kind="continuous"))))
     t = np.arange(0.0, 8.0, 0.01)
     q = np.stack([(k - 2.5) * t for k in range(6)], axis=1)
@@ -186,14 +186,13 @@ def test_a_jump_of_a_turn_is_taken_back_and_said(tmp_path: Path) -> None:
     log = Recording(t=t, q=within, target_q=within)
     found = unwound(log, arm6)
     np.testing.assert_allclose(found.q, q, atol=1e-13)  # rounding of a few turns
-    assert found.target_q is not None
     np.testing.assert_allclose(found.target_q, q, atol=1e-13)
     (remark,) = found.source.remarks
     assert remark.where.joints == (1, 2, 3, 4, 5, 6)
     assert Examiner().read_as(log, arm6, ReadChoice()).source.remarks == (remark,)
 
 
-def test_what_does_not_jump_is_the_log_itself(tmp_path: Path) -> None:
+def test_what_does_not_jump_is_the_log_itself(tmp_path):
     endless = load_robot(written(tmp_path, robot(link("base"), arm(5, kind="continuous"))))
     limited = replace(endless, endless=())
     jumping = Recording(t=np.array([0.0, 0.1]), q=np.array([[0.0] * 5, [6.0] * 5]))

@@ -38,7 +38,7 @@ def motion(joints: int, samples: int = 400, rate: float = 500.0) -> tuple[np.nda
     return t, 0.5 * np.sin(angle), 0.5 * w * np.cos(angle), -0.5 * w**2 * np.sin(angle)
 
 
-def test_mu_integrates_to_the_momentum_of_free_motion() -> None:
+def test_mu_integrates_to_the_momentum_of_free_motion():
     """On torque made by Pinocchio's inverse dynamics, ṗ = μ: nothing is left to explain."""
     robot = load_robot("ur5").without_friction()
     t, q, dq, ddq = motion(6)
@@ -51,7 +51,7 @@ def test_mu_integrates_to_the_momentum_of_free_motion() -> None:
     np.testing.assert_allclose(change, 0.0, atol=step**3 / 12 * 2e3)
 
 
-def test_current_becomes_torque_through_the_drive_constant() -> None:
+def test_current_becomes_torque_through_the_drive_constant():
     torque = drive_torque(Recording(t=T, q=Q, current=np.ones_like(Q)), load_robot("ur5"))
     np.testing.assert_array_equal(torque[0], [12.625, 12.625, 12.625, 9.3122, 9.3122, 9.3122])
 
@@ -65,7 +65,7 @@ def test_current_becomes_torque_through_the_drive_constant() -> None:
         ("panda", 7, "dq current", MissingSignalError, "no torque_constant"),
     ],
 )
-def test_what_a_robot_s_log_lacks_is_named(robot, joints, signals, error, words) -> None:
+def test_what_a_robot_s_log_lacks_is_named(robot, joints, signals, error, words):
     q = np.zeros((3, joints))
     with pytest.raises(error, match=words):
         dynamics_terms(
@@ -74,7 +74,7 @@ def test_what_a_robot_s_log_lacks_is_named(robot, joints, signals, error, words)
 
 
 @pytest.mark.parametrize("size", [1, 150, 399])
-def test_blocks_of_a_log_have_the_whole_log_s_terms(size: int) -> None:
+def test_blocks_of_a_log_have_the_whole_log_s_terms(size):
     """To the last bit, friction that remembers the motion included."""
     robot = load_robot("ur5")
     slips = {**robot.friction[0].parameters, "presliding": 2.0, "presliding_length": 0.05}
@@ -94,7 +94,7 @@ def test_blocks_of_a_log_have_the_whole_log_s_terms(size: int) -> None:
             np.testing.assert_array_equal(getattr(block, name), getattr(whole, name)[span])
 
 
-def test_torque_without_gravity_gets_that_of_the_arm_and_its_payload() -> None:
+def test_torque_without_gravity_gets_that_of_the_arm_and_its_payload():
     load = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.1]), inertia=np.zeros((3, 3)))
     arm = UR5E.with_payload(load)
     log = Recording(t=T, q=Q, torque_without_gravity=EFFORT)
@@ -113,7 +113,7 @@ def test_torque_without_gravity_gets_that_of_the_arm_and_its_payload() -> None:
         (("current",), "current", "current"),
     ],
 )
-def test_an_arm_takes_what_its_makers_logs_hold(signals, of_ur, of_franka) -> None:
+def test_an_arm_takes_what_its_makers_logs_hold(signals, of_ur, of_franka):
     """UR measures currents, Franka torques; what is not there is made up for by the other."""
     log = Recording(t=T, q=Q, **dict.fromkeys(signals, EFFORT))
     assert effort_name(log, UR5E) == of_ur
@@ -131,7 +131,7 @@ def terms_of(t: np.ndarray, torque: np.ndarray) -> DynamicsTerms:
     return DynamicsTerms(t=t, p=p, mu=mu)
 
 
-def test_an_even_clock_is_only_cut() -> None:
+def test_an_even_clock_is_only_cut():
     t = STEP * np.arange(50)
     torque = np.random.default_rng(2).standard_normal((49, 1))
     inside = np.ones(50, dtype=bool)
@@ -142,7 +142,7 @@ def test_an_even_clock_is_only_cut() -> None:
     np.testing.assert_allclose(found[1], torque[22:39], atol=1e-11)
 
 
-def test_an_uneven_clock_keeps_the_impulse() -> None:
+def test_an_uneven_clock_keeps_the_impulse():
     """The integral of d over a stretch does not change with the clock."""
     rng = np.random.default_rng(3)
     t = np.cumsum(rng.uniform(0.6 * STEP, 1.4 * STEP, 300))
@@ -159,7 +159,7 @@ def test_an_uneven_clock_keeps_the_impulse() -> None:
 
 
 @pytest.mark.parametrize("clock", ["even", "gapped", "uneven"])
-def test_white_noise_has_the_density_of_white_noise_on_any_clock(clock: str) -> None:
+def test_white_noise_has_the_density_of_white_noise_on_any_clock(clock):
     """σ²·2Ts: the second Welch took raw samples of an uneven clock at its median step."""
     rng = np.random.default_rng(4)
     sigma, count = 2.0, 60_000
@@ -184,7 +184,7 @@ def test_white_noise_has_the_density_of_white_noise_on_any_clock(clock: str) -> 
     assert np.mean(low) == pytest.approx(expected, rel=0.05)
 
 
-def test_blocks_follow_one_another_and_hold_the_mean_torque() -> None:
+def test_blocks_follow_one_another_and_hold_the_mean_torque():
     """On an uneven clock too a block holds whole samples, and d is the impulse over its time."""
     rng = np.random.default_rng(7)
     t = np.cumsum(rng.uniform(0.8 * STEP, 1.2 * STEP, 103))
@@ -206,7 +206,7 @@ def test_blocks_follow_one_another_and_hold_the_mean_torque() -> None:
     np.testing.assert_array_equal(few.t, blocks.t[2:5])
 
 
-def test_a_gap_and_what_is_left_out_are_blocks_of_which_nothing_is_known() -> None:
+def test_a_gap_and_what_is_left_out_are_blocks_of_which_nothing_is_known():
     t = STEP * np.arange(100.0)
     t[60:] += 1.0
     terms, q = terms_of(t, np.ones((99, 1))), np.zeros((100, 1))
@@ -223,7 +223,7 @@ def test_a_gap_and_what_is_left_out_are_blocks_of_which_nothing_is_known() -> No
 
 
 @pytest.mark.parametrize("inside", [None, np.zeros(1, dtype=bool)])
-def test_one_sample_is_a_block_of_which_nothing_is_known(inside: np.ndarray | None) -> None:
+def test_one_sample_is_a_block_of_which_nothing_is_known(inside):
     one = DynamicsTerms(t=np.zeros(1), p=np.ones((1, 2)), mu=np.ones((1, 2)))
     found = disturbance_blocks(one, np.ones((1, 2)), 0.1, inside)
     assert (len(found.t), found.length.tolist(), found.known.tolist()) == (1, [0.0], [False])

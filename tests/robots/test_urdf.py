@@ -78,7 +78,7 @@ ONE_JOINT = link("base") + link("one") + joint("j", "base", "one")
         (robot(ONE_JOINT * 1001), "1001 joints; a robot has at most 1000"),
     ],
 )
-def test_a_urdf_that_is_no_arm_is_refused(text, words, tmp_path, capfd) -> None:
+def test_a_urdf_that_is_no_arm_is_refused(text, words, tmp_path, capfd):
     refused(tmp_path, text, words, capfd)
 
 
@@ -112,7 +112,7 @@ def test_a_urdf_that_is_no_arm_is_refused(text, words, tmp_path, capfd) -> None:
         ('<axis xyz="0 1 0"/>', "<mimic/>", "joint 'b': <mimic> names no joint"),
     ],
 )
-def test_a_urdf_with_an_error_is_refused_by_the_part(tmp_path, old, new, words, capfd) -> None:
+def test_a_urdf_with_an_error_is_refused_by_the_part(tmp_path, old, new, words, capfd):
     assert old in URDF
     refused(tmp_path, URDF.replace(old, new, 1), words, capfd)
 
@@ -121,7 +121,7 @@ def test_a_urdf_with_an_error_is_refused_by_the_part(tmp_path, old, new, words, 
     ("shape", "count"),
     [("fingered", 7), ("knuckled", 7), ("barred", 6), ("clawed", 6), ("mobile", 6)],
 )
-def test_every_shape_is_read_as_pinocchio_reads_it(shape, count, tmp_path: Path) -> None:
+def test_every_shape_is_read_as_pinocchio_reads_it(shape, count, tmp_path):
     """Hands and bases are no joints of the arm."""
     text = SHAPES[shape]()
     found = load_robot(written(tmp_path, text))
@@ -130,13 +130,13 @@ def test_every_shape_is_read_as_pinocchio_reads_it(shape, count, tmp_path: Path)
     assert np.isnan(found.limits.q_max).all() == (shape == "knuckled")  # endless joints
 
 
-def test_a_joint_and_a_link_may_share_a_name(tmp_path: Path) -> None:
+def test_a_joint_and_a_link_may_share_a_name(tmp_path):
     text = robot(link("base"), arm(5)).replace('"joint3"', '"link3"')
     found = load_robot(written(tmp_path, text))
     assert found.chain.names == ("joint1", "joint2", "link3", "joint4", "joint5")
 
 
-def test_what_a_urdf_leaves_out_has_its_default(tmp_path: Path) -> None:
+def test_what_a_urdf_leaves_out_has_its_default(tmp_path):
     """No limit, no axis (x then), no origin."""
     bare = '<joint name="j" type="revolute"><parent link="base"/><child link="one"/></joint>'
     found = load_robot(written(tmp_path, robot(link("base"), link("one"), bare)))
@@ -174,7 +174,7 @@ HAND = "".join(
 )
 
 
-def test_an_mjcf_is_pinocchio_s_model_of_it(tmp_path: Path) -> None:
+def test_an_mjcf_is_pinocchio_s_model_of_it(tmp_path):
     """Two sliding fingers are locked, the site is the flange, the armature the rotor's inertia."""
     path = written(tmp_path, mjcf('armature="0.4"', HAND), "arm.mjcf.xml")
     found = load_robot(path)
@@ -194,7 +194,7 @@ def test_an_mjcf_is_pinocchio_s_model_of_it(tmp_path: Path) -> None:
         )
 
 
-def test_a_body_is_a_tip_and_a_pendulum_an_arm_of_one_joint(tmp_path: Path) -> None:
+def test_a_body_is_a_tip_and_a_pendulum_an_arm_of_one_joint(tmp_path):
     path = written(tmp_path, mjcf(), "arm.xml")
     assert load_robot(path, tip="link4").chain.names[-1] == "joint4"
     body = f'<body name="bob">{INERTIAL.format(1)}<joint name="swing" axis="0 1 0"/></body>'
@@ -203,7 +203,7 @@ def test_a_body_is_a_tip_and_a_pendulum_an_arm_of_one_joint(tmp_path: Path) -> N
     np.testing.assert_allclose(turn[:, 2], [0, 1, 0], atol=1e-15)
 
 
-def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> None:
+def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path):
     path = written(tmp_path, mjcf('damping="20" frictionloss="0.3"'), "arm.xml")
     log = Recording(t=np.array([0.0, 0.1]), q=np.zeros((2, 5)))
     robot = RobotChoice(name=str(path)).load(log)
@@ -238,11 +238,11 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
         ("<COLLADA/>", "a mesh; take the URDF that names it"),
     ],
 )
-def test_an_mjcf_that_is_no_arm_is_refused(text, words, tmp_path, capfd) -> None:
+def test_an_mjcf_that_is_no_arm_is_refused(text, words, tmp_path, capfd):
     refused(tmp_path, text, words, capfd, "arm.xml")
 
 
-def test_without_pinocchio_an_mjcf_is_refused_and_a_urdf_is_read(tmp_path, monkeypatch) -> None:
+def test_without_pinocchio_an_mjcf_is_refused_and_a_urdf_is_read(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pinocchio", None)
     with pytest.raises(RobotError, match=r"an MJCF needs pin, which is not .*: pip install pin"):
         load_robot(written(tmp_path, mjcf(), "arm.xml"))

@@ -12,7 +12,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.wrench import FIT, WrenchChoice, ZeroChoice
 
 
-def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for_others() -> None:
+def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for_others():
     choice = WrenchChoice.parsed(zero=[])
     assert choice == WrenchChoice(frame="flange", solver=None)
     # a named solver is every observer's; the smoother's σ_min, null space and mask are pinv's
@@ -26,7 +26,7 @@ def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for
         assert (choice.smooths("best"), choice.smooths("kfo-fe")) == (best, other)
 
 
-def test_a_zero_is_spans_or_the_start() -> None:
+def test_a_zero_is_spans_or_the_start():
     assert ZeroChoice.parsed(["1:2", "8:9"]).spans == ((1.0, 2.0), (8.0, 9.0))
     assert ZeroChoice.parsed(["start"]) == ZeroChoice(start=True)
     assert ZeroChoice.parsed([]) == ZeroChoice()
@@ -41,12 +41,12 @@ def test_a_zero_is_spans_or_the_start() -> None:
         (["2:1"], "A:B with A < B"),
     ],
 )
-def test_a_zero_that_is_none(words: list[str], message: str) -> None:
+def test_a_zero_that_is_none(words, message):
     with pytest.raises(ParameterError, match=message):
         ZeroChoice.parsed(words)
 
 
-def test_what_is_asked_goes_before_the_robot_file() -> None:
+def test_what_is_asked_goes_before_the_robot_file():
     robot = load_robot("ur5")
     there = WrenchChoice(tool="0,0,0.1", sensor_pose="0,0,0.03").mounting(robot)
     np.testing.assert_array_equal(there.tool.translation, [0, 0, 0.1])
@@ -70,7 +70,7 @@ COMMON = [CIRCLE, "--robot", "ur5", "--observer", "gmo"]
         ((), False),
     ],
 )
-def test_any_wrench_option_asks_for_the_wrench(tmp_path, option, asks) -> None:
+def test_any_wrench_option_asks_for_the_wrench(tmp_path, option, asks):
     code, _, err = run(["estimate", *COMMON, *option, "-o", tmp_path])
     assert code == 0, err
     columns = pl.read_parquet_schema(tmp_path / "estimates.parquet")
@@ -93,7 +93,7 @@ def test_any_wrench_option_asks_for_the_wrench(tmp_path, option, asks) -> None:
         ),
     ],
 )
-def test_bad_options_are_one_line_and_leave_nothing(tmp_path, option, words) -> None:
+def test_bad_options_are_one_line_and_leave_nothing(tmp_path, option, words):
     out = tmp_path / "out"
     code, _, err = run(["estimate", *COMMON, *option, "-o", out])
     assert code == 1

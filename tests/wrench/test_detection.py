@@ -50,16 +50,14 @@ def reference(height: float, floor: float | None = None) -> ExternalTorque:
     return ExternalTorque(name="truth", t=T, tau=tau, floor=floors)
 
 
-def judged(
-    tau: np.ndarray, truth: ExternalTorque | None = None, known: KnownContacts | None = None
-) -> ContactScore:
+def judged(tau, truth=None, known=None) -> ContactScore:
     """An estimate's torque against the true one, else 2 N·m."""
     estimate = ExternalTorque(name="gmo", t=T, tau=tau)
     (score,) = judge_contacts([estimate], None, truth or reference(2.0), known)
     return score
 
 
-def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
+def test_hits_misses_false_alarms_and_delays_are_counted():
     true = contacts((2, 4), (8, 9), (14, 15))
     found = contacts((2.2, 4.3), (11, 11.5), (14.1, 15))
     reported = match_contacts(found, true, 20.0)
@@ -71,7 +69,7 @@ def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
     assert reported.longest_delay == pytest.approx(0.2)
 
 
-def test_a_found_contact_is_credited_to_one_true_one() -> None:
+def test_a_found_contact_is_credited_to_one_true_one():
     true = contacts((2, 4), (5, 6), (7, 8), (14, 15))
     # One interval over three contacts, the last of which it has most of; one in two pieces.
     found = contacts((3.9, 8), (14, 14.3), (14.6, 15))
@@ -81,7 +79,7 @@ def test_a_found_contact_is_credited_to_one_true_one() -> None:
     assert assignment(found, true)[3] == 2  # the longer piece
 
 
-def test_as_many_contacts_as_possible_are_credited() -> None:
+def test_as_many_contacts_as_possible_are_credited():
     """The first interval overlaps the second contact more, but the second has nothing else."""
     true = [ContactInterval(1.0, 2.0), ContactInterval(3.0, 6.0)]
     found = [ContactInterval(1.9, 4.0), ContactInterval(4.5, 5.0)]
@@ -93,7 +91,7 @@ def test_as_many_contacts_as_possible_are_credited() -> None:
     assert (late.missed, late.false_alarms) == (1, 0)
 
 
-def test_the_free_band_reaches_a_third_beyond_the_free_part() -> None:
+def test_the_free_band_reaches_a_third_beyond_the_free_part():
     """About a median of 0 and of 5: 1.3 times 2, and half a newton-metre at least."""
     quiet = np.array([[-1.0, 5.1], [0.0, 5.0], [2.0, 4.9], [np.nan, 9.0]])
     values = np.array([[2.6, 5.0], [-5.2, 5.4], [0.0, 6.5], [np.nan, np.nan], [1.3, np.nan]])
@@ -102,7 +100,7 @@ def test_the_free_band_reaches_a_third_beyond_the_free_part() -> None:
         departure(values, quiet[3:], 0.5)
 
 
-def test_contacts_are_reported_from_torques_before_the_first_true_one() -> None:
+def test_contacts_are_reported_from_torques_before_the_first_true_one():
     truth = np.zeros((len(T), 6))
     truth[:, 1] = push(10.0, 5.0, 6.0) + push(10.0, 10.0, 11.0)
     rng = np.random.default_rng(2)
@@ -128,14 +126,14 @@ def test_contacts_are_reported_from_torques_before_the_first_true_one() -> None:
         (push(1.3, 4.995, 5.025), 1),
     ],
 )
-def test_a_contact_is_a_score_beyond_one_that_lasts(score: np.ndarray, count: int) -> None:
+def test_a_contact_is_a_score_beyond_one_that_lasts(score, count):
     assert len(find_contacts(T, score)) == count
 
 
 @pytest.mark.parametrize(
     ("start", "false"), [(1.88, 1), (1.92, 0), (3.05, 0), (3.15, 0), (3.95, 0), (4.05, 1)]
 )
-def test_what_begins_too_early_or_late_is_false(start: float, false: int) -> None:
+def test_what_begins_too_early_or_late_is_false(start, false):
     """A true contact from 2 to 3 s: .1 s before it to 1 s behind its end are its own."""
     found = [ContactInterval(start, start + 0.5)]
     reported = match_contacts(found, [ContactInterval(2.0, 3.0)], 10.0)
@@ -148,15 +146,13 @@ def test_what_begins_too_early_or_late_is_false(start: float, false: int) -> Non
     ("pause", "floor", "count"),
     [(0.10, None, 1), (0.13, None, 2), (0.23, 0.1, 1), (0.26, 0.1, 2)],
 )
-def test_contacts_of_an_exact_reference_are_parted_by_a_shorter_pause(
-    pause: float, floor: float | None, count: int
-) -> None:
+def test_contacts_of_an_exact_reference_are_parted_by_a_shorter_pause(pause, floor, count):
     tau = np.outer(push(2.0, 5.0, 6.0) + push(2.0, 6.0 + pause, 7.0), [1.0, 0.0])
     known = replace(reference(2.0, floor), tau=tau)
     assert judged(tau, known).detection.contacts == count
 
 
-def test_true_contacts_exceed_half_a_newton_metre_on_any_joint() -> None:
+def test_true_contacts_exceed_half_a_newton_metre_on_any_joint():
     truth = np.zeros((len(T), 6))
     truth[:, 1], truth[:, 4] = push(0.6), push(0.6, 10.0, 11.0)
     truth[:, 2], truth[0, 0] = push(0.4, 14.0, 15.0), np.nan
@@ -164,13 +160,13 @@ def test_true_contacts_exceed_half_a_newton_metre_on_any_joint() -> None:
     assert [(round(c.start, 1), round(c.stop, 1)) for c in found] == [(5.0, 7.0), (10.0, 11.0)]
 
 
-def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contact() -> None:
+def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contact():
     for floor, count in ((None, 1), (0.5, 0)):
         score = judged(reference(2.0).tau, reference(2.0, floor))
         assert score.detection.contacts == count
 
 
-def test_stiction_at_rest_deafens_no_reference() -> None:
+def test_stiction_at_rest_deafens_no_reference():
     """1 N·m in motion, of half the samples or of one; a joint at rest has its floor."""
     t = np.arange(200) * 0.01
     moving = np.arange(200)[:, None] < [100, 1, 0]
@@ -185,7 +181,7 @@ def test_stiction_at_rest_deafens_no_reference() -> None:
     np.testing.assert_allclose(floor_in_motion(one), [1.0, 1.0, 5.0])
 
 
-def test_settling_is_no_contact() -> None:
+def test_settling_is_no_contact():
     score = judged(reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0)
     assert score.detection.false_alarms == 0
     assert score.detection.delay == (0.0,)
@@ -205,7 +201,7 @@ def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReadi
     )
 
 
-def test_contacts_are_reported_from_wrenches_where_there_are_some() -> None:
+def test_contacts_are_reported_from_wrenches_where_there_are_some():
     values = np.zeros((len(T), 6))
     values[:, 2] = push(8.0)
     values[:, 0] = push(5.0, 12.0, 18.0)  # within the zero span, so part of its band
@@ -216,7 +212,7 @@ def test_contacts_are_reported_from_wrenches_where_there_are_some() -> None:
     assert (zeroed.detection.missed, zeroed.detection.false_alarms) == (0, 0)
 
 
-def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
+def test_the_free_part_lasts_from_settling_to_the_first_contact():
     true = contacts((5.0, 7.0))
     np.testing.assert_array_equal(learned_free(T, true), (T >= 1.0) & (true[0].start > T))
     assert learned_free(T, ())[-2]
@@ -224,14 +220,14 @@ def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
         learned_free(T, contacts((1.05, 7.0)))
 
 
-def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
+def test_false_alarms_count_by_the_hour_of_the_whole_log():
     """One alarm in 19.99 s, of which the push holds 5 to 6.99 s: one in 18.00 s, 200 an hour."""
     score = judged(reference(2.0).tau + np.outer(push(2.0, 12.0, 13.0), [1.0, 0.0]))
     assert score.detection.false_alarms == 1
     assert score.detection.false_alarms_per_h == pytest.approx(200.0)
 
 
-def test_what_is_listed_is_judged_as_it_stands() -> None:
+def test_what_is_listed_is_judged_as_it_stands():
     """Two rows for one push: one is credited, the other a piece."""
     reported = KnownContacts(
         untouched=np.zeros(len(T), dtype=bool),
@@ -243,7 +239,7 @@ def test_what_is_listed_is_judged_as_it_stands() -> None:
     assert (detection.found, detection.listed, detection.false_alarms) == (1, 2, 0)
 
 
-def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
+def test_the_band_is_learned_where_the_arm_is_known_to_be_free():
     """A bump of 5 N·m at 12 s is a false alarm, unless the free part or a free run shows it."""
     tau = reference(8.0).tau + np.outer(push(5.0, 12.0, 13.0), [1.0, 0.0])
 
@@ -260,7 +256,7 @@ def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
     assert alarms(KnownContacts(untouched=nothing, beside={"gmo": beside})) == 0
 
 
-def test_observers_are_run_along_free_runs() -> None:
+def test_observers_are_run_along_free_runs():
     log = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
     run = Run(recording=log, robot=load_robot("ur5"))
     piece = RunSamples(run, (log.t > 0.3) & (log.t < 4.0))

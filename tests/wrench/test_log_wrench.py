@@ -55,7 +55,7 @@ def in_base(frame: WrenchFrame | None, mounting: Mounting = MOUNTED) -> np.ndarr
         (WrenchFrame("tool", "sensor"), Pose(TOOL.rotation, SENSOR.translation)),
     ],
 )
-def test_axes_and_point_of_the_flange_are_pinocchios_action(frame, pose) -> None:
+def test_axes_and_point_of_the_flange_are_pinocchios_action(frame, pose):
     there = pin.SE3(pose.rotation, pose.translation)
     for found, R, given in zip(in_base(frame), FLANGE, READ, strict=True):
         expected = (pin.SE3(R, np.zeros(3)) * there).act(pin.Force(given[:3], given[3:])).vector
@@ -66,14 +66,14 @@ def test_axes_and_point_of_the_flange_are_pinocchios_action(frame, pose) -> None
     ("point", "lever"),
     [("flange", np.zeros(3)), ("tool", TOOL.translation), ("sensor", SENSOR.translation)],
 )
-def test_in_base_axes_only_the_moment_moves(point: str, lever: np.ndarray) -> None:
+def test_in_base_axes_only_the_moment_moves(point, lever):
     found = in_base(WrenchFrame("base", point))
     np.testing.assert_array_equal(found[:, :3], READ[:, :3])
     moment = READ[:, 3:] + np.cross(FLANGE @ lever, READ[:, :3])
     np.testing.assert_allclose(found[:, 3:], moment, atol=ROUNDING)
 
 
-def test_a_moment_about_the_bases_origin_is_pinocchios_action() -> None:
+def test_a_moment_about_the_bases_origin_is_pinocchios_action():
     """What libfranka's O_F_ext_hat_K is: the base's placement moves it to the flange's point."""
     origins = link_poses(UR5.chain, Q).translation[:, -1]
     found = in_base(WrenchFrame("base", "base"), Mounting())
@@ -89,7 +89,7 @@ def explained(recording: Recording, robot: Robot) -> list[np.ndarray]:
     return [np.linalg.lstsq(j.T, tau, rcond=None)[0] for j, tau in pairs]
 
 
-def test_both_wrenches_of_a_real_franka_are_its_joint_torque(logs: Path) -> None:
+def test_both_wrenches_of_a_real_franka_are_its_joint_torque(logs):
     """O_F_ext_hat_K about the base's origin, K_F_ext_hat_K about K, K being this log's flange.
 
     Both equal pinv(Jᵀ) of its joint torque within 7e-4 N and 2e-4 N·m on every sample, which the
@@ -115,7 +115,7 @@ def test_both_wrenches_of_a_real_franka_are_its_joint_torque(logs: Path) -> None
     np.testing.assert_allclose(of_stiffness, of_base, atol=1e-3)
 
 
-def test_a_simulated_franka_states_its_wrench_as_a_real_one() -> None:
+def test_a_simulated_franka_states_its_wrench_as_a_real_one():
     """panda_bag's O_F_ext_hat_K is its joint torque's wrench about the base's origin."""
     recording, robot = read(FIXTURES / "panda_bag"), load_robot("panda")
     wrench = logged_wrench(recording, robot.chain, Mounting()).values
@@ -124,13 +124,13 @@ def test_a_simulated_franka_states_its_wrench_as_a_real_one() -> None:
 
 
 @pytest.mark.parametrize("frame", FRAMES)
-def test_the_answers_frame_undoes_the_logs(frame: str) -> None:
+def test_the_answers_frame_undoes_the_logs(frame):
     back = from_base(frame, FLANGE, MOUNTED) @ in_base(WrenchFrame.parsed(frame))[:, :, None]
     np.testing.assert_allclose(np.squeeze(back, axis=2), READ, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("axes", ["base", "sensor"])
-def test_a_force_by_the_robot_is_turned(axes: str) -> None:
+def test_a_force_by_the_robot_is_turned(axes):
     by = in_base(WrenchFrame(axes, "sensor", "by-robot"))
     np.testing.assert_array_equal(by, -in_base(WrenchFrame(axes, "sensor")))
 
@@ -141,7 +141,7 @@ def of_sensor(recording: Recording, mounting: Mounting) -> np.ndarray:
     return make_reference(motion, ReferenceChoice(name="sensor"), mounting).torque.tau
 
 
-def test_one_contact_in_every_frame_is_one_joint_torque() -> None:
+def test_one_contact_in_every_frame_is_one_joint_torque():
     base = in_base(WrenchFrame("sensor", "sensor"))
     sensor = of_sensor(log(WrenchFrame("sensor", "sensor")), MOUNTED)
     frame = WrenchFrame("base", "flange", "by-robot")
@@ -154,7 +154,7 @@ def codes(frame: WrenchFrame | None, mounting: Mounting) -> list[str]:
     return [remark.code for remark in logged_wrench(log(frame), UR5.chain, mounting).remarks]
 
 
-def test_what_is_not_stated_is_assumed_aloud() -> None:
+def test_what_is_not_stated_is_assumed_aloud():
     assert codes(None, MOUNTED) == ["wrench-frame-unstated"]
     assert codes(None, Mounting()) == ["wrench-frame-unstated", "sensor-pose-unstated"]
     assert codes(WrenchFrame("base", "tool"), Mounting()) == ["tool-pose-unstated"]
@@ -165,18 +165,18 @@ def test_what_is_not_stated_is_assumed_aloud() -> None:
     np.testing.assert_array_equal(in_base(None), in_base(WrenchFrame("sensor", "sensor")))
 
 
-def test_the_flange_stands_for_a_tool_that_is_not_known() -> None:
+def test_the_flange_stands_for_a_tool_that_is_not_known():
     flange = in_base(WrenchFrame("flange", "flange"), Mounting())
     np.testing.assert_array_equal(in_base(WrenchFrame("tool", "tool"), Mounting()), flange)
 
 
 @pytest.mark.parametrize("frame", [WrenchFrame("world", "flange"), WrenchFrame("base", "wrist")])
-def test_a_frame_that_is_not_known_is_refused(frame: WrenchFrame) -> None:
+def test_a_frame_that_is_not_known_is_refused(frame):
     with pytest.raises(ParameterError, match=r"no frame known here.*flange, base, tool, sensor"):
         in_base(frame)
 
 
-def test_a_wrench_of_zeros_is_no_reference() -> None:
+def test_a_wrench_of_zeros_is_no_reference():
     with pytest.raises(MissingSignalError, match="zero in every sample"):
         logged_wrench(log(None, np.zeros((30, 6))), UR5.chain, Mounting())
     with pytest.raises(MissingSignalError, match="no wrenches"):
@@ -211,7 +211,7 @@ def pushed(point: str, force: float = 25.0, seed: int = 3) -> Recording:
     current = target - torque / ROBOT.torque_constant + rng.normal(0.0, NOISE, q.shape)
     wrench = about_flange.copy()
     if point == "tool":
-        lever = link_poses(ROBOT.chain, q).rotation[:, -1] @ TOOL_AHEAD.tool.translation  # type: ignore[union-attr]
+        lever = link_poses(ROBOT.chain, q).rotation[:, -1] @ TOOL_AHEAD.tool.translation
         wrench[:, 3:] -= np.cross(lever, wrench[:, :3])
     return Recording(
         t=t, q=q, current=current, target_current=target, wrench=wrench, wrench_frame=CONTROLLER
@@ -220,7 +220,7 @@ def pushed(point: str, force: float = 25.0, seed: int = 3) -> Recording:
 
 @pytest.mark.parametrize("seed", [3, 4, 5])
 @pytest.mark.parametrize("point", ["flange", "tool"])
-def test_the_currents_tell_the_point(point: str, seed: int) -> None:
+def test_the_currents_tell_the_point(point, seed):
     log = pushed(point, seed=seed)
     found = logged_wrench(log, ROBOT.chain, TOOL_AHEAD)
     (remark,) = found.remarks
@@ -232,15 +232,15 @@ def test_the_currents_tell_the_point(point: str, seed: int) -> None:
     np.testing.assert_allclose(found.values, planted.values, atol=1e-12)
 
 
-def test_a_log_without_pushes_tells_nothing() -> None:
+def test_a_log_without_pushes_tells_nothing():
     log = pushed("tool", force=0.0)
     noise = np.random.default_rng(8).normal(0.0, 2.0, log.q.shape)
-    quiet = replace(log, current=log.target_current + NOISE * noise, wrench=noise)  # type: ignore[operator]
+    quiet = replace(log, current=log.target_current + NOISE * noise, wrench=noise)
     found = logged_wrench(quiet, ROBOT.chain, TOOL_AHEAD)
     assert [remark.code for remark in found.remarks] == ["controller-point-open"]
 
 
-def test_without_a_tool_or_target_currents_it_is_the_flange_aloud() -> None:
+def test_without_a_tool_or_target_currents_it_is_the_flange_aloud():
     log = pushed("flange")
     bare = logged_wrench(log, ROBOT.chain, Mounting())
     assert [remark.code for remark in bare.remarks] == ["controller-point-without-tool"]
@@ -249,6 +249,6 @@ def test_without_a_tool_or_target_currents_it_is_the_flange_aloud() -> None:
     np.testing.assert_array_equal(found.values, log.wrench)
 
 
-def test_a_stated_point_is_not_tested() -> None:
+def test_a_stated_point_is_not_tested():
     stated = replace(pushed("tool"), wrench_frame=WrenchFrame("base", "tool"))
     assert logged_wrench(stated, ROBOT.chain, TOOL_AHEAD).remarks == ()

@@ -57,7 +57,7 @@ def cost(logs: np.ndarray, f: np.ndarray, P: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(("sd", "time"), [(2.0, 0.5), (3.0, 4.0)])
-def test_a_drawn_process_is_found_again(sd: float, time: float) -> None:
+def test_a_drawn_process_is_found_again(sd, time):
     """20 000 blocks: 2000 s of T ≤ 4 s fix s² to √(2·4/2000) = 6 % and T to about twice that."""
     d = wandering(20_000, sd, time, 1) + 0.3 * np.random.default_rng(2).standard_normal(20_000)
     f = np.fft.rfftfreq(len(d), SECONDS)[1:]
@@ -68,7 +68,7 @@ def test_a_drawn_process_is_found_again(sd: float, time: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_no_other_optimiser_finds_a_likelier_noise(seed: int) -> None:
+def test_no_other_optimiser_finds_a_likelier_noise(seed):
     """Nelder–Mead from the truth on 500 blocks; the grid's last step leaves under .2 nats."""
     d = wandering(500, 1.5, 1.2, seed) + 0.5 * np.random.default_rng(seed).standard_normal(500)
     f = np.fft.rfftfreq(len(d), SECONDS)[1:]
@@ -79,7 +79,7 @@ def test_no_other_optimiser_finds_a_likelier_noise(seed: int) -> None:
     assert cost(np.log(found), f, P) <= other.fun + 0.2
 
 
-def test_a_joint_without_disturbance_has_no_noise() -> None:
+def test_a_joint_without_disturbance_has_no_noise():
     f = np.fft.rfftfreq(100, SECONDS)[1:]
     found = fit_spectrum(f, np.zeros(50), SECONDS, 10.0)
     assert np.all(np.isfinite(found))
@@ -109,7 +109,7 @@ def blocks_at(velocity: np.ndarray) -> Blocks:
 LOG = blocks_at(np.ones((50, 6)))
 
 
-def test_rest_and_joints_that_never_moved_have_the_drives_share() -> None:
+def test_rest_and_joints_that_never_moved_have_the_drives_share():
     moving = np.array([1.0, 1, 1, 0, 0, 0])
     dry = dry_torques(UR5)
     found = torque_noise(LOG, [free_run(moving)], UR5, SECONDS)
@@ -123,7 +123,7 @@ def test_rest_and_joints_that_never_moved_have_the_drives_share() -> None:
     assert found.free_seconds == pytest.approx(60.0, abs=2.0)  # from first to last motion
 
 
-def test_rests_before_and_after_the_motion_teach_nothing() -> None:
+def test_rests_before_and_after_the_motion_teach_nothing():
     """20 s at rest under 5 N·m beside 60 s of motion leave the motion's noise as it is."""
     piece = free_run(np.ones(6))
     run = piece.run
@@ -137,7 +137,7 @@ def test_rests_before_and_after_the_motion_teach_nothing() -> None:
     np.testing.assert_allclose(both.moving, alone.moving, rtol=0.05)
 
 
-def test_without_free_motion_the_dry_friction_is_taken_and_said() -> None:
+def test_without_free_motion_the_dry_friction_is_taken_and_said():
     rng = np.random.default_rng(3)
     noisy = LOG._replace(d=0.2 * rng.standard_normal((50, 6)))
     for free in ([], [free_run(np.ones(6), seconds=1.0)]):  # ten blocks are no spectrum
@@ -156,7 +156,7 @@ def test_without_free_motion_the_dry_friction_is_taken_and_said() -> None:
         np.testing.assert_allclose(found.white * 1.5 * 0.455, np.median(bend**2, axis=0))
 
 
-def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
+def test_near_a_rest_stiction_counts_where_it_is_assumed():
     velocity = np.ones((50, 6))
     velocity[20:25, 2] = 0.0
     log = blocks_at(velocity)
@@ -167,7 +167,7 @@ def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
         assert np.flatnonzero(variance > variance[0]).tolist() == list(expected)
 
 
-def test_a_sigmoids_dry_torque_is_its_amplitude() -> None:
+def test_a_sigmoids_dry_torque_is_its_amplitude():
     panda = load_robot("panda")
     amplitudes = [joint.parameters["amplitude"] for joint in panda.friction]
     np.testing.assert_allclose(dry_torques(panda), np.abs(amplitudes))
@@ -177,7 +177,7 @@ def test_a_sigmoids_dry_torque_is_its_amplitude() -> None:
 # The model error that a contact has to exceed
 
 
-def test_what_was_drawn_is_learned() -> None:
+def test_what_was_drawn_is_learned():
     d = drawn(4000, np.random.default_rng(1))
     found = learn_noise([blocks(d, np.full_like(d, 0.5))], np.array([10.0]))
     # 96 s hold 120 correlation times: the variance is known to some 13 %, two of its deviations.
@@ -192,7 +192,7 @@ def test_what_was_drawn_is_learned() -> None:
     assert learn_noise([blocks(d[:10], d[:10])], np.array([10.0])) is None
 
 
-def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
+def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned():
     """A joint that moves: as wide as where it is quietest, and at least .2 of its friction."""
     log = blocks(drawn(8000, np.random.default_rng(7)), np.full((8000, 1), 0.5))
     dry = np.array([0.1])
@@ -216,7 +216,7 @@ def test_the_noise_of_a_log_itself_is_no_less_than_what_was_learned() -> None:
     assert infer_noise(blocks(np.zeros((2, 1)), np.zeros((2, 1))), dry, None) is None
 
 
-def test_reversals_are_bridged_in_a_straight_line() -> None:
+def test_reversals_are_bridged_in_a_straight_line():
     d = np.arange(6.0)[:, None]
     d[3] = 50.0
     velocity = np.array([0.3, 0.2, 0.1, 0.0, -0.1, -0.2])[:, None]
@@ -224,7 +224,7 @@ def test_reversals_are_bridged_in_a_straight_line() -> None:
     np.testing.assert_allclose(bridged[:, 0], np.arange(6.0))
 
 
-def test_the_filter_of_the_error_agrees_with_a_dense_solve() -> None:
+def test_the_filter_of_the_error_agrees_with_a_dense_solve():
     """Σ ν²/S is dᵀ C⁻¹ d with the dense covariance of the model."""
     log = blocks(drawn(40, np.random.default_rng(3)), np.full((40, 1), 0.5))
     process = error_process(noise(), log)._replace(spikes=np.full((40, 1), 1e-300))
@@ -237,7 +237,7 @@ def test_the_filter_of_the_error_agrees_with_a_dense_solve() -> None:
     )
 
 
-def test_a_bad_sample_is_a_spike() -> None:
+def test_a_bad_sample_is_a_spike():
     d = np.zeros((50, 1))
     d[25] = 20.0
     log = blocks(d, np.full((50, 1), 0.5))
@@ -247,7 +247,7 @@ def test_a_bad_sample_is_a_spike() -> None:
     assert np.all(np.delete(white, 25) == np.delete(course.white, 25))
 
 
-def test_a_joint_that_stops_draws_its_stiction() -> None:
+def test_a_joint_that_stops_draws_its_stiction():
     velocity = np.concatenate([np.full(20, 0.5), np.zeros(20)])[:, None]
     course = error_process(noise(), blocks(np.zeros((40, 1)), velocity))
     assert course.added[20, 0] == (STOP_SHARE * 10.0) ** 2
@@ -257,7 +257,7 @@ def test_a_joint_that_stops_draws_its_stiction() -> None:
     assert back.decay[20, 0] < course.decay[30, 0]
 
 
-def test_a_joint_that_turns_round_may_show_any_friction_for_a_moment() -> None:
+def test_a_joint_that_turns_round_may_show_any_friction_for_a_moment():
     """In the blocks beside the turn, and only if it moves: noise at rest turns nothing."""
     velocity = np.column_stack([np.linspace(0.5, -0.5, 20), 0.005 * (-1.0) ** np.arange(20)])
     course = error_process(noise(2), blocks(np.zeros((20, 2)), velocity))
@@ -270,7 +270,7 @@ def test_a_joint_that_turns_round_may_show_any_friction_for_a_moment() -> None:
     assert gap.white[7].tolist() == [UNKNOWN, UNKNOWN]
 
 
-def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
+def test_a_push_frees_the_stiction_of_joints_at_rest_only():
     log = blocks(np.zeros((20, 2)), np.tile([0.0, 0.5], (20, 1)))
     strict = error_process(noise(2), log)
     free = error_process(noise(2), log, np.arange(20) >= 10)
@@ -279,7 +279,7 @@ def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
     np.testing.assert_array_equal(free.added[5], strict.added[5])
 
 
-def test_a_joint_that_the_free_part_never_moved_errs_by_its_friction() -> None:
+def test_a_joint_that_the_free_part_never_moved_errs_by_its_friction():
     log = blocks(np.zeros((20, 1)), np.full((20, 1), 0.5))
     course = error_process(noise(seen=False), log)
     stationary = course.added[10, 0] / (1.0 - course.decay[10, 0] ** 2)

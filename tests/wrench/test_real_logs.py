@@ -32,7 +32,7 @@ def by_axis(analysis, observer: str) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
+def test_the_ur5e_of_mujoco_reads_its_truth(logs):
     """Exact profile, gain 30: ≤ 3 N and ≤ 0.6 N·m in unmasked samples (measured 1.19 and 0.12)."""
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
@@ -55,7 +55,7 @@ def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_dry_friction_at_a_reversal_is_no_push(logs: Path) -> None:
+def test_dry_friction_at_a_reversal_is_no_push(logs):
     """J2 and J3 turn round within the pushes, stuck for a block or two.
 
     MuJoCo's friction is 5 N·m off the model's then: a peak was 34 ± 8 N where 18 N act.
@@ -72,7 +72,7 @@ def test_dry_friction_at_a_reversal_is_no_push(logs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) -> None:
+def test_the_fr3_behind_libfranka_reads_its_truth(logs, tmp_path):
     """Exact profile, gain 30: ≤ 1.5 N and ≤ 0.4 N·m (measured 0.52 and 0.07)."""
     for name in ("pushes", "pushes_truth"):
         packed = (logs / "libfranka_sim" / f"{name}.csv.gz").read_bytes()
@@ -92,7 +92,7 @@ def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_the_payload_weighs_what_it_weighs(logs: Path) -> None:
+def test_the_payload_weighs_what_it_weighs(logs):
     """2.805 kg are 27.5 N; measured −26.4 N, 93 and 100 % of the horizontal force in its band."""
     request = AnalysisChoice(
         wrench=WrenchChoice(frame="base"),
@@ -107,7 +107,7 @@ def test_the_payload_weighs_what_it_weighs(logs: Path) -> None:
     assert np.all(inside.mean(axis=0) >= 0.9)
 
 
-def test_the_pandas_wrench_is_the_atis(logs: Path) -> None:
+def test_the_pandas_wrench_is_the_atis(logs):
     """[Wx, Wz, −Wy] from tau_ext and the logged Jacobian: rms ≤ (0.36 0.60 0.31) N, r ≥ 0.98."""
     table = pl.read_csv(logs / "panda_ati" / "traj_raw.csv", infer_schema_length=None)
     columns = {
@@ -127,7 +127,7 @@ def test_the_pandas_wrench_is_the_atis(logs: Path) -> None:
     assert own.words == "+x +z −y"
 
 
-def test_a_franka_that_logs_zeros_is_reported(logs: Path) -> None:
+def test_a_franka_that_logs_zeros_is_reported(logs):
     request = AnalysisChoice(
         wrench=WrenchChoice(),
         robot=RobotChoice(name="fr3"),

@@ -44,7 +44,7 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 def analysed(log: str, names: tuple[str, ...], wrench: WrenchChoice, **read: object) -> Analysis:
     choice = AnalysisChoice(
-        read=ReadChoice(**read),  # type: ignore[arg-type]
+        read=ReadChoice(**read),
         robot=RobotChoice(name="ur5" if log.startswith("ur5") else "panda"),
         observers=ObserverChoice(names=names),
         wrench=wrench,
@@ -53,7 +53,7 @@ def analysed(log: str, names: tuple[str, ...], wrench: WrenchChoice, **read: obj
 
 
 def reading(log: str, *names: str, **choice: object) -> SensorReading:
-    sensed = analysed(log, names, WrenchChoice(**choice)).virtual_sensor  # type: ignore[arg-type]
+    sensed = analysed(log, names, WrenchChoice(**choice)).virtual_sensor
     assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
     return sensed
 
@@ -63,7 +63,7 @@ START = ZeroChoice(start=True)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", ["base", "flange"])
-def test_neither_order_nor_company_nor_frame_moves_the_zero(frame: str) -> None:
+def test_neither_order_nor_company_nor_frame_moves_the_zero(frame):
     alone = reading("ur5_sensor.parquet", "gmo", zero=START, frame=frame)
     orders = [("gmo", "fdo", "kfo-fe"), ("kfo-fe", "fdo", "gmo")]
     for names in orders:
@@ -84,7 +84,7 @@ def test_neither_order_nor_company_nor_frame_moves_the_zero(frame: str) -> None:
 
 
 @pytest.mark.slow
-def test_further_spans_show_the_drift_and_only_the_first_is_removed() -> None:
+def test_further_spans_show_the_drift_and_only_the_first_is_removed():
     zero = ZeroChoice(spans=((1.0, 2.0), (2.5, 3.5)))
     found = reading("ur5_circle.csv", "gmo", "fdo", zero=zero, frame="base")
     assert [(d.name, d.span[0], d.removed) for d in found.drifts] == [
@@ -99,7 +99,7 @@ def test_further_spans_show_the_drift_and_only_the_first_is_removed() -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded() -> None:
+def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded():
     found = reading("ur5_circle.csv", "gmo")
     assert found.drifts == ()
     assert found.zero_span is None
@@ -120,12 +120,12 @@ def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded() -> N
         ({"solver": "map"}, "no-wrench-band"),
     ],
 )
-def test_the_band_says_where_it_comes_from(choice: dict[str, object], code: str) -> None:
+def test_the_band_says_where_it_comes_from(choice, code):
     found = reading("ur5_circle.csv", "gmo", **choice)
     assert code in [remark.code for remark in found.remarks]
 
 
-def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed() -> None:
+def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed():
     short = analysed(
         "ur5_circle.csv", ("best", "gmo", "fdo"), WrenchChoice(), interval=(0.0, 2.0)
     )
@@ -136,7 +136,7 @@ def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed() -> None:
 
 
 @pytest.mark.slow
-def test_a_smoothed_wrench_turns_with_the_flange() -> None:
+def test_a_smoothed_wrench_turns_with_the_flange():
     """Force and moment about the flange point in its own axes are those in base axes, turned."""
     base, flange = (
         reading("ur5_circle.csv", "best", frame=f).wrenches[0] for f in ("base", "flange")
@@ -150,7 +150,7 @@ def test_a_smoothed_wrench_turns_with_the_flange() -> None:
         )  # rounding of 100 N
 
 
-def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value() -> None:
+def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value():
     sigma, hidden = np.array([0.2, 0.03, 0.04, 0.1]), np.array([False, True, True, False])
     (said,) = mask_remark(hidden, sigma)
     assert said.code == "pose-hides-wrench"
@@ -171,7 +171,7 @@ def choice(*names: str, free: FreeChoice = FREE, **wrench: object) -> AnalysisCh
         robot=RobotChoice(name="ur5"),
         observers=ObserverChoice(names=names),
         free=free,
-        wrench=WrenchChoice(**wrench),  # type: ignore[arg-type]
+        wrench=WrenchChoice(**wrench),
     )
 
 
@@ -184,13 +184,13 @@ def motion() -> FreeMotion:
 
 
 def first_seconds(*names: str, **wrench: object) -> SensorReading:
-    sensed = analyse_log(CIRCLE, choice(*names, **wrench)).virtual_sensor  # type: ignore[arg-type]
+    sensed = analyse_log(CIRCLE, choice(*names, **wrench)).virtual_sensor
     assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
     return sensed
 
 
 @pytest.mark.slow
-def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion: FreeMotion) -> None:
+def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion):
     sensed = first_seconds("gmo", "fdo", solver="smoother", frame="base")
     assert sensed.solver == "smoother"
     log, (piece,) = motion.log, motion.part.pieces
@@ -207,9 +207,7 @@ def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion: FreeMo
     assert not {"pose-hides-wrench", "band-from-torques"} & {r.code for r in sensed.remarks}
 
 
-def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(
-    motion: FreeMotion,
-) -> None:
+def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion):
     log = motion.log
     unloaded = log.t < 4.0
     (found,) = FreeLog(log, ()).known_free(unloaded)
@@ -220,16 +218,14 @@ def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(
 
 
 @pytest.mark.slow
-def test_a_zero_takes_its_mean_off_the_smoothed_wrench_too() -> None:
+def test_a_zero_takes_its_mean_off_the_smoothed_wrench_too():
     sensed = first_seconds("gmo", solver="smoother", zero=ZeroChoice(spans=((0.3, 4.0),)))
     (wrench,) = sensed.wrenches
     np.testing.assert_allclose(wrench.values[sensed.free].mean(axis=0), 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("newtons", [0.0, 40.0])
-def test_a_correction_is_left_out_where_the_log_shows_one_load(
-    motion: FreeMotion, newtons: float
-) -> None:
+def test_a_correction_is_left_out_where_the_log_shows_one_load(motion, newtons):
     """Under 40 N down all the time the uncorrected terms are used, under pushes the corrected."""
     log, plain = motion.log, as_modelled(motion)
     J = flange_jacobian(log.robot.chain, log.q)
@@ -248,7 +244,7 @@ def test_a_correction_is_left_out_where_the_log_shows_one_load(
         assert found.values[:, 2].mean() == pytest.approx(-newtons, abs=4.0)
 
 
-def test_a_list_of_contacts_is_its_gate(motion: FreeMotion) -> None:
+def test_a_list_of_contacts_is_its_gate(motion):
     log = motion.log
     estimates = [MomentumObserver(gain=10.0).estimate(log.terms)]
     asked = WrenchChoice(solver="smoother", frame="base")
@@ -261,7 +257,7 @@ def test_a_list_of_contacts_is_its_gate(motion: FreeMotion) -> None:
     assert wrench.values[(t > 4.5) & (t < 5.0)].any()
 
 
-def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion: FreeMotion) -> None:
+def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion):
     """2 kg at 5 cm off the flange, in every sample: 19.6 N outside of the contacts too."""
     load = FreeLoad(
         mass=2.0, moment=np.array([0.0, 0.0, 0.1]), sd=0.1, moment_sd=np.full(3, 0.01), share=0.5
@@ -296,11 +292,11 @@ def torque(name: str = "gmo", **more: np.ndarray) -> ExternalTorque:
 
 
 @pytest.mark.parametrize(("text", "sd"), [("0.4", [0.4, 0.4]), ("1,2.5", [1.0, 2.5])])
-def test_a_given_error_is_one_for_all_or_one_a_joint(text: str, sd: list[float]) -> None:
+def test_a_given_error_is_one_for_all_or_one_a_joint(text, sd):
     np.testing.assert_array_equal(given_error(text, [torque()])[0]["gmo"], sd)
 
 
-def test_own_takes_the_covariance_of_those_that_have_one() -> None:
+def test_own_takes_the_covariance_of_those_that_have_one():
     own = torque("kfo-fe", sd=np.ones((len(T), 2)))
     deviations, remarks = given_error("own", [torque(), own])
     assert set(deviations) == {"kfo-fe"}
@@ -308,12 +304,12 @@ def test_own_takes_the_covariance_of_those_that_have_one() -> None:
 
 
 @pytest.mark.parametrize("text", ["1,2,3", "0", "-1", "nan", "much"])
-def test_what_is_no_error(text: str) -> None:
+def test_what_is_no_error(text):
     with pytest.raises(ParameterError, match="one positive number, or one for each of 2 joints"):
         given_error(text, [torque()])
 
 
-def test_a_measured_band_is_taken_as_it_is() -> None:
+def test_a_measured_band_is_taken_as_it_is():
     run = log_run(np.zeros((len(T), 6)))
     varying = torque(error_sd=np.linspace(0.1, 0.2, 2 * len(T)).reshape(-1, 2))
     deviations, remarks = torque_error(None, run, (), [varying], T < 0.0)
@@ -330,7 +326,7 @@ def log_run(dq: np.ndarray) -> Run:
 
 
 @pytest.mark.parametrize("moves", [True, False])
-def test_a_free_part_measures_the_spread_about_its_mean(moves: bool) -> None:
+def test_a_free_part_measures_the_spread_about_its_mean(moves):
     """A free part at rest says nothing of friction in motion: a fifth of it is added."""
     rng = np.random.default_rng(3)
     one = ExternalTorque(name="gmo", t=T, tau=1.0 + rng.normal(0.0, 0.5, (len(T), 6)))
@@ -350,7 +346,7 @@ def test_a_free_part_measures_the_spread_about_its_mean(moves: bool) -> None:
 
 
 @pytest.mark.slow
-def test_two_observers_of_one_response_have_one_band() -> None:
+def test_two_observers_of_one_response_have_one_band():
     """FE and ZOH read nearly the same and get nearly the same error, whatever P₂₂ each has."""
     choice = AnalysisChoice(
         robot=RobotChoice(name="ur5"),
@@ -362,7 +358,7 @@ def test_two_observers_of_one_response_have_one_band() -> None:
     np.testing.assert_allclose(one, other, rtol=0.02)
 
 
-def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
+def test_the_lag_adds_what_it_leaves_out_of_the_contacts():
     """A torque of .5 Hz after 20 s, GMO of 5 1/s: |1 − H| = ω/√(ω² + K²) of its rms."""
     tau = np.where(T < 20.0, 0.0, 8.0 * np.sin(2 * np.pi * 0.5 * T))[:, None]
     gained = 0.5 * (tau[1:] + tau[:-1]) * 0.01
@@ -376,7 +372,7 @@ def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
     assert lag[0] == pytest.approx(expected, rel=0.1)
 
 
-def test_a_part_too_short_for_a_spectrum_is_no_part() -> None:
+def test_a_part_too_short_for_a_spectrum_is_no_part():
     terms = DynamicsTerms(t=T, p=np.zeros((len(T), 1)), mu=np.zeros((len(T), 1)))
     assert missed_torque(run_of(terms), (MomentumObserver(gain=5.0),), T < 0.05) is None
 
@@ -394,14 +390,14 @@ def uneven(samples: int = 600) -> np.ndarray:
     return np.cumsum(np.random.default_rng(1).uniform(0.002, 0.02, samples))
 
 
-def test_a_constant_torque_is_itself_on_an_uneven_clock() -> None:
+def test_a_constant_torque_is_itself_on_an_uneven_clock():
     t = uneven()
     mu = np.sin(3.0 * t)[:, None]
     found = mean_disturbance(terms_of(t, np.full((600, 1), 2.5), mu))
     np.testing.assert_allclose(found.tau, 2.5, atol=1e-10)  # rounding of sums of some 10 N·m·s
 
 
-def test_a_ramp_keeps_its_place_and_a_step_is_spread_over_the_window() -> None:
+def test_a_ramp_keeps_its_place_and_a_step_is_spread_over_the_window():
     t = np.arange(0.0, 4.0, 0.001)
     inner = (t > HALF) & (t < t[-1] - HALF)
     ramp = mean_disturbance(terms_of(t, t[:, None], np.zeros((len(t), 1))))
@@ -413,7 +409,7 @@ def test_a_ramp_keeps_its_place_and_a_step_is_spread_over_the_window() -> None:
     np.testing.assert_allclose(found, expected, atol=0.01)
 
 
-def test_noise_of_the_velocity_is_averaged_out() -> None:
+def test_noise_of_the_velocity_is_averaged_out():
     """2 mrad/s on 1.5 kg·m²: the difference of two samples 0.1 s apart leaves √2·3e-3/0.1 N·m."""
     t = np.arange(0.0, 60.0, 0.002)
     p = 1.5 * 2e-3 * np.random.default_rng(2).standard_normal((len(t), 1))
@@ -422,7 +418,7 @@ def test_noise_of_the_velocity_is_averaged_out() -> None:
     assert np.std(found.tau) == pytest.approx(np.sqrt(2) * 3e-3 / (2 * HALF), rel=0.2)
 
 
-def test_two_samples_tell_the_mean_between_them_and_one_nothing() -> None:
+def test_two_samples_tell_the_mean_between_them_and_one_nothing():
     t = np.array([0.0, 0.02])
     found = mean_disturbance(terms_of(t, np.array([[1.0], [3.0]]), np.array([[5.0], [-2.0]])))
     np.testing.assert_allclose(found.tau, 2.0, rtol=1e-12)

@@ -46,14 +46,14 @@ PUSH = np.sin(np.outer(T, [0.7, 1.1, 1.3, 0.9, 1.7, 2.1])) * [20, 15, 25, 2, 2, 
 """A contact at the flange, in flange axes. (T, 6) [N, N·m]"""
 
 
-def test_a_sensors_pose_is_found_again_whatever_its_zero() -> None:
+def test_a_sensors_pose_is_found_again_whatever_its_zero():
     reading = PUSH @ adjoint(inverse(POSE)).T + np.array([1.0, -2.0, 3.0, 0.1, 0.0, -0.2])
     fit = fit_pose(PUSH, reading)
     np.testing.assert_allclose(fit.pose.rotation, POSE.rotation, atol=1e-9)
     np.testing.assert_allclose(fit.pose.translation, POSE.translation, atol=1e-9)
 
 
-def test_under_noise_the_pose_is_found_within_its_own_deviation() -> None:
+def test_under_noise_the_pose_is_found_within_its_own_deviation():
     """Of 50 noises a deviation is known to 10 %; .05 N·m over √400 samples of 20 N are < 1 mm."""
     rng = np.random.default_rng(2)
     reading = PUSH @ adjoint(inverse(POSE)).T
@@ -65,7 +65,7 @@ def test_under_noise_the_pose_is_found_within_its_own_deviation() -> None:
     assert np.all(sd < 1e-3)
 
 
-def test_pushes_along_one_line_tell_no_pose() -> None:
+def test_pushes_along_one_line_tell_no_pose():
     line = np.outer(np.sin(np.linspace(0, 6, 50)), [10.0, 0, 0, 0, 1, 0])
     with pytest.raises(ParameterError, match=r"forces lie on one line.*virtual-sensor.sensor"):
         fit_pose(line, line)
@@ -87,9 +87,7 @@ def disturbance() -> ExternalTorque:
 @pytest.mark.parametrize(
     ("sign", "frame"), [(1.0, None), (-1.0, WrenchFrame("sensor", "sensor", "by-robot"))]
 )
-def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(
-    sign: float, frame: WrenchFrame | None
-) -> None:
+def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(sign, frame):
     recording = log(sign * PUSH @ adjoint(inverse(POSE)).T, frame)
     mounting, remarks = find_mounting(
         recording, UR5, disturbance(), WrenchChoice(sensor_pose=FIT)
@@ -101,7 +99,7 @@ def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(
     assert "10.0 −20.0 40.0 mm" in str(remark)
 
 
-def test_a_pose_that_is_given_is_not_looked_for_nor_one_without_a_sensors_wrench() -> None:
+def test_a_pose_that_is_given_is_not_looked_for_nor_one_without_a_sensors_wrench():
     given = WrenchChoice(sensor_pose="0,0,0.05")
     mounting, remarks = find_mounting(log(None), UR5, disturbance(), given)
     np.testing.assert_array_equal(mounting.sensor.translation, [0, 0, 0.05])
@@ -141,7 +139,7 @@ def reading(*removed: bool) -> SensorReading:
     )
 
 
-def test_a_sensors_own_zero_goes_where_the_readings_went() -> None:
+def test_a_sensors_own_zero_goes_where_the_readings_went():
     theirs = Wrench(name="sensor", t=TIMES, values=force(offset=1.5), frame="base")
     found = with_reference(reading(True), theirs, of_sensor=True)
     np.testing.assert_allclose(found.reference.values, force(), atol=1e-12)
@@ -160,28 +158,26 @@ def test_a_sensors_own_zero_goes_where_the_readings_went() -> None:
         ((True,), False, []),  # another reference has no zero and no lag of its own
     ],
 )
-def test_without_a_zero_of_the_reading_the_sensor_keeps_its_own(
-    flags: tuple[bool, ...], of_sensor: bool, codes: list[str]
-) -> None:
+def test_without_a_zero_of_the_reading_the_sensor_keeps_its_own(flags, of_sensor, codes):
     theirs = Wrench(name="sensor", t=TIMES, values=force(offset=1.5), frame="base")
     found = with_reference(reading(*flags), theirs, of_sensor=of_sensor)
     assert found.reference is theirs
     assert [remark.code for remark in found.remarks] == codes
 
 
-def test_what_is_masked_and_zeroed_can_be_asked() -> None:
+def test_what_is_masked_and_zeroed_can_be_asked():
     assert reading(True).masked_share == pytest.approx(0.05, abs=0.001)
     assert reading(False, True).zero_span == SPAN
     assert reading(False).zero_span is None
 
 
-def test_which_solver_made_which_wrench() -> None:
+def test_which_solver_made_which_wrench():
     found = reading()
     assert (found.solver, found.hides) == ("pinv", True)
     one = found.wrenches[0]
     best = replace(one, name="best", masked=None)
     smoothed = {"best": object()}  # its numbers are not asked for here
-    both = replace(found, wrenches=(best, one), smoothed=smoothed)  # type: ignore[arg-type]
+    both = replace(found, wrenches=(best, one), smoothed=smoothed)
     assert (both.solver, both.hides) == ("smoother for best, pinv for the others", True)
     alone = replace(both, wrenches=(best,))
     assert (alone.solver, alone.hides) == ("smoother", False)
@@ -197,7 +193,7 @@ def wrench(null_space: np.ndarray | None) -> Wrench:
 FREE = np.arange(1000) < 500
 
 
-def test_a_contact_elsewhere_is_what_exceeds_the_free_part() -> None:
+def test_a_contact_elsewhere_is_what_exceeds_the_free_part():
     residual = np.full(1000, 0.8)
     residual[100], residual[600:650], residual[700:800], residual[10] = 1.0, 2.0, MARGIN, np.nan
     (remark,) = contact_elsewhere(wrench(residual), FREE)
@@ -209,7 +205,7 @@ def test_a_contact_elsewhere_is_what_exceeds_the_free_part() -> None:
     assert contact_elsewhere(wrench(np.where(np.arange(1000) >= 998, 5.0, 1.0)), FREE)
 
 
-def test_nothing_is_said_without_a_channel_or_a_free_part() -> None:
+def test_nothing_is_said_without_a_channel_or_a_free_part():
     residual = np.where(FREE, 1.0, 2.0)
     assert contact_elsewhere(wrench(None), FREE) == ()
     assert contact_elsewhere(wrench(residual), np.zeros(1000, dtype=bool)) == ()
@@ -231,7 +227,7 @@ def pushes(samples: int = 400, seed: int = 1) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_any_order_and_sign_of_axes_is_recognised(seed: int) -> None:
+def test_any_order_and_sign_of_axes_is_recognised(seed):
     rng = np.random.default_rng(seed)
     P = np.eye(3)[rng.permutation(3)] * rng.choice([-1.0, 1.0], 3)[:, None]
     ours = pushes(seed=seed)[:, :3]
@@ -285,11 +281,11 @@ def noisy(values: np.ndarray, seed: int) -> np.ndarray:
         (-PUSHES, "fits flange axes with turned sign"),
     ],
 )
-def test_a_vendors_frame_and_sign_are_reported(theirs: np.ndarray, words: str) -> None:
+def test_a_vendors_frame_and_sign_are_reported(theirs, words):
     assert words in str(remarks(noisy(theirs, 0), WrenchFrame("vendor", "vendor"))[-1])
 
 
-def test_a_log_without_a_wrench_or_of_zeros_has_no_convention() -> None:
+def test_a_log_without_a_wrench_or_of_zeros_has_no_convention():
     """Some controllers log zeros where no sensor is fitted: their gain is 0, 0/0 correlates not."""
     assert remarks(None) == []
     assert [remark.code for remark in remarks(0.0 * PUSHES)] == ["log-wrench-all-zero"]
@@ -298,21 +294,21 @@ def test_a_log_without_a_wrench_or_of_zeros_has_no_convention() -> None:
     assert np.isnan(fit.correlation)
 
 
-def test_a_fit_that_is_the_same_signal_is_reported_to_be_derived() -> None:
+def test_a_fit_that_is_the_same_signal_is_reported_to_be_derived():
     fits, derived = remarks(2.0 * OURS.values)
     assert (fits.code, derived.code) == ("log-wrench-fits", "log-wrench-derived")
     assert fits.values["gain"] == pytest.approx(2.0)
     assert fits.values["stated"] == "frame not stated"
 
 
-def test_swapped_axes_are_named() -> None:
+def test_swapped_axes_are_named():
     swapped = OURS.values[:, [0, 2, 1, 3, 5, 4]] * [1, 1, -1, 1, 1, -1]
     (remark,) = remarks(noisy(swapped, 3))
     assert remark.code == "log-wrench-fits-other-axes"
     assert remark.values["axes"] == "+x +z −y"
 
 
-def test_what_resembles_nothing_is_reported_and_zeros_in_part() -> None:
+def test_what_resembles_nothing_is_reported_and_zeros_in_part():
     noise = np.random.default_rng(1).standard_normal(PUSHES.shape)
     noise[:100] = 0.0
     zero, unlike = remarks(noise)
@@ -323,7 +319,7 @@ def test_what_resembles_nothing_is_reported_and_zeros_in_part() -> None:
     assert zero.values["force_N"] == pytest.approx(rms)
 
 
-def test_a_late_field_is_reported_by_how_much() -> None:
+def test_a_late_field_is_reported_by_how_much():
     late, *_ = remarks(np.roll(OURS.values, 4, axis=0))
     step = 10.0 / 399
     # four of 400 samples are wrapped round, and a parabola stands for the peak
@@ -348,7 +344,7 @@ def hung(masked: bool = False, noise: float = 0.05) -> Wrench:
     return Wrench(name="kfo-fe", t=t, values=values, frame="base", masked=np.full(len(t), masked))
 
 
-def test_the_drift_is_the_mean_of_the_span_and_its_removal_leaves_the_load() -> None:
+def test_the_drift_is_the_mean_of_the_span_and_its_removal_leaves_the_load():
     wrench = hung()
     drift = zero_drift(wrench, (1.0, 4.5))
     # the mean of 350 samples of 0.05 N noise: 0.003 N
@@ -359,7 +355,7 @@ def test_the_drift_is_the_mean_of_the_span_and_its_removal_leaves_the_load() -> 
     assert "drift of 1 to 4.5 s removed (base axes)" in str(clean.remarks[-1])
 
 
-def test_the_change_between_two_spans_is_reported() -> None:
+def test_the_change_between_two_spans_is_reported():
     wrench = hung(noise=0.0)
     moved = zero_moved(zero_drift(wrench, (1, 2)), zero_drift(wrench, (6, 7)))
     np.testing.assert_allclose(moved.values["force_N"], [0.0, 0.0, -9.2], atol=1e-12)
@@ -371,9 +367,7 @@ def test_the_change_between_two_spans_is_reported() -> None:
     ("lasts", "size", "stop"),
     [(0, 0.0, 12.99), (0.09, 9, 12.99), (0.11, 9, 7.7), (2, 2.8, 12.99), (2, 3.2, 7.7)],
 )
-def test_what_is_short_or_light_does_not_end_the_unloaded_start(
-    lasts: float, size: float, stop: float
-) -> None:
+def test_what_is_short_or_light_does_not_end_the_unloaded_start(lasts, size, stop):
     """From a second after the log's begin at 3 s to .3 s before a load of .1 s and 3 N, if any."""
     t = 3.0 + np.arange(0.0, 10.0, 0.01)
     values = DRIFT + 0.05 * np.random.default_rng(0).standard_normal((len(t), 6))
@@ -382,14 +376,14 @@ def test_what_is_short_or_light_does_not_end_the_unloaded_start(
     assert span == (pytest.approx(4.0), pytest.approx(stop))
 
 
-def test_a_log_too_short_or_masked_has_no_unloaded_start() -> None:
+def test_a_log_too_short_or_masked_has_no_unloaded_start():
     assert unloaded_start(hung(masked=True)) is None
     t = np.arange(0.0, 1.2, 0.01)
     short = Wrench(name="x", t=t, values=np.zeros((len(t), 6)), frame="base")
     assert unloaded_start(short) is None
 
 
-def test_a_zero_inside_a_contact_is_suspected_and_an_unloaded_one_is_not() -> None:
+def test_a_zero_inside_a_contact_is_suspected_and_an_unloaded_one_is_not():
     wrench = hung()
     assert zero_warning(wrench, zero_drift(wrench, (2.0, 4.0))) == ()
     (remark,) = zero_warning(wrench, zero_drift(wrench, (6.0, 8.0)))
@@ -399,7 +393,7 @@ def test_a_zero_inside_a_contact_is_suspected_and_an_unloaded_one_is_not() -> No
     assert remark.values["size"] == pytest.approx(9.2 - 0.3, abs=0.05)
 
 
-def test_a_zero_across_the_begin_of_a_contact_swings() -> None:
+def test_a_zero_across_the_begin_of_a_contact_swings():
     no_start = replace(hung(), masked=np.arange(1000) < 300)
     twice = replace(no_start, values=no_start.values + (no_start.values - DRIFT))
     (remark,) = zero_warning(twice, zero_drift(twice, (4.0, 6.0)))
@@ -416,14 +410,12 @@ def test_a_zero_across_the_begin_of_a_contact_swings() -> None:
         ((1.0, 4.0), True, "no two of its samples have a known wrench"),
     ],
 )
-def test_a_zero_outside_the_log_or_in_a_masked_span_is_refused(
-    span: tuple[float, float], masked: bool, words: str
-) -> None:
+def test_a_zero_outside_the_log_or_in_a_masked_span_is_refused(span, masked, words):
     with pytest.raises(ParameterError, match=words):
         zero_drift(hung(masked), span)
 
 
-def test_the_zero_is_the_chosen_spans_or_the_start_where_it_is_chosen() -> None:
+def test_the_zero_is_the_chosen_spans_or_the_start_where_it_is_chosen():
     wrench, spans = hung(), ((1.0, 2.0), (8.0, 9.0))
     start = (unloaded_start(wrench),)
     assert zero_spans(ZeroChoice(spans=spans), wrench) == (spans, spans)
@@ -433,7 +425,7 @@ def test_the_zero_is_the_chosen_spans_or_the_start_where_it_is_chosen() -> None:
         zero_spans(ZeroChoice(start=True), hung(masked=True))
 
 
-def test_a_sensors_own_zero_is_removed_by_the_same_choice() -> None:
+def test_a_sensors_own_zero_is_removed_by_the_same_choice():
     wrench = hung(noise=0.0)
     clean = without_zero(wrench, ZeroChoice(spans=((1.0, 4.0), (6.0, 7.0))))
     np.testing.assert_allclose(clean.values, wrench.values - DRIFT, atol=1e-12)

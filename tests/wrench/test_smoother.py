@@ -76,7 +76,7 @@ def untouched(robot: Robot, q: Array, t: Array) -> RunSamples:
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
+def test_a_steady_load_is_found_to_be_one_and_weighed(name):
     """25 N for 30 s of motion against .3 N·m of error; the band says what is left."""
     robot, t = load_robot(name), np.arange(0.0, 30.0, STEP)
     q = swing(robot, t)
@@ -89,7 +89,7 @@ def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
     assert np.sqrt(np.mean(error[:, 2] ** 2)) < 2.0
 
 
-def test_pushes_are_followed_in_short_blocks() -> None:
+def test_pushes_are_followed_in_short_blocks():
     robot, t = load_robot("ur5"), np.arange(0.0, 30.0, STEP)
     q, push = swing(robot, t), load(t) * (np.sin(2.0 * t) > 0.6)[:, None]
     found = smooth_wrench(simulated(robot, q, push, t), [untouched(robot, q, t)])
@@ -102,7 +102,7 @@ def test_pushes_are_followed_in_short_blocks() -> None:
     assert np.all(inside.mean(axis=0) >= 0.9)
 
 
-def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
+def test_the_gate_leaves_no_wrench_where_nothing_touches():
     """Outside of the listed contact the wrench is zero within a band, and the model error known."""
     robot, t = load_robot("ur5"), np.arange(0.0, 20.0, STEP)
     q, push = swing(robot, t), load(t) * ((t > 8.0) & (t < 11.0))[:, None]
@@ -123,7 +123,7 @@ def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
 
 
 @pytest.mark.parametrize("at", [4.0, 9.0])
-def test_the_band_where_nothing_is_listed_is_that_of_a_contact_there(at: float) -> None:
+def test_the_band_where_nothing_is_listed_is_that_of_a_contact_there(at):
     """As the smoother itself gives it where .6 s are listed there.
 
     It takes every block for itself, the band their mean weight: the two agree within a quarter
@@ -141,7 +141,7 @@ def test_the_band_where_nothing_is_listed_is_that_of_a_contact_there(at: float) 
     np.testing.assert_allclose(never.sd[k], once.sd[k], rtol=0.25)
 
 
-def test_the_band_where_nothing_is_listed_grows_with_the_blindness_of_the_pose() -> None:
+def test_the_band_where_nothing_is_listed_grows_with_the_blindness_of_the_pose():
     """With q5 at zero a force along one line turns nothing: the prior alone bounds it there."""
     robot, t = load_robot("ur5"), np.arange(0.0, 10.0, STEP)
     q, prior = swing(robot, t), WrenchPrior(3.0, 30.0)
@@ -154,7 +154,7 @@ def test_the_band_where_nothing_is_listed_grows_with_the_blindness_of_the_pose()
     assert np.all(found.sd <= np.repeat([45.0, 6.0], 3) * (1.0 + 1e-9))
 
 
-def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing() -> None:
+def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing():
     """q5 goes to zero and stays: the wrists' axes align, and force along one line turns nothing."""
     robot, t = load_robot("ur5"), np.arange(0.0, 30.0, STEP)
     q = swing(robot, t)
@@ -175,7 +175,7 @@ def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing() -> None
     assert np.all(inside.mean(axis=0) >= 0.9)
 
 
-def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows() -> None:
+def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows():
     robot, t = load_robot("ur5"), np.arange(0.0, 20.0, STEP)
     there = (t < 8.0) | (t > 12.0)
     q, prior = swing(robot, t), WrenchPrior(3.0, 30.0)
@@ -191,7 +191,7 @@ def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows() -> None:
     assert np.all(np.abs(values - load(t[:3])) <= 3.0 * sd)
 
 
-def test_a_log_of_one_sample_leaves_the_prior() -> None:
+def test_a_log_of_one_sample_leaves_the_prior():
     nothing = np.zeros((1, 6))
     run = run_of(DynamicsTerms(t=np.zeros(1), p=nothing, mu=nothing), nothing)
     found = smooth_wrench(run)
@@ -201,7 +201,7 @@ def test_a_log_of_one_sample_leaves_the_prior() -> None:
     np.testing.assert_allclose(unlisted_there.sd[0], np.repeat([45.0, 6.0], 3))
 
 
-def test_fewer_than_six_joints_tell_no_wrench() -> None:
+def test_fewer_than_six_joints_tell_no_wrench():
     nothing = np.zeros((9, 5))
     terms = DynamicsTerms(t=np.arange(9.0), p=nothing, mu=nothing)
     with pytest.raises(RobotError, match="5 joint torques cannot determine"):
@@ -212,16 +212,14 @@ def test_fewer_than_six_joints_tell_no_wrench() -> None:
     ("step", "jitter", "seconds"),
     [(0.002, 0.0, 0.024), (0.008, 0.002, 0.04), (0.03, 0.01, 0.1), (0.2, 0, 0.1)],
 )
-def test_short_blocks_hold_five_samples_of_an_uneven_clock(
-    step: float, jitter: float, seconds: float
-) -> None:
+def test_short_blocks_hold_five_samples_of_an_uneven_clock(step, jitter, seconds):
     t = step * np.arange(100.0) + jitter * np.random.default_rng(1).random(100)
     # the median of a drawn clock
     assert block_length(t, fine=True) == pytest.approx(seconds, rel=0.1)
     assert block_length(t, fine=False) == pytest.approx(0.1)
 
 
-def test_a_clock_is_uneven_by_more_than_a_tenth_of_its_steps() -> None:
+def test_a_clock_is_uneven_by_more_than_a_tenth_of_its_steps():
     even = 0.01 * np.arange(500)
     assert contact_block(np.delete(even, np.arange(20, 500, 20))) == BLOCK  # samples are lost
     # A third of the steps 2 ms off, as on the UR10e logs.
@@ -233,7 +231,7 @@ def test_a_clock_is_uneven_by_more_than_a_tenth_of_its_steps() -> None:
     assert block_length(t[:1], fine=True) == pytest.approx(0.1)
 
 
-def test_a_circle_under_pushes_reads_its_truth() -> None:
+def test_a_circle_under_pushes_reads_its_truth():
     """Simulated UR5 with errors of its model, noise from the free 3.7 s before the first push.
 
     Measured 3.9 3.2 1.5 N and .62 .44 .14 N·m rms, of joints that give before they slide (the bars
@@ -251,7 +249,7 @@ def test_a_circle_under_pushes_reads_its_truth() -> None:
     assert np.all(np.mean(np.abs(error) <= 1.96 * sd, axis=0) >= 0.93)
 
 
-def test_a_real_payload_is_read_in_every_pose(logs: Path) -> None:
+def test_a_real_payload_is_read_in_every_pose(logs):
     """UR10e with 2.805 kg, (0, 0, −27.52) N in every sample; noise from a free log.
 
     Measured 3.7 3.5 3.5 N rms, mean error −.9 −.6 1.0 N, coverage .92 1.0 .97; the pseudo-inverse
@@ -272,7 +270,7 @@ def test_a_real_payload_is_read_in_every_pose(logs: Path) -> None:
     assert np.all(np.mean(np.abs(error) <= 1.96 * sd[:, :3], axis=0) >= 0.88)
 
 
-def test_blocks_hide_a_share_of_a_bend_and_drives_one_of_the_reading() -> None:
+def test_blocks_hide_a_share_of_a_bend_and_drives_one_of_the_reading():
     """A tooth of 40 N: it stands 40 N above its neighbours' mean, they 20 N below theirs."""
     values = np.zeros((5, 6))
     values[2, 0] = 40.0
@@ -285,7 +283,7 @@ def test_blocks_hide_a_share_of_a_bend_and_drives_one_of_the_reading() -> None:
 
 
 @pytest.mark.parametrize("near", [0.0, 0.3])
-def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near: float) -> None:
+def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near):
     """A joint's error is 100 × as uncertain at rest as just before and behind: no block has none.
 
     Where free motion is assumed a rest counts for .3 s more. The band is at most what the error at
@@ -329,7 +327,7 @@ def moves(blocks: Blocks, inside: Mask) -> tuple[Array, Array]:
     return model.decay[:, 0], model.added[:, 0]
 
 
-def test_a_listed_contact_opens_its_blocks_and_one_on_either_side() -> None:
+def test_a_listed_contact_opens_its_blocks_and_one_on_either_side():
     # .55 to .85 s touches blocks 5 to 8
     assert np.flatnonzero(gated(BLOCKS, [(0.55, 0.85)])).tolist() == list(range(4, 10))
     assert np.flatnonzero(gated(BLOCKS, [(0.0, 0.05), (2.95, 9.0)])).tolist() == [0, 1, 28, 29]
@@ -337,7 +335,7 @@ def test_a_listed_contact_opens_its_blocks_and_one_on_either_side() -> None:
     assert gated(BLOCKS, None).all()
 
 
-def test_a_wrench_keeps_its_variance_while_it_lasts_and_starts_with_it() -> None:
+def test_a_wrench_keeps_its_variance_while_it_lasts_and_starts_with_it():
     inside = gated(BLOCKS, [(0.55, 0.85), (2.0, 2.2)])
     decay, variance = moves(BLOCKS, inside)
     assert not decay[~inside, :6].any()
@@ -350,7 +348,7 @@ def test_a_wrench_keeps_its_variance_while_it_lasts_and_starts_with_it() -> None
     np.testing.assert_allclose(decay[5, :6] ** 2 * stationary + variance[5, :6], stationary)
 
 
-def test_the_model_error_is_stationary_from_the_first_block_on() -> None:
+def test_the_model_error_is_stationary_from_the_first_block_on():
     decay, variance = moves(BLOCKS, gated(BLOCKS, None))
     assert not decay[0].any()
     np.testing.assert_allclose(variance[0, 6:], 4.0)
@@ -358,14 +356,14 @@ def test_the_model_error_is_stationary_from_the_first_block_on() -> None:
     np.testing.assert_allclose(decay[1:, 6:] ** 2 * 4.0 + variance[1:, 6:], 4.0)
 
 
-def test_a_gap_lets_both_decay_by_its_own_length() -> None:
+def test_a_gap_lets_both_decay_by_its_own_length():
     late = BLOCKS._replace(t=np.concatenate([T[:10], T[10:] + 3.0]))
     decay, _ = moves(late, gated(late, None))
     np.testing.assert_allclose(decay[10, :6], np.exp(-3.1 / 2.0))
     np.testing.assert_allclose(decay[10, 6:], np.exp(-3.1 / 0.5))
 
 
-def test_what_keeps_for_half_a_minute_and_hardly_changes_in_a_second_is_a_load() -> None:
+def test_what_keeps_for_half_a_minute_and_hardly_changes_in_a_second_is_a_load():
     """σ_f √(2/τ_w) is 15 N for (30 s, 60 N), pushes in a row, and 5 N for (300 s, 60 N)."""
     steady = [(prior.time, prior.force) for prior in GRID if prior.is_steady]
     assert steady == [(30, 10), (100, 10), (100, 30), (300, 10), (300, 30), (300, 60)]

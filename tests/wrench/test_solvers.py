@@ -55,7 +55,7 @@ def poses(robot: str, samples: int = 60, seed: int = 2) -> np.ndarray:
 
 
 @pytest.mark.parametrize("robot", ["ur5", "ur10e", "panda", "fr3"])
-def test_a_wrench_at_the_flange_comes_back(robot: str) -> None:
+def test_a_wrench_at_the_flange_comes_back(robot):
     q, wrench = poses(robot), np.array([10.0, -20.0, 5.0, 1.0, -0.5, 2.0])
     found = reported(robot, q, torque_of(robot, q, wrench))
     regular = ~found.hidden
@@ -67,7 +67,7 @@ def test_a_wrench_at_the_flange_comes_back(robot: str) -> None:
 
 
 @pytest.mark.parametrize("robot", ["ur5", "panda"])
-def test_pinv_is_numpys(robot: str) -> None:
+def test_pinv_is_numpys(robot):
     q = poses(robot)
     tau = np.random.default_rng(8).normal(size=q.shape)
     found = reported(robot, q, tau)
@@ -77,7 +77,7 @@ def test_pinv_is_numpys(robot: str) -> None:
     np.testing.assert_allclose(found.values[known], expected[known], rtol=1e-9, atol=1e-9)
 
 
-def test_sigma_min_is_that_of_the_jacobian_with_angular_rows_times_0_3() -> None:
+def test_sigma_min_is_that_of_the_jacobian_with_angular_rows_times_0_3():
     q = poses("ur5")
     J = flange_jacobian(load_robot("ur5").chain, q)
     expected = np.linalg.svd(SCALE[:, None] * J, compute_uv=False)[:, -1]
@@ -90,7 +90,7 @@ def test_sigma_min_is_that_of_the_jacobian_with_angular_rows_times_0_3() -> None
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver: str) -> None:
+def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver):
     """One sample, dense: cov = A Σ Aᵀ, and the posterior covariance for the MAP solver."""
     q, tau = REGULAR[None], np.array([[1.0, -2.0, 3.0, 0.5, -0.5, 0.2]])
     sd = np.array([0.3, 0.5, 0.4, 0.1, 0.2, 0.15])
@@ -109,7 +109,7 @@ def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver: str) ->
     np.testing.assert_allclose(found.sd[0], np.sqrt(np.diag(covariance)), rtol=1e-9)
 
 
-def test_the_map_bias_is_a_hundredth_of_a_newton_in_a_regular_pose() -> None:
+def test_the_map_bias_is_a_hundredth_of_a_newton_in_a_regular_pose():
     """27 N under 0.3 N·m of stated joint noise: the prior of 50 N pulls by 0.01 N (science §4)."""
     wrench = np.array([0.0, 0.0, -27.0, 0.0, 0.0, 0.0])
     tau = torque_of("ur5", REGULAR[None], wrench)
@@ -124,7 +124,7 @@ STRAIGHT_ELBOW = np.array([0.3, -1.2, 1e-3, -1.7, -1.5, 0.2])
 @pytest.mark.parametrize(
     "pose", [NEAR_WRIST, STRAIGHT_ELBOW], ids=["q5 = 0.02", "straight elbow"]
 )
-def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> None:
+def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose):
     """0.3 N·m of joint noise: masked, tens of newtons of pinv, the prior's width at most of map."""
     rng = np.random.default_rng(11)
     q = np.tile(pose, (200, 1))
@@ -141,7 +141,7 @@ def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> 
     )
 
 
-def test_joint_noise_is_newtons_in_a_regular_pose_and_tens_at_the_wrist() -> None:
+def test_joint_noise_is_newtons_in_a_regular_pose_and_tens_at_the_wrist():
     """Science §4: 0.3 N·m is 1.2 N in a regular UR5 pose and 38 N at q5 = 0.02."""
     q = np.array([REGULAR, NEAR_WRIST])
     found = reported("ur5", q, np.zeros_like(q), sd=np.full(6, 0.3))
@@ -151,7 +151,7 @@ def test_joint_noise_is_newtons_in_a_regular_pose_and_tens_at_the_wrist() -> Non
 
 
 @pytest.mark.parametrize("robot", ["panda", "fr3"])
-def test_a_tip_wrench_leaves_the_null_space_and_a_link_wrench_does_not(robot: str) -> None:
+def test_a_tip_wrench_leaves_the_null_space_and_a_link_wrench_does_not(robot):
     q = poses(robot, samples=30)
     chain = load_robot(robot).chain
     parts = decompose(flange_jacobian(chain, q))
@@ -175,7 +175,7 @@ def test_a_tip_wrench_leaves_the_null_space_and_a_link_wrench_does_not(robot: st
     assert np.max(moved) > 1.0
 
 
-def test_directions_that_are_left_out_read_nothing_and_the_others_stay() -> None:
+def test_directions_that_are_left_out_read_nothing_and_the_others_stay():
     """Against the SVD with its small singular values cut, the textbook's way to the same."""
     rng = np.random.default_rng(5)
     J, tau = rng.standard_normal((60, 6, 6)), rng.standard_normal((60, 6))
@@ -187,7 +187,7 @@ def test_directions_that_are_left_out_read_nothing_and_the_others_stay() -> None
     np.testing.assert_allclose(found, expected, atol=1e-10)
 
 
-def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_do_not_show(monkeypatch):
     q = poses("panda", samples=50)
     tau = np.random.default_rng(1).normal(size=q.shape)
     whole = reported("panda", q, tau)
@@ -197,7 +197,7 @@ def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("frame", ["base", "flange", "tool"])
-def test_a_force_acts_at_the_point_of_its_frame_along_its_axes(frame: str) -> None:
+def test_a_force_acts_at_the_point_of_its_frame_along_its_axes(frame):
     """A tool of 3-4-0 cm that is turned by a quarter about the flange's z axis."""
     tool = Pose(rpy_matrix((0.0, 0.0, 0.5 * np.pi)), np.array([0.03, 0.04, 0.0]))
     chain, q = load_robot("ur5").chain, np.random.default_rng(4).uniform(-2.0, 2.0, (3, 6))
@@ -211,7 +211,7 @@ def test_a_force_acts_at_the_point_of_its_frame_along_its_axes(frame: str) -> No
         np.testing.assert_allclose(found[1][k], along, atol=1e-14)
 
 
-def test_a_five_joint_arm_is_refused() -> None:
+def test_a_five_joint_arm_is_refused():
     with pytest.raises(RobotError, match="5 joint torques cannot determine"):
         decompose(np.zeros((3, 6, 5)))
 
@@ -219,7 +219,7 @@ def test_a_five_joint_arm_is_refused() -> None:
 # Frames: what rotating a frame does to the answer; the adjoint itself: test_pose.py
 
 
-def test_the_printed_56_turns_the_rotation_round_in_its_lower_left_block() -> None:
+def test_the_printed_56_turns_the_rotation_round_in_its_lower_left_block():
     """docs/paper.md: 20 mm off, turned by .5 rad, 20 N across: 20·.02·2 sin .5 = .38 N·m."""
     c, s = np.cos(0.5), np.sin(0.5)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -247,7 +247,7 @@ TOOL = Pose(rpy_matrix((0.2, 0.5, -0.4)), np.array([0.05, -0.1, 0.15]))
 TURN = rpy_matrix((0.7, -0.3, 1.9))
 
 
-def test_turning_the_base_turns_the_answer_in_base_axes_only() -> None:
+def test_turning_the_base_turns_the_answer_in_base_axes_only():
     plain, turned = sensed("base", Mounting()), sensed("base", Mounting(), turn=TURN)
     expected = np.concatenate([plain.force @ TURN.T, plain.moment @ TURN.T], axis=1)
     np.testing.assert_allclose(turned.known, expected, rtol=1e-9, atol=1e-9)
@@ -257,7 +257,7 @@ def test_turning_the_base_turns_the_answer_in_base_axes_only() -> None:
 
 
 @pytest.mark.parametrize("frame", ["tool", "sensor"])
-def test_turning_what_is_mounted_turns_the_answer(frame: str) -> None:
+def test_turning_what_is_mounted_turns_the_answer(frame):
     """A tool turned about its own point reads the same force in turned axes."""
     other = Pose(TOOL.rotation @ TURN, TOOL.translation)
     plain = sensed(frame, Mounting(tool=TOOL, sensor=TOOL))
@@ -270,7 +270,7 @@ def test_turning_what_is_mounted_turns_the_answer(frame: str) -> None:
         np.testing.assert_allclose(np.sum(turned.sd[:, part] ** 2, axis=1), trace, rtol=1e-9)
 
 
-def test_moving_the_tool_moves_the_moment_by_the_lever() -> None:
+def test_moving_the_tool_moves_the_moment_by_the_lever():
     lever = np.array([0.1, -0.2, 0.3])
     flange = sensed("flange", Mounting())
     tool = sensed("tool", Mounting(tool=Pose(np.eye(3), lever)))
@@ -280,7 +280,7 @@ def test_moving_the_tool_moves_the_moment_by_the_lever() -> None:
     )
 
 
-def test_a_frame_without_its_pose_says_how_to_give_it() -> None:
+def test_a_frame_without_its_pose_says_how_to_give_it():
     with pytest.raises(
         ParameterError, match=r"no tool, so there is no Jacobian.*virtual-sensor.tool"
     ):
@@ -289,7 +289,7 @@ def test_a_frame_without_its_pose_says_how_to_give_it() -> None:
         VirtualSensor(frame="sensor")
 
 
-def test_poses_are_read_as_three_or_six_numbers_or_a_name(tmp_path) -> None:
+def test_poses_are_read_as_three_or_six_numbers_or_a_name(tmp_path):
     robot = load_robot("ur5")
     short = read_pose("0.1,0,0.2", robot, "tool", "virtual-sensor.tool")
     long = read_pose("0.1,0,0.2,0.1,0.2,0.3", robot, "tool", "virtual-sensor.tool")
@@ -346,7 +346,7 @@ SCHEMES = ["fe", pytest.param("zoh", marks=pytest.mark.statistical)]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_over_200_simulations_the_band_holds_the_truth_in_93_to_97_percent(scheme: str) -> None:
+def test_over_200_simulations_the_band_holds_the_truth_in_93_to_97_percent(scheme):
     """200 runs of 100 samples, correlated over about 25: 800 independent ones, ± 0.8 % each way."""
     first, last, runs = 150, 250, 200
     observer = KalmanObserver(discretisation=scheme, r_diag=R, q_p_diag=Q_P, q_tau_diag=Q_TAU)
