@@ -27,6 +27,7 @@ robot = "ur5"
 truth = "torque"
 truth_file = "ur5_circle.csv.truth.parquet"
 truth_error = { tau_Nm = 0.05, note = "a simulation's" }
+free = ["gone"]
 [[log]]
 name = "gone"
 arm = "UR5"
@@ -38,7 +39,7 @@ truth = "free"
 
 @pytest.fixture
 def manifest(tmp_path: Path) -> Path:
-    """A manifest of one log that is there and one that is not."""
+    """A manifest of one log that is there, and one that is not, which is its free motion."""
     path = tmp_path / "my.toml"
     path.write_text(MANIFEST)
     return path
@@ -268,8 +269,8 @@ def test_every_kind_of_entry_is_scored_by_all_that_it_can_be(run, kinds: Path) -
     whole, log = (Library().open(path) for path in (made, kinds / "before.csv"))
     for name in PARTS:
         np.testing.assert_array_equal(whole.require(name), log.require(name))
-    (robot,) = (kinds / "o").glob("made/robots/*.toml")
-    assert robot.name.startswith("fitted-")
+    (robot,) = (kinds / "o").glob("made/*/*.toml")
+    assert robot.name == "fitted.toml"
     rows = pl.read_parquet(kinds / "o" / "scores.parquet")
     best = rows.filter(method="best", part="contact", log="push")
     errors = [best.filter(protocol=p)["rmse_Nm"].mean() for p in ("alone", "free", "identified")]
@@ -293,7 +294,7 @@ def test_every_kind_of_entry_is_scored_by_all_that_it_can_be(run, kinds: Path) -
 @pytest.mark.slow
 def test_a_method_that_lacks_an_arm_is_named(run, manifest: Path, tmp_path: Path) -> None:
     """Estimates of the first second of one of two arms."""
-    one = MANIFEST.partition('[[log]]\nname = "gone"')[0]
+    one = MANIFEST.partition('free = ["gone"]')[0]
     manifest.write_text(one + one.replace('"circle"', '"again"').replace('"UR5"', '"UR5 b"'))
     (tmp_path / "zz").mkdir()
     t = np.arange(0.0, 1.0, 0.01)
@@ -400,7 +401,7 @@ def test_an_experiment_that_fails_is_a_row_and_exit_code_one(
     item = PaperItem(label="Table I", verdict="no", experiments=("e",),
                      lines=(PrintedLine("k", "l"),), **shared)  # fmt: skip
     drawn = PaperItem(label="Fig. 1", verdict="a picture", **shared)
-    failing = Experiment(title="the experiment", run="fail", seeds=(1,))
+    failing = Experiment(name="e", title="the experiment", run="fail", seeds=(1,))
     declared = Paper(name="p", title="t", doi="d", experiments={"e": failing},
                      items={"table1": item, "fig1": drawn}, setting=())  # fmt: skip
     monkeypatch.setitem(paper.PAPERS, "p", declared)

@@ -63,6 +63,11 @@ def oracle(
     }
 
 
+def score_of(estimate: ExternalTorque, truth: Array, inside: Array) -> Score:
+    """The score of an estimate with its own band."""
+    return Score.of(estimate.t, estimate.tau, truth, inside, estimate.error_sd)
+
+
 def made(seed: int = 1, samples: int = 2400) -> tuple[ExternalTorque, Array]:
     """An estimate with gaps in clock, answers and bands, and the truth."""
     rng = np.random.default_rng(seed)
@@ -82,7 +87,7 @@ def test_scores_are_those_of_plain_loops(banded: bool) -> None:
         estimate = ExternalTorque(name="made", t=estimate.t, tau=estimate.tau)
     inside = estimate.t > 3.0
     expected = oracle(estimate.t, estimate.tau, truth, inside, estimate.error_sd)
-    found = Score.of(estimate, truth, inside).numbers()
+    found = score_of(estimate, truth, inside).numbers()
     assert {key: found[key] for key in expected} == pytest.approx(expected, nan_ok=True, **CLOSE)
 
 
@@ -93,7 +98,7 @@ def test_the_truth_is_perfect_and_nothing_is_zero() -> None:
     silent = ExternalTorque(name="silent", t=estimate.t, tau=np.full(truth.shape, np.nan))
     nothing = ExternalTorque(name="zero", t=estimate.t, tau=np.zeros(truth.shape))
     perfect, silence, zero = (
-        Score.of(each, truth, everywhere).numbers() for each in (exact, silent, nothing)
+        score_of(each, truth, everywhere).numbers() for each in (exact, silent, nothing)
     )
     assert (perfect["skill"], perfect["l1_Nm"]) == (1.0, 0.0)
     assert (silence["skill"], silence.pop("missing"), zero.pop("missing")) == (0.0, 1.0, 0.0)
@@ -129,7 +134,7 @@ def test_eight_cells_have_an_interval_and_seven_have_none() -> None:
     noise = np.random.default_rng(2).normal(size=(len(t), 2))
     estimate = ExternalTorque(name="noise", t=t, tau=noise)
     for cells in (7, 8):
-        found = Score.of(estimate, np.zeros_like(noise), t < 2.0 * cells - 0.005).numbers()
+        found = score_of(estimate, np.zeros_like(noise), t < 2.0 * cells - 0.005).numbers()
         assert (found["rmse_low_Nm"] < found["rmse_Nm"] < found["rmse_high_Nm"]) == (cells == 8)
         assert np.isnan(found["rmse_low_Nm"]) == (cells == 7)
 
@@ -137,8 +142,9 @@ def test_eight_cells_have_an_interval_and_seven_have_none() -> None:
 def test_two_logs_are_one_sum() -> None:
     (first, truth), (second, other) = made(1), made(2)
     everywhere = np.ones(len(truth), bool)
-    one, two = Score.of(first, truth, everywhere), Score.of(second, other, everywhere)
-    both = Score.pooled([one.by_joint(), two.by_joint()])
+    one, two = score_of(first, truth, everywhere), score_of(second, other, everywhere)
+    joints = zip(one.by_joint(), two.by_joint(), strict=True)
+    both = Score.pooled([{name: a[name] + b[name] for name in a} for a, b in joints])
     seconds = [score.numbers()["seconds"] for score in (one, two)]
     square = (one.rmse**2 * seconds[0] + two.rmse**2 * seconds[1]) / sum(seconds)
     assert both.rmse == pytest.approx(np.sqrt(square))

@@ -7,9 +7,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.readers.references import estimates_columns, read_reference
-from vftcli.reproduction.manifest import read_list
-from vftcli.reproduction.scoring import read_outside
+from vftcli.readers.references import estimates_columns, read_outside, read_reference
+from vftcli.reproduction.scoring import read_list
 from vftcli.signals.errors import ClockError, LogError
 
 
@@ -71,10 +70,10 @@ def test_a_cell_without_a_number_and_a_clock_that_stands_are_refused(write):
 def test_a_band_is_one_deviation_of_the_error(tmp_path, inner):
     path = tmp_path / "a.csv"
     path.write_text(f"t,tau_ext/{inner}1,band/{inner}1\n0.0,1.0,0.5\n0.1,2.0,0.25\n")
-    torque, wrench = read_outside(path, "mine")
-    assert wrench is None
-    assert torque.error_sd is not None
-    assert np.array_equal(torque.error_sd[:, 0], [0.5, 0.25])
+    found = read_outside(path, "mine")
+    assert found.signals.keys() == {"tau_ext", "band"}
+    assert np.array_equal(found.signals["band"][:, 0], [0.5, 0.25])
+    np.testing.assert_allclose(found.stamps, [0.0, 0.1])
 
 
 def test_a_list_needs_no_forces(tmp_path):

@@ -33,7 +33,7 @@ def other(name: str, day: str) -> str:
 
 
 def lines(manifest: Manifest, rivals: tuple[Rival, ...] = ()) -> list[str]:
-    return [line for each in manifest.complaints(rivals).values() for line in each]
+    return [line for _, line in manifest.complaints(rivals)]
 
 
 def test_an_entry_with_pushes_is_two_logs(tmp_path: Path) -> None:

@@ -11,14 +11,14 @@ import pytest
 
 from vftcli.evaluation.scores import LAGS, ListedRow
 from vftcli.pipeline import AnalysisChoice
+from vftcli.readers.reader import RawLog
 from vftcli.reproduction import scoring
+from vftcli.reproduction.benchmark import planted
 from vftcli.reproduction.manifest import BenchmarkLog, Declaration, Rival
 from vftcli.reproduction.scoring import (
     Answer,
     KnownTruth,
-    ScoreTask,
     own_answers,
-    planted,
     rows_of,
     truth_of,
     worst_of,
@@ -55,12 +55,13 @@ def answered() -> tuple[Answer, KnownTruth]:
 
 
 def by_part(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> dict[Any, dict[str, Any]]:
-    """The rows by part, and joint where they have one; that of shifts as "lag"."""
+    """The rows by part, and joint or axis where they have one; that of shifts as "lag"."""
     rows = list(rows_of(answer, truth, log))
-    named = {
-        "lag" if "lag_squares" in r else (r["part"], r["joint"]) if "joint" in r else r["part"]: r
-        for r in rows
-    }
+    named = {}
+    for row in rows:
+        column = row.get("joint", row.get("axis"))
+        place = row["part"] if column is None else (row["part"], column)
+        named["lag" if "lag_squares" in row else place] = row
     assert len(named) == len(rows)
     return named
 
@@ -90,14 +91,13 @@ def test_every_row_is_that_of_plain_numpy() -> None:
         (w[scored, None] * error[scored] ** 2).sum()
     )
     f, known = np.nan_to_num(answer.wrench)[touch], np.isfinite(answer.wrench[touch, 0])
-    for kind, part in (("force", slice(3)), ("moment", slice(3, 6))):
-        gap, own = f[:, part] - truth.wrench[touch, part], truth.wrench[touch, part]
-        square = found["wrench"][f"{kind}_squares"]
-        assert square == pytest.approx((w[touch] * (gap**2).sum(axis=1)).sum())
-        square = found["wrench"][f"true_{kind}_squares"]
-        assert square == pytest.approx((w[touch] * (own**2).sum(axis=1)).sum())
-    assert found["wrench"]["wrench_missing_s"] == pytest.approx(w[touch][~known].sum())
-    assert found["wrench"]["wrench_s"] == pytest.approx(w[touch].sum())
+    for axis in range(6):
+        row, own = found["wrench", axis + 1], truth.wrench[touch, axis]
+        square = (w[touch] * (f[:, axis] - own) ** 2).sum()
+        assert sum(row["squares"]) == pytest.approx(square)
+        assert sum(row["truth"]) == pytest.approx((w[touch] * own**2).sum())
+        assert sum(row["missing"]) == pytest.approx(w[touch][~known].sum())
+        assert sum(row["seconds"]) == pytest.approx(w[touch].sum())
     up, asked = -answer.wrench[:, 2], (t >= 1.0) & (t <= 18.0)
     here = asked & np.isfinite(up)
     assert found["weight"]["mean_N"] == pytest.approx((w * up)[here].sum() / w[here].sum())
@@ -114,15 +114,11 @@ def test_every_row_is_that_of_plain_numpy() -> None:
 def test_parts_that_are_empty_or_scored_elsewhere_have_no_row() -> None:
     answer, truth = answered()
     whole = truth._replace(contacts=[(0.0, 30.0, np.nan)])
-    assert {key[0] for key in by_part(answer, whole, LOG) if isinstance(key, tuple)} == {
-        "contact",
-        "all",
-    }
+    parts = {key[0] for key in by_part(answer, whole, LOG) if isinstance(key, tuple)}
+    assert parts == {"contact", "all", "wrench"}
     pushed = replace(LOG, pushes=((5.0, 2.0, (1.0, 0.0, 0.0)),))
-    assert {key[0] for key in by_part(answer, truth, pushed) if isinstance(key, tuple)} == {
-        "contact",
-        "all",
-    }
+    parts = {key[0] for key in by_part(answer, truth, pushed) if isinstance(key, tuple)}
+    assert parts == {"contact", "all", "wrench"}
     free = KnownTruth(np.zeros_like(truth.tau), None, [])
     kept = by_part(answer, free, replace(LOG, truth="free", weight_N=0.0))
     assert set(kept) == {("free", 1), ("free", 2), "worst", "list"}
@@ -153,11 +149,11 @@ def read_truth(path: Path, columns: dict[str, Any], words: str, **more: Any) -> 
     """The truth that an entry with these words finds in a file."""
     np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",")
     log = replace(LOG, truth_columns=words, **more)
-    task = ScoreTask(path.parent, "", log, "alone", AnalysisChoice(), path, path, None, False)
+    log = replace(log, data=str(path.parent), truth_file=path.name)
     t = columns["t"]
     source = Source(format="x", clock="x", rows=len(t), duplicates=0, t0=0.0)
     recording = Recording(t=t, q=np.zeros((len(t), 6)), source=source)
-    return truth_of(task, recording, load_robot("ur5"))
+    return truth_of(log, recording, load_robot("ur5"))
 
 
 def test_a_torque_alone_shows_its_contacts(tmp_path: Path) -> None:
@@ -200,7 +196,7 @@ def test_a_planted_push_is_half_a_sine_at_the_flange_and_missing_in_the_drives(
     q = np.linspace(-0.6, 0.5, robot.joints) + 0.1 * t[:, None]
     free = Recording(t=t, q=q, dq=0.1 + 0.0 * q, **{signal: np.ones(q.shape)})
     pushes = ((1.0, 2.0, (3.0, -4.0, 12.0)), (2.0, 0.5, (0.0, 8.0, 0.0)))
-    pushed, wrench, tau = planted(Run(recording=free, robot=robot), replace(LOG, pushes=pushes))
+    pushed, wrench, tau = planted(Run(recording=free, robot=robot), pushes)
     sine = np.sin(np.pi * np.clip((t - 1.0) / 2.0, 0.0, 1.0))[:, None] * [3.0, -4.0, 12.0]
     sine[:, 1] += 8.0 * np.sin(np.pi * np.clip((t - 2.0) / 0.5, 0.0, 1.0))
     np.testing.assert_allclose(wrench[:, :3], sine, atol=1e-12)
@@ -221,23 +217,20 @@ def test_stamps_within_a_microsecond_are_the_logs_own(
     """Else what another program says is read off between its samples."""
     t = 0.01 * np.arange(50)
     steps = np.where(np.arange(50)[:, None] % 2, 1.0, 0.0) * np.ones(6)
-    said = ExternalTorque(name="theirs", t=t + apart, tau=steps)
+    said = RawLog(stamps=t + apart, tick=1.0, clock="t", signals={"tau_ext": steps})
     listed = [ListedRow(0.1, 0.2, 3.0, 1.0)]
-    monkeypatch.setattr(scoring, "read_outside", lambda *_: (said, None))
+    monkeypatch.setattr(scoring, "read_outside", lambda *_: said)
     monkeypatch.setattr(scoring, "read_list", lambda _: listed)
     rival = Rival("theirs", tmp_path, Declaration(causal=True))
     for name in ("a.csv", "a.contacts.csv"):
         (tmp_path / name).touch()
-    task = ScoreTask(tmp_path, "", LOG, "own", AnalysisChoice(), tmp_path, None, rival, False)
-    (answer,) = scoring.outside_answer(
-        task, Recording(t=t, q=np.zeros((50, 6))), load_robot("ur5")
-    )
+    answer = scoring.outside_answer(Recording(t=t, q=np.zeros((50, 6))), LOG, rival)
     assert np.array_equal(answer.torque.tau, steps) == own
     assert (answer.future, answer.lists) == (False, {"list": listed})
 
 
 def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A contact of unknown force is listed with 0 N; candidates are sorted in by time."""
     contact = SimpleNamespace(start=3.0, stop=4.0, peak_force=17.0, peak_band=4.0, is_load=False)
@@ -253,9 +246,8 @@ def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(
         ],
     )
     monkeypatch.setattr(scoring, "analyse", lambda *_: made)
-    path = tmp_path / "a.csv"
-    task = ScoreTask(tmp_path, "", LOG, "own", AnalysisChoice(), path, path, None, False)
-    answers = own_answers(task, Recording(t=t, q=np.zeros((500, 6))), load_robot("ur5"))
+    run = Run(recording=Recording(t=t, q=np.zeros((500, 6))), robot=load_robot("ur5"))
+    answers = own_answers(run, AnalysisChoice(), LOG)
     lists = {answer.torque.name: answer.lists for answer in answers}
     listed = ListedRow(3.0, 4.0, 17.0, 4.0)
     both = [ListedRow(1.0, 2.0, 0.0, 0.0, is_load=True), listed]

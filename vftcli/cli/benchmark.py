@@ -16,7 +16,6 @@ from vftcli.signals.option import LOG, Anyway, Asked, Choice, Option
 from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:
-    from vftcli.outputs.benchmark import Results
     from vftcli.reproduction.manifest import Manifest, Rival
 
 SPEED = "speed"  #: The benchmark of times.
@@ -62,12 +61,11 @@ def benchmark(
 
     Example: vftcli benchmark sim
     """
-    engine, form, anyway = asked.of(WorkersChoice), opt.form_of(asked), asked.anyway
-    length = asked.states(BenchChoice)
-    unfit: dict[str, object] = {"--robot": robot, "--set bench": length}
+    form = opt.form_of(asked)
+    unfit: dict[str, object] = {"--robot": robot, "--set bench": asked.states(BenchChoice)}
     if what == SPEED:
-        unfit = {"--outside": outside, "-o": output, "--anyway": anyway, "--force": force}
-        unfit |= {"--open": open_page, "--jobs": engine != WorkersChoice()}
+        unfit = {"--outside": outside, "-o": output, "--anyway": asked.anyway, "--force": force}
+        unfit |= {"--open": open_page, "--jobs": asked.of(WorkersChoice) != WorkersChoice()}
     if what in {SPEED, "sim"}:
         unfit["--data"] = data
     if given := [name for name, value in unfit.items() if value]:
@@ -75,24 +73,15 @@ def benchmark(
     if what == SPEED:
         time_observers(robot or "ur5", asked.of(BenchChoice), form)
         return
-    from vftcli.reproduction.benchmark import BenchmarkRun
-
     manifest, rivals = named(what, data, outside)
-    if all(map(manifest.missing, manifest.logs)):
+    if all(log.missing for log in manifest.logs):
         say_none(manifest, form)
         return
-    marked, output = unfair(manifest, rivals, anyway=anyway), output or Path("benchmark.vft")
-    engine.check_closed(anyway=anyway)
-    run = BenchmarkRun(manifest, rivals, output, engine, asked.line, marked, say)
-    results = run.run(force=force)
-    print_results(results, form, manifest.absent(), every=asked.words["details"])
-    for name, failure in run.failures:
-        echo(printable(f"error: {name}: {failure.line}"), err=True)
-    say("\n".join([*manifest.absent(), f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
-    if open_page:
+    output = output or Path("benchmark.vft")
+    code = score(manifest, rivals, output, asked, force=force)
+    if open_page and code != 1:
         open_made(output)
-    if run.failures:
-        raise typer.Exit(SOME_FAILED if results.rows else 1)
+    raise typer.Exit(code)
 
 
 def named(
@@ -120,26 +109,34 @@ def say_none(manifest: "Manifest", form: str) -> None:
         echo(printable(line), err=True)
 
 
-def unfair(manifest: "Manifest", rivals: "list[Rival]", *, anyway: bool) -> frozenset[str]:
-    """Names of logs with unfair rows or another file; exits unless `anyway`."""
-    complaints = manifest.complaints(rivals)
-    for line in (line for lines in complaints.values() for line in lines):
+def score(
+    manifest: "Manifest", rivals: "list[Rival]", output: Path, asked: Asked, *, force: bool
+) -> int:
+    """Score every log that is there and print the results; the exit code."""
+    from vftcli.outputs.benchmark import text_of
+    from vftcli.reproduction.benchmark import BenchmarkRun
+
+    engine, form, anyway = asked.of(WorkersChoice), opt.form_of(asked), asked.anyway
+    complaints, absent = manifest.complaints(rivals), manifest.absent()
+    for _, line in complaints:
         echo(printable(f"{'warning' if anyway else 'error'}: {line}"), err=True)
     if complaints and not anyway:
-        raise typer.Exit(1)
-    return frozenset(complaints)
-
-
-def print_results(results: "Results", form: str, absent: list[str], *, every: bool) -> None:
-    """Print a benchmark's results in the form asked for."""
-    from vftcli.outputs.benchmark import text_of
-
+        return 1
+    engine.check_closed(anyway=anyway)
+    marked = frozenset(name for name, _ in complaints)
+    run = BenchmarkRun(manifest, rivals, output, engine, asked.line, marked, say)
+    results = run.run(force=force)
     if form == "json":
         say_json([], rows=results.rows, left_out=absent)
     elif form != "terminal":
-        echo_data(text_of(results, form, every=every))
+        echo_data(text_of(results, form, every=True))
     elif len(results.table):
-        show(text_of(results, form, every=every))
+        show(text_of(results, form, every=asked.words["details"]))
+    for name, failure in run.failures:
+        echo(printable(f"error: {name}: {failure.line}"), err=True)
+    say("\n".join([*absent, f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
+    failed = SOME_FAILED if results.rows else 1
+    return failed if run.failures else 0
 
 
 def time_observers(robot: str, asked: BenchChoice, form: str) -> None:

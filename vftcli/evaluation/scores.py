@@ -7,7 +7,7 @@ A true contact is found if a row overlaps it within `SLACK`; further rows on it 
 A row without overlap is false if its middle lies in a vouched span.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import sqrt
 from typing import Any, NamedTuple, Self
 
@@ -67,21 +67,23 @@ class Score(NamedTuple):
     penalties: Array  #: Σ w (2 b + 40 max(0, |e| − b)) over the band's half width b. (C, n)
 
     @classmethod
-    def of(cls, estimate: ExternalTorque, truth: Array, inside: Mask) -> Self:
-        """Sums of an estimate with bands of ±1.96 `error_sd` over at least one sample.
+    def of(
+        cls, t: Array, values: Array, truth: Array, inside: Mask, sd: Array | None = None
+    ) -> Self:
+        """Sums of an estimate (T, n) with bands of ±1.96 `sd` over at least one sample.
 
-        The truth is on its clock (T, n) [N·m], `inside` the samples that count. (T,)
+        The truth is on its clock (T, n), `inside` the samples that count (T,).
         """
-        t, tau, sd = estimate.t, estimate.tau[inside], estimate.error_sd
+        tau = values[inside]
         known, y = np.isfinite(tau), truth[inside]
         size = abs(np.where(known, tau, 0.0) - y)
         band = np.full(tau.shape, np.nan) if sd is None else Z_95 * sd[inside]
         has = np.isfinite(band)
         penalty = np.where(has, 2.0 * band + PENALTY * np.maximum(0.0, size - band), 0.0)
-        values = (np.ones(tau.shape), ~known, size**2, size, y**2, has, size <= band, penalty)
+        each = (np.ones(tau.shape), ~known, size**2, size, y**2, has, size <= band, penalty)
         start = np.unique((t[inside] - t[0]) // CELL, return_index=True)[1]
         w = weights(t)[inside, None]
-        return cls(*(np.add.reduceat(w * x, start) for x in values))
+        return cls(*(np.add.reduceat(w * x, start) for x in each))
 
     def by_joint(self) -> list[dict[str, list[float]]]:
         """The sums of all cells by name, joint by joint."""
@@ -89,13 +91,10 @@ class Score(NamedTuple):
         return [dict(zip(self._fields, joint, strict=True)) for joint in joints]
 
     @classmethod
-    def pooled(cls, logs: Iterable[Sequence[Mapping[str, Sequence[float]]]]) -> Self:
-        """The score of several logs' `by_joint`."""
-        sums = [
-            [np.array([joint[name] for joint in log], float).T for name in cls._fields]
-            for log in logs
-        ]
-        return cls(*map(np.concatenate, zip(*sums, strict=True)))
+    def pooled(cls, joints: Sequence[Mapping[str, Any]]) -> Self:
+        """The score of `by_joint` rows, a joint's with the cells of all logs in one list."""
+        each = ([joint[name] for joint in joints] for name in cls._fields)
+        return cls(*(np.array(cells, float).T for cells in each))
 
     def mean(self, sums: Array) -> Array:
         """Σ w x / Σ w of each joint. (n,)"""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import polars as pl
@@ -27,6 +28,7 @@ SILENT = 0.05  #: Share of time without an answer from which it is mentioned.
 LISTS = {"list": "counted", "list with candidates": "all"}
 COUNTS = ("found", "true_contacts", "false", "free_h")
 BY = ("arm", "protocol", "method")
+PLACE = (*BY, "part")
 #: Pooling of several logs' lists: sums, all values, the largest.
 POOLED = (
     pl.col(*COUNTS, "found_as_load", "split", "peaks_held").sum(),
@@ -61,11 +63,11 @@ LIST_COLUMNS = {
 }
 WRENCH_COLUMNS = {
     **dict(zip(BY, BY, strict=True)),
-    "force_squares": Column("force", "N", ".2f"),
-    "true_force_squares": Column("truth's rms", "N", ".2f"),
-    "moment_squares": Column("moment", "N·m", ".2f"),
-    "true_moment_squares": Column("truth's rms", "N·m", ".2f"),
-    "wrench_missing_s": Column("no answer", form=".2f"),
+    "force": Column("force", "N", ".2f"),
+    "true_force": Column("truth's rms", "N", ".2f"),
+    "moment": Column("moment", "N·m", ".2f"),
+    "true_moment": Column("truth's rms", "N·m", ".2f"),
+    "missing": Column("no answer", form=".2f"),
 }
 WEIGHT_COLUMNS = {
     "log": "log",
@@ -97,34 +99,30 @@ class Results:
         """Values of a column in order, of all rows or those with a set flag."""
         return self.table.filter(*rows)[key].unique(maintain_order=True).to_list()
 
+    def pooled(self, key: str) -> dict[tuple[str, ...], Score]:
+        """Place → score of its logs together, of torques by "joint", of wrenches by "axis"."""
+        rows = self.table.drop_nulls(key).group_by(*PLACE, key, maintain_order=True)
+        places = rows.agg(pl.col(*Score._fields).explode()).partition_by(
+            *PLACE, maintain_order=True, as_dict=True
+        )
+        return {place: Score.pooled(each.to_dicts()) for place, each in places.items()}
+
     @cached_property
     def rows(self) -> list[Record]:
         """One row an arm, protocol, method and part, for machines and tables."""
-        joints, shifts = (
-            self.table.drop_nulls(key).partition_by(
-                *BY, "part", maintain_order=True, as_dict=True
-            )
-            for key in ("joint", "lag_squares")
-        )
-        scores = {
-            place: Score.pooled(
-                log.to_dicts() for log in rows.partition_by("log", maintain_order=True)
-            )
-            for place, rows in joints.items()
-        }
-        found = []
-        for place, score in scores.items():
-            arm, protocol, method, part = place
-            best = scores.get((arm, protocol, BEST, part))
-            row = dict(zip((*BY, "part"), place, strict=True))
-            row["exact_model"] = joints[place]["exact_model"][0]
-            row |= {key: joints[place][key].mean() for key in ("observer_us", "command_us")}
-            row |= score.numbers(np.nan if best is None or method == BEST else best.drawn)
-            if part == "free":
+        scores, found = self.pooled("joint"), []
+        facts = pl.col("exact_model").first(), pl.col("observer_us", "command_us").mean()
+        shared = self.table.drop_nulls("joint").group_by(*PLACE, maintain_order=True).agg(*facts)
+        shifts = self.table.drop_nulls("lag_squares")
+        for about, score in zip(shared.to_dicts(), scores.values(), strict=True):
+            place = {key: about[key] for key in PLACE}
+            best = scores.get(tuple((place | {"method": BEST}).values()))
+            over = np.nan if best is None or best is score else best.drawn
+            row: Record = {**about, **score.numbers(over), "lag_s": np.nan, "rmse_at_lag": np.nan}
+            if row["part"] == "free":
                 row["skill"] = np.nan  # zero is perfect there: L1 and false rows speak
-            row |= {"lag_s": np.nan, "rmse_at_lag": np.nan}
-            if place in shifts:
-                sums = np.sum(shifts[place]["lag_squares"].to_list(), axis=0)
+            if each := shifts.filter(**place)["lag_squares"].to_list():
+                sums = np.sum(each, axis=0)
                 share = np.sqrt(sums.min() / sums[abs(LAGS).argmin()])
                 row |= {"lag_s": float(LAGS[sums.argmin()]), "rmse_at_lag": float(share)}
             found.append(row)
@@ -141,12 +139,9 @@ class Results:
 
     def headline(self) -> Grid:
         """Skill in contact and L1 in free motion, by method and protocol."""
-        columns: list[Column | str] = ["method"]
-        means: list[dict[str, float]] = []
-        for part, (key, column) in HEADLINE.items():
-            for protocol in self.protocols:
-                if not (arms := self.arms(protocol, part)):
-                    continue
+        columns, means = list[Column | str](["method"]), list[dict[str, float]]()
+        for (part, (key, column)), protocol in product(HEADLINE.items(), self.protocols):
+            if arms := self.arms(protocol, part):
                 columns.append(column._replace(head=f"{column.head}, {protocol}"))
                 own: dict[str, list[float]] = {}
                 for row in self.of(protocol, part, headline=True):
@@ -181,7 +176,14 @@ class Results:
         if rest := [method for method in self.methods if shown and method not in shown]:
             why = "in no mean, as some arm lacks them (-v and page have their rows)"
             yield f"{why}: {', '.join(rest)}"
-        yield from self.silences()
+        for p, method in product(self.protocols, self.methods):
+            spoken = (row for part in HEADLINE for row in self.of(p, part, headline=True))
+            each = [(row["missing"], row["seconds"]) for row in spoken if row["method"] == method]
+            share = (
+                np.average([x for x, _ in each], weights=[x for _, x in each]) if each else 0.0
+            )
+            if share > SILENT:
+                yield f"{method}, {p}: no answer for {percent(share)} of the time, read as 0"
         for p in self.protocols:
             if arms := self.arms(p, "contact"):
                 yield f"skill, {p}, is the mean of {'; '.join(arms)}"
@@ -191,16 +193,6 @@ class Results:
             yield f"with the whole log, its future too: {', '.join(future)}"
         if marked := self.seen("log", "marked"):
             yield f"in spite of a complaint (--anyway): {', '.join(marked)}"
-
-    def silences(self) -> Iterator[str]:
-        """Lines on methods without an answer for more than `SILENT`."""
-        for p in self.protocols:
-            spoken = [row for part in HEADLINE for row in self.of(p, part, headline=True)]
-            for method in dict.fromkeys(row["method"] for row in spoken):
-                each = [(x["missing"], x["seconds"]) for x in spoken if x["method"] == method]
-                shares, seconds = zip(*each, strict=True)
-                if (share := np.average(shares, weights=seconds)) > SILENT:
-                    yield f"{method}, {p}: no answer for {percent(share)} of the time, read as 0"
 
     def grids(self) -> Iterator[Grid]:
         """Every table below the headline."""
@@ -218,18 +210,22 @@ class Results:
             marked = any(row["rmse"].mark for row in texts)
             shown = keyed_grid(ARM_COLUMNS, texts, title, swatches=True)
             yield replace(shown, notes=(NEAR,) * marked, marked=marked)
-        wrench = self.table.filter(part="wrench").group_by(*BY, maintain_order=True)
-        squares, second = pl.col("^.*_squares$"), pl.col("wrench_s")
-        pooled = wrench.agg(pl.col(*[*WRENCH_COLUMNS][3:], "wrench_s").sum())
-        shares = pooled.with_columns(
-            (squares / second).sqrt(), pl.col("wrench_missing_s") / second
-        )
-        for columns, table, title in (
-            (WRENCH_COLUMNS, shares, "Wrench in contact, rms error"),
-            (WEIGHT_COLUMNS, self.table.filter(part="weight"), "A carried weight"),
+        wrench = []
+        for place, score in self.pooled("axis").items():
+            # Of force and moment, the estimate's error and the truth itself.
+            sizes = (
+                score.mean(x).reshape(2, 3).sum(axis=1) for x in (score.squares, score.truth)
+            )
+            (force, moment), (true_force, true_moment) = map(np.sqrt, sizes)
+            numbers = (force, true_force, moment, true_moment, score.mean(score.missing)[0])
+            wrench.append(dict(zip(WRENCH_COLUMNS, (*place[:3], *numbers), strict=True)))
+        weight = self.table.filter(part="weight").to_dicts()
+        for columns, each, title in (
+            (WRENCH_COLUMNS, wrench, "Wrench in contact, rms error"),
+            (WEIGHT_COLUMNS, weight, "A carried weight"),
         ):
-            if len(table):
-                yield keyed_grid(columns, table.iter_rows(named=True), title)
+            if each:
+                yield keyed_grid(columns, each, title)
 
 
 def arm_texts(rows: Sequence[Record], error: float) -> list[Record]:

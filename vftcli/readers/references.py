@@ -3,6 +3,7 @@
 They are tables with a clock and one external torque a joint, but no positions.
 """
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -19,16 +20,19 @@ from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import (
     JACOBIAN,
     JacobianError,
+    NoColumnError,
     Notes,
     Picks,
     Table,
     listed,
+    named_cells,
     picks_of,
 )
 from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.option import interval_text
+from vftcli.signals.wrench import AXES
 
 TORQUE = "tau_ext"
 
@@ -61,6 +65,31 @@ def read_reference(path: Path, columns: str | None = None) -> RawLog:
             row, column = np.argwhere(~np.isfinite(values))[0]
             raise LogError(f"{path}: {name} {column + 1} is not a number in row {row + 1}.")
     return raw
+
+
+def read_outside(path: Path, name: str) -> RawLog:
+    """Another program's `tau_ext`, and its `band` and `wrench` if there.
+
+    Its columns are t, tau_ext/1…, band/1… (one standard deviation), wrench/fx… (force and
+    moment on the robot, base axes); a file of `vftcli estimate` has them as
+    tau_ext/NAME/1…. NaN is no answer.
+    """
+    table = table_at(path)
+    inner = f"/{name}/" if f"{TORQUE}/{name}/1" in table.names else "/"
+    columns = {"t": "t", TORQUE: f"{TORQUE}{inner}{{i}}", "band": f"band{inner}{{i}}"}
+    columns["wrench"] = "|".join(f"wrench{inner}{axis}" for axis in AXES)
+    picks = {}
+    for signal, pattern in columns.items():
+        item = Item(signal, unit="s" if signal == "t" else None, pattern=pattern)
+        with suppress(NoColumnError):
+            picks[signal] = item._replace(cells=named_cells(table, item))
+    if not {"t", TORQUE} <= picks.keys():
+        raise LogError(
+            f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
+            f"{listed(table.names)}"
+        )
+    raw = load_signals(table, picks, ReadChoice())
+    return replace(raw, stamps=program_clock(raw, path), tick=1.0)
 
 
 def _stated(table: Table, columns: str) -> Picks:

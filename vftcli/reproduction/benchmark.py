@@ -7,9 +7,11 @@ days. Each task writes its rows; a second run skips tasks with rows.
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 from polars import String
 
@@ -24,21 +26,19 @@ from vftcli.outputs.benchmark import Results, render_benchmark
 from vftcli.outputs.conversion import companions, convert, save
 from vftcli.outputs.files import put_table
 from vftcli.outputs.run_record import envelope
-from vftcli.pipeline import prepared
+from vftcli.pipeline import AnalysisChoice, prepared
 from vftcli.readers.reading import Library, absolute
-from vftcli.reproduction.manifest import (
-    PUSHED,
-    BenchmarkLog,
-    Manifest,
-    Rival,
-    TrainedRobot,
-    read_parts,
-)
-from vftcli.reproduction.scoring import SCHEMA, ScoreTask, planted, score_log
-from vftcli.signals.option import interval
+from vftcli.reproduction.manifest import BenchmarkLog, Manifest, Pushes, Rival, TrainedRobot
+from vftcli.reproduction.scoring import SCHEMA, ScoreTask, score_log
+from vftcli.robots.chain import flange_jacobian
+from vftcli.robots.run import Run
+from vftcli.robots.terms import effort_name
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import counted
 from vftcli.signals.progress import stage
+from vftcli.signals.recording import Recording
 from vftcli.signals.shown import frame_of, per_joint
 from vftcli.signals.wrench import per_axis
 from vftcli.simulation import load_scenario, simulate
@@ -46,7 +46,7 @@ from vftcli.simulation import load_scenario, simulate
 
 @dataclass
 class BenchmarkRun:
-    """A benchmark and one run of it: failures and efforts of its tasks."""
+    """A benchmark and one run of it."""
 
     manifest: Manifest
     rivals: Sequence[Rival]
@@ -55,10 +55,10 @@ class BenchmarkRun:
     command: str  #: The command line, for the records.
     marked: frozenset[str]  #: Logs scored in spite of a complaint.
     tell: Tell = field(repr=False)
-    failures: list[tuple[str, Failure]] = field(default_factory=list)
-    efforts: list[dict[str, Any]] = field(default_factory=list)
-    #: Name → file of each log that is there.
-    files: dict[str, Path] = field(default_factory=dict)
+    #: Each piece of work by name, and how it ended.
+    ended: list[tuple[str, Outcome[Any]]] = field(default_factory=list)
+    #: Name → log to score, as its entry has it or with the file that was made of that.
+    logs: dict[str, BenchmarkLog] = field(default_factory=dict)
     #: Name → file of each trained robot.
     robots: dict[str, Path] = field(default_factory=dict)
 
@@ -67,25 +67,22 @@ class BenchmarkRun:
 
     def run(self, *, force: bool) -> Results:
         """Scores of every method, once all is done and written."""
-        manifest = self.manifest
-        logs = [log for log in manifest.logs if not manifest.missing(log)]
+        logs = [log for log in self.manifest.logs if not log.missing]
         marker = {"command": self.command, "do": "benchmark"}
         with self.folder.opened(options_digest("benchmark"), marker, force=force):
             for log in logs:
                 self.make_log(log)
-            for robot in manifest.robots:
-                if robot.name in {log.identified for log in logs}:
+            for name, robot in self.manifest.robots.items():
+                if name in {log.identified for log in logs}:
                     self.fit(robot)
-            tasks = list(self.tasks([log for log in logs if log.name in self.files]))
-            self.score(tasks)
+            tasks, done = {task.key: task for task in self.tasks()}, self.folder.keys()
+            self.score([task for key, task in tasks.items() if key not in done])
             there = self.folder.keys()
-            done = dict.fromkeys(task.key for task in tasks if task.key in there)
-            keys = pl.DataFrame({"key": [*done]}, schema={"key": String})
-            pieces = self.folder.gather(keys, {"key": String, **SCHEMA})
-            table = pl.concat([*pieces]).drop_nulls("method").select(*SCHEMA)
+            rows = [pl.read_parquet(self.folder.row_file(key)) for key in tasks if key in there]
+            table = pl.concat([pl.DataFrame(schema=SCHEMA), *rows])
             results, record = Results(table), self.record(logs)
             columns = dict.fromkeys(("task", "stage", "error", "line"), String)
-            ends = [(name, *why) for name, why in self.failures]
+            ends = [(name, *failure) for name, failure in self.failures]
             title = f"{counted(len(logs), 'log')} against the truth"
             self.folder.put_gathered(
                 [table],
@@ -95,118 +92,113 @@ class BenchmarkRun:
             )
             return results
 
-    def note(self, name: str, outcome: Outcome[Any]) -> None:
-        """Keep a task's failure and effort."""
-        if outcome.failure is not None:
-            self.failures.append((name, outcome.failure))
-        if outcome.effort is not None:
-            self.efforts.append({"task": name, **outcome.effort._asdict()})
+    @property
+    def failures(self) -> list[tuple[str, Failure]]:
+        """What failed, by name, and why."""
+        return [(name, outcome.failure) for name, outcome in self.ended if outcome.failure]
 
-    def make(self, name: str, path: Path, work: Callable[[Path], object]) -> bool:
-        """Whether a file is there; makes it if missing."""
+    def made(
+        self, file: str, sources: Sequence[Path], options: object, work: Callable[[Path], object]
+    ) -> Path | None:
+        """A file made of others and options, if not there yet; None if that fails."""
+        name = Path(file).stem
+        key = key_of(content_digest(sources), options_digest(options))
+        path = self.folder.made(f"{name}-{key[:8]}") / file
         if not path.exists():
             stage(f"making {name}")
-            self.note(name, perform(work, path))
-        return path.exists()
+            self.ended.append((name, perform(work, path)))
+        return path if path.exists() else None
 
     def make_log(self, log: BenchmarkLog) -> None:
-        """Find a log, or make it: simulated, joined, or with pushes planted."""
-        manifest, base = self.manifest, self.files.get(log.name.removesuffix(PUSHED))
-        if log.file and not log.pushes:
-            self.files[log.name] = manifest.data / log.file
-            return
-        if log.pushes and base is None:
-            return  # it could not be made, which is said
-        sources = [base] if log.pushes and base else manifest.paths(log)
-        content = content_digest(sources) if sources else ""
-        place = f"{log.name}-{key_of(content, options_digest(log))[:8]}"
-
-        def plant(path: Path) -> None:
-            choice = manifest.choice(log, "alone", sources[0])
-            choice = replace(choice, library=Library(), examiner=Examiner(anyway=True))
-            read = choice.library.open(sources[0], replace(choice.read, derive="none"))
-            recording, wrench, tau = planted(prepared(read, choice), log)
-            table = (("t", recording.t), *per_joint("tau_ext", tau), *per_axis("wrench", wrench))
-            put_table(companions(path)[0], frame_of(table))
-            convert(recording, path, force=True)
-
-        def assemble(path: Path) -> None:
-            signals = (part.partition("=")[0] for part in log.parts)
-            put_table(path, pl.DataFrame(read_parts(dict(zip(signals, sources, strict=True)))))
-
-        def run(path: Path) -> None:
-            check_installed("pinocchio", "a simulated log")
-            made = simulate(load_scenario(log.scenario, log.changes), log.seed)
-            save({path: made}, "parquet", force=True, command=self.command)
-
-        work = plant if log.pushes else run if log.scenario else assemble
-        path = self.folder.made(place) / f"{log.name}.parquet"
-        if self.make(log.name, path, work):
-            self.files[log.name] = path
+        """Have a log to score: its file, or one that is made for it."""
+        base, work = self.logs.get(log.base), None
+        if log.pushes:
+            if base is None:
+                return  # it could not be made, which is said
+            work = partial(plant, base, log.pushes)
+        elif log.scenario:
+            work = partial(simulated, log, self.command)
+        elif log.parts:
+            work = partial(joined, log)
+        if work is not None:
+            sources = base.paths if log.pushes and base else log.paths
+            path = self.made(f"{log.name}.parquet", sources, log, work)
+            if path is None:
+                return
+            words = tuple(each for each in log.options if each[0] != "columns")
+            if log.pushes or log.scenario:
+                log = replace(log, truth="torque", truth_file=str(companions(path)[0]))
+            log = replace(log, file=str(path), parts=(), scenario="", options=words)
+        self.logs[log.name] = log
 
     def fit(self, robot: TrainedRobot) -> None:
         """Make a robot file from its training logs, if all are there."""
-        if not self.files.keys() >= set(robot.train):
+        if not self.logs.keys() >= set(robot.train):
             return
-        logs = [self.files[name] for name in robot.train]
-        choice = self.manifest.choice(self.manifest.by_name[robot.train[0]], "alone", logs[0])
-        read = replace(choice.read, interval=interval(robot.interval) if robot.interval else None)
-        arm = replace(choice.robot, name=robot.robot or choice.robot.name)
+        logs = [self.logs[name] for name in robot.train]
+        paths = [path for log in logs for path in log.paths]
         task = Task(method=robot.method or None, name=robot.name)
-        examiner = Examiner(fitting=task.keeps_links)
-        choice = replace(choice, read=read, robot=arm, wrench=None)
-        choice = replace(choice, library=Library(logs), examiner=examiner)
-        key = key_of(content_digest(logs), options_digest([choice, task]))
-        path = self.folder.made("robots") / f"{robot.name}-{key[:8]}.toml"
+        words = {"robot": robot.robot} if robot.robot else {}
+        choice = replace(
+            logs[0].choice(interval=robot.interval or None, **words),
+            wrench=None,
+            library=Library(paths),
+            examiner=Examiner(fitting=task.keeps_links),
+        )
 
         def fit(path: Path) -> None:
-            identified(logs, (), choice, task).robot.save(path)
+            identified(paths, (), choice, task).robot.save(path)
 
-        if self.make(robot.name, path, fit):
+        if path := self.made(f"{robot.name}.toml", paths, [choice, task], fit):
             self.robots[robot.name] = path
 
+    def tasks(self) -> Iterator[ScoreTask]:
+        """A task per log and protocol, and per log of an arm with outside estimates."""
+        logs = self.logs
+        for log in logs.values():
+            words: dict[str, dict[str, object]] = {"alone": {}}
+            if logs.keys() >= set(log.free_logs):
+                places = [str(logs[word].paths[0]) if word in logs else word for word in log.free]
+                words["free"] = {"free": places}
+            if log.identified in self.robots:
+                words["identified"] = {"robot": str(self.robots[log.identified])}
+            for protocol in log.protocols:
+                if protocol in words:
+                    yield self.task(log, protocol, log.choice(**words[protocol]), None)
+        for rival in self.rivals:
+            arms = {log.arm for log in logs.values() if rival.file(log) is not None}
+            for log in logs.values():
+                if log.arm in arms and log.protocols:
+                    yield self.task(log, rival.declared.protocol, log.choice(), rival)
+
+    def task(
+        self, log: BenchmarkLog, protocol: str, choice: AnalysisChoice, rival: Rival | None
+    ) -> ScoreTask:
+        """The task of a log, with a key of all its inputs."""
+        label, outside = f"{log.name}, {protocol}", list[object]()
+        about = {"protocol": protocol, "marked": log.base in self.marked}
+        if rival is not None:
+            label += f", {rival.name}"
+            outside = [
+                rival.name,
+                rival.declared,
+                rival.file(log),
+                rival.file(log, "contacts.csv"),
+            ]
+        options = options_digest([log, choice, log.truth_path, outside, about])
+        key = key_of(content_digest(log.paths), options)
+        return ScoreTask(self.folder.path, key, label, log, choice, rival, about)
+
     def score(self, tasks: Sequence[ScoreTask]) -> None:
-        """Score what is not scored yet."""
-        there, seen = self.folder.keys(), [str(self.folder.path)]
-        left = [task for task in tasks if task.key not in there]
-        if not left:
+        """Score some tasks, in the order in which they end."""
+        if not tasks:
             return
-        ended = run_tasks(([task] for task in left), score_log, self.workers, self.tell, seen)
+        groups, seen = ([task] for task in tasks), [str(self.folder.path)]
+        ended = run_tasks(groups, score_log, self.workers, self.tell, seen)
         with closing(ended):  # type: ignore[type-var]
             for done, outcome in enumerate(ended, 1):
-                self.note(outcome.task.label, outcome)
-                stage(f"{done} of {len(left)} scored", done / len(left))
-
-    def tasks(self, logs: Sequence[BenchmarkLog]) -> Iterator[ScoreTask]:
-        """A task per log and protocol, and per log of an arm with outside estimates."""
-        for log in logs:
-            for protocol in log.protocols:
-                is_fit = protocol == "identified"
-                free = {word for word in log.free if ":" not in word}
-                if log.identified in self.robots if is_fit else free <= self.files.keys():
-                    yield self.task(log, protocol, None)
-        for rival in self.rivals:
-            arms = {log.arm for log in logs if rival.file(log) is not None}
-            asked = [log for log in logs if log.arm in arms and log.protocols]
-            yield from (self.task(log, rival.declared.protocol, rival) for log in asked)
-
-    def task(self, log: BenchmarkLog, protocol: str, rival: Rival | None) -> ScoreTask:
-        """The task of a log, with a key of all its inputs."""
-        file, truth, outside = self.files[log.name], None, list[object]()
-        robot = self.robots[log.identified] if protocol == "identified" and not rival else None
-        asked = protocol if rival is None else "alone"
-        choice = self.manifest.choice(log, asked, file, robot, self.files)
-        if log.pushes or log.scenario:
-            truth = companions(file)[0]
-        elif log.truth in {"sensor", "torque"}:
-            truth = self.manifest.data / log.truth_file if log.truth_file else file
-        if rival is not None:
-            own = rival.file(log), rival.file(log, "contacts.csv")
-            outside = [rival.name, rival.declared, *own]
-        marked = log.name.removesuffix(PUSHED) in self.marked
-        options = options_digest([log, protocol, choice, truth, outside, marked])
-        key = key_of(content_digest([file]), options)
-        return ScoreTask(self.folder.path, key, log, protocol, choice, file, truth, rival, marked)
+                self.ended.append((outcome.task.label, outcome))
+                stage(f"{done} of {len(tasks)} scored", done / len(tasks))
 
     def record(self, logs: Sequence[BenchmarkLog]) -> dict[str, Any]:
         """Content of `run.json`: manifest, logs, absent ones, efforts."""
@@ -214,8 +206,8 @@ class BenchmarkRun:
         entries = [
             {
                 "recording": log.name,
-                "path": str(self.files.get(log.name)),
-                "sha256": content_digest(paths) if (paths := manifest.paths(log)) else None,
+                "path": str(made.paths[0]) if (made := self.logs.get(log.name)) else None,
+                "sha256": content_digest(log.paths) if log.paths else None,
                 **{key: getattr(log, key) for key in keys},
                 "truth_error": log.truth_error.note,
             }
@@ -227,6 +219,63 @@ class BenchmarkRun:
             "left_out": manifest.absent(),
             "failures": {name: failure.line for name, failure in self.failures},
             "outside": {rival.name: rival.declared for rival in self.rivals},
-            "tasks": self.efforts,
+            "tasks": [
+                {"task": name, **each.effort._asdict()}
+                for name, each in self.ended
+                if each.effort
+            ],
         }
         return envelope(self.command, entries, found=found)
+
+
+def simulated(log: BenchmarkLog, command: str, path: Path) -> None:
+    """Write the log of a scenario, with its truth."""
+    check_installed("pinocchio", "a simulated log")
+    made = simulate(load_scenario(log.scenario, log.changes), log.seed)
+    save({path: made}, "parquet", force=True, command=command)
+
+
+def joined(log: BenchmarkLog, path: Path) -> None:
+    """Write the log of text files, one a signal, t first: columns t, q1…."""
+    columns: dict[str, Array] = {}
+    samples = 0
+    for part, source in zip(log.parts, log.paths, strict=True):
+        try:
+            values = np.loadtxt(source, ndmin=1).ravel()
+            rows = values.reshape(samples or len(values), -1)
+        except (OSError, UnicodeDecodeError, ValueError):
+            raise LogError(
+                f"{source}: not numbers, as many for each of {samples or 'its'} samples"
+            ) from None
+        samples, signal = len(rows), part.partition("=")[0]
+        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
+        columns |= dict(zip(names, rows.T, strict=True))
+    put_table(path, pl.DataFrame(columns))
+
+
+def plant(log: BenchmarkLog, pushes: Pushes, path: Path) -> None:
+    """Write a free log with pushes in its drive torque, and their truth."""
+    choice = replace(log.choice(), examiner=Examiner(anyway=True))
+    read = choice.library.open(log.paths[0], replace(choice.read, derive="none"))
+    recording, wrench, tau = planted(prepared(read, choice), pushes)
+    table = (("t", recording.t), *per_joint("tau_ext", tau), *per_axis("wrench", wrench))
+    put_table(companions(path)[0], frame_of(table))
+    convert(recording, path, force=True)
+
+
+def planted(run: Run, pushes: Pushes) -> tuple[Recording, Array, Array]:
+    """A run's log with pushes in its drive torque (τ − Jᵀ w), their w and Jᵀ w.
+
+    Half sines at the flange in base axes, without moments. The motion does not yield.
+    """
+    t, recording, robot = run.t, run.recording, run.robot
+    wrench = np.zeros((recording.samples, 6))
+    for start, length, force in pushes:
+        share = (t - start) / length
+        course = np.where(abs(share - 0.5) < 0.5, np.sin(np.pi * share), 0.0)
+        wrench[:, :3] += course[:, None] * force
+    tau = np.einsum("tij,ti->tj", flange_jacobian(robot.chain, recording.q), wrench)
+    name = effort_name(recording, robot)
+    constant = robot.torque_constant if name == "current" else None
+    effort = recording.require(name) - (tau if constant is None else tau / constant)
+    return replace(recording, **{name: effort}), wrench, tau

@@ -8,22 +8,16 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib.resources import files
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple, cast
-
-import numpy as np
 
 from vftcli.batch.log_work import content_digest, digest_of, with_files
 from vftcli.doctor.examination import Examiner
-from vftcli.evaluation.scores import ListedRow
 from vftcli.notebook import OF_ESTIMATE
 from vftcli.pipeline import AnalysisChoice, choice_of
 from vftcli.readers.reading import Library, absolute
 from vftcli.readers.table import listed
-from vftcli.signals.arrays import Array
-from vftcli.signals.errors import LogError, ParameterError
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Asked, interval
 from vftcli.signals.parsing import check_known, toml_file
 from vftcli.simulation.scenario import Vector, section_from
@@ -42,6 +36,8 @@ OPTIONS = {
     if not option.is_setting and word not in {"arm", "free"}
 }
 Spans = tuple[tuple[float, float], ...]
+#: Planted: start [s], length [s], peak force on the flange in base axes [N].
+Pushes = tuple[tuple[float, float, Vector], ...]
 ALWAYS: Spans = ((0.0, 1e9),)  #: All of a log. [s]
 
 
@@ -61,7 +57,8 @@ class BenchmarkLog:
     arm: str  #: Logs of one arm are pooled.
     truth: str  #: One of `TRUTHS`.
     day: str = ""  #: No log of this day may train for it.
-    file: str = ""  #: Below the folder of the data.
+    data: str = field(default="", compare=False)  #: Folder of its files.
+    file: str = ""  #: Below that folder.
     parts: tuple[str, ...] = ()  #: Files of numbers that are one log, as ``q=positions.txt``.
     scenario: str = ""  #: Name of a simulated log's scenario.
     seed: int = 1
@@ -77,8 +74,7 @@ class BenchmarkLog:
     #: True contacts: start, end [s], peak [N] if known; by hand.
     contacts: tuple[tuple[float, ...], ...] = ()
     contact_N: float = 1.0  #: Force from which the truth is a contact. [N]
-    #: Planted: start [s], length [s], peak force on the flange in base axes [N].
-    pushes: tuple[tuple[float, float, Vector], ...] = ()
+    pushes: Pushes = ()
     weight_N: float = 0.0  #: Weight carried over `score`. [N]
     #: Protocols it is scored by, none of what only trains.
     protocols: tuple[str, ...] = ("alone",)
@@ -109,6 +105,42 @@ class BenchmarkLog:
         }
         if broken := [rule for rule, holds in rules.items() if not holds]:
             raise ParameterError(f"log {self.name!r}: {broken[0]}")
+
+    @property
+    def base(self) -> str:
+        """The name of the entry, without pushes."""
+        return self.name.removesuffix(PUSHED)
+
+    @property
+    def paths(self) -> list[Path]:
+        """Its files, there or not; a simulated one has none."""
+        names = [part.partition("=")[2] for part in self.parts] or [self.file]
+        return [Path(self.data, name) for name in names if name]
+
+    @property
+    def truth_path(self) -> Path | None:
+        """The file of its truth, None where the entry says it."""
+        in_file = self.truth in {"sensor", "torque"}
+        return Path(self.data, self.truth_file or self.file) if in_file else None
+
+    @property
+    def missing(self) -> list[Path]:
+        """The missing files of its entry."""
+        robot = Path(dict(self.options).get("robot", ""))
+        # A name that is not given is a folder that is there.
+        beside = (Path(self.data, self.truth_file), robot if robot.suffix else Path())
+        return [path for path in (*self.paths, *beside) if not path.exists()]
+
+    @property
+    def free_logs(self) -> list[str]:
+        """The logs among its free motion, by name."""
+        return [word for word in self.free if ":" not in word]
+
+    def choice(self, **words: object) -> AnalysisChoice:
+        """Choices of its analysis: the options of its entry, then these words."""
+        own = {"frame": "base", "wrench": True, **dict(self.options), **words}
+        made = choice_of(Asked(own, {}, ""), Library(), Examiner())
+        return cast("AnalysisChoice", with_files(made, absolute))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,111 +184,82 @@ class Manifest:
     path: Path
     data: Path
     logs: tuple[BenchmarkLog, ...]
-    robots: tuple[TrainedRobot, ...]
+    robots: Mapping[str, TrainedRobot]  #: Name → robot.
+
+    def __post_init__(self) -> None:
+        names = [log.name for log in self.logs]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ParameterError(f"{self.path}: two logs are called {twice[0]}")
+        if not names:
+            raise ParameterError(f"{self.path}: no [[log]]; docs/benchmark.md shows an entry")
+        for robot in self.robots.values():
+            for name in robot.train:
+                check_known(name, names, f"robot {robot.name}: no log {name!r} to train on")
+        for log in self.logs:
+            if word := log.identified:
+                check_known(word, self.robots, f"log {log.name}: no [[robot]] {word!r}")
+            for word in log.free_logs:
+                check_known(word, names, f"log {log.name}: no free log {word!r}")
 
     @cached_property
     def by_name(self) -> dict[str, BenchmarkLog]:
         """Name → log."""
         return {log.name: log for log in self.logs}
 
-    def paths(self, log: BenchmarkLog) -> list[Path]:
-        """The files of a log, there or not; a simulated one has none."""
-        names = [part.partition("=")[2] for part in log.parts] if log.parts else [log.file]
-        return [self.data / name for name in names if name]
-
-    def robot(self, log: BenchmarkLog) -> str | None:
-        """A log's arm: a profile, a file below `data`, or None."""
-        name: str | None = dict(log.options).get("robot")
-        return str(self.data / name) if name and Path(name).suffix else name
-
-    def missing(self, log: BenchmarkLog) -> list[Path]:
-        """The missing files of its entry."""
-        robot = self.robot(log) or ""
-        also = [log.truth_file] * bool(log.truth_file) + [robot] * ("." in robot)
-        paths = (*self.paths(log), *(self.data / name for name in also))
-        return [path for path in paths if not path.exists()]
-
-    def choice(
-        self,
-        log: BenchmarkLog,
-        protocol: str,
-        file: Path,
-        robot: Path | None = None,
-        logs: Mapping[str, Path] = MappingProxyType({}),
-    ) -> AnalysisChoice:
-        """Choices of a protocol for a log in `file`; `robot` is of protocol 3.
-
-        `logs` is name → file of each log, for free motion.
-        """
-        words = {w: OPTIONS[w].keyword(v) for w, v in log.options if w != "robot"}
-        if file not in self.paths(log):
-            words.pop("columns", None)  # those of a file that this one is made of
-        if protocol == "free":
-            words["free"] = [str(logs.get(word, word)) for word in log.free]
-        arm = str(robot) if robot is not None else self.robot(log)
-        asked = Asked({"frame": "base", "wrench": True, **words, "robot": arm}, {}, "")
-        made = choice_of(asked, Library(), Examiner())
-        return cast("AnalysisChoice", with_files(made, absolute))
-
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
         """Reasons for unfair rows of a protocol: a line per training log."""
-        name, own = log.name.removesuffix(PUSHED), list(map(digest_of, self.paths(log)))
         training: list[tuple[BenchmarkLog, Spans]] = []
+        key, own = protocol, [digest_of(path) for path in log.paths]
         if protocol == "free":
-            by_name = self.by_name
-            each = ((w, ALWAYS if w in by_name else (interval(w),)) for w in log.free)
-            training = [(by_name.get(word, log), spans) for word, spans in each]
+            training = [
+                (log, (interval(word),)) if ":" in word else (self.by_name[word], ALWAYS)
+                for word in log.free
+            ]
         if protocol == "identified":
-            robot = next(r for r in self.robots if r.name == log.identified)
+            robot = self.robots[log.identified]
             whole = (interval(robot.interval),) if robot.interval else ALWAYS
-            training = [(self.by_name[other], whole) for other in robot.train]
+            training = [(self.by_name[name], whole) for name in robot.train]
+            key = f"interval of [[robot]] {robot.name}"
         for other, spans in training:
-            what = f"{name}, {protocol}: {other.name}"
-            if other.name.removesuffix(PUSHED) == name:
+            what = f"{log.base}, {protocol}: {other.name}"
+            if other.base == log.base:
                 near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.score)
                 if any(near):
-                    fit = f"interval of [[robot]] {log.identified}"
-                    key = "free" if protocol == "free" else fit
                     yield (
-                        f"{name}: {key} ({in_words(spans)}) must stay {APART:g} s away from score "
-                        f"({in_words(log.score)}); change one of them"
+                        f"{log.base}: {key} ({in_words(spans)}) must stay {APART:g} s away from "
+                        f"score ({in_words(log.score)}); change one of them"
                     )
-            elif self.missing(other):
+            elif other.missing:
                 continue
-            elif own and own == list(map(digest_of, self.paths(other))):
+            elif own and own == [digest_of(path) for path in other.paths]:
                 yield f"{what} is the scored file under another name"
             elif protocol == "identified" and other.day and other.day == log.day:
                 yield f"{what} is of the same day, {log.day}"
 
-    def complaints(self, rivals: Sequence[Rival]) -> dict[str, list[str]]:
-        """Name of a log → lines on unfair rows or another file."""
-        found: dict[str, list[str]] = {}
-        for log in self.logs:
-            if self.missing(log):
-                continue
-            paths = self.paths(log)
-            sha = content_digest(paths) if paths else ""
-            lines = [line for protocol in log.protocols for line in self.leaks(log, protocol)]
-            if log.sha256 and sha != log.sha256 and not log.pushes:
-                lines.append(
-                    f"{log.name}: {paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
-                )
-            lines += [
-                f"{log.name}: {rival.name} was trained on it (sha256 {sha[:9]}…)"
-                for rival in rivals
-                if sha in rival.declared.training and rival.file(log)
-            ]
-            if lines:
-                own = found.setdefault(log.name.removesuffix(PUSHED), [])
-                own += [line for line in lines if line not in own]
-        return found
+    def unfair(self, log: BenchmarkLog, rivals: Sequence[Rival]) -> Iterator[str]:
+        """A line on each unfair row of a log, and on another file than the manifest's."""
+        paths = log.paths
+        sha = content_digest(paths)
+        for protocol in log.protocols:
+            yield from self.leaks(log, protocol)
+        if log.sha256 and sha != log.sha256 and not log.pushes:
+            yield f"{log.name}: {paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
+        for rival in rivals:
+            if sha in rival.declared.training and rival.file(log):
+                yield f"{log.name}: {rival.name} was trained on it (sha256 {sha[:9]}…)"
+
+    def complaints(self, rivals: Sequence[Rival]) -> list[tuple[str, str]]:
+        """Entry and line of what is unfair or another file, among the logs that are there."""
+        there = (log for log in self.logs if not log.missing)
+        lines = ((log.base, line) for log in there for line in self.unfair(log, rivals))
+        return list(dict.fromkeys(lines))  # an entry with pushes has every line once
 
     def absent(self) -> list[str]:
         """A line on each absent log: its source."""
         return [
             f"{log.name}: no {lacking[0]}" + (f"; source: {log.source}" if log.source else "")
             for log in self.logs
-            if not log.pushes and (lacking := self.missing(log))
+            if not log.pushes and (lacking := log.missing)
         ]
 
 
@@ -264,57 +267,37 @@ def load_manifest(name: str, data: Path | None) -> Manifest:
     """A built-in manifest or a user's; logs are beside it or in `data`."""
     path = Path(name)
     if name in BUILT_IN:
-        path = Path(str(files("vftcli.reproduction") / f"{name}.toml"))
+        path = Path(__file__).with_name(f"{name}.toml")
     elif path.suffix != ".toml":
         check_known(name, (*BUILT_IN, "speed"), f"no FILE.toml and no benchmark {name!r}")
     tables = toml_file(path, "a manifest")
     for key in tables:
         check_known(key, ("log", "robot"), f"{path}: no table {key!r}")
-    logs = tuple(each for table in tables.get("log", ()) for each in logs_of(table))
+    data = data or (Path() if name in BUILT_IN else path.parent)
+    logs = tuple(log for table in tables.get("log", ()) for log in logs_of(table, data))
     robots = [section_from(TrainedRobot, table, "robot") for table in tables.get("robot", ())]
-    default = Path() if name in BUILT_IN else path.parent
-    found = Manifest(path=path, data=data or default, logs=logs, robots=tuple(robots))
-    check_names(found)
-    return found
+    return Manifest(
+        path=path, data=data, logs=logs, robots={robot.name: robot for robot in robots}
+    )
 
 
-def check_names(manifest: Manifest) -> None:
-    """Raise unless log names are unique and all names in use are known."""
-    names = [log.name for log in manifest.logs]
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ParameterError(f"{manifest.path}: two logs are called {twice[0]}")
-    if not names:
-        raise ParameterError(f"{manifest.path}: no [[log]]; docs/benchmark.md shows an entry")
-    for robot in manifest.robots:
-        for name in robot.train:
-            check_known(name, names, f"robot {robot.name}: no log {name!r} to train on")
-    for log in manifest.logs:
-        if log.identified:
-            there = [robot.name for robot in manifest.robots]
-            check_known(log.identified, there, f"log {log.name}: no [[robot]] {log.identified!r}")
-        for word in log.free:
-            if ":" not in word:
-                check_known(word, names, f"log {log.name}: no free log {word!r}")
-
-
-def logs_of(table: Mapping[str, Any]) -> Iterator[BenchmarkLog]:
+def logs_of(table: Mapping[str, Any], data: Path) -> Iterator[BenchmarkLog]:
     """The log of an entry; with pushes two: without and with them."""
-    words = {key: value for key, value in table.items() if key in OPTIONS}
+    # Wrong ones are refused now rather than in a worker.
+    words = {key: OPTIONS[key].keyword(value) for key, value in table.items() if key in OPTIONS}
     rest = {key: value for key, value in table.items() if key not in OPTIONS}
-    for word, value in words.items():
-        OPTIONS[word].keyword(value)  # refused now rather than in a worker
+    if Path(robot := str(words.get("robot", ""))).suffix:
+        words["robot"] = str(data / robot)
     if "score" in table:
         rest.setdefault("vouched", table["score"])
     rest.setdefault("protocols", [p for p in PROTOCOLS if p == "alone" or table.get(p)])
     log = section_from(BenchmarkLog, rest, f"log {table.get('name', '')}".strip())
-    log = replace(log, options=tuple(words.items()))
-    if not log.pushes:
-        yield log
-        return
-    if log.truth != "free":
+    if log.pushes and log.truth != "free":
         raise ParameterError(f"log {log.name}: pushes are planted where truth is free")
+    log = replace(log, data=str(data), options=tuple(words.items()))
     yield replace(log, pushes=())
-    yield replace(log, name=f"{log.name}{PUSHED}", arm=f"{log.arm} (planted)")
+    if log.pushes:
+        yield replace(log, name=f"{log.name}{PUSHED}", arm=f"{log.arm} (planted)")
 
 
 def in_words(spans: Spans) -> str:
@@ -347,41 +330,3 @@ def rival_of(text: str, ours: Sequence[str], logs: Sequence[BenchmarkLog]) -> Ri
             f"is looked for, LOG one of {', '.join(log.name for log in logs)}"
         )
     return rival
-
-
-def read_list(path: Path) -> list[ListedRow]:
-    """A list of contacts from CSV."""
-    import polars as pl
-
-    try:
-        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
-        return [
-            ListedRow(
-                start=float(row["start_s"]),
-                stop=float(row["stop_s"]),
-                peak=float(row.get("peak_force_N") or 0.0),
-                band=float(row.get("peak_force_band_N") or 0.0),
-                is_load=row.get("kind") == "load",
-            )
-            for row in rows
-        ]
-    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
-        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
-
-
-def read_parts(files: Mapping[str, Path]) -> dict[str, Array]:
-    """Columns t, q1… of text files, one a signal, t first."""
-    columns: dict[str, Array] = {}
-    samples = 0
-    for signal, path in files.items():
-        try:
-            values = np.loadtxt(path, ndmin=1).ravel()
-            rows = values.reshape(samples or len(values), -1)
-        except (OSError, UnicodeDecodeError, ValueError):
-            raise LogError(
-                f"{path}: not numbers, as many for each of {samples or 'its'} samples"
-            ) from None
-        samples = len(rows)
-        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
-        columns |= dict(zip(names, rows.T, strict=True))
-    return columns

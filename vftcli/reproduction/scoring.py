@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import count, takewhile
 from pathlib import Path
 from time import thread_time
 from typing import Any, NamedTuple
@@ -27,23 +26,17 @@ from vftcli.evaluation.scores import (
 from vftcli.free_motion.free_motion import within
 from vftcli.observers.table import BEST, OBSERVERS
 from vftcli.outputs.batch_folder import BatchFolder
-from vftcli.pipeline import AnalysisChoice, analyse, prepared, run_of
-from vftcli.readers.columns import Cell, Item
-from vftcli.readers.reader import ReadChoice
+from vftcli.pipeline import AnalysisChoice, analyse, prepared
+from vftcli.readers.reader import RawLog
 from vftcli.readers.reading import Library
-from vftcli.readers.references import TORQUE, program_clock, read_reference, table_at
-from vftcli.readers.table import listed
-from vftcli.readers.tables import load_signals
-from vftcli.reproduction.manifest import BenchmarkLog, Rival, read_list
-from vftcli.robots.chain import flange_jacobian
+from vftcli.readers.references import TORQUE, read_outside, read_reference
+from vftcli.reproduction.manifest import BenchmarkLog, Rival
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
-from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import Array, Mask, summed
 from vftcli.signals.errors import LogError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import AXES
 from vftcli.wrench.solvers import NOTHING
 
 #: A joint is touched from here on, until below this. [N·m]
@@ -55,7 +48,7 @@ LISTS = ("list", "list with candidates")  #: Parts of rows of lists.
 #: lists; wrench and weight; shifts; the worst 10 s of `best`.
 COLUMNS: tuple[tuple[Any, str], ...] = (
     (String, "log arm protocol method part"),
-    (Int64, "joint"),
+    (Int64, "joint axis"),
     (Boolean, "future exact_model marked"),
     (Float64, "truth_error_Nm rmse_Nm l1_Nm observer_us command_us"),
     (pl.List(Float64), " ".join(Score._fields)),
@@ -64,8 +57,7 @@ COLUMNS: tuple[tuple[Any, str], ...] = (
     (pl.List(Float64), "onset_s peak_error_N true_peak_N"),
     (Int64, "peaks_held"),
     (Float64, "hardest_false_N"),
-    (Float64, "force_squares moment_squares true_force_squares true_moment_squares"),
-    (Float64, "wrench_missing_s wrench_s weight_N mean_N rms_error_N answered"),
+    (Float64, "weight_N mean_N rms_error_N answered"),
     (pl.List(Float64), "lag_squares"),
     (Int64, "worst_joint"),
     (pl.List(Float64), "worst_t worst_truth worst_estimate"),
@@ -78,37 +70,12 @@ class ScoreTask(NamedTuple):
 
     folder: Path
     key: str
+    label: str
     log: BenchmarkLog
-    protocol: str
     choice: AnalysisChoice
-    file: Path
-    truth: Path | None  #: The file of the truth.
     rival: Rival | None
-    marked: bool  #: Whether scored in spite of a complaint.
-
-    @property
-    def label(self) -> str:
-        """Name of the task."""
-        rival = f", {self.rival.name}" if self.rival else ""
-        return f"{self.log.name}, {self.protocol}{rival}"
-
-
-def planted(run: Run, log: BenchmarkLog) -> tuple[Recording, Array, Array]:
-    """A free log with pushes in its drive torque (τ − Jᵀ w), their w and Jᵀ w.
-
-    Half sines at the flange in base axes, without moments. The motion does not yield.
-    """
-    t, recording, robot = run.t, run.recording, run.robot
-    wrench = np.zeros((recording.samples, 6))
-    for start, length, force in log.pushes:
-        share = (t - start) / length
-        course = np.where(abs(share - 0.5) < 0.5, np.sin(np.pi * share), 0.0)
-        wrench[:, :3] += course[:, None] * force
-    tau = np.einsum("tij,ti->tj", flange_jacobian(robot.chain, recording.q), wrench)
-    name = effort_name(recording, robot)
-    constant = robot.torque_constant if name == "current" else None
-    effort = recording.require(name) - (tau if constant is None else tau / constant)
-    return replace(recording, **{name: effort}), wrench, tau
+    #: What every row has: protocol, and whether it is scored in spite of a complaint.
+    about: Mapping[str, Any]
 
 
 class KnownTruth(NamedTuple):
@@ -119,17 +86,17 @@ class KnownTruth(NamedTuple):
     contacts: Sequence[TrueContact] | None
 
 
-def truth_of(task: ScoreTask, recording: Recording, robot: Robot) -> KnownTruth:
+def truth_of(log: BenchmarkLog, recording: Recording, robot: Robot) -> KnownTruth:
     """The truth of a log, from the manifest or a file."""
-    log, t = task.log, recording.t
+    t, path = recording.t, log.truth_path
     listed: list[Any] | None = [(*c, np.nan)[:3] for c in log.contacts] or None
-    if task.truth is None:
+    if path is None:
         if log.truth == "free":
             return KnownTruth(np.zeros(recording.q.shape), None, [])
         return KnownTruth(None, None, listed)
-    table = read_reference(task.truth, log.truth_columns or None)
+    table = read_reference(path, log.truth_columns or None)
     table = replace(table, stamps=since_start(table.stamps, recording))
-    load = table_reference(table, task.truth, recording, robot, NOTHING)
+    load = table_reference(table, path, recording, robot, NOTHING)
     tau, wrench = load.torque.tau, None if load.wrench is None else load.wrench.values
     if listed is None and wrench is not None:
         size = np.linalg.norm(wrench[:, :3], axis=1)
@@ -157,45 +124,43 @@ def score_log(task: ScoreTask) -> None:
     if folder.row_file(task.key).exists():
         return
     begin("reading")
-    choice = replace(task.choice, library=Library([task.file]), examiner=Examiner(anyway=True))
-    task = task._replace(choice=choice)
-    run = prepared(choice.library.open(task.file, choice.read), choice)
-    recording, robot = run.recording, run.robot
+    (path,) = log.paths
+    choice = replace(task.choice, library=Library([path]), examiner=Examiner(anyway=True))
+    run = prepared(choice.library.open(path, choice.read), choice)
     begin("estimating")
-    answers = [*(own_answers if task.rival is None else outside_answer)(task, recording, robot)]
+    answers = [
+        *(
+            own_answers(run, choice, log)
+            if task.rival is None
+            else [outside_answer(run.recording, log, task.rival)]
+        )
+    ]
     begin("scoring")
-    truth = truth_of(task, recording, robot)
-    shared = {
-        "key": task.key,
-        "log": log.name,
-        "arm": log.arm,
-        "protocol": task.protocol,
-        "exact_model": log.exact_model,
-        "marked": task.marked,
-        "truth_error_Nm": log.truth_error.tau_Nm,
-    }
+    truth = truth_of(log, run.recording, run.robot)
     rows = [
-        {**shared, **answer.cost, "method": answer.torque.name, "future": answer.future, **row}
+        {**answer.cost, "method": answer.torque.name, "future": answer.future, **row}
         for answer in answers
         for row in rows_of(answer, truth, log)
     ]
-    folder.put_rows(task.key, pl.DataFrame(rows, schema={"key": String, **SCHEMA}))
+    about = {"log": log.name, "arm": log.arm, "exact_model": log.exact_model}
+    about |= {"truth_error_Nm": log.truth_error.tau_Nm, **task.about}
+    same = [pl.lit(value, SCHEMA[name]).alias(name) for name, value in about.items()]
+    folder.put_rows(task.key, pl.DataFrame(rows, schema=SCHEMA).with_columns(same))
 
 
-def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator[Answer]:
+def own_answers(run: Run, choice: AnalysisChoice, log: BenchmarkLog) -> Iterator[Answer]:
     """Answers of zero, the vendor and our observers, `best` with its contacts."""
-    t, begun, choice = recording.t, thread_time(), task.choice
-    made = analyse(run_of(recording, robot, choice), choice)
+    recording, t, begun = run.recording, run.t, thread_time()
+    made = analyse(run, choice)
     us = 1e6 / len(t)
     whole = us * (thread_time() - begun)
     wrenches = {wrench.name: wrench.known for wrench in made.wrenches}
     nothing = np.zeros((recording.samples, 6))
     yield Answer(ExternalTorque(name="zero", t=t, tau=np.zeros(recording.q.shape)), nothing)
-    if task.log.vendor:
-        table = read_reference(task.file, task.log.vendor)
-        t_file, tau = since_start(table.stamps, recording), table.signals["tau_ext"]
-        tau = on_the_logs_clock(t_file, tau, recording, task.file)
-        yield Answer(ExternalTorque(name="vendor", t=t, tau=tau))
+    if log.vendor:
+        (path,) = log.paths
+        there = at_the_logs_times(read_reference(path, log.vendor), recording, path)
+        yield Answer(ExternalTorque(name="vendor", t=t, tau=there[TORQUE]))
     lists: dict[str, Sequence[ListedRow]] = {}
     if made.contacts is not None:
         counted, weak = (
@@ -214,29 +179,28 @@ def own_answers(task: ScoreTask, recording: Recording, robot: Robot) -> Iterator
         yield Answer(torque, wrenches.get(name), not OBSERVERS[name].online, own, cost)
 
 
-def outside_answer(task: ScoreTask, recording: Recording, _: Robot) -> Iterator[Answer]:
+def outside_answer(recording: Recording, log: BenchmarkLog, rival: Rival) -> Answer:
     """Another program's answer for a log, at the log's stamps."""
-    rival = task.rival
-    assert rival is not None, "it has a folder"
-    path, listed = rival.file(task.log), rival.file(task.log, "contacts.csv")
-    lists = {} if listed is None else {LISTS[0]: read_list(listed)}
-    # Without estimates for a log it answers nothing there.
-    t = recording.t
-    columns: list[Any] = [np.full(recording.q.shape, np.nan), None, None]
+    path, listed = rival.file(log), rival.file(log, "contacts.csv")
+    there: Mapping[str, Array] = {}
     if path is not None:
-        read, wrench = read_outside(path, rival.name)
-        if read.joints != recording.joints:
-            joints = f"{read.joints} joints for a log of {recording.joints}"
-            raise LogError(f"{path}: torques of {joints}")
-        own, columns = since_start(read.t, recording), [read.tau, read.error_sd, wrench]
-        if len(own) != len(t) or abs(own - t).max() >= SAME:
-            there = (
-                x if x is None else on_the_logs_clock(own, x, recording, path) for x in columns
-            )
-            columns = [*there]
-    tau, sd, wrench = columns
-    torque = ExternalTorque(name=rival.name, t=t, tau=tau, error_sd=sd)
-    yield Answer(torque, wrench, not rival.declared.causal, lists)
+        read = read_outside(path, rival.name)
+        if (joints := read.signals[TORQUE].shape[1]) != recording.joints:
+            raise LogError(f"{path}: torques of {joints} joints for a log of {recording.joints}")
+        there = at_the_logs_times(read, recording, path)
+    # Without estimates for a log it answers nothing there.
+    tau = there.get(TORQUE, np.full(recording.q.shape, np.nan))
+    torque = ExternalTorque(name=rival.name, t=recording.t, tau=tau, error_sd=there.get("band"))
+    lists = {} if listed is None else {LISTS[0]: read_list(listed)}
+    return Answer(torque, there.get("wrench"), not rival.declared.causal, lists)
+
+
+def at_the_logs_times(read: RawLog, recording: Recording, path: Path) -> Mapping[str, Array]:
+    """Signals of a file beside a log, at the log's stamps; NaN beyond the file's."""
+    t, signals = since_start(read.stamps, recording), read.signals
+    if len(t) == recording.samples and abs(t - recording.t).max() < SAME:
+        return signals
+    return {name: on_the_logs_clock(t, x, recording, path) for name, x in signals.items()}
 
 
 def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[dict[str, Any]]:
@@ -253,7 +217,9 @@ def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[di
             del parts["free"]  # it is scored of the log without them
         yield from torque_rows(answer.torque, truth.tau, parts)
     if wrench is not None and truth.wrench is not None and touch.any():
-        yield {"part": "wrench", **wrench_sums(wrench[touch], truth.wrench[touch], w[touch])}
+        score = Score.of(t, wrench, truth.wrench, touch)
+        for axis, sums in enumerate(score.by_joint(), 1):
+            yield {"part": "wrench", "axis": axis, **sums}
     if wrench is not None and log.weight_N:
         yield {"part": "weight", **weighed(-wrench[scored, 2], log.weight_N, w[scored])}
     if truth.contacts is not None:
@@ -267,7 +233,7 @@ def torque_rows(
     """Rows of a torque: sums by part and joint, shifts, the worst span."""
     for part, inside in parts.items():
         if inside.any():
-            score = Score.of(torque, truth, inside)
+            score = Score.of(torque.t, torque.tau, truth, inside, torque.error_sd)
             means = zip(score.rmse.tolist(), score.mean(score.sizes).tolist(), strict=True)
             for j, ((rmse, l1), sums) in enumerate(zip(means, score.by_joint(), strict=True), 1):
                 yield {"part": part, "joint": j, "rmse_Nm": rmse, "l1_Nm": l1, **sums}
@@ -291,16 +257,6 @@ def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, An
     return dict(zip(names, (joint + 1, t[part].tolist(), *seen), strict=True))
 
 
-def wrench_sums(values: Array, truth: Array, w: Array) -> dict[str, float]:
-    """Σ w |f̂ − f|² and its like; a missing wrench counts as 0."""
-    error, sums = np.where(np.isfinite(values), values, 0.0) - truth, {}
-    for head, wrench in (("", error), ("true_", truth)):
-        for kind, part in (("force", wrench[:, :3]), ("moment", wrench[:, 3:])):
-            sums[f"{head}{kind}_squares"] = float((w * (part**2).sum(axis=1)).sum())
-    missing = float((w * ~np.isfinite(values[:, 0])).sum())
-    return {**sums, "wrench_missing_s": missing, "wrench_s": float(w.sum())}
-
-
 def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
     """Mean and rms error of a carried weight [N], and the share of answered time."""
     known = np.isfinite(up)
@@ -311,33 +267,19 @@ def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
     return {**found, "answered": total / w.sum()}
 
 
-def read_outside(path: Path, name: str) -> tuple[ExternalTorque, Array | None]:
-    """Torque and wrench (T, 6) or None of another program's file, at its own stamps.
-
-    Its columns are t, tau_ext/1…, band/1… (one standard deviation), wrench/fx… (force and
-    moment on the robot, base axes); a file of `vftcli estimate` has them as
-    tau_ext/NAME/1…. NaN is no answer.
-    """
-    table = table_at(path)
-    inner = f"/{name}/" if f"{TORQUE}/{name}/1" in table.names else "/"
-    columns = {column: Cell(k) for k, column in enumerate(table.names)}
-    picks = {}
-    for kind, ends in {TORQUE: count(1), "band": count(1), "wrench": AXES}.items():
-        wanted = (f"{kind}{inner}{end}" for end in ends)
-        cells = tuple(columns[each] for each in takewhile(columns.__contains__, wanted))
-        if cells and (kind != "wrench" or len(cells) == len(AXES)):
-            picks[kind] = Item(kind, cells=cells)
-    if "t" not in columns or TORQUE not in picks:
-        raise LogError(
-            f"{path}: estimates have columns t, {TORQUE}/1, {TORQUE}/2 …; it has "
-            f"{listed(table.names)}"
-        )
-    picks["t"] = Item("t", unit="s", cells=(columns["t"],))
-    raw = load_signals(table, picks, ReadChoice())
-    torque = ExternalTorque(
-        name=name,
-        t=program_clock(raw, path),
-        tau=raw.signals[TORQUE],
-        error_sd=raw.signals.get("band"),
-    )
-    return torque, raw.signals.get("wrench")
+def read_list(path: Path) -> list[ListedRow]:
+    """A list of contacts from CSV."""
+    try:
+        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
+        return [
+            ListedRow(
+                start=float(row["start_s"]),
+                stop=float(row["stop_s"]),
+                peak=float(row.get("peak_force_N") or 0.0),
+                band=float(row.get("peak_force_band_N") or 0.0),
+                is_load=row.get("kind") == "load",
+            )
+            for row in rows
+        ]
+    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
+        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
