@@ -37,11 +37,20 @@ PAPER = Paper(
     title="A paper",
     doi="10.1/1",
     experiments={
-        "works": Experiment(title="what works", run="measure", seeds=(1, 2, 3)),
-        "fails": Experiment(
-            title="what fails", run="fail", given={"what": "nothing"}, seeds=(1, 2)
-        ),
-        "timed": Experiment(title="what takes the time", run="measure", seeds=(0,), alone=True),
+        e.name: e
+        for e in (
+            Experiment(name="works", title="what works", run="measure", seeds=(1, 2, 3)),
+            Experiment(
+                name="fails",
+                title="what fails",
+                run="fail",
+                given={"what": "nothing"},
+                seeds=(1, 2),
+            ),
+            Experiment(
+                name="timed", title="what takes the time", run="measure", seeds=(0,), alone=True
+            ),
+        )
     },
     items={
         "fig1": PaperItem(

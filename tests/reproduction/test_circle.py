@@ -58,8 +58,8 @@ def test_the_first_seed_lies_in_the_documents_range() -> None:
         ("table1", "fig3", "fig4", "fig6", "fig7", "fig12"), fast=True
     ).items():
         document, compared = documented(name), 0
-        for line in shown.item.lines:
-            kinds = (*shown.item.variants, "floor")
+        for line in shown.lines:
+            kinds = (*shown.variants, "floor")
             for kind, text in zip(kinds, document[line.label], strict=False):
                 values = shown.values.get(line.key, {}).get(kind)
                 wanders = kind == AS_PRINTED and name in WANDERING
@@ -69,7 +69,7 @@ def test_the_first_seed_lies_in_the_documents_range() -> None:
                 least, most = low - 0.005 * abs(low), high + 0.005 * abs(high)
                 assert least <= values[0] <= most, f"{name}, {line.label}, {kind}"
                 compared += 1
-        assert compared >= len(shown.item.lines)
+        assert compared >= len(shown.lines)
 
 
 @pytest.mark.statistical
@@ -78,10 +78,10 @@ def test_the_whole_document_is_what_the_code_gives() -> None:
     made_by = re.search("Made by `([^`]*)`", DOCUMENT.read_text("utf-8"))
     fast = "--fast" in made_by[1]
     for name, shown in computed(tuple(HUANG.items), fast=fast).items():
-        if not shown.item.lines:
+        if not shown.lines:
             continue
         document = documented(name)
-        first = int(name in WANDERING and shown.item.variants[0] == AS_PRINTED)
+        first = int(name in WANDERING and shown.variants[0] == AS_PRINTED)
         for row in item_grid(shown).cells:
             if not TIMED.search(row[0].text):
                 texts = [cell.text for cell in row[3:]]

@@ -56,5 +56,5 @@ def reproduce(
         write_reproduction(folder, wanted, found, jobs, asked.line, figures)
     show(terminal(overview(found)))
     say(f"wrote {output}: open {output / 'index.html'}")
-    if any(shown.failures for shown in found.values()):
+    if any(item.failures for item in found.values()):
         raise typer.Exit(1)

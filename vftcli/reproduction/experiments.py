@@ -5,12 +5,12 @@ and figures show them.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from html import escape
-from itertools import chain, product
-from typing import Any, NamedTuple
+from itertools import chain
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from vftcli.outputs.paper import Drawing, figure_files, line_figure, plots_of, w
 from vftcli.outputs.run_record import envelope, seal
 from vftcli.reproduction.control import closed_loop, latest_turns, released
 from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle
-from vftcli.reproduction.paper import FLOOR, Given, Paper, ShownItem, paper_of
+from vftcli.reproduction.paper import FLOOR, Given, Job, Paper, PaperItem
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.progress import stage
 
@@ -49,14 +49,6 @@ RATIOS = (
 )
 
 
-class Job(NamedTuple):
-    """One experiment with one seed."""
-
-    paper: str
-    experiment: str
-    seed: int
-
-
 #: A job's results by variant and key.
 RunResult = dict[tuple[str, str], float | Chart | None]
 Result = RunResult | str  #: A job's results, or the one line of its failure.
@@ -66,16 +58,16 @@ def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
     """Experiments of these items, once a seed; only the first if `fast`."""
     wanted = {e for name in names for e in paper.items[name].experiments}
     return [
-        Job(paper.name, name, seed)
-        for name in paper.experiments
+        Job(experiment, seed)
+        for name, experiment in paper.experiments.items()
         if name in wanted
-        for seed in paper.experiments[name].seeds[: 1 if fast else None]
+        for seed in experiment.seeds[: 1 if fast else None]
     ]
 
 
 def run_job(job: Job) -> RunResult:
     """A job's results; traces of the first seed alone."""
-    experiment, found = paper_of(job.paper).experiments[job.experiment], RunResult()
+    experiment, found = job.experiment, RunResult()
     for variant, key, value in RUNS[experiment.run](job.seed, **experiment.given):
         if not isinstance(value, Chart):
             found[variant, key] = None if value is None else float(value)
@@ -84,41 +76,48 @@ def run_job(job: Job) -> RunResult:
     return found
 
 
-def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> dict[Job, Result]:
-    """Results of jobs, timed ones last, alone; a failure is one line."""
+def run_jobs(jobs: Sequence[Job], workers: int | None = None) -> list[tuple[Job, Result]]:
+    """Jobs and their results, timed ones run last, alone; a failure is one line."""
     stage(f"{len(jobs)} runs")
-    experiments = {job: paper_of(job.paper).experiments[job.experiment] for job in jobs}
-    alone = [job for job in jobs if experiments[job].alone]
-    beside = ([job] for job in jobs if job not in alone)
-    found: dict[Job, Result] = {}
+    alone = [job for job in jobs if job.experiment.alone]
+    beside = ([job] for job in jobs if not job.experiment.alone)
+    found: dict[tuple[str, int], Result] = {}
     with closing(
         run_tasks(beside, run_job, WorkersChoice(jobs=workers), lambda _: None)
     ) as ended:  # type: ignore[type-var]
-        for job, value, failure, _ in chain(ended, (perform(run_job, job) for job in alone)):
-            where = f"{experiments[job].title}, seed {job.seed}"
-            found[job] = value if failure is None else f"{where}: {failure.line}"
+        for (experiment, seed), value, failure, _ in chain(
+            ended, (perform(run_job, job) for job in alone)
+        ):
+            where = f"{experiment.title}, seed {seed}"
+            found[experiment.name, seed] = (
+                value if failure is None else f"{where}: {failure.line}"
+            )
             done = f"{len(found)} of {len(jobs)} runs done"
-            stage(f"{done}: {job.experiment}, seed {job.seed}", len(found) / len(jobs))
-    return {job: found[job] for job in jobs}
+            stage(f"{done}: {experiment.name}, seed {seed}", len(found) / len(jobs))
+    return [(job, found[job.experiment.name, job.seed]) for job in jobs]
 
 
 def gather(
-    paper: Paper, names: Sequence[str], results: dict[Job, Result]
-) -> dict[str, ShownItem]:
-    """Name of an item → its values, a list over the seeds for each."""
+    paper: Paper, names: Sequence[str], results: Iterable[tuple[Job, Result]]
+) -> dict[str, PaperItem]:
+    """Name of an item → it with its results, a list over the seeds for each value."""
     found = {}
     for name in names:
-        item, values = paper.items[name], defaultdict[str, Any](lambda: defaultdict(list))
-        own = [result for job, result in results.items() if job.experiment in item.experiments]
-        made = [result for result in own if not isinstance(result, str)]
-        for one, line in product(made, item.lines):
-            for (variant, key), value in one.items():
-                if key == line.key:
+        item = paper.items[name]
+        values = {line.key: defaultdict[str, list[float | None]](list) for line in item.lines}
+        chart, failures = None, list[str]()
+        for job, result in results:
+            if job.experiment.name not in item.experiments:
+                continue
+            if isinstance(result, str):
+                failures.append(result)
+                continue
+            for (variant, key), value in result.items():
+                if not isinstance(value, Chart) and key in values:
                     values[key][variant].append(value)
-        charts = [x for x in (one.get(("", name)) for one in made) if isinstance(x, Chart)]
-        chart = charts[0]._replace(key=name, title=item.traces) if charts else None
-        failures = tuple(result for result in own if isinstance(result, str))
-        found[name] = ShownItem(item, values, chart, failures)
+                elif isinstance(value, Chart) and key == name:
+                    chart = value._replace(key=name, title=item.traces)
+        found[name] = replace(item, values=values, chart=chart, failures=failures)
     return found
 
 
@@ -145,10 +144,9 @@ def short_number(value: float) -> str:
     return minus(text)
 
 
-def item_grid(shown: ShownItem) -> Grid:
+def item_grid(item: PaperItem) -> Grid:
     """The print, ours in every variant, and the floor, if any."""
-    item, values = shown.item, shown.values
-    floors = any(FLOOR in values.get(line.key, {}) for line in item.lines)
+    floors = any(FLOOR in values for values in item.values.values())
     kinds = (*item.variants, *([FLOOR] if floors else []))
     heads = ("what", "unit", "printed", *kinds)
     rows = [
@@ -156,7 +154,7 @@ def item_grid(shown: ShownItem) -> Grid:
             line.label,
             line.unit or DASH,
             minus(line.printed) or DASH,
-            *(spread(values.get(line.key, {}).get(kind, [])) for kind in kinds),
+            *(spread(item.values[line.key].get(kind, [])) for kind in kinds),
         )
         for line in item.lines
     ]
@@ -164,12 +162,11 @@ def item_grid(shown: ShownItem) -> Grid:
     return Grid(tuple(Column(h, words=h in words) for h in heads), rows=tuple(rows))
 
 
-def beside_print(shown: ShownItem) -> str:
+def beside_print(item: PaperItem) -> str:
     """Ours over the print: median and range of the lines with a number."""
-    kind = shown.item.nearest
     ratios = []
-    for line in shown.item.lines:
-        values = shown.values.get(line.key, {}).get(kind, [])
+    for line in item.lines:
+        values = item.values[line.key].get(item.nearest, [])
         known = [value for value in values if value is not None]
         if known and line.number and line.compared:
             ratios.append(float(np.mean(known)) / line.number)
@@ -180,18 +177,18 @@ def beside_print(shown: ShownItem) -> str:
     return text if low == high else f"{text} ({low} … {high})"
 
 
-def overview(found: Mapping[str, ShownItem]) -> Grid:
+def overview(found: Mapping[str, PaperItem]) -> Grid:
     """Every item in a row: its title, ours over the print, and its verdict."""
     heads = "item", "what it shows", "ours / print", "ours", "reproduced"
     rows = [
         (
-            GridCell(shown.item.label, html=f'<a href="#{name}">{escape(shown.item.label)}</a>'),
-            wrapped(shown.item.title),
-            (ratio := beside_print(shown)),
-            DASH if ratio == DASH else shown.item.nearest,
-            wrapped("; ".join(shown.failures) or shown.item.verdict),
+            GridCell(item.label, html=f'<a href="#{name}">{escape(item.label)}</a>'),
+            wrapped(item.title),
+            (ratio := beside_print(item)),
+            DASH if ratio == DASH else item.nearest,
+            wrapped("; ".join(item.failures) or item.verdict),
         )
-        for name, shown in found.items()
+        for name, item in found.items()
     ]
     seldom = {"what it shows", "ours"}
     columns = [Column(h, words=h != "ours / print", seldom=h in seldom) for h in heads]
@@ -207,7 +204,7 @@ def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
     """Experiments and their seeds."""
     seeds: dict[str, list[int]] = {}
     for job in jobs:
-        seeds.setdefault(job.experiment, []).append(job.seed)
+        seeds.setdefault(job.experiment.name, []).append(job.seed)
     return tuple(
         paper.experiments[name].title
         + (f": seed{'s' * (len(own) > 1)} {', '.join(map(str, own))}" if own != [0] else "")
@@ -215,12 +212,12 @@ def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
     )
 
 
-def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
+def render_page(paper: Paper, found: Mapping[str, PaperItem], jobs: Sequence[Job]) -> str:
     """The page."""
     return page(
         "reproduction.html",
         f"{paper.name}, reproduced",
-        [shown.chart for shown in found.values() if shown.chart is not None],
+        [item.chart for item in found.values() if item.chart is not None],
         paper=paper,
         overview=overview(found),
         ratios=RATIOS,
@@ -231,7 +228,7 @@ def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job
 
 
 def render_markdown(
-    paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job], command: str
+    paper: Paper, found: Mapping[str, PaperItem], jobs: Sequence[Job], command: str
 ) -> str:
     """Markdown of a reproduction, with its command."""
     parts = [
@@ -242,13 +239,12 @@ def render_markdown(
         markdown(overview(found)),
         f"{RATIOS}\n",
     ]
-    for shown in found.values():
-        item = shown.item
+    for item in found.values():
         parts.append(f"## {item.label}: {item.title}\n")
-        parts += [f"**Failed:** {line}\n" for line in shown.failures]
+        parts += [f"**Failed:** {line}\n" for line in item.failures]
         parts.append(f"**{item.answer}** {item.why}\n")
         if item.lines:
-            parts.append(markdown(item_grid(shown)))
+            parts.append(markdown(item_grid(item)))
     parts.append("## What was run\n")
     parts.append("".join(f"- {line}\n" for line in seeds_line(jobs, paper)))
     return "\n".join(parts)
@@ -257,7 +253,7 @@ def render_markdown(
 def write_reproduction(
     folder: OutputFolder,
     paper: Paper,
-    found: Mapping[str, ShownItem],
+    found: Mapping[str, PaperItem],
     jobs: Sequence[Job],
     command: str,
     form: str | None = None,
@@ -268,17 +264,16 @@ def write_reproduction(
     if form is not None:
         drawings = {
             name: Drawing(
-                f"{shown.item.label}: {shown.item.title}",
-                partial(line_figure, plots=plots_of(shown.chart)),
+                f"{item.label}: {item.title}", partial(line_figure, plots=plots_of(item.chart))
             )
-            for name, shown in found.items()
-            if shown.chart is not None
+            for name, item in found.items()
+            if item.chart is not None
         }
         write_figures(folder, drawings, form)
     record = {
         "paper": paper.name,
-        "runs": [{"experiment": job.experiment, "seed": job.seed} for job in jobs],
-        "values": {name: shown.values for name, shown in found.items()},
-        "failures": {name: shown.failures for name, shown in found.items() if shown.failures},
+        "runs": [{"experiment": job.experiment.name, "seed": job.seed} for job in jobs],
+        "values": {name: item.values for name, item in found.items()},
+        "failures": {name: item.failures for name, item in found.items() if item.failures},
     }
     seal(folder, SEAL, envelope(command, found=record))

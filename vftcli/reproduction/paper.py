@@ -3,16 +3,14 @@
 A paper is a TOML file beside this one; all run and are shown alike.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from vftcli.evaluation.published import TABLES
 from vftcli.outputs.charts import Chart
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import check_known
+from vftcli.signals.parsing import check_known, tables_beside
 
 #: Variants of a value: printed formulas; corrected ones; these with R and Q as densities;
 #: the reference's own error.
@@ -26,11 +24,19 @@ Given = tuple[str, str, float | Chart | None]
 class Experiment:
     """One experiment, for one or more tables and figures."""
 
+    name: str
     title: str  #: Its content, with its scenario.
     run: str  #: Name of the function that runs it.
     given: Mapping[str, Any] = field(default_factory=dict)  #: Its arguments beside the seed.
     seeds: Sequence[int] = (1, 2, 3, 4, 5)  #: Those of a full run; ``--fast`` takes the first.
     alone: bool = False  #: Whether it measures time, so that nothing may run beside it.
+
+
+class Job(NamedTuple):
+    """One experiment with one seed."""
+
+    experiment: Experiment
+    seed: int
 
 
 class PrintedLine(NamedTuple):
@@ -53,7 +59,7 @@ class PrintedLine(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class PaperItem:
-    """A table or a figure of the paper, or a conclusion."""
+    """A table or a figure of the paper, or a conclusion; once run, with its results."""
 
     label: str  #: Its name in the paper.
     title: str
@@ -66,6 +72,10 @@ class PaperItem:
     #: The column of ours beside the print in the overview.
     nearest: str = CORRECTED
     traces: str = ""  #: Title of its chart, "" if it has none.
+    #: Key of a line → variant → one value a seed.
+    values: Mapping[str, Mapping[str, Sequence[float | None]]] = field(default_factory=dict)
+    chart: Chart | None = None  #: Its traces, of the first seed.
+    failures: Sequence[str] = ()  #: One line for each run that failed.
 
     @property
     def answer(self) -> str:
@@ -96,21 +106,9 @@ class Paper:
         return tuple(name for name in self.items if name in names)
 
 
-@dataclass(frozen=True)
-class ShownItem:
-    """An item with its experiments' results."""
-
-    item: PaperItem
-    #: Key of a line → variant → one value a seed.
-    values: Mapping[str, Mapping[str, Sequence[float | None]]]
-    chart: Chart | None  #: Its traces, of the first seed.
-    failures: Sequence[str]  #: One line for each run that failed.
-
-
 def load_paper(name: str) -> Paper:
     """The paper of a TOML file beside this one."""
-    text = Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
-    declared = tomllib.loads(text)
+    declared = dict(tables_beside(__file__, f"{name}.toml"))
     each, items = declared.pop("each"), {}
     for key, entry in declared.pop("items").items():
         lines = [line for row in entry.pop("lines", ()) for line in lines_of(row, each)]
@@ -123,7 +121,9 @@ def load_paper(name: str) -> Paper:
                 for j, rmse in enumerate(numbers, start=1)
             ]
         items[key] = PaperItem(**entry, lines=lines)
-    experiments = {key: Experiment(**entry) for key, entry in declared.pop("experiments").items()}
+    experiments = {
+        key: Experiment(name=key, **entry) for key, entry in declared.pop("experiments").items()
+    }
     return Paper(name=name, experiments=experiments, items=items, **declared)
 
 
