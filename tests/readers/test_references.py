@@ -7,8 +7,12 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.readers.references import estimates_columns, read_outside, read_reference
-from vftcli.reproduction.scoring import read_list
+from vftcli.readers.references import (
+    estimates_columns,
+    read_list,
+    read_outside,
+    read_reference,
+)
 from vftcli.signals.errors import ClockError, LogError
 
 

@@ -109,11 +109,15 @@ class BatchFolder:
         with atomic(path, force=True) as temporary, table_file(temporary) as file:
             rows.write_parquet(file, compression="zstd", statistics=False)
 
+    def read_rows(self, keys: Iterable[str], schema: Record) -> pl.DataFrame:
+        """Rows of finished logs, one log after another."""
+        files = [self.row_file(key) for key in keys]
+        return pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
+
     def gather(self, logs: pl.DataFrame, schema: Record) -> Iterator[pl.DataFrame]:
         """Rows of all logs in their order, `PIECE` logs at a time."""
         for part in logs.iter_slices(PIECE) if logs.height else (logs,):
-            files = [self.row_file(key) for key in part["key"].unique(maintain_order=True)]
-            rows = pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
+            rows = self.read_rows(part["key"].unique(maintain_order=True), schema)
             yield part.join(rows, on="key", how="left", maintain_order="left_right")
 
     def put_gathered(

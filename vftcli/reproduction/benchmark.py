@@ -28,13 +28,19 @@ from vftcli.outputs.files import put_table
 from vftcli.outputs.run_record import envelope
 from vftcli.pipeline import AnalysisChoice, prepared
 from vftcli.readers.reading import Library, absolute
-from vftcli.reproduction.manifest import BenchmarkLog, Manifest, Pushes, Rival, TrainedRobot
+from vftcli.reproduction.manifest import (
+    BenchmarkLog,
+    Manifest,
+    Pushes,
+    Rival,
+    TrainedRobot,
+    read_parts,
+)
 from vftcli.reproduction.scoring import SCHEMA, ScoreTask, score_log
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import Array
-from vftcli.signals.errors import LogError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import counted
 from vftcli.signals.progress import stage
@@ -78,8 +84,7 @@ class BenchmarkRun:
             tasks, done = {task.key: task for task in self.tasks()}, self.folder.keys()
             self.score([task for key, task in tasks.items() if key not in done])
             there = self.folder.keys()
-            rows = [pl.read_parquet(self.folder.row_file(key)) for key in tasks if key in there]
-            table = pl.concat([pl.DataFrame(schema=SCHEMA), *rows])
+            table = self.folder.read_rows([key for key in tasks if key in there], SCHEMA)
             results, record = Results(table), self.record(logs)
             columns = dict.fromkeys(("task", "stage", "error", "line"), String)
             ends = [(name, *failure) for name, failure in self.failures]
@@ -111,18 +116,12 @@ class BenchmarkRun:
 
     def make_log(self, log: BenchmarkLog) -> None:
         """Have a log to score: its file, or one that is made for it."""
-        base, work = self.logs.get(log.base), None
-        if log.pushes:
-            if base is None:
-                return  # it could not be made, which is said
-            work = partial(plant, base, log.pushes)
-        elif log.scenario:
-            work = partial(simulated, log, self.command)
-        elif log.parts:
-            work = partial(joined, log)
-        if work is not None:
-            sources = base.paths if log.pushes and base else log.paths
-            path = self.made(f"{log.name}.parquet", sources, log, work)
+        base = self.logs.get(log.base) if log.pushes else log
+        if base is None:
+            return  # it could not be made, which is said
+        if log.pushes or log.scenario or log.parts:
+            work = partial(write_log, log, base, self.command)
+            path = self.made(f"{log.name}.parquet", base.paths, log, work)
             if path is None:
                 return
             words = tuple(each for each in log.options if each[0] != "columns")
@@ -228,39 +227,21 @@ class BenchmarkRun:
         return envelope(self.command, entries, found=found)
 
 
-def simulated(log: BenchmarkLog, command: str, path: Path) -> None:
-    """Write the log of a scenario, with its truth."""
-    check_installed("pinocchio", "a simulated log")
-    made = simulate(load_scenario(log.scenario, log.changes), log.seed)
-    save({path: made}, "parquet", force=True, command=command)
-
-
-def joined(log: BenchmarkLog, path: Path) -> None:
-    """Write the log of text files, one a signal, t first: columns t, q1…."""
-    columns: dict[str, Array] = {}
-    samples = 0
-    for part, source in zip(log.parts, log.paths, strict=True):
-        try:
-            values = np.loadtxt(source, ndmin=1).ravel()
-            rows = values.reshape(samples or len(values), -1)
-        except (OSError, UnicodeDecodeError, ValueError):
-            raise LogError(
-                f"{source}: not numbers, as many for each of {samples or 'its'} samples"
-            ) from None
-        samples, signal = len(rows), part.partition("=")[0]
-        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
-        columns |= dict(zip(names, rows.T, strict=True))
-    put_table(path, pl.DataFrame(columns))
-
-
-def plant(log: BenchmarkLog, pushes: Pushes, path: Path) -> None:
-    """Write a free log with pushes in its drive torque, and their truth."""
-    choice = replace(log.choice(), examiner=Examiner(anyway=True))
-    read = choice.library.open(log.paths[0], replace(choice.read, derive="none"))
-    recording, wrench, tau = planted(prepared(read, choice), pushes)
-    table = (("t", recording.t), *per_joint("tau_ext", tau), *per_axis("wrench", wrench))
-    put_table(companions(path)[0], frame_of(table))
-    convert(recording, path, force=True)
+def write_log(log: BenchmarkLog, base: BenchmarkLog, command: str, path: Path) -> None:
+    """Write the log of an entry, with its truth: pushed, simulated, or of several files."""
+    if log.pushes:
+        choice = replace(base.choice(), examiner=Examiner(anyway=True))
+        read = choice.library.open(base.paths[0], replace(choice.read, derive="none"))
+        recording, wrench, tau = planted(prepared(read, choice), log.pushes)
+        table = (("t", recording.t), *per_joint("tau_ext", tau), *per_axis("wrench", wrench))
+        put_table(companions(path)[0], frame_of(table))
+        convert(recording, path, force=True)
+    elif log.scenario:
+        check_installed("pinocchio", "a simulated log")
+        made = simulate(load_scenario(log.scenario, log.changes), log.seed)
+        save({path: made}, "parquet", force=True, command=command)
+    else:
+        put_table(path, pl.DataFrame(read_parts(log)))
 
 
 def planted(run: Run, pushes: Pushes) -> tuple[Recording, Array, Array]:

@@ -11,13 +11,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
+import numpy as np
+
 from vftcli.batch.log_work import content_digest, digest_of, with_files
 from vftcli.doctor.examination import Examiner
 from vftcli.notebook import OF_ESTIMATE
 from vftcli.pipeline import AnalysisChoice, choice_of
 from vftcli.readers.reading import Library, absolute
 from vftcli.readers.table import listed
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.option import Asked, interval
 from vftcli.signals.parsing import check_known, toml_file
 from vftcli.simulation.scenario import Vector, section_from
@@ -330,3 +333,21 @@ def rival_of(text: str, ours: Sequence[str], logs: Sequence[BenchmarkLog]) -> Ri
             f"is looked for, LOG one of {', '.join(log.name for log in logs)}"
         )
     return rival
+
+
+def read_parts(log: BenchmarkLog) -> dict[str, Array]:
+    """Columns t, q1… of an entry's text files, one a signal, t first."""
+    columns: dict[str, Array] = {}
+    samples = 0
+    for part, path in zip(log.parts, log.paths, strict=True):
+        try:
+            values = np.loadtxt(path, ndmin=1).ravel()
+            rows = values.reshape(samples or len(values), -1)
+        except (OSError, UnicodeDecodeError, ValueError):
+            raise LogError(
+                f"{path}: not numbers, as many for each of {samples or 'its'} samples"
+            ) from None
+        samples, signal = len(rows), part.partition("=")[0]
+        names = ["t"] if signal == "t" else [f"{signal}{j + 1}" for j in range(rows.shape[1])]
+        columns |= dict(zip(names, rows.T, strict=True))
+    return columns

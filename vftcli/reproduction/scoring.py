@@ -29,7 +29,7 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.reader import RawLog
 from vftcli.readers.reading import Library
-from vftcli.readers.references import TORQUE, read_outside, read_reference
+from vftcli.readers.references import TORQUE, read_list, read_outside, read_reference
 from vftcli.reproduction.manifest import BenchmarkLog, Rival
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
@@ -191,7 +191,7 @@ def outside_answer(recording: Recording, log: BenchmarkLog, rival: Rival) -> Ans
     # Without estimates for a log it answers nothing there.
     tau = there.get(TORQUE, np.full(recording.q.shape, np.nan))
     torque = ExternalTorque(name=rival.name, t=recording.t, tau=tau, error_sd=there.get("band"))
-    lists = {} if listed is None else {LISTS[0]: read_list(listed)}
+    lists = {} if listed is None else {LISTS[0]: [ListedRow(*row) for row in read_list(listed)]}
     return Answer(torque, there.get("wrench"), not rival.declared.causal, lists)
 
 
@@ -265,21 +265,3 @@ def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
     square = float((w * (up - weight) ** 2)[known].sum()) / total
     found = {"weight_N": weight, "mean_N": mean, "rms_error_N": np.sqrt(square)}
     return {**found, "answered": total / w.sum()}
-
-
-def read_list(path: Path) -> list[ListedRow]:
-    """A list of contacts from CSV."""
-    try:
-        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
-        return [
-            ListedRow(
-                start=float(row["start_s"]),
-                stop=float(row["stop_s"]),
-                peak=float(row.get("peak_force_N") or 0.0),
-                band=float(row.get("peak_force_band_N") or 0.0),
-                is_load=row.get("kind") == "load",
-            )
-            for row in rows
-        ]
-    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
-        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
