@@ -145,7 +145,7 @@ def friction_share(dq: Array, tau: Array) -> Array:
     shares = []
     for velocity, y in zip(dq.T, tau.T, strict=True):
         X = np.column_stack([np.tanh(velocity / SIGN_SPEED), velocity])
-        weights, *_ = np.linalg.lstsq(X, y, rcond=None)
+        weights, *_ = np.linalg.lstsq(X.T @ X, X.T @ y, rcond=None)
         power = np.sum(y**2)
         shares.append(1.0 - np.sum((y - X @ weights) ** 2) / power if power > 0 else 0.0)
     return np.clip(shares, 0.0, 1.0)

@@ -159,9 +159,7 @@ def refined_period(t: Array, q: Array, period: float) -> float:
 
     Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES` in the log.
     """
-    # Interpolation goes along time, column by column.
-    q = np.asfortranarray(q)
-    dq = np.asfortranarray(np.gradient(q, t, axis=0))
+    both, n = np.hstack([q, np.gradient(q, t, axis=0)]), q.shape[1]
     last = max(1, int((t[-1] - t[0]) / period - LEAST_REPEATED))
     several = np.unique(np.linspace(1, last, min(last, MULTIPLES)).astype(int))
     every = -(-len(t) // ENOUGH)
@@ -170,10 +168,13 @@ def refined_period(t: Array, q: Array, period: float) -> float:
         for _ in range(20):
             gram, right = np.zeros((1, 1)), np.zeros(1)
             for m in multiples:
-                there = here + m * period
-                inside = there <= t[-1]
-                distance = resample_columns(there[inside], t, q) - path[inside]
-                slope = m * resample_columns(there[inside], t, dq)
+                inside = here + m * period <= t[-1]
+                there = here[inside] + m * period
+                # Of few times in a long log one search for all columns is faster.
+                after = np.minimum(t.searchsorted(there, "right"), len(t) - 1)
+                share = (there - t[after - 1]) / (t[after] - t[after - 1])
+                found = both[after - 1] + share[:, None] * (both[after] - both[after - 1])
+                slope, distance = m * found[:, n:], found[:, :n] - path[inside]
                 own, move = robust_equations(slope[None], distance)
                 gram, right = gram + own, right + move
             step = right.item() / (gram.item() or np.inf)

@@ -212,11 +212,13 @@ def even_starts(samples: int, stretches: int) -> Index:
 
 def extremes(values: Array, starts: Index) -> Index:
     """First lowest and highest known sample of every stretch, else its first one."""
-    width, kept = np.diff(starts, append=len(values)), list[Index]()
+    stops, kept = np.append(starts[1:], len(values)), list[Index]()
+    longest = np.arange(max(stops - starts))
+    at = np.minimum(starts[:, None] + longest, stops[:, None] - 1)
     # One column at a time: all of a long log would fill the memory.
     for column in values.T:
-        for ends in (each.reduceat(column, starts) for each in (np.fmin, np.fmax)):
-            rows = np.flatnonzero(column == np.repeat(ends, width))
-            _, first = np.unique(np.searchsorted(starts, rows, "right"), return_index=True)
-            kept += [rows[first], starts[np.isnan(ends)]]
+        here = column[at]
+        unknown = np.isnan(here)
+        kept.append(starts + np.where(unknown, np.inf, here).argmin(axis=1))
+        kept.append(starts + np.where(unknown, -np.inf, here).argmax(axis=1))
     return np.concatenate(kept)

@@ -94,17 +94,22 @@ def filter_columns(t: Array, x: Array, sections: Array, settling: float | None =
 
 
 def cascade(sections: Array, x: Array) -> Array:
-    """Columns behind each section in turn, settled on its first input. (T, n)"""
+    """Columns behind all sections, settled on their first input. (T, n)"""
+    # y_t = c·z_{t−1} + b x_t, z_t = F z_{t−1} + g x_t: each section's transposed direct form,
+    # with the output of those before it as its input.
+    F, g, c, b = np.zeros((0, 0)), np.zeros(0), np.zeros(0), 1.0
     for b0, b1, b2, _, a1, a2 in sections.tolist():
-        # y_t = z_{t−1} + b₀x_t with the state (z, z') of the transposed direct form.
-        F = np.array([[-a1, 1.0], [-a2, 0.0]])
-        g = np.array([b1 - a1 * b0, b2 - a2 * b0])
-        settled = np.linalg.solve(np.eye(2) - F, g)[:, None] * x[0]
-        n = x.shape[1]
-        turned = F[:, :, None].repeat(n, axis=2), g[:, None].repeat(n, axis=1)
-        state = steady_filter(*turned, x[:-1], settled, np.array([[1.0], [0.0]]))[0]
-        x = b0 * x + np.concatenate([settled[:1], state])
-    return x
+        own, into = np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0])
+        F = np.block([[F, np.zeros((len(c), 2))], [np.outer(into, c), own]])
+        g, c, b = np.append(g, into * b), np.append(b0 * c, [1.0, 0.0]), b0 * b
+    settled = np.linalg.solve(np.eye(len(g)) - F, g)[:, None] * x[0]
+    n = x.shape[1]
+    each = F[:, :, None].repeat(n, axis=2), g[:, None].repeat(n, axis=1)
+    states = steady_filter(*each, x[:-1], settled, c[:, None])[0]
+    y: Array = b * x
+    y[:1] += c @ settled
+    y[1:] += states
+    return y
 
 
 def refuse_mostly_gap(t: Array, step: float) -> None:

@@ -49,6 +49,7 @@ USUAL_TIME, TIME_SPREAD = 0.5, 1.5
 LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
 #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
 LEAST_BLOCKS = 20
+LONG = 8192  #: Least length of the stretches of a long piece, in blocks.
 ASSUMED_SHARE = 0.2  #: Model error of motion as a share of F_c, without a free part.
 #: Share of blocks in which a joint moves, to bridge reversals.
 MOVES = 0.3
@@ -163,7 +164,15 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
     each = []
     for piece in pieces:
         process = error_process(noise, piece)._replace(white=noise.white + 0.0 * piece.d)
-        each.append(innovations(piece.d, process)[0])
+        # Stretches of a long piece go side by side, each begun with what b is like anywhere.
+        count = len(piece.d) // LONG or 1
+        used = slice(len(piece.d) // count * count)
+        d, decay, added, *rest = (
+            np.stack(np.split(x[used], count), axis=1) for x in (piece.d, *process)
+        )
+        added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
+        stretches = innovations(d, ErrorProcess(decay, added, *rest))[0]
+        each.append(np.concatenate(stretches))
     squares = np.concatenate(each)
     asked = [np.quantile(squares, share, axis=0) / value for share, value in QUANTILES]
     factor = np.maximum(np.max(asked, axis=0), 1.0)
