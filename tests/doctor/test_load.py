@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from swinging import Said, only
 
 from vftcli.doctor import examine, in_words
 from vftcli.doctor.load import controller_findings, temperature_findings
@@ -93,11 +94,16 @@ def test_a_mismatch_needs_both_currents_and_a_rest(name):
     assert not mismatches(replace(log(0, 1, 1, 0, 0, 0), **{name: None}))
 
 
-def constants_found(constants, current=None, **changes) -> list[Remark]:
+LOADS = 2 + np.sin(np.outer(T, np.arange(1, 7)))
+"""Slowly changing, 1 to 3 A, as in a series of held poses."""
+OTHER = np.array([11.976, 11.976, 9.839, 7.7, 7.7, 7.7])
+"""The UR10e's, its wrists with the constants of a smaller joint. [N·m/A]"""
+ODD = np.where(np.arange(400) % 2, 1.0, -1.0)[:, None]
+LATE = (np.arange(400) >= 200)[:, None] * np.ones(6)
+
+
+def constants_found(constants, current=LOADS, **changes) -> list[Remark]:
     """What is reported of a controller of these constants beside the UR10e profile's."""
-    if current is None:
-        # slowly changing loads of 1 to 3 A, as in a series of held poses
-        current = 2 + np.sin(np.outer(T, np.arange(1, 7)))
     current = np.broadcast_to(current, (400, 6))
     still = replace(log(0, 0, 0, 0, 0, 0), current=current, target_current=current)
     still = replace(still, target_torque=current * constants)
@@ -105,45 +111,30 @@ def constants_found(constants, current=None, **changes) -> list[Remark]:
     return [remark for remark in found if remark.code == "drive-constants"]
 
 
-OTHER = np.array([11.976, 11.976, 9.839, 7.7, 7.7, 7.7])
-"""The UR10e's, its wrists with the constants of a smaller joint. [N·m/A]"""
-
-
-def test_constants_are_the_controller_s_torque_per_current():
-    (found,) = constants_found(OTHER)
-    assert found.where.joints == (4, 5, 6)
-    assert found.values["found_Nm_A"] == pytest.approx([7.7] * 3, rel=1e-12)
-    assert not constants_found(OTHER, target_torque=None)
-    assert not constants_found(OTHER, target_current=None)
-
-
-@pytest.mark.parametrize(("current", "known"), [(0.019, False), (0.021, True), (-0.021, True)])
-def test_constants_need_a_fiftieth_of_an_ampere(current, known):
-    assert bool(constants_found(OTHER, current)) == known
-
-
-@pytest.mark.parametrize(("samples", "known"), [(9, False), (10, True)])
-def test_constants_need_ten_samples(samples, known):
-    current = np.where(np.arange(400) < samples, 1.0, 0.0)[:, None]
-    assert bool(constants_found(OTHER, current)) == known
-
-
-@pytest.mark.parametrize(("noise", "known"), [(0.04, True), (0.06, False)])
-def test_constants_need_torques_that_are_proportional_to_the_currents(noise, known):
-    """Up to a twentieth of the torque, as with an offset or friction that the drive model adds."""
-    wave = np.where(np.arange(400) % 2, 1 + noise, 1 - noise)[:, None]
-    found = constants_found(OTHER, 1.0, target_torque=OTHER * wave)
-    assert bool(found) == known
-    if known:
-        assert found[0].values["found_Nm_A"] == pytest.approx([7.7] * 3)
-
-
-def test_constants_come_from_resting_samples_only():
-    moves = (np.arange(400) >= 200)[:, None] * np.ones(6)
-    (found,) = constants_found(
-        OTHER, 1.0, dq=0.5 * moves, target_torque=np.where(moves > 0, 3.0, 1.0) * OTHER
-    )
-    assert found.values["found_Nm_A"] == pytest.approx([7.7] * 3)
+@pytest.mark.parametrize(
+    ("current", "changes", "known"),
+    [
+        (LOADS, {}, True),
+        (LOADS, {"target_torque": None}, False),
+        (LOADS, {"target_current": None}, False),
+        # of a fiftieth of an ampere and more, in ten samples
+        (0.019, {}, False),
+        (0.021, {}, True),
+        (-0.021, {}, True),
+        ((np.arange(400) < 9)[:, None], {}, False),
+        ((np.arange(400) < 10)[:, None], {}, True),
+        # a twentieth of the torque may be an offset or friction that the drive model adds
+        (1.0, {"target_torque": OTHER * (1 + 0.04 * ODD)}, True),
+        (1.0, {"target_torque": OTHER * (1 + 0.06 * ODD)}, False),
+        # of resting samples only
+        (1.0, {"dq": 0.5 * LATE, "target_torque": OTHER * (1 + 2 * LATE)}, True),
+    ],
+)
+def test_constants_are_the_controller_s_torque_per_current(current, changes, known):
+    found = constants_found(OTHER, current, **changes)
+    assert [remark.where.joints for remark in found] == [(4, 5, 6)] * known
+    for remark in found:
+        assert remark.values["found_Nm_A"] == pytest.approx([7.7] * 3)
 
 
 @pytest.mark.parametrize(
@@ -194,77 +185,73 @@ SPEED = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 """Joint 6 rests. [rad/s]"""
 UR5E = load_robot("ur5e")
 LAWLESS = replace(UR5E, friction=tuple(replace(f, temperature=()) for f in UR5E.friction))
+SILENT = replace(UR5E, friction=tuple(replace(f, temperature_at=None) for f in LAWLESS.friction))
 
 
 def warm_log(temperature: float | None, changes: float = 0.0) -> Recording:
     """An arm that moves to and fro at a temperature that changes by so much. [°C, K]"""
     q = SPEED * np.sin(TIMES)[:, None]
-    warm = (
-        None
-        if temperature is None
-        else temperature + changes * TIMES[:, None] / TIMES[-1] + 0.0 * q
-    )
+    warm = None
+    if temperature is not None:
+        warm = temperature + changes * TIMES[:, None] / TIMES[-1] + 0.0 * q
     return Recording(t=TIMES, q=q, dq=SPEED * np.cos(TIMES)[:, None], temperature=warm)
 
 
-def found(recording: Recording, robot: Robot = UR5E) -> list[Remark]:
-    return list(temperature_findings(recording, robot))
+def with_gaps(recording: Recording) -> Recording:
+    """A quarter of the third joint's temperatures are missing."""
+    missing = (np.arange(500)[:, None] < 125) & (np.arange(6) == 2)
+    return replace(recording, temperature=np.where(missing, np.nan, recording.temperature))
 
 
-@pytest.mark.parametrize("temperature", [5.0, 20.0, 60.0, 80.0])
-def test_where_the_law_holds_there_is_nothing_to_say(temperature):
-    if 15.0 < temperature < 65.0:
-        assert found(warm_log(temperature)) == []
-        return
-    (remark,) = found(warm_log(temperature))
-    assert (remark.code, remark.level) == ("temperature-beyond-law", "warning")
-    assert remark.values["seen_C"][0] == temperature
+def found(recording: Recording, robot: Robot = UR5E) -> dict[str, Remark]:
+    return {remark.code: remark for remark in temperature_findings(recording, robot)}
 
 
-def test_a_log_without_temperatures_is_reported_with_the_one_assumed():
-    (remark,) = found(warm_log(None))
-    assert (remark.code, remark.level) == ("no-temperature", "fact")
-    # s(25)/s(35) worked by hand: size 3 2.9177/2.5366, size 1 .64593/.52003
-    assert remark.values["least_percent"] == pytest.approx(15.02, abs=0.01)
-    assert remark.values["most_percent"] == pytest.approx(24.21, abs=0.01)
-    assert "35 °C" in str(remark)
-    (same,) = found(warm_log(0.0))  # a controller that measures none writes zeros
-    assert same == remark
+def far(code: str, temperature: float, level: str = "warning") -> Said:
+    """The sixth joint rests."""
+    return only(
+        code, 1, 2, 3, 4, 5, level=level, seen_C=pytest.approx([temperature] * 5, abs=0.2)
+    )
 
 
-def test_gaps_are_reported_with_their_share():
-    recording = warm_log(30.0)
-    gaps = recording.temperature.copy()
-    gaps[:125, 2] = np.nan
-    (remark,) = found(replace(recording, temperature=gaps))
-    assert (remark.code, remark.where.joints) == ("temperature-gaps", (3,))
-    assert remark.values["share_percent"] == 25.0
+# s(25)/s(35) worked by hand: size 3 2.9177/2.5366, size 1 .64593/.52003
+NONE = only(
+    "no-temperature",
+    level="fact",
+    reference_C=[35.0],
+    least_percent=pytest.approx(15.02, abs=0.01),
+    most_percent=pytest.approx(24.21, abs=0.01),
+)
+
+
+@pytest.mark.parametrize(
+    ("recording", "robot", "said"),
+    [
+        # where the law holds there is nothing to say
+        (warm_log(20.0), UR5E, only()),
+        (warm_log(60.0), UR5E, only()),
+        (warm_log(5.0), UR5E, far("temperature-beyond-law", 5.0)),
+        (warm_log(80.0), UR5E, far("temperature-beyond-law", 80.0)),
+        (warm_log(None), UR5E, NONE),
+        (warm_log(0.0), UR5E, NONE),  # a controller that measures none writes zeros
+        (with_gaps(warm_log(30.0)), UR5E, only("temperature-gaps", 3, share_percent=25.0)),
+        (warm_log(30.0), LAWLESS, only()),
+        # one that warms up is far at its cold end: a twentieth of the samples lie below
+        (warm_log(26.0, changes=10.0), LAWLESS, far("far-temperature", 26.5)),
+        # a temperature that nobody stated is assumed
+        (warm_log(22.0), SILENT, far("far-temperature-assumed", 22.0, level="caution")),
+        (warm_log(27.0), SILENT, only()),
+        (warm_log(None), UR5E.without_friction(), only()),
+        (warm_log(5.0), UR5E.without_friction(), only()),
+        (warm_log(5.0), load_robot("panda"), only()),
+    ],
+)
+def test_joint_temperatures_far_from_the_model_s_are_reported(recording, robot, said):
+    said.check(found(recording, robot))
 
 
 def test_without_a_law_a_cold_log_is_reported_with_what_it_means():
-    (remark,) = found(warm_log(25.0), LAWLESS)
-    assert (remark.code, remark.level) == ("far-temperature", "warning")
-    assert remark.where.joints == (1, 2, 3, 4, 5)  # the sixth rests
+    remark = found(warm_log(25.0), LAWLESS)["far-temperature"]
     # 10 K at 1.5 % a kelvin of 12.9 N·m at the median speed of |cos|, about .8 rad/s
     assert remark.values["wrong_Nm"][0] == pytest.approx(0.162 * 12.4, rel=0.1)
     assert "temperature law" in in_words(remark).remedy
-    assert found(warm_log(30.0), LAWLESS) == []
-
-
-def test_a_log_that_warms_up_is_far_at_its_cold_end():
-    (remark,) = found(warm_log(26.0, changes=10.0), LAWLESS)
-    # a twentieth of the samples lie below
-    assert remark.values["seen_C"][0] == pytest.approx(26.5, abs=0.2)
-
-
-def test_a_temperature_that_nobody_stated_is_assumed():
-    silent = tuple(replace(f, temperature=(), temperature_at=None) for f in UR5E.friction)
-    (remark,) = found(warm_log(22.0), replace(UR5E, friction=silent))
-    assert (remark.code, remark.level) == ("far-temperature-assumed", "caution")
-    assert found(warm_log(27.0), replace(UR5E, friction=silent)) == []
-
-
-def test_an_arm_without_friction_and_another_arm_s_log_say_nothing():
-    assert found(warm_log(None), UR5E.without_friction()) == []
-    assert found(warm_log(5.0), UR5E.without_friction()) == []
-    assert found(warm_log(5.0), load_robot("panda")) == []
