@@ -69,18 +69,6 @@ def test_after_zeroing_the_bearing_weighs_what_it_weighs(log, share, request):
     assert all(drift.removed for drift in analysis.virtual_sensor.drifts)
 
 
-def test_a_zero_under_the_bearing_is_suspected(exact):
-    remarks = sensed(exact, spans=((6.0, 8.0),)).virtual_sensor.remarks
-    assert remarks[0].code == "zero-far-from-start"
-    assert remarks[0].values["axis"] == "fz"
-
-
-def test_the_unloaded_start_ends_before_the_bearing(exact):
-    (start, stop) = sensed(exact, start=True).virtual_sensor.drifts[0].span
-    assert start == pytest.approx(1.0)
-    assert 3.5 < stop < 4.0
-
-
 def test_with_the_exact_profile_the_moving_arm_reads_nothing(exact):
     """F_z ≤ 0.6 N rms while moving unloaded: what is left is stiction the profile has not."""
     moving = (exact.t > 0.5) & (exact.t < 3.5)

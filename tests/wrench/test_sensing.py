@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from made_runs import analyse_log, run_of
 
-from vftcli.analysis import Analysis
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
 from vftcli.observers import MomentumObserver, ObserverChoice
@@ -42,18 +41,22 @@ from vftcli.wrench.smoother import WrenchPrior, deviations, smooth_wrench
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 
-def analysed(log: str, names: tuple[str, ...], wrench: WrenchChoice, **read: object) -> Analysis:
-    choice = AnalysisChoice(
-        read=ReadChoice(**read),
+CIRCLE = "ur5_circle.csv"
+FIRST_SECONDS = {"interval": (0.0, 8.0), "free": ["0.3:4"]}
+
+
+def asked(log, *names, interval=None, free=(), **wrench) -> AnalysisChoice:
+    return AnalysisChoice(
+        read=ReadChoice(interval=interval),
         robot=RobotChoice(name="ur5" if log.startswith("ur5") else "panda"),
         observers=ObserverChoice(names=names),
-        wrench=wrench,
+        free=FreeChoice.parsed(free=free),
+        wrench=WrenchChoice(**wrench),
     )
-    return analyse_log(FIXTURES / log, choice)
 
 
-def reading(log: str, *names: str, **choice: object) -> SensorReading:
-    sensed = analysed(log, names, WrenchChoice(**choice)).virtual_sensor
+def reading(log, *names, **choice) -> SensorReading:
+    sensed = analyse_log(FIXTURES / log, asked(log, *names, **choice)).virtual_sensor
     assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
     return sensed
 
@@ -86,7 +89,7 @@ def test_neither_order_nor_company_nor_frame_moves_the_zero(frame):
 @pytest.mark.slow
 def test_further_spans_show_the_drift_and_only_the_first_is_removed():
     zero = ZeroChoice(spans=((1.0, 2.0), (2.5, 3.5)))
-    found = reading("ur5_circle.csv", "gmo", "fdo", zero=zero, frame="base")
+    found = reading(CIRCLE, "gmo", "fdo", zero=zero, frame="base")
     assert [(d.name, d.span[0], d.removed) for d in found.drifts] == [
         ("gmo", 1.0, True), ("fdo", 1.0, True), ("gmo", 2.5, False), ("fdo", 2.5, False),
     ]  # fmt: skip
@@ -100,11 +103,11 @@ def test_further_spans_show_the_drift_and_only_the_first_is_removed():
 
 @pytest.mark.slow
 def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded():
-    found = reading("ur5_circle.csv", "gmo")
+    found = reading(CIRCLE, "gmo")
     assert found.drifts == ()
     assert found.zero_span is None
     assert ("pose-hides-wrench" in {r.code for r in found.remarks}) == found.masked.any()
-    zeroed = reading("ur5_circle.csv", "gmo", zero=START)
+    zeroed = reading(CIRCLE, "gmo", zero=START)
     np.testing.assert_array_equal(found.free, zeroed.free)
     assert found.free.any()
 
@@ -121,15 +124,12 @@ def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded():
     ],
 )
 def test_the_band_says_where_it_comes_from(choice, code):
-    found = reading("ur5_circle.csv", "gmo", **choice)
+    found = reading(CIRCLE, "gmo", **choice)
     assert code in [remark.code for remark in found.remarks]
 
 
 def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed():
-    short = analysed(
-        "ur5_circle.csv", ("best", "gmo", "fdo"), WrenchChoice(), interval=(0.0, 2.0)
-    )
-    found = short.virtual_sensor
+    found = reading(CIRCLE, "best", "gmo", "fdo", interval=(0.0, 2.0))
     (unknown,) = [remark for remark in found.remarks if remark.code == "no-wrench-band"]
     assert unknown.where.about == "gmo, fdo"
     assert found.wrenches[0].sd is not None
@@ -138,16 +138,13 @@ def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed():
 @pytest.mark.slow
 def test_a_smoothed_wrench_turns_with_the_flange():
     """Force and moment about the flange point in its own axes are those in base axes, turned."""
-    base, flange = (
-        reading("ur5_circle.csv", "best", frame=f).wrenches[0] for f in ("base", "flange")
-    )
-    log = read_file(FIXTURES / "ur5_circle.csv")
+    base, flange = (reading(CIRCLE, "best", frame=f).wrenches[0] for f in ("base", "flange"))
+    log = read_file(FIXTURES / CIRCLE)
     turn = link_poses(load_robot("ur5").chain, log.q).rotation[:, -1]
     for part in (slice(0, 3), slice(3, 6)):
         expected = np.einsum("tji,tj->ti", turn, base.values[:, part])
-        np.testing.assert_allclose(
-            flange.values[:, part], expected, atol=1e-9
-        )  # rounding of 100 N
+        # rounding of 100 N
+        np.testing.assert_allclose(flange.values[:, part], expected, atol=1e-9)
 
 
 def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value():
@@ -161,37 +158,17 @@ def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value(
 # The smoother as a solver beside the others: what it is fed, and what its wrench looks like
 
 
-CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
-FREE = FreeChoice.parsed(free=["0.3:4"])
-
-
-def choice(*names: str, free: FreeChoice = FREE, **wrench: object) -> AnalysisChoice:
-    return AnalysisChoice(
-        read=ReadChoice(interval=(0.0, 8.0)),
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=names),
-        free=free,
-        wrench=WrenchChoice(**wrench),
-    )
-
-
 @pytest.fixture(scope="module")
 def motion() -> FreeMotion:
     """8 s of the circle, free until 4 s."""
-    asked = choice("gmo")
-    recording = asked.library.open(CIRCLE, asked.read)
-    return read(prepared(recording, asked), asked)
-
-
-def first_seconds(*names: str, **wrench: object) -> SensorReading:
-    sensed = analyse_log(CIRCLE, choice(*names, **wrench)).virtual_sensor
-    assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
-    return sensed
+    choice = asked(CIRCLE, "gmo", **FIRST_SECONDS)
+    recording = choice.library.open(FIXTURES / CIRCLE, choice.read)
+    return read(prepared(recording, choice), choice)
 
 
 @pytest.mark.slow
 def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion):
-    sensed = first_seconds("gmo", "fdo", solver="smoother", frame="base")
+    sensed = reading(CIRCLE, "gmo", "fdo", solver="smoother", frame="base", **FIRST_SECONDS)
     assert sensed.solver == "smoother"
     log, (piece,) = motion.log, motion.part.pieces
     values, covariance = smooth_wrench(log, [piece]).at(log.t)
@@ -219,7 +196,8 @@ def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion):
 
 @pytest.mark.slow
 def test_a_zero_takes_its_mean_off_the_smoothed_wrench_too():
-    sensed = first_seconds("gmo", solver="smoother", zero=ZeroChoice(spans=((0.3, 4.0),)))
+    zero = ZeroChoice(spans=((0.3, 4.0),))
+    sensed = reading(CIRCLE, "gmo", solver="smoother", zero=zero, **FIRST_SECONDS)
     (wrench,) = sensed.wrenches
     np.testing.assert_allclose(wrench.values[sensed.free].mean(axis=0), 0.0, atol=1e-9)
 
@@ -282,7 +260,6 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion):
 # The torque error behind a band: given, measured, brought along or unknown
 
 
-FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 T = np.arange(0.0, 40.0, 0.01)
 
 
@@ -348,12 +325,7 @@ def test_a_free_part_measures_the_spread_about_its_mean(moves):
 @pytest.mark.slow
 def test_two_observers_of_one_response_have_one_band():
     """FE and ZOH read nearly the same and get nearly the same error, whatever P₂₂ each has."""
-    choice = AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("kfo-fe", "kfo-zoh")),
-        wrench=WrenchChoice(zero=ZeroChoice(start=True)),
-    )
-    found = analyse_log(FIXTURE, choice).virtual_sensor
+    found = reading(CIRCLE, "kfo-fe", "kfo-zoh", zero=START)
     one, other = (wrench.sd[~wrench.hidden] for wrench in found.wrenches)
     np.testing.assert_allclose(one, other, rtol=0.02)
 
