@@ -113,7 +113,7 @@ def test_every_fault_changes_the_log_and_states_the_rows_that_it_changes():
 
 @pytest.mark.statistical
 def test_few_faults_do_harm_unnoticed_and_few_refuse_a_log(logs, tmp_path):
-    """Three minutes; 26 of 245 cells were silent or noted and harmful, 40 refused."""
+    """Five minutes; 26 of 245 cells were silent or noted and harmful, 40 refused."""
     path = tmp_path / "planted.csv"
     count, unnoticed, refused = 0, [], {}
     for log in SOURCES:

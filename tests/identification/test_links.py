@@ -20,7 +20,6 @@ from vftcli.identification.links import (
     predicts_best_unpulled,
     pseudo_inertias,
     residuals,
-    solve,
     stack,
     starting_point,
     thicken_links,
@@ -243,25 +242,6 @@ def test_the_nearest_links_are_physical_and_predict(name, weight):
     error = np.sqrt(np.mean((Y @ (x - chain_parameters(true))) ** 2))
     # 43 parameters of 300·7 equations: noise·√(43/2100) = 0.07, and a pull of one count
     assert error < 0.12
-
-
-def test_newtons_point_is_stationary_and_unique():
-    chain = load_robot("panda").chain
-    triangles, _ = stacked(chain, chain_parameters(perturbed(chain, 4)), noise=0.5)
-    start = starting_point(triangles.layout, chain_parameters(chain))
-    R, z = triangles.joined()
-    problem = Problem(R, z, start, triangles.layout, 1.0)
-    one = solve(problem, start)
-    two = solve(problem, starting_point(triangles.layout, chain_parameters(perturbed(chain, 5))))
-    _, decrement = problem.step(one)
-    assert decrement < 1e-3
-    # convex: both ends lie within the stopping decrement of one optimum
-    assert problem.value(one) == pytest.approx(problem.value(two), abs=2e-3)
-    nearby = [
-        problem.value(one * (1 + 1e-3 * np.random.default_rng(k).normal(size=len(one))))
-        for k in range(5)
-    ]
-    assert min(nearby) > problem.value(one) - 1e-3
 
 
 def test_a_point_mass_is_thickened_and_the_physical_stays():
