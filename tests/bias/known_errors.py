@@ -128,5 +128,4 @@ def best_by_hand(A, d, weight, scale, rows):
 
 
 def ur10e():
-    """The robot most tests are on."""
     return load_robot("ur10e")

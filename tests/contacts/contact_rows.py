@@ -24,7 +24,6 @@ def contact(**changed: object) -> Contact:
 
 
 def contact_list(*contacts: Contact, **changed: object) -> ContactList:
-    """A list of contacts with a free part."""
     values: dict[str, object] = {
         "recording": "log.csv", "duration": 20.0, "contacts": contacts, "basis": "free motion",
         "free": (fact("free-span", begin_s=0.3, end_s=4.0),), "free_seconds": 3.7,

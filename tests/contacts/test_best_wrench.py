@@ -36,7 +36,6 @@ def analysed(name: str) -> Analysis:
 
 
 def best_of(analysis: Analysis) -> Wrench:
-    """The wrench of `best`, with a band."""
     (best,) = analysis.virtual_sensor.wrenches
     return best
 

@@ -75,7 +75,6 @@ def test_free_cycles_are_found_where_nothing_is_said(listed):
 
 
 def part(recording: Recording, chosen: np.ndarray) -> Recording:
-    """Some samples of a log."""
     signals = {
         name: getattr(recording, name)[chosen]
         for name in ("q", "dq", "current")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn_blocks import B
+from drawn_blocks import B, blocks, noise
 
 from vftcli.contacts.search import split_at_turns, split_run
 from vftcli.contacts.windows import (
@@ -13,7 +13,6 @@ from vftcli.contacts.windows import (
     likelihoods,
     smooth_lanes,
 )
-from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import covered
 from vftcli.wrench.model_error import ErrorProcess, TorqueNoise, error_process
 from vftcli.wrench.smoother import BlockLog, Lane, in_blocks
@@ -39,6 +38,12 @@ def test_two_pushes_are_split_where_force_and_torque_pause(pause, force, sd, fel
     assert found == pieces
 
 
+def known_noise(variance: float) -> TorqueNoise:
+    values = {"white": 0.01, "variance": variance, "time": 0.5, "dry": 1.0}
+    values |= {"at_rest": 0.09, "pushed": 0.36}
+    return noise(6)._replace(**{name: np.full(6, value) for name, value in values.items()})
+
+
 def test_a_drawn_wrench_is_measured_and_its_prior_learned():
     """Twelve pushes drawn with σ_f = 30 N, a random well-posed Jacobian, little noise."""
     rng = np.random.default_rng(7)
@@ -52,17 +57,8 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned():
             w = g * w + np.repeat([30.0, 3.0], 3) * np.sqrt(1 - g * g) * rng.standard_normal(6)
             true[k] = w
     d = np.einsum("ki,kij->kj", true, jacobian) + 0.1 * rng.standard_normal((count, 6))
-    still = np.full((count, 6), 0.5)
-    blocks = Blocks(
-        t=B * (np.arange(count) + 0.5), length=np.full(count, B), d=d,
-        q=np.zeros_like(d), velocity=still, known=np.ones(count, dtype=bool),
-    )  # fmt: skip
-    noise = TorqueNoise(
-        white=np.full(6, 0.01), variance=np.full(6, 1e-4), time=np.full(6, 0.5),
-        dry=np.ones(6), seen=np.ones(6, dtype=bool),
-        at_rest=np.full(6, 0.09), pushed=np.full(6, 0.36),
-    )  # fmt: skip
-    log = BlockLog(blocks, error_process(noise, blocks))
+    moving = blocks(d, np.full((count, 6), 0.5))
+    log = BlockLog(moving, error_process(known_noise(variance=1e-4), moving))
     prior = learn_prior(log, in_blocks(jacobian), runs, START, rounds=2)
     assert prior.time == 0.3
     # A dozen pushes of 1.6 correlation times and three axes: some 60 numbers, 10 %; two of these.
@@ -82,24 +78,16 @@ def test_two_blocks_say_what_all_quiet_ones_beside_a_contact_do():
     d = 0.3 * rng.standard_normal((count, 6)).cumsum(axis=0)
     d[50:70] += 20.0
     rests = np.where(rng.random((count, 6)) < 0.3, 0.0, 0.5)
-    blocks = Blocks(
-        t=B * (np.arange(count) + 0.5), length=np.full(count, B), d=d,
-        q=np.zeros_like(d), velocity=rests, known=rng.random(count) > 0.05,
-    )  # fmt: skip
-    noise = TorqueNoise(
-        white=np.full(6, 0.01), variance=np.full(6, 0.04), time=np.full(6, 0.5),
-        dry=np.ones(6), seen=np.ones(6, dtype=bool),
-        at_rest=np.full(6, 0.09), pushed=np.full(6, 0.36),
-    )  # fmt: skip
-    log = BlockLog(blocks, error_process(noise, blocks))
+    resting = blocks(d, rests, rng.random(count) > 0.05)
+    log = BlockLog(resting, error_process(known_noise(variance=0.04), resting))
     jacobian = in_blocks(rng.standard_normal((count, 6, 6)))
     for run, lane in zip(runs, contact_lanes(log, runs, jacobian), strict=True):
-        first, last = blocks.t.searchsorted(blocks.t[[run[0], run[1] - 1]] + [-1.0, 1.0 + 1e-9])
+        first, last = resting.t.searchsorted(resting.t[[run[0], run[1] - 1]] + [-1.0, 1.0 + 1e-9])
         gate = covered([run], count, 1)
         hidden = covered(runs, count, 1) & ~gate
         some = slice(first, last)
         own = ErrorProcess(*(x[some] for x in log.process.hiding(hidden)))
-        whole = Lane(BlockLog(blocks.part(some), own), (first, last), gate[some], jacobian, None)
+        whole = Lane(BlockLog(resting.part(some), own), (first, last), gate[some], jacobian, None)
         each = [lane, whole]
         touched = [one._replace(prior=START) for one in each]
         bare, nats = ([likelihoods([one])[0] for one in lanes] for lanes in (each, touched))

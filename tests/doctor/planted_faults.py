@@ -28,8 +28,6 @@ NEIGHBOURS = {"ur10e": "ur5", "ur5": "ur10e", "panda": "fr3"}
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """The columns of a log."""
-
     t: Array  # (T,) [s]
     q: Array  # (T, n) [rad]
     dq: Array  # (T, n) [rad/s]
@@ -43,12 +41,10 @@ class Table:
 
     @property
     def arm(self) -> Robot:
-        """The arm that the log is from."""
         return robot_named(self.robot)
 
     @property
     def joints(self) -> int:
-        """Number of joints n."""
         return int(self.q.shape[1])
 
     @property
@@ -64,7 +60,6 @@ class Table:
         return np.ones(self.joints)
 
     def selected(self, rows: Array) -> "Table":
-        """The table with these rows, in this order."""
         signals = {name: value[rows] for name, value in self.series()}
         sound_t = None if self.sound_t is None else self.sound_t[rows]
         return replace(self, t=self.t[rows], sound_t=sound_t, **signals)
@@ -98,7 +93,6 @@ class Table:
 
 @cache
 def robot_named(name: str) -> Robot:
-    """A profile, loaded once."""
     return load_robot(name)
 
 
@@ -291,8 +285,6 @@ READER = ""
 
 
 class Fault(NamedTuple):
-    """A fault that is planted."""
-
     plant: Maker
     codes: tuple[str, ...]  # of the findings that name it
     joints: tuple[int, ...] = ()  # from 1, that a finding which tells joints has to tell

@@ -54,7 +54,6 @@ def rows_of(table: Table, signals: tuple[str, ...], count: int, value: float) ->
 
 
 def position_sample(table: Table, degrees: float, joint: int = 3) -> Table:
-    """One sample of a joint's position that is so much off."""
     column = np.array(table.q[:, joint - 1])
     column[first_bad(table)] += np.deg2rad(degrees)
     return replace(table, q=plant.edited(table.q, joint, column))
@@ -77,7 +76,6 @@ def velocity_in_degrees(table: Table, joint: int) -> Table:
 
 
 def accelerations(table: Table, joints: tuple[int, ...] = ()) -> Table:
-    """Accelerations where the velocities of some joints should be."""
     wrong = of_joints(table, joints)
     return replace(table, dq=np.where(wrong, plant.acceleration(table), table.dq))
 
@@ -148,7 +146,6 @@ def wrapped(table: Table, joint: int) -> Table:
 
 
 def clock_jump(table: Table, seconds: float) -> Table:
-    """Stamps that jump ahead in the middle of the log."""
     later = np.arange(len(table.t)) >= len(table.t) // 2
     return replace(table, t=table.t + seconds * later)
 
@@ -236,8 +233,6 @@ EFFORT, MEASURED = ("effort",), ("q", "dq", "effort")
 
 
 class SpanLog(NamedTuple):
-    """A sound log that faults are planted in."""
-
     table: Table
     other: str  # the profile of another generation of its arm
     target: Array | None = None  # what its controller expects of the drives (T, n) [A]

@@ -115,7 +115,6 @@ def robot_of(log: SoundLog, folder: Path) -> Robot | None:
 
 @cache
 def recording_of(log: SoundLog, folder: Path) -> Recording:
-    """A log, read once."""
     path = folder / log.path
     if log.path == "panda_exciting":
         return panda_exciting(path)
@@ -137,7 +136,6 @@ def panda_exciting(folder: Path) -> Recording:
 
 
 def every(recording: Recording, step: int) -> Recording:
-    """Every `step`-th row of a log."""
     rows = {name: getattr(recording, name)[::step] for name in ("t", *recording.signals)}
     return replace(recording, **rows)
 

@@ -78,8 +78,6 @@ class Said(NamedTuple):
 
 
 class Unsaid(NamedTuple):
-    """What is not to be said: no code begins so."""
-
     code: str
 
     def check(self, findings: dict[str, Remark]) -> None:
@@ -95,15 +93,12 @@ def has(code: str, *joints: int, level: str = "", **values: Any) -> Said:
 
 
 class Case(NamedTuple):
-    """A log and what is to be said of it."""
-
     name: str
     find: Callable[[], dict[str, Remark]]
     said: Said | Unsaid
 
 
 def only_if(there: bool, code: str, *joints: int, **values: Any) -> Said:
-    """The one finding, or none."""
     return only(code, *joints, **values) if there else only()
 
 

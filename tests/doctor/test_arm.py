@@ -27,7 +27,6 @@ CURRENT = MOTION.require("current")
 
 
 def findings(log: Recording, robot: Robot | None = UR10E) -> list[Remark]:
-    """The warnings and cautions."""
     return [finding for finding in examine(log, robot).findings if finding.level != "fact"]
 
 

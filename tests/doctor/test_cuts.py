@@ -27,7 +27,6 @@ Signals = dict[str, Array]
 
 @pytest.fixture(scope="module")
 def circle() -> Recording:
-    """The circle of the README, sound."""
     return read(FIXTURES / "ur5_circle.csv")
 
 
@@ -66,7 +65,6 @@ def frozen(signals: Signals) -> None:
 
 
 def planted(recording: Recording, *plants: Callable[[Signals], None]) -> Recording:
-    """The recording with faults in it."""
     signals = {name: getattr(recording, name).copy() for name in ("t", *recording.signals)}
     for plant in plants:
         plant(signals)

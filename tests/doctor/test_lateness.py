@@ -46,7 +46,6 @@ def log_of(late=0.0, push=0.0, scale=1.0, *, rate=0.0, clock=T) -> Recording:
 
 
 def reported(log: Recording) -> dict[str, Remark]:
-    """The finding by its code, none or one."""
     found = {finding.code: finding for finding in effort_lag(log, ARM)}
     assert len(found) <= 1
     return found

@@ -198,7 +198,6 @@ def warm_log(temperature: float | None, changes: float = 0.0) -> Recording:
 
 
 def with_gaps(recording: Recording) -> Recording:
-    """A quarter of the third joint's temperatures are missing."""
     missing = (np.arange(500)[:, None] < 125) & (np.arange(6) == 2)
     return replace(recording, temperature=np.where(missing, np.nan, recording.temperature))
 

@@ -72,7 +72,6 @@ def table_of(request):
 
 @pytest.fixture(scope="module")
 def kinds_of(table_of, tmp_path_factory):
-    """The kinds of findings on a sound log."""
     path = tmp_path_factory.mktemp("sound") / "log.csv"
     return cache(lambda log: {kind(finding) for finding in said_of(table_of(log), path)})
 

@@ -39,7 +39,6 @@ def prepared_log(
 
 @pytest.fixture
 def prepared() -> Callable[..., PreparedLog]:
-    """The maker of prepared logs."""
     return prepared_log
 
 
@@ -60,7 +59,6 @@ def three_sines(seconds=8.0, rate=125.0, joints=6, seed=0, fastest=0.5):
 
 @pytest.fixture
 def sines() -> Callable[..., tuple]:
-    """The maker of motions."""
     return three_sines
 
 
@@ -84,5 +82,4 @@ def recording(arm) -> Recording:
 
 @pytest.fixture
 def data(arm, recording) -> Training:
-    """That log as training data for its own robot."""
     return prepare_training([recording], arm)

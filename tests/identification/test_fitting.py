@@ -52,7 +52,6 @@ def motion(seed, duration=30.0, joints=6):
 
 
 def drive(robot, q, dq, ddq):
-    """Torque of a robot by its own model, payload and friction included."""
     Y = torque_regressor(robot.chain, q, dq, ddq)
     torque = Y @ chain_parameters(robot.loaded_chain) + robot.chain.rotor_inertia * ddq
     return torque + friction_torque(robot.friction, dq, gravity_torque(robot, q))

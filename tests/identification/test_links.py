@@ -50,7 +50,6 @@ def log(prepared, sines) -> PreparedLog:
 
 
 def planted():
-    """The parameters of the log."""
     return np.concatenate([chain_parameters(CHAIN), 1.0 + np.arange(6), 5.0 + np.arange(7)])
 
 

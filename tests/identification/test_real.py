@@ -55,7 +55,6 @@ def left(recording, robot):
 
 
 def codes(found):
-    """Codes of an identification's remarks."""
     return {remark.code for remark in found.remarks}
 
 

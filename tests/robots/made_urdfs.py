@@ -66,7 +66,6 @@ def arm(count: int, prefix: str = "", root: str = "base", kind: str = "revolute"
 
 
 def fixed(name: str, parent: str, mass: float = 0.0, xyz: str = "0 0 0.1") -> str:
-    """A link and the fixed joint that holds it."""
     held = joint(f"{name}_mount", parent, name, "fixed", xyz=xyz, rpy="0.1 0 0.7")
     return link(name, mass) + held
 
@@ -176,7 +175,6 @@ def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
 
 
 def said(robot: Robot, code: str) -> Remark:
-    """The robot's remark of a code."""
     (remark,) = (remark for remark in robot.remarks if remark.code == code)
     return remark
 

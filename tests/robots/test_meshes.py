@@ -23,7 +23,6 @@ def shape(file: str, more: str = "", kind: str = "visual", origin: str = ORIGIN)
 
 
 def shaped(text: str, name: str, shapes: str) -> str:
-    """The URDF with shapes on a link of it."""
     before, after = text.split(f'<link name="{name}">')
     return f'{before}<link name="{name}">{shapes}{after}'
 

@@ -75,7 +75,6 @@ def log(wrench: np.ndarray | None, frame: WrenchFrame | None = None) -> Recordin
 
 
 def disturbance() -> ExternalTorque:
-    """The torque of that contact."""
     tau = np.einsum("tij,ti->tj", flange_jacobian(UR5.chain, Q), in_base(PUSH))
     return ExternalTorque(name="disturbance", t=T, tau=tau)
 
@@ -226,7 +225,6 @@ OURS = Wrench(name="x", t=T, values=in_base(PUSH), frame="base")
 
 
 def remarks(wrench: np.ndarray | None, frame: WrenchFrame | None = None) -> list[Remark]:
-    """What is said of a log's own wrench."""
     return vendor_remarks(log(wrench, frame), OURS, UR5.chain)
 
 
