@@ -1,23 +1,16 @@
 """The figures a complete log was asked for: reference simulation, other engines, real logs."""
 
-import gzip
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import polars as pl
 import pytest
-from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
 from vftcli.bias.refine import refine
-from vftcli.evaluation import ReferenceChoice
-from vftcli.free_motion import FreeChoice
+from vftcli.notebook import report
 from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, model, read, run_of
-from vftcli.readers.reader import ReadChoice
-from vftcli.robots import RobotChoice
-from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
 
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -78,41 +71,29 @@ def test_reference_runs_reach_their_ratios_and_coverage():
     assert np.all((covered.mean(axis=0) >= 0.93) & (covered.mean(axis=0) <= 0.99))
 
 
+OF_ARM = {"observer": ("gmo", "rts-auto"), "settings": {"gmo.gain": 30}}
+"""For an exact robot file."""
+
+
 @pytest.mark.slow
 def test_mujoco_ur5e(logs):
     """An independent engine: the tuned smoother at most 0.6 of GMO(30). Measured .53."""
     folder = logs / "mujoco_ur5e"
-    request = AnalysisChoice(
-        robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(
-            settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")
-        ),
-        reference=ReferenceChoice(name="vendor"),
-    )
-    analysis = analyse_log(folder / "circle.csv", request)
+    analysis = report(folder / "circle.csv", folder / "robot.toml", reference="vendor", **OF_ARM)
     assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
 
 
 @pytest.mark.slow
-def test_libfranka_simulation(logs, tmp_path):
+def test_libfranka_simulation(logs):
     """Behind Franka's own protocol; the log repeats nothing, so its free part is stated.
 
     Measured .39 of GMO(30).
     """
     folder = logs / "libfranka_sim"
-    for name in ("pushes.csv", "pushes_truth.csv"):
-        with gzip.open(folder / f"{name}.gz") as packed, (tmp_path / name).open("wb") as plain:
-            shutil.copyfileobj(packed, plain)
-    request = AnalysisChoice(
-        free=FreeChoice(spans=((1.5, 6.0),)),
-        read=ReadChoice(interval=(1.5, 27.5)),
-        robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(
-            settings={"gmo.gain": "30"}, observer=("gmo", "rts-auto")
-        ),
-        reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
-    )
-    analysis = analyse_log(tmp_path / "pushes.csv", request)
+    asked = {"interval": "1.5:27.5", "free": "1.5:6"}
+    truth = f"file:{folder / 'pushes_truth.csv.gz'}"
+    log, robot = folder / "pushes.csv.gz", folder / "robot.toml"
+    analysis = report(log, robot, reference=truth, **asked, **OF_ARM)
     assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
 
 
@@ -120,31 +101,16 @@ def test_libfranka_simulation(logs, tmp_path):
 def test_ur10e_payload(logs):
     """Real: at most the error of the best causal observer. Measured .92: friction is in all."""
     folder = logs / "ur10e"
-    request = AnalysisChoice(
-        free=FreeChoice(logs=(folder / "free_14harm.csv",)),
-        read=ReadChoice(columns=UR10E),
-        robot=RobotChoice(name="ur10e"),
-        observers=ObserverChoice(names=("fdo", "gmo", "kfo-fe", "kfo-zoh", "rts-auto")),
-        reference=ReferenceChoice(name="two-cycle"),
-    )
-    plain = analyse_log(folder / "load_14harm.csv", request)
-    causal = min(mean_rmse(plain, name) for name in request.observers.names[:4])
-    assert mean_rmse(plain, "rts-auto") <= causal
+    causal = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
+    asked = {"columns": UR10E, "free": folder / "free_14harm.csv", "reference": "two-cycle"}
+    plain = report(folder / "load_14harm.csv", "ur10e", observer=(*causal, "rts-auto"), **asked)
+    assert mean_rmse(plain, "rts-auto") <= min(mean_rmse(plain, name) for name in causal)
 
 
 @pytest.mark.slow
 def test_ur10e_pushes_between_which_stiction_is_named(logs):
     """Real: a held pose; what is left between pushes is stiction, and is said to be."""
-    request = AnalysisChoice(
-        free=FreeChoice(spans=((0.0, 2.0),)),
-        read=ReadChoice(columns=UR10E),
-        robot=RobotChoice(name="ur10e"),
-        observers=ObserverChoice(names=("rts-auto",)),
-    )
-    analysis = analyse_log(logs / "ur10e" / "push_pose.csv", request)
-    named = [
-        remark.where.joints
-        for remark in analysis.remarks
-        if isinstance(remark, Remark) and remark.code == "band-of-a-standing-joint"
-    ]
+    asked = {"columns": UR10E, "free": "0:2", "observer": "rts-auto"}
+    remarks = report(logs / "ur10e" / "push_pose.csv", "ur10e", **asked).remarks
+    named = [r.where.joints for r in remarks if r.code == "band-of-a-standing-joint"]
     assert named == [(1, 2, 3, 4, 5, 6)]

@@ -5,12 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.observers import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.robots import RobotChoice
+from vftcli.notebook import report
 from vftcli.signals.arrays import Z_95
 from vftcli.simulation import load_scenario, simulate
-from vftcli.wrench import WrenchChoice, ZeroChoice
 
 pytestmark = pytest.mark.slow
 
@@ -38,12 +35,8 @@ def erring():
 
 def sensed(recording, **zero):
     # The file's R and Q as densities: as a sample's variances they let more of the noise through.
-    request = AnalysisChoice(
-        wrench=WrenchChoice(frame="base", zero=ZeroChoice(**zero)),
-        robot=RobotChoice(name="panda"),
-        observers=ObserverChoice.parsed(settings={"kfo.noise_convention": "density"}),
-    )
-    return analyse(run_of(recording, request.robot.load(recording), request), request)
+    density = {"kfo.noise_convention": "density"}
+    return report(recording, "panda", frame="base", settings=density, **zero)
 
 
 @pytest.mark.parametrize(("log", "share"), [("exact", 0.02), ("erring", 0.025)])
@@ -57,7 +50,7 @@ def test_after_zeroing_the_bearing_weighs_what_it_weighs(log, share, request):
     (measured 9.00, 9.16 and 9.15 N with seeds 1 to 3).
     """
     recording = request.getfixturevalue(log)
-    analysis = sensed(recording, spans=((2.0, 3.9),))
+    analysis = sensed(recording, zero="2:3.9")
     hung = (recording.t > 6.0) & (recording.t < 8.7)
     best, *others = analysis.wrenches
     for wrench in others:

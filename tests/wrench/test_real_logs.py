@@ -1,19 +1,10 @@
 """The virtual sensor on real and foreign logs: the figures the documentation quotes."""
 
-import gzip
-from pathlib import Path
-
 import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import ReferenceChoice
-from vftcli.free_motion import FreeChoice
-from vftcli.observers import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.readers.reader import ReadChoice
-from vftcli.robots import RobotChoice
-from vftcli.wrench import WrenchChoice
+from vftcli.notebook import report
 from vftcli.wrench.sensor import DERIVED, fit_axes
 from vftcli.wrench.solvers import wrench_of
 
@@ -21,9 +12,8 @@ UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 MUJOCO = "t=time,q=q{i},dq=qd{i},tau=tau{i},tau_ext=tau_ext{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz"
 
 
-def analysed(path: Path, request: AnalysisChoice):
-    recording = request.library.open(path, request.read)
-    return analyse(run_of(recording, request.robot.load(recording), request), request)
+OF_ARM = {"observer": "gmo", "frame": "base", "settings": {"gmo.gain": 30}}
+"""For an exact robot file."""
 
 
 def by_axis(analysis, observer: str) -> np.ndarray:
@@ -35,14 +25,8 @@ def by_axis(analysis, observer: str) -> np.ndarray:
 def test_the_ur5e_of_mujoco_reads_its_truth(logs):
     """Exact profile, gain 30: ≤ 3 N and ≤ 0.6 N·m in unmasked samples (measured 1.19 and 0.12)."""
     folder = logs / "mujoco_ur5e"
-    request = AnalysisChoice(
-        wrench=WrenchChoice(frame="base"),
-        read=ReadChoice(columns=MUJOCO),
-        robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(observer=("gmo",), settings={"gmo.gain": "30"}),
-        reference=ReferenceChoice(name="sensor"),
-    )
-    analysis = analysed(folder / "circle.csv", request)
+    log, robot = folder / "circle.csv", folder / "robot.toml"
+    analysis = report(log, robot, columns=MUJOCO, reference="sensor", **OF_ARM)
     errors = by_axis(analysis, "gmo")
     assert np.all(errors[:3] <= 3.0)
     assert np.all(errors[3:] <= 0.6)
@@ -61,10 +45,7 @@ def test_dry_friction_at_a_reversal_is_no_push(logs):
     MuJoCo's friction is 5 N·m off the model's then: a peak was 34 ± 8 N where 18 N act.
     """
     folder = logs / "mujoco_ur5e"
-    request = AnalysisChoice(
-        read=ReadChoice(columns=MUJOCO), robot=RobotChoice(name=str(folder / "robot.toml"))
-    )
-    rows = analysed(folder / "circle.csv", request).contacts.contacts
+    rows = report(folder / "circle.csv", folder / "robot.toml", columns=MUJOCO).contacts
     assert len(rows) == 5
     for row in rows:
         off = abs(row.peak_force - row.sensor_force)
@@ -72,19 +53,11 @@ def test_dry_friction_at_a_reversal_is_no_push(logs):
 
 
 @pytest.mark.slow
-def test_the_fr3_behind_libfranka_reads_its_truth(logs, tmp_path):
+def test_the_fr3_behind_libfranka_reads_its_truth(logs):
     """Exact profile, gain 30: ≤ 1.5 N and ≤ 0.4 N·m (measured 0.52 and 0.07)."""
-    for name in ("pushes", "pushes_truth"):
-        packed = (logs / "libfranka_sim" / f"{name}.csv.gz").read_bytes()
-        (tmp_path / f"{name}.csv").write_bytes(gzip.decompress(packed))
-    request = AnalysisChoice(
-        wrench=WrenchChoice(frame="base"),
-        read=ReadChoice(interval=(1.5, 27.5)),
-        robot=RobotChoice(name=str(logs / "libfranka_sim" / "robot.toml")),
-        observers=ObserverChoice.parsed(observer=("gmo",), settings={"gmo.gain": "30"}),
-        reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
-    )
-    analysis = analysed(tmp_path / "pushes.csv", request)
+    folder = logs / "libfranka_sim"
+    asked = {"interval": "1.5:27.5", "reference": f"file:{folder / 'pushes_truth.csv.gz'}"}
+    analysis = report(folder / "pushes.csv.gz", folder / "robot.toml", **asked, **OF_ARM)
     errors = by_axis(analysis, "gmo")
     assert np.all(errors[:3] <= 1.5)
     assert np.all(errors[3:] <= 0.4)
@@ -94,14 +67,9 @@ def test_the_fr3_behind_libfranka_reads_its_truth(logs, tmp_path):
 @pytest.mark.slow
 def test_the_payload_weighs_what_it_weighs(logs):
     """2.805 kg are 27.5 N; measured −26.4 N, 93 and 100 % of the horizontal force in its band."""
-    request = AnalysisChoice(
-        wrench=WrenchChoice(frame="base"),
-        read=ReadChoice(columns=UR10E),
-        robot=RobotChoice(name="ur10e"),
-        free=FreeChoice(logs=(logs / "ur10e" / "free_14harm.csv",)),
-        observers=ObserverChoice(names=("best",)),
-    )
-    wrench = analysed(logs / "ur10e" / "load_14harm.csv", request).wrench
+    folder = logs / "ur10e"
+    asked = {"columns": UR10E, "free": folder / "free_14harm.csv", "frame": "base"}
+    wrench = report(folder / "load_14harm.csv", "ur10e", observer="best", **asked).wrench
     assert wrench.force[:, 2].mean() == pytest.approx(-27.5, rel=0.05)
     inside = np.abs(wrench.values[:, :2]) <= 1.96 * wrench.sd[:, :2]
     assert np.all(inside.mean(axis=0) >= 0.9)
@@ -128,10 +96,6 @@ def test_the_pandas_wrench_is_the_atis(logs):
 
 
 def test_a_franka_that_logs_zeros_is_reported(logs):
-    request = AnalysisChoice(
-        wrench=WrenchChoice(),
-        robot=RobotChoice(name="fr3"),
-        observers=ObserverChoice(names=("gmo",)),
-    )
-    analysis = analysed(logs / "franka_bags" / "calib_0108.bag", request)
+    bag = logs / "franka_bags" / "calib_0108.bag"
+    analysis = report(bag, "fr3", observer="gmo", frame="flange")
     assert "log-wrench-all-zero" in [remark.code for remark in analysis.virtual_sensor.remarks]
