@@ -1,38 +1,27 @@
 """What a complete log allows, on the reference fixture: tuned gains, bands, bias, limits."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
-from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.bias import RefinementChoice, baseline
-from vftcli.evaluation import ReferenceChoice
-from vftcli.free_motion import FreeChoice
-from vftcli.observers import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.readers.reader import ReadChoice
-from vftcli.readers.reading import Library
-from vftcli.robots import RobotChoice
+from vftcli.bias import baseline
+from vftcli.notebook import report
+from vftcli.readers.reading import read
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.errors import MissingSignalError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
-DENSITIES = ObserverChoice.parsed(
-    observer=["rts-auto", "kfo-rts"], settings={"kfo.noise_convention": "density"}
-)
-"""A tuned smoother, and what it falls back to."""
+DENSITY = {"kfo.noise_convention": "density"}
 MOVING = [0, 1, 2, 3, 5]
 """Joint 5 of the circle rests."""
 
 
 def codes(analysis: Analysis) -> set[str]:
-    return {remark.code for remark in analysis.remarks if isinstance(remark, Remark)}
+    return {remark.code for remark in analysis.remarks}
 
 
 @pytest.mark.slow
@@ -81,53 +70,40 @@ def test_what_limits_the_log_is_said_joint_by_joint(worked_up):
 
 def test_a_log_that_is_free_throughout_tunes_nothing():
     """Two free cycles of one log: the part is no quieter than the rest."""
-    once = Library().open(FIXTURE, ReadChoice(interval=(0.0, 4.0)))
+    once = read(FIXTURE).between(0.0, 4.0)
     twice = Recording(
         t=np.concatenate([once.t, once.t + 4.0 + once.median_step]),
         **{name: np.tile(once.require(name), (2, 1)) for name in ("q", "dq", "current")},
     )
-    request = AnalysisChoice(
-        robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("kfo-auto",))
-    )
-    analysis = analyse(run_of(twice, request.robot.load(twice), request), request)
+    analysis = report(twice, "ur5", observer="kfo-auto")
     assert "free-part-not-quiet" in codes(analysis)
     assert analysis.estimates[0].error_sd is None
 
 
 @pytest.mark.slow
-def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_):
+def test_a_log_in_contact_throughout_is_not_believed_to_be_free():
     """Its quietest cycle is pushed too: hand-set gains, no bands, both said."""
-    always = replace(request_, read=ReadChoice(interval=(4.3, 20.0)), observers=DENSITIES)
-    analysis = analyse_log(FIXTURE, always)
+    always = {"interval": "4.3:20", "observer": ("rts-auto", "kfo-rts")}
+    analysis = report(FIXTURE, "ur5", settings=DENSITY, **always)
     assert "free-part-not-quiet" in codes(analysis)
     np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)
     assert analysis.estimates[0].error_sd is None
     # what the user states is not doubted
-    stated = analyse_log(FIXTURE, replace(always, free=FreeChoice(cycles=(1,))))
+    stated = report(FIXTURE, "ur5", settings=DENSITY | {"two-cycle.free-cycles": 1}, **always)
     assert stated.estimates[0].error_sd is not None
 
 
 # What `best` is made of: the whole log's bias off where it may be, and what stands in for it
 
 
-BY_DENSITY = ObserverChoice.parsed(
-    observer=["kfo-rts"], settings={"kfo.noise_convention": "density"}
-)
-"""What `best` falls back to."""
+def asked(observer=("best", "gmo", "rts-auto"), **more) -> Analysis:
+    truth = f"file:{FIXTURE}.truth.parquet"
+    return report(FIXTURE, "ur5", observer=observer, reference=truth, **more)
 
 
 @pytest.fixture(scope="module")
-def asked() -> AnalysisChoice:
-    return AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("best", "gmo", "rts-auto")),
-        reference=ReferenceChoice(name=f"file:{FIXTURE}.truth.parquet"),
-    )
-
-
-@pytest.fixture(scope="module")
-def automatic(asked) -> Analysis:
-    return analyse_log(FIXTURE, asked)
+def automatic() -> Analysis:
+    return asked()
 
 
 def rmse(analysis: Analysis, name: str) -> float:
@@ -158,9 +134,8 @@ def test_the_bias_is_off_for_the_best_alone(automatic):
 
 
 @pytest.mark.slow
-def test_whole_log_is_off_for_everyone_and_none_for_no_one(asked, automatic):
-    everyone = analyse_log(FIXTURE, replace(asked, refinement=RefinementChoice(bias="whole-log")))
-    nobody = analyse_log(FIXTURE, replace(asked, refinement=RefinementChoice(bias="none")))
+def test_whole_log_is_off_for_everyone_and_none_for_no_one(automatic):
+    everyone, nobody = (asked(settings={"bias.method": word}) for word in ("whole-log", "none"))
     best, gmo, auto = (e.tau for e in everyone.estimates)
     np.testing.assert_array_equal(best, auto)
     np.testing.assert_array_equal(best, automatic.estimates[0].tau)
@@ -173,48 +148,37 @@ def test_whole_log_is_off_for_everyone_and_none_for_no_one(asked, automatic):
 
 
 @pytest.mark.slow
-def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(asked):
+def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free():
     """From 4.3 s on every cycle is pushed, so that none is believed to be free."""
-    pushed = replace(asked, read=ReadChoice(interval=(4.3, 20.0)))
-    analysis = analyse_log(FIXTURE, pushed)
+    analysis = asked(interval="4.3:20")
     assert "free-by-the-fit" in codes(analysis)
     assert "free-part-not-quiet" not in codes(analysis)
     assert analysis.refinement.baselines.plain.by_fit
     assert analysis.refinement.baselines.plain.untouched == ()
     assert all(estimate.error_sd is not None for estimate in analysis.estimates)
-    by_hand = BY_DENSITY
-    smoothed = analyse_log(FIXTURE, replace(pushed, observers=by_hand))
+    smoothed = asked("kfo-rts", interval="4.3:20", settings=DENSITY)
     assert rmse(analysis, "best") < 0.5 * rmse(smoothed, "kfo-rts")
 
 
 @pytest.mark.slow
-def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(asked):
+def test_a_free_part_that_does_not_do_is_dropped_with_a_reason():
     """0.1 s are 13 samples, and a spectrum needs 32."""
-    given = replace(asked, free=FreeChoice(spans=((0.0, 0.1),)))
-    analysis = analyse_log(FIXTURE, given)
+    analysis = asked(free="0:0.1")
     assert "free-by-the-fit" not in codes(analysis)
     (said,) = (r for r in analysis.refinement.remarks if r.code == "free-by-the-fit-instead")
     assert "a spectrum needs 32 samples" in str(said)
 
 
 @pytest.mark.slow
-def test_a_short_log_takes_what_is_left(asked):
+def test_a_short_log_takes_what_is_left():
     """6 s tell friction alone, the free part tunes. 1.5 s tell nothing: the robot file's gains.
 
     The band of the best is there in any case, at rest no narrower than what stiction holds.
     """
-    six = analyse_log(
-        FIXTURE,
-        replace(
-            asked, read=ReadChoice(interval=(0.0, 6.0)), free=FreeChoice(spans=((0.0, 4.0),))
-        ),
-    )
+    six = asked(interval="0:6", free="0:4")
     assert "whole-log-friction-alone" in codes(six)
     assert rmse(six, "best") < rmse(six, "rts-auto")
-    names = replace(BY_DENSITY, names=("best", "kfo-rts"))
-    tiny = analyse_log(
-        FIXTURE, replace(asked, read=ReadChoice(interval=(4.5, 6.0)), observers=names)
-    )
+    tiny = asked(("best", "kfo-rts"), interval="4.5:6", settings=DENSITY)
     np.testing.assert_array_equal(tiny.estimates[0].tau, tiny.estimates[1].tau)
     assert {"no-free-part", "tuning-without-free-part", "no-band"} <= set(codes(tiny))
     band, log = tiny.estimates[0].error_sd, tiny.motion.log
@@ -226,12 +190,12 @@ def test_a_short_log_takes_what_is_left(asked):
 
 
 @pytest.mark.slow
-def test_a_fit_that_fails_is_said_and_costs_nothing_else(asked, automatic, monkeypatch):
-    def fails(_run: object) -> None:
+def test_a_fit_that_fails_is_said_and_costs_nothing_else(automatic, monkeypatch):
+    def fails(_run):
         raise MissingSignalError("no current")
 
     monkeypatch.setattr(baseline, "whole_log_bias", fails)
-    analysis = analyse_log(FIXTURE, asked)
+    analysis = asked()
     (said,) = [r for r in analysis.remarks if r.code == "whole-log-bias-failed"]
     assert said.level == "caution"
     np.testing.assert_array_equal(analysis.estimates[0].tau, automatic.estimates[2].tau)

@@ -9,35 +9,24 @@ from contact_logs import FIXTURES, true_wrench
 from made_runs import analyse_log
 
 from vftcli.analysis import Analysis
-from vftcli.free_motion import FreeChoice
+from vftcli.notebook import report
 from vftcli.observers import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, run_of, sense
-from vftcli.robots import RobotChoice, load_robot
+from vftcli.pipeline import AnalysisChoice, sense
+from vftcli.robots import load_robot
 from vftcli.robots.kernels import load_regressor, load_wrench
 from vftcli.signals.arrays import resample_columns
-from vftcli.signals.wrench import Wrench
 from vftcli.wrench import WrenchChoice
 
 NAMES = "ur5_circle.csv", "ur5_table1.csv"
 
 
-CHOICE = AnalysisChoice(
-    robot=RobotChoice(name="ur5"),
-    free=FreeChoice.parsed(free=["0.3:4"]),
-    observers=ObserverChoice(names=("best",)),
-    wrench=WrenchChoice(frame="base"),
-)
+ASKED = {"free": "0.3:4", "observer": "best", "frame": "base"}
 
 
 @cache
 def analysed(name: str) -> Analysis:
     """A fixture's contacts and the wrench of `best`, base axes."""
-    return analyse_log(FIXTURES / name, CHOICE)
-
-
-def best_of(analysis: Analysis) -> Wrench:
-    (best,) = analysis.virtual_sensor.wrenches
-    return best
+    return report(FIXTURES / name, "ur5", **ASKED)
 
 
 @pytest.mark.slow
@@ -49,7 +38,7 @@ def test_the_wrench_of_best_is_that_of_the_rows_and_holds_the_truth(name):
     the samples an axis; with no band outside of the rows it was .93 to .98.
     """
     analysis = analysed(name)
-    best = best_of(analysis)
+    best = analysis.wrench
     away, near = 0, np.zeros(len(best.t), dtype=bool)
     for row in analysis.contacts.contacts:
         here = int(np.argmin(np.abs(best.t - row.peak)))
@@ -89,12 +78,9 @@ def test_a_load_nobody_reported_is_in_the_wrench_of_best():
     whole = analysed(NAMES[0]).recording
     robot = load_robot("ur5")
     weights = np.array([2.0, 0.0, 0.0, 0.1])
-    log = replace(
-        whole,
-        current=whole.current
-        - load_regressor(robot.chain, whole.q) @ weights / robot.torque_constant,
-    )
-    best = best_of(analyse(run_of(log, robot, CHOICE), CHOICE))
+    more = load_regressor(robot.chain, whole.q) @ weights / robot.torque_constant
+    log = replace(whole, current=whole.current - more)
+    best = report(log, robot, **ASKED).wrench
     carried = load_wrench(robot.chain, log.q) @ weights
     error = best.values - resample_columns(best.t, *true_wrench(NAMES[0])) - carried
     assert np.all(np.mean(np.abs(error) <= 1.96 * best.sd, axis=0) >= 0.88)

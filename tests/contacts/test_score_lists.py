@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 from contact_scores import Score, angle, score, touched, true_contacts
 
-from vftcli.free_motion import FreeChoice
-from vftcli.observers import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse, run_of
+from vftcli.notebook import report
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Mask
 from vftcli.simulation import load_scenario, simulate
@@ -43,11 +41,8 @@ def scored(name: str, seed: int) -> tuple[Score, Mask]:
     truth = made.truth.contacts.get("hand", made.truth.wrench)
     truth = truth[np.unique(np.array(made.measured.rows))]
     t = made.recording.t
-    choice = AnalysisChoice(
-        observers=ObserverChoice(names=("best",)), free=FreeChoice.parsed(free=[free])
-    )
-    analysis = analyse(run_of(made.recording, made.robot, choice), choice)
-    (wrench,) = analysis.virtual_sensor.wrenches
+    analysis = report(made.recording, made.robot, observer="best", free=free)
+    wrench = analysis.wrench
     inside = np.zeros(len(t), dtype=bool)
     for row in analysis.contacts.contacts:
         inside |= (t >= row.start) & (t <= row.stop)
