@@ -80,10 +80,7 @@ def test_a_tip_on_the_hand_moves_the_flange(tmp_path):
 @pytest.mark.parametrize(
     ("tip", "words"),
     [
-        (
-            "left_tool",
-            r"no link or joint .*mean left_tool0\? Tips: left_link7, left_tool0, right",
-        ),
+        ("left_tool", r"no link or joint .*mean left_tool0\? Tips: left_link7, left_tool0, r"),
         ("elbow", r"--tip 'elbow': no link or joint of that name\. Tips:"),
         ("base", r"--tip 'base': no arm leads there\. Tips: left_link7"),
     ],

@@ -29,6 +29,7 @@ from vftcli.signals.recording import Recording
 # Joint test of a UR5e, mean of its size-3 joints [rad/s, N·m].
 SPEEDS, TORQUES = (0.01, 0.5, 1.5, 3.2), (5.73, 9.32, 13.58, 18.72)
 STRIBECK = {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity": 0.1}
+SLOW_STRIBECK = STRIBECK | {"stribeck_velocity": 0.5}
 SIGMOID = {"amplitude": -1.5, "slope": 10.0, "shift": 0.1}
 
 
@@ -51,10 +52,7 @@ LOGARITHMIC = joint("coulomb-logarithmic", coulomb=2.0, logarithmic=3.0, logarit
         (joint("coulomb-viscous", coulomb=6.3, viscous=0.0, smoothing=0.5), 6.3 * np.tanh(1.0)),
         (joint("coulomb-viscous-quadratic", coulomb=6.3, viscous=14.2, quadratic=-4.5), 12.275),
         (joint("coulomb-viscous-stribeck", **STRIBECK), 3.5 + 2.0 * np.exp(-25.0)),
-        (
-            joint("coulomb-viscous-stribeck", **STRIBECK | {"stribeck_velocity": 0.5}),
-            4.2357588823,
-        ),
+        (joint("coulomb-viscous-stribeck", **SLOW_STRIBECK), 3.5 + 2.0 * np.exp(-1.0)),
         (LOGARITHMIC, 2.0 + 3.0 * np.log(1.0 + 0.5 / 1.2)),
         (LOADED, 2.0 + 0.1 * 30.0 + 0.5),
         (points(), 9.32),

@@ -72,16 +72,8 @@ PLANAR, VISCOUS, MASS, DOF = 'name = "planar"', "viscous = 0.5", "mass = 1.0", "
     [
         (MASS, "mass = -1.0", r"line 19: joint 2 \(elbow\): mass is -1 kg"),
         (MASS, "mas = 1.0", r"line 15: joint 2 \(elbow\): mass is missing"),
-        (
-            TENSOR,
-            "inertia = [0.1, 0, 0, 0.01, 0, 0.01]",
-            "line 21: .*elbow.*: inertia breaks the",
-        ),
-        (
-            TENSOR,
-            "inertia = [0.01, 0.02, 0, 0.01, 0, 0.01]",
-            "line 21: .* has the negative princ",
-        ),
+        (TENSOR, "inertia = [0.1, 0, 0, 0.01, 0, 0.01]", "21: .*elbow.*: inertia breaks the"),
+        (TENSOR, "inertia = [0.01, 0.02, 0, 0.01, 0, 0.01]", "21: .* has the negative princ"),
         ("com = [0.2, 0.0, 0.0]", "com = [0.2, 0.0]", "line 20: .*com is .* 3 finite numbers"),
         (MASS, 'mass = "one"', "line 19: .*mass is 'one'; it must be a finite number"),
         (MASS, "mass = nan", "line 19: .*mass is nan; it must be a finite number"),
@@ -108,19 +100,11 @@ PLANAR, VISCOUS, MASS, DOF = 'name = "planar"', "viscous = 0.5", "mass = 1.0", "
         (PLANAR, "ee_rpy = [0, 180, 0]", "line 2: ee_rpy is 180 rad; on a robot it"),
         ('"elbow"', '"shoulder"', "line 16: joint 2 .*: name is 'shoulder', as another joint's"),
         ("coulomb-viscous", "sticky", "line 23: joint 2 .*: model is 'sticky'"),
-        (
-            '"coulomb-viscous"',
-            "{}",
-            r"line 23: joint 2 \(elbow\): model is {}; it must be one of",
-        ),
+        ('"coulomb-viscous"', "{}", r"line 23: joint 2 \(elbow\): model is {}; it must be one"),
         (VISCOUS, "vicous = 0.5", "line 22: joint 2 .*viscous is missing"),
         (VISCOUS, "viscous = 1e20", r"line 25: .*viscous is 1e\+20 N·m·s/rad; on a robot"),
         (VISCOUS, "viscous = 0.5\n[observers.gmo]\ngain = nan", "line 27: gain is nan; it"),
-        (
-            VISCOUS,
-            "viscous = 0.5\n[observers.gmo]\ngain = []",
-            r"27: gain is \[\]; it must be a n",
-        ),
+        (VISCOUS, "viscous = 0.5\n[observers.gmo]\ngain = []", r"27: gain is \[\]; it must"),
         (VISCOUS, "viscous = 0.5\n[observers]\ngmo = 3", "line 27: gmo is 3; it must be a sec"),
         (VISCOUS, "viscous = 0.5\n[admittance]\nperiod = true", "line 27: period is True"),
         (VISCOUS, "viscous = 0.5\n[admittance]\nmass = 3", "line 27: no key 'mass'; it has"),
@@ -128,7 +112,7 @@ PLANAR, VISCOUS, MASS, DOF = 'name = "planar"', "viscous = 0.5", "mass = 1.0", "
         (
             VISCOUS,
             "viscous = 0.5\n[admittance.position]\nmass = [nan]",
-            r"line 27: mass is \[nan\]; it must be a number or one an axis",
+            r"27: mass is \[nan\]; it",
         ),
     ],
 )

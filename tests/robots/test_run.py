@@ -80,6 +80,9 @@ def test_a_run_less_a_torque_is_a_run_whose_disturbance_is_less_by_it():
 NAMES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_a", "wrist_b", "wrist_c")
 
 
+FR3_NAMES = ("fr3_finger_1", *(f"fr3_joint{j}" for j in range(7, 0, -1)), "fr3_finger_2")
+
+
 def log_of(names: tuple[str, ...]) -> Recording:
     """A log with j everywhere in column j. 10 samples"""
     t = 0.01 * np.arange(10)
@@ -96,15 +99,7 @@ def log_of(names: tuple[str, ...]) -> Recording:
         (("gripper", *(f"left_{name}" for name in UR_NAMES)), UR.chain.names, (1, 2, 3, 4, 5, 6)),
         (tuple(f"ns/{name}" for name in UR_NAMES), UR.chain.names, (0, 1, 2, 3, 4, 5)),
         (("Wrist 3", *UR_WORDS[:5]), UR.chain.names, (1, 2, 3, 4, 5, 0)),
-        (
-            (
-                "fr3_finger_joint1",
-                *(f"fr3_joint{j}" for j in range(7, 0, -1)),
-                "fr3_finger_joint2",
-            ),
-            PANDA.chain.names,
-            (7, 6, 5, 4, 3, 2, 1),
-        ),
+        (FR3_NAMES, PANDA.chain.names, (7, 6, 5, 4, 3, 2, 1)),
         # Numbers of the log alone, from zero or one, and of the robot alone.
         (("axis_2", "axis_0", "axis_1"), NAMES[:3], (1, 2, 0)),
         (("A3", "A1", "A2"), ("lbr_joint_1", "lbr_joint_2", "lbr_joint_3"), (1, 2, 0)),

@@ -229,10 +229,7 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path):
         ("<mujoco>" + "<body>" * 5000, "more than 500 elements within one another"),
         ('<mujoco><body quat="0 0 0 0"/></mujoco>', "body quat is of zeros only"),
         # Pinocchio would take 20 GB for it.
-        (
-            "<mujoco>" + "<body><joint/></body>" * 1000 + "</mujoco>",
-            "has 1000 joints, more than 250",
-        ),
+        (f"<mujoco>{'<body><joint/></body>' * 1000}</mujoco>", "has 1000 joints, more than 250"),
         ("<mujocoinclude/>", "a part of an MJCF; take the file that includes it"),
         ("<sdf version='1.9'/>", "an SDF; take the robot's URDF, or convert it"),
         ("<COLLADA/>", "a mesh; take the URDF that names it"),
