@@ -112,9 +112,8 @@ def test_the_band_holds_on_a_real_arm_with_planted_pushes(logs, monkeypatch):
     base = baseline_of(FreeMotion(log=run, choice=FreeChoice(spans=((0.0, 8.0),))))
     assert base.load is None
     observer = tune_to_spectra("rts-auto", base.spectra)
-    estimate = with_band(
-        base, free_reading(base, observer, observer.estimate(base.of(base.motion.log).terms))
-    )
+    reading = free_reading(base, observer, observer.estimate(base.of(base.motion.log).terms))
+    estimate = with_band(base, reading)
     error, half = estimate.tau - pushed.torque, 1.96 * estimate.error_sd
     assert np.all(np.mean(np.abs(error) <= half, axis=0) >= 0.88)
     assert half.mean() <= 2.6 * np.sqrt(np.mean(error**2, axis=0)).mean()
@@ -160,9 +159,8 @@ def test_the_largest_cause_of_each_joint_is_named():
     assert stuck.values["causes"] == [STICTION, "bandwidth"]
     assert stuck.values["size_Nm"][0] == 9.0
     # 9 N·m beside the 5 of the other causes, and nothing beside the joint that moves
-    np.testing.assert_allclose(
-        stuck.values["total_Nm"], [np.sqrt(9.0**2 + 5.0**2), np.sqrt(0.31)]
-    )
+    together = np.sqrt([9.0**2 + 5.0**2, 0.31])
+    np.testing.assert_allclose(stuck.values["total_Nm"], together)
     found = budget()
     found.parts[STICTION][0] = 0.0
     assert limits_remark(found, np.array([True, True])).values["causes"] == ["friction", STICTION]

@@ -127,9 +127,8 @@ def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
     frames = [model.getFrameId("flange")]
     for joint in joints:
         point = pin.SE3(np.eye(3), robot.chain.translation[joint])
-        frames += [
-            model.addFrame(pin.Frame(f"point {joint}", joint, point, pin.FrameType.OP_FRAME))
-        ]
+        place = pin.Frame(f"point {joint}", joint, point, pin.FrameType.OP_FRAME)
+        frames.append(model.addFrame(place))
     data, sd = model.createData(), np.repeat([50.0, 10.0, 50.0, 50.0], 3)
     for row, found in zip(q, loads.torque, strict=True):
         J = [
@@ -320,14 +319,12 @@ def test_a_joint_is_judged_while_it_moves(wrong):
 def test_a_joint_that_seldom_moves_is_judged_by_all_samples(wrong):
     fit, dq = in_turn(*wrong, joint=0, shares=0.85, level=0.0)
     rests = np.abs(dq) < MOVES
-    np.testing.assert_array_equal(
-        guarded(fit, dq).share[0], guarded(fit, np.where(rests, 1.0, dq)).share[0]
-    )
+    moving = guarded(fit, np.where(rests, 1.0, dq))
+    np.testing.assert_array_equal(guarded(fit, dq).share[0], moving.share[0])
 
 
 def test_between_worth_it_and_not_a_part_is_used():
     """.9 of the unseen error left: all of the correction; .95: none; between in proportion."""
     share = np.array([0.3, 0.9, 0.91, 0.94, 0.95, 1.2])
-    np.testing.assert_allclose(
-        faded(share, 0.9, 0.95), [1.0, 1.0, 0.8, 0.2, 0.0, 0.0], atol=1e-12
-    )
+    expected = [1.0, 1.0, 0.8, 0.2, 0.0, 0.0]
+    np.testing.assert_allclose(faded(share, 0.9, 0.95), expected, atol=1e-12)

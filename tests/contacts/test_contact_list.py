@@ -104,9 +104,7 @@ def test_a_list_is_a_sequence_of_its_rows_and_a_table():
     found = contact_list(*rows)
     assert (len(found), found[1], list(found)) == (2, rows[1], list(rows))
     assert found.to_polars()["peak_force_N"].to_list() == [64.8, 80.0]
-    assert repr(found).startswith(
-        "<ContactList of log.csv: 2 contacts in 20 s, the hardest 80 ± 7"
-    )
+    assert repr(found).startswith("<ContactList of log.csv: 2 contacts in 20 s, the hardest 80")
     assert repr(rows[0]) == "<Contact 1, a contact: 4.60 to 4.78 s, 65 ± 7 N, wrist (good)>"
     assert repr(rows[1]).startswith("<Contact 2, a load: ")
     assert "<td>0 52 -39</td>" in found._repr_html_()

@@ -303,9 +303,8 @@ def test_pushes_whose_ends_the_models_error_hides_keep_their_size():
     assert (found.basis, len(pairs)) == ("whole log", 6)
     held = [abs(row.peak_force - true.size) < row.peak_band for row, true in pairs]
     assert np.count_nonzero(held) >= len(held) - 1
-    assert np.mean([row.peak_force / true.size for row, true in pairs]) == pytest.approx(
-        1, abs=0.05
-    )
+    ratios = [row.peak_force / push.size for row, push in pairs]
+    assert np.mean(ratios) == pytest.approx(1, abs=0.05)
 
 
 def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap():
@@ -313,9 +312,7 @@ def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap():
     whole = read(FIXTURES / "ur5_taps_ur_rtde.csv")
     slow = list_contacts(motion(part(whole, np.arange(0, whole.samples, 2)), "ur5", "0.3:4"))
     assert slow.contacts
-    assert {remark.code for row in slow.contacts for remark in row.remarks} == {
-        "peak-cut-by-rate"
-    }
+    assert {said.code for row in slow.contacts for said in row.remarks} == {"peak-cut-by-rate"}
     fast = list_contacts(motion(whole, "ur5", "0.3:4"))
     assert not {remark.code for row in fast.contacts for remark in row.remarks}
 

@@ -37,9 +37,7 @@ from vftcli.wrench.smoother import hidden_by_blocks
         (29.0, 121.0, np.nan, True),  # nothing says what free motion reads
     ],
 )
-def test_a_force_within_its_band_needs_sure_evidence_and_what_shows(
-    force, evidence, smallest, shows
-):
+def test_a_force_within_its_band_needs_evidence_and_what_shows(force, evidence, smallest, shows):
     row = contact(peak_force=force, peak_band=90.0, place_band=30.0, evidence=evidence)
     assert shows_force(row, smallest) == shows
 

@@ -22,6 +22,7 @@ from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
 
 Signals = ("q", "dq", "effort", "tau_ext")
+Effort, Speed = ("effort",), ("dq",)
 NEIGHBOURS = {"ur10e": "ur5", "ur5": "ur10e", "panda": "fr3"}
 """Arm → another profile with as many joints."""
 
@@ -167,9 +168,8 @@ def acceleration(table: Table) -> Array:
     half = max(1, round(0.025 / float(np.median(np.diff(table.t)))))
     rows = np.arange(len(table.t))
     before, after = np.maximum(rows - half, 0), np.minimum(rows + half, len(rows) - 1)
-    return np.asarray(
-        (table.dq[after] - table.dq[before]) / (table.t[after] - table.t[before])[:, None]
-    )
+    moved, passed = table.dq[after] - table.dq[before], table.t[after] - table.t[before]
+    return np.asarray(moved / passed[:, None])
 
 
 def payload(table, mass=2.8, com=(0.0, 0.0, 0.05)) -> Table:
@@ -183,9 +183,8 @@ def payload(table, mass=2.8, com=(0.0, 0.0, 0.05)) -> Table:
 
 def effort_offset(table: Table, joint: int = 3, share: float = 0.2) -> Table:
     column = table.effort[:, joint - 1]
-    return replace(
-        table, effort=edited(table.effort, joint, column + share * np.max(np.abs(column)))
-    )
+    more = share * np.max(np.abs(column))
+    return replace(table, effort=edited(table.effort, joint, column + more))
 
 
 def effort_zero(table: Table, joint: int = 5) -> Table:
@@ -307,16 +306,12 @@ FAULTS: Mapping[str, Fault] = {
     ),
     "positions_degrees_only": Fault(positions_in_degrees, ("degrees", "velocity-unit", READER)),
     "time_ms": Fault(lambda t: replace(t, t=np.round(1e3 * t.t, 3)), ("time-unit",)),
-    "effort_swapped_J2_J3": Fault(
-        partial(swapped, signals=("effort",)), ("effort-order",), (2, 3)
-    ),
+    "effort_swapped_J2_J3": Fault(partial(swapped, signals=Effort), ("effort-order",), (2, 3)),
     # On a plane circle both orders explain the same: either says which joints are swapped.
     "all_swapped_J2_J3": Fault(
         partial(swapped, signals=Signals), ("joint-order", "effort-order"), (2, 3)
     ),
-    "velocity_swapped_J2_J3": Fault(
-        partial(swapped, signals=("dq",)), ("velocity-order",), (2, 3)
-    ),
+    "velocity_swapped_J2_J3": Fault(partial(swapped, signals=Speed), ("velocity-order",), (2, 3)),
     "velocity_lag_3": Fault(partial(late, signal="dq", samples=3), ("velocity-lag",)),
     "velocity_1Hz_filtered": Fault(velocity_filtered, ("velocity-filtered",)),
     "velocity_held_8": Fault(velocity_held, ("velocity-held",)),

@@ -94,9 +94,7 @@ def test_the_log_of_another_arm_is_reported_with_its_name(name, own, beside):
         ("ur10", 2.0, "ur16e", 0.05, "unmodelled-load"),  # 2.9 kg as a UR16e, 2 kg as a UR10
     ],
 )
-def test_of_arms_that_fit_alike_one_that_carries_much_less_is_the_log_s(
-    name, load, own, beside, code
-):
+def test_of_arms_that_fit_alike_one_that_carries_much_less_is_it(name, load, own, beside, code):
     """A share of every torque that no arm explains: the right one leaves .6 to .8 of the other."""
     made = examine(with_wave(moving(name, load=load), beside), load_robot(own))
     assert [f.code for f in made.findings if f.level != "fact"] == [code]
@@ -379,9 +377,8 @@ def test_a_rough_description_is_no_exchange_of_wrist_joints():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_still_arm_is_not_checked_and_that_is_said(sign):
     q = np.repeat(MOTION.q[:1], MOTION.samples, axis=0)
-    still = replace(
-        MOTION, q=q, dq=0 * q, current=sign * gravity(UR10E, replace(MOTION, q=q)) / K
-    )
+    holding = gravity(UR10E, replace(MOTION, q=q)) / K
+    still = replace(MOTION, q=q, dq=0 * q, current=sign * holding)
     assert codes(still) == []
     (finding,) = (f for f in examine(still, UR10E).findings if f.code == "effort-unchecked")
     assert (finding.level, finding.values["least_Nm"]) == ("fact", 10.0)

@@ -54,9 +54,7 @@ def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it():
     guessed = examiner.robot(known, RobotChoice())
     assert guessed.name == "ur5e"
     assert "robot-guessed" in [remark.code for remark in guessed.remarks]
-    with pytest.raises(
-        RobotError, match=r"^Which arm\? Best fits: ur5e \(.* %\), .*\. Add --robot ur5e$"
-    ):
+    with pytest.raises(RobotError, match=r"^Which arm\? Best fits: ur5e \(.* Add --robot ur5e$"):
         examiner.robot(log, RobotChoice())
     with pytest.raises(
         RobotError,

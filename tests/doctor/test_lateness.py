@@ -36,9 +36,8 @@ def log_of(late=0.0, push=0.0, scale=1.0, *, rate=0.0, clock=T) -> Recording:
     t = clock - late - rate * clock
     angle = np.outer(t, RATES) + np.arange(6)
     x, dx, ddx = np.sin(angle), RATES * np.cos(angle), -(RATES**2) * np.sin(angle)
-    torque = torque_regressor(ARM.chain, 0.6 * x, 0.6 * dx, 0.6 * ddx) @ chain_parameters(
-        ARM.chain
-    )
+    phi = chain_parameters(ARM.chain)
+    torque = torque_regressor(ARM.chain, 0.6 * x, 0.6 * dx, 0.6 * ddx) @ phi
     torque += 4 * np.tanh(60 * dx) + 3 * dx
     torque += push * np.clip(np.sin(2 * np.pi * t / 4) - 0.6, 0, None)[:, None] / 0.4
     torque += np.random.default_rng(0).normal(0, 0.3, torque.shape)

@@ -27,9 +27,8 @@ def log(*extra: float) -> Recording:
 def with_constants(still: Recording, constant: float) -> Recording:
     """A controller that has these drive constants, by an expected ampere on every joint. [N·m/A]"""
     one = np.ones((400, 6))
-    return replace(
-        still, current=still.current + one, target_current=one, target_torque=constant * one
-    )
+    targets = {"target_current": one, "target_torque": constant * one}
+    return replace(still, current=still.current + one, **targets)
 
 
 def mismatches(still: Recording) -> list[Remark]:
@@ -208,9 +207,8 @@ def found(recording: Recording, robot: Robot = UR5E) -> dict[str, Remark]:
 
 def far(code: str, temperature: float, level: str = "warning") -> Said:
     """The sixth joint rests."""
-    return only(
-        code, 1, 2, 3, 4, 5, level=level, seen_C=pytest.approx([temperature] * 5, abs=0.2)
-    )
+    seen = pytest.approx([temperature] * 5, abs=0.2)
+    return only(code, 1, 2, 3, 4, 5, level=level, seen_C=seen)
 
 
 # s(25)/s(35) worked by hand: size 3 2.9177/2.5366, size 1 .64593/.52003

@@ -110,9 +110,8 @@ def test_an_effort_that_takes_energy_is_inverted(share, joints, code):
     said = by_work(torque=effort_of_share(share, *joints))
     assert [each[:2] for each in said] == ([(code, joints)] if code else [])
     for *_, finding in said:
-        assert finding.values["shares_percent"] == pytest.approx(
-            [100 * share] * len(joints), abs=0.2
-        )
+        shares = pytest.approx([100 * share] * len(joints), abs=0.2)
+        assert finding.values["shares_percent"] == shares
 
 
 def test_joints_that_tell_nothing_are_not_judged():

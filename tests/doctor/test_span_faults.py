@@ -81,9 +81,8 @@ def is_harmful(made: Answer, sound: Answer) -> bool:
 
 def bad_share(table: Table, sound: Table) -> float:
     """Share of a table's rows whose values or step of time differ from the sound log's."""
-    rows = np.searchsorted(
-        sound.t, np.where(np.isfinite(table.sound_t), table.sound_t, sound.t[0])
-    )
+    known = np.isfinite(table.sound_t)
+    rows = np.searchsorted(sound.t, np.where(known, table.sound_t, sound.t[0]))
     bad = ~np.isfinite(table.sound_t)
     for (_, made), (_, good) in zip(table.series(), sound.series(), strict=True):
         bad |= (made != good[rows]).any(axis=1)

@@ -111,9 +111,7 @@ def of_clock() -> Iterator[Case]:
         yield case(f"jitter of {half}", jittering(half), uneven)
     # Four in a hundred steps at either end lie outside the nine in ten, seven do not.
     for longer in (40, 70):
-        yield case(
-            f"rare jitter {longer}", rarely_jittering(longer), has_if(longer > 40, "jitter")
-        )
+        yield case(f"rarely {longer}", rarely_jittering(longer), has_if(longer > 40, "jitter"))
     # A tenth of the steps are that long: as jitter they would be reported at once.
     yield case("3.9 sample times", steps_with(100, 3.9), only("jitter"))
     yield case("4.1 sample times", steps_with(100, 4.1), only("gaps", gaps=100, steps=4.0))
@@ -258,21 +256,17 @@ def of_velocity_order() -> Iterator[Case]:
     dq = filtered(with_column(DQ, RATES[0] * np.cos(phase), 6), 0.5)
     yield changed("filtered twins", only("velocity-filtered"),
                   q=with_column(Q, np.sin(phase), 6), dq=dq)  # fmt: skip
-    yield changed(
-        "dq J2 and J4 exchanged", only("velocity-order", 2, 4), dq=DQ[:, [0, 3, 2, 1, 4, 5]]
-    )
+    exchanged = DQ[:, [0, 3, 2, 1, 4, 5]]
+    yield changed("dq J2 and J4 exchanged", only("velocity-order", 2, 4), dq=exchanged)
     yield changed("dq of three", has("velocity-order", 1, 2, 3), dq=DQ[:, [1, 2, 0, 3, 4, 5]])
     # In a plane the elbow often turns against the shoulder: own fits too, with another gain.
     q, dq = with_column(Q, -1.4 * Q[:, 1], 3), with_column(DQ, -1.4 * DQ[:, 1], 3)
-    yield changed(
-        "elbow as shoulder", only("velocity-order", 2, 3), q=q, dq=dq[:, [0, 2, 1, 3, 4, 5]]
-    )
+    exchanged = dq[:, [0, 2, 1, 3, 4, 5]]
+    yield changed("elbow as shoulder", only("velocity-order", 2, 3), q=q, dq=exchanged)
     # J6 rests; J5's velocity is its own, J6's that of J5: both are reported, neither as a size.
     q, dq = scaled(Q, 0.0, 6), scaled(DQ, 0.0, 6)[:, [0, 1, 2, 3, 5, 4]]
     frozen = "still-joint stuck-velocity stuck-position"
-    yield changed(
-        "dq for a resting joint", only("velocity-order", 5, 6, beside=frozen), q=q, dq=dq
-    )
+    yield changed("dq of a rest", only("velocity-order", 5, 6, beside=frozen), q=q, dq=dq)
     # Held for two samples, half of the steps repeat: that is the limit.
     for samples in (2, 3, 8, 20):
         share = approx([100 * (1 - 1 / samples)] * 6, abs=0.5)
@@ -326,9 +320,7 @@ def of_standing() -> Iterator[Case]:
                       torque=torque)  # fmt: skip
     # A simulated arm without noise turns about the vertical by a trapezoid of speed.
     torque = np.sign(RAMP) + 2 * np.round(np.gradient(RAMP, STEP, axis=0))
-    yield changed(
-        "a trapezoid's effort", Unsaid("stuck-effort"), q=TURNED, dq=RAMP, torque=torque
-    )
+    yield changed("a trapezoid", Unsaid("stuck-effort"), q=TURNED, dq=RAMP, torque=torque)
     rows = np.where((np.arange(4001) >= 1500) & (np.arange(4001) < 1600), 1500, np.arange(4001))
     yield changed("a late packet", Unsaid("stuck-"), q=Q[rows], dq=DQ[rows], torque=TORQUE[rows])
     # Steps of 2 N·m of a torque that goes over 9 N·m: up to a second of one value at the turns.
@@ -341,9 +333,7 @@ def of_standing() -> Iterator[Case]:
         (0.45e-3, (2, 6), only("still-joints", 2, 6, beside="no-velocity")),
         (0.45e-3, ALL, only("at-rest", beside="no-velocity", **travel)),
     ):
-        yield changed(
-            f"{joints} travel {2 * size} rad", said, q=scaled(Q, size, *joints), dq=None
-        )
+        yield changed(f"{joints} {2 * size} rad", said, q=scaled(Q, size, *joints), dq=None)
 
 
 def wave(peak: float = 1.0, low: float = -1.0, run: int = 0) -> Array:
@@ -475,9 +465,8 @@ def of_sizes() -> Iterator[Case]:
         ("lines in less than a tenth", way, effort * (EARLY < 2.0), None),
         ("lines in more than a tenth", way, effort * (EARLY < 6.0), 25.0),
     ):
-        lines = has_if(
-            rate is not None, "interpolated", rate_Hz=approx(rate), logged_Hz=approx(100.0)
-        )
+        rates = {"rate_Hz": approx(rate), "logged_Hz": approx(100.0)}
+        lines = has_if(rate is not None, "interpolated", **rates)
         yield changed(name, lines, q=q, torque=torque)
 
 

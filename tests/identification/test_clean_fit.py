@@ -165,9 +165,7 @@ def test_strict_methods_refuse_what_others_remark_on(recording, arm):
 
 
 @pytest.mark.slow
-def test_links_of_another_arm_are_reported_from_an_effort_that_no_links_explain(
-    recording, arm, data
-):
+def test_links_of_another_arm_are_told_from_an_effort_no_links_explain(recording, arm, data):
     """The same effort through a UR10e's links, and its own links under noise of 30 N·m."""
 
     def ratio(training):

@@ -92,9 +92,8 @@ def test_friction_and_rotor_come_back():
         assert values["load_coulomb"] == pytest.approx(0.08, rel=0.1)
         assert values["coulomb"] == pytest.approx(5.0, rel=0.05)
     v = np.linspace(0.1, 0.6, 6)[:, None] * np.ones(6)
-    np.testing.assert_allclose(
-        friction_torque(found.friction, v), friction_torque(true.friction, v), rtol=0.03
-    )
+    expected = friction_torque(true.friction, v)
+    np.testing.assert_allclose(friction_torque(found.friction, v), expected, rtol=0.03)
 
 
 @pytest.mark.slow
@@ -227,7 +226,7 @@ LITTLE, MISSING = IdentificationError, MissingSignalError
         (lambda: log(UR5.with_payload(HEAVY)), "friction", LITTLE, "kg on the flange .* payload"),
     ],
 )
-def test_a_log_that_tells_too_little_or_contradicts_the_robot_is_refused(
+def test_a_log_that_tells_too_little_or_contradicts_its_arm_is_refused(
     made, method, error, words
 ):
     with pytest.raises(error, match=words):
@@ -382,9 +381,8 @@ def sine_motion(prepared, sines):
 
 
 def trace(sine_motion, residual, role="held-out"):
-    return Trace(
-        sine_motion, role, residual, np.zeros_like(residual), np.zeros(sine_motion.q.shape[1])
-    )
+    nothing = np.zeros(sine_motion.q.shape[1])
+    return Trace(sine_motion, role, residual, np.zeros_like(residual), nothing)
 
 
 def test_rigid_torque_is_pinocchios_without_rotors(sine_motion):

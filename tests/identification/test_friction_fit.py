@@ -92,7 +92,7 @@ def test_candidates_are_what_the_motion_can_tell(prepared):
         (3.0, True, 1000.0, ("offset",)),  # as much of a strong joint may be a model's error
     ],
 )
-def test_what_pushes_is_no_friction_and_competes_with_none(
+def test_what_pushes_is_no_friction_nor_competes_with_any(
     prepared, pushes, reverses, limit, terms
 ):
     truth = {"coulomb": -pushes, "viscous": -pushes, "offset": 0.2 * reverses}

@@ -63,9 +63,8 @@ def codes(found):
     ("method", "train", "test"), [("friction", 1.40, 1.40), ("base", 1.30, 1.40)]
 )
 def test_ur10e_residuals_and_observer_floor(ur10e, method, train, test):
-    found = identify(
-        [ur10e("free_14harm")], load_robot("ur10e"), Task(method=method), [ur10e("free_12harm")]
-    )
+    train_log, test_log = ur10e("free_14harm"), ur10e("free_12harm")
+    found = identify([train_log], load_robot("ur10e"), Task(method=method), [test_log])
     assert [t.role for t in found.traces] == ["train", "held-out"]
     assert np.all([t.rms.mean() for t in found.traces] <= np.array([train, test]))
     assert not codes(found) & {"repeated-trajectory", "suspected-contacts"}
@@ -95,9 +94,8 @@ def test_other_free_logs_show_no_contact(ur10e, name):
 
 
 def test_ur10e_targets_are_the_controllers_own(ur10e):
-    found = identify(
-        [ur10e("jointwise_2"), ur10e("free_14harm")], load_robot("ur10e"), Task(method="targets")
-    )
+    logs = ur10e("jointwise_2"), ur10e("free_14harm")
+    found = identify(logs, load_robot("ur10e"), Task(method="targets"))
     K = found.parameters.filter(found.parameters["parameter"] == "torque_constant")
     value = K["value"].to_numpy()
     # the figures of the logs' README

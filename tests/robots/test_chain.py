@@ -106,6 +106,5 @@ def test_poses_and_jacobian_agree_with_pinocchio(name):
         # the same products in another order: rounding of numbers of order 1
         np.testing.assert_allclose(jacobian[k], J, atol=1e-13)
         np.testing.assert_allclose(poses.rotation[k, -1], flange.rotation, atol=1e-13)
-        np.testing.assert_allclose(
-            poses.translation[k], [*places, flange.translation], atol=1e-13
-        )
+        expected = [*places, flange.translation]
+        np.testing.assert_allclose(poses.translation[k], expected, atol=1e-13)

@@ -77,9 +77,8 @@ def test_a_joint_that_follows_a_locked_one_goes_with_it(tmp_path):
     followers = [
         f"{side}_joint" for side in ("left_knuckle", "left_tip", "right_knuckle", "right_tip")
     ]
-    agrees_with_pinocchio(
-        knuckled(), found, {"finger_joint": 0.3, **dict.fromkeys(followers, -0.2)}
-    )
+    angles = {"finger_joint": 0.3, **dict.fromkeys(followers, -0.2)}
+    agrees_with_pinocchio(knuckled(), found, angles)
 
 
 def test_a_joint_of_the_arm_may_be_locked(tmp_path):
@@ -127,9 +126,8 @@ def test_a_tensor_that_no_body_has_is_projected_and_its_effect_said(tmp_path):
     remark = said(found, "tensors-changed")
     assert remark.where.joints == (4,)
     assert remark.values["links"] == ["link4"]
-    np.testing.assert_allclose(
-        np.linalg.eigvalsh(found.chain.inertia[3]), [1.5e-3, 2.5e-3, 4e-3], rtol=1e-12
-    )
+    moments = np.linalg.eigvalsh(found.chain.inertia[3])
+    np.testing.assert_allclose(moments, [1.5e-3, 2.5e-3, 4e-3], rtol=1e-12)
     # What Pinocchio makes of the file as it is differs by what is said, at 1 rad/s and 2 rad/s².
     model, rng, worst = pin.buildModelFromXML(text), np.random.default_rng(5), 0.0
     for _ in range(300):
@@ -274,9 +272,7 @@ def test_a_xacro_is_expanded_with_its_arguments(tmp_path):
         (xacro("${load_yaml('../beside.yaml')}"), "name:=made", r"\./beside\.yaml, which is out"),
     ],
 )
-def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
-    text, arguments, words, tmp_path, capfd
-):
+def test_a_xacro_that_cannot_be_expanded_says_why(text, arguments, words, tmp_path, capfd):
     with pytest.raises(RobotError, match=words) as caught:
         load_robot(f"{written(tmp_path, text, 'arm.xacro')} {arguments}".strip())
     assert "\n" not in str(caught.value)
@@ -295,9 +291,7 @@ def test_a_xacro_that_never_ends_is_ended(tmp_path, monkeypatch, name):
 
 
 @pytest.mark.usefixtures("_xacro_installed")
-def test_a_maker_s_package_loads_its_tables_and_those_of_a_package_beside_it(
-    tmp_path, monkeypatch
-):
+def test_a_maker_s_package_loads_its_tables_and_those_beside_it(tmp_path, monkeypatch):
     """As UR's description does: arguments name the files, a macro of another folder loads them.
 
     A package is found by its manifest, and what it includes may declare arguments.

@@ -56,9 +56,8 @@ def put(file: Path) -> Path:
 )  # fmt: skip
 def test_a_mesh_is_found_by_its_name(tmp_path, name, place):
     for folder, package in (("some_folder", "held"), ("other", "beside")):
-        put(tmp_path / "ws" / folder / "package.xml").write_text(
-            f"<name>{package}</name>", "utf-8"
-        )
+        manifest = put(tmp_path / "ws" / folder / "package.xml")
+        manifest.write_text(f"<name>{package}</name>", "utf-8")
     (tmp_path / "ws/some_folder/urdf").mkdir()
     named = name.format(folder=tmp_path)
     put(tmp_path / (place or "ws/meshes/f.txt"))

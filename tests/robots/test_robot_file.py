@@ -167,9 +167,8 @@ def test_changed_numbers_are_written(name, tmp_path):
     said = 'made up, "quoted" \\ and so on'
     friction = JointFriction(model="coulomb-viscous-load", parameters=values, confidence=said)
     load = Payload(mass=1.25, com=np.array([0.01, 0.0, 0.05]), inertia=np.eye(3) * 1e-3)
-    changed = replace(
-        robot, chain=chain, friction=(friction,) * robot.joints, payload=load, name="mine"
-    )
+    friction = (friction,) * robot.joints
+    changed = replace(robot, chain=chain, friction=friction, payload=load, name="mine")
     read = again(changed, tmp_path)
     for key in CHAIN:
         # turned into the table's frames and back: rounding of a rotation

@@ -67,10 +67,9 @@ def test_current_becomes_torque_through_the_drive_constant():
 )
 def test_what_a_robot_s_log_lacks_is_named(robot, joints, signals, error, words):
     q = np.zeros((3, joints))
+    log = Recording(t=T, q=q, **dict.fromkeys(signals.split(), q))
     with pytest.raises(error, match=words):
-        dynamics_terms(
-            Recording(t=T, q=q, **dict.fromkeys(signals.split(), q)), load_robot(robot)
-        )
+        dynamics_terms(log, load_robot(robot))
 
 
 @pytest.mark.parametrize("size", [1, 150, 399])
@@ -87,9 +86,8 @@ def test_blocks_of_a_log_have_the_whole_log_s_terms(size):
     running = RunningTerms(robot, clock_of(t))
     for first in range(0, len(t), size):
         span = slice(first, first + size)
-        block = running.next(
-            Recording(t=t[span], q=q[span], dq=dq[span], current=np.cos(q[span]))
-        )
+        signals = {"q": q[span], "dq": dq[span], "current": np.cos(q[span])}
+        block = running.next(Recording(t=t[span], **signals))
         for name in ("p", "mu", "d", "dt"):
             np.testing.assert_array_equal(getattr(block, name), getattr(whole, name)[span])
 

@@ -213,9 +213,8 @@ def pushed(point: str, force: float = 25.0, seed: int = 3) -> Recording:
     if point == "tool":
         lever = link_poses(ROBOT.chain, q).rotation[:, -1] @ TOOL_AHEAD.tool.translation
         wrench[:, 3:] -= np.cross(lever, wrench[:, :3])
-    return Recording(
-        t=t, q=q, current=current, target_current=target, wrench=wrench, wrench_frame=CONTROLLER
-    )
+    currents = {"current": current, "target_current": target}
+    return Recording(t=t, q=q, wrench=wrench, wrench_frame=CONTROLLER, **currents)
 
 
 @pytest.mark.parametrize("seed", [3, 4, 5])

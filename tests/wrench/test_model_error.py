@@ -232,9 +232,8 @@ def test_the_filter_of_the_error_agrees_with_a_dense_solve():
     lag = np.abs(log.t[:, None] - log.t)
     covariance = 0.25 * np.exp(-lag / 0.4) + 0.01 * np.eye(40)
     # Rounding of a 40×40 solve.
-    np.testing.assert_allclose(
-        squares.sum(), log.d[:, 0] @ np.linalg.solve(covariance, log.d[:, 0]), rtol=1e-9
-    )
+    exact = log.d[:, 0] @ np.linalg.solve(covariance, log.d[:, 0])
+    np.testing.assert_allclose(squares.sum(), exact, rtol=1e-9)
 
 
 def test_a_bad_sample_is_a_spike():

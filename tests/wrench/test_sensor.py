@@ -37,9 +37,8 @@ from vftcli.wrench.solvers import VirtualSensor
 POSE = Pose(rpy_matrix((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
 UR5 = load_robot("ur5")
 T = np.arange(0.0, 20.0, 0.05)
-Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.5 * np.sin(
-    np.outer(T, [0.3, 0.5, 0.7, 0.9, 1.1, 0.4])
-)
+SWING = np.sin(np.outer(T, [0.3, 0.5, 0.7, 0.9, 1.1, 0.4]))
+Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.5 * SWING
 FLANGE = link_poses(UR5.chain, Q).rotation[:, -1]
 PHASE = np.outer(T, [0.7, 1.1, 1.3, 0.9, 1.7, 2.1]) + np.arange(1.0, 7.0)
 PUSH = np.sin(PHASE) * [20, 15, 25, 2, 2, 1.5]
@@ -85,9 +84,8 @@ def disturbance() -> ExternalTorque:
 def test_a_pose_is_found_in_the_contacts_whatever_sign_and_zero_they_are_logged_with(sign, frame):
     zero = np.array([1.0, -2.0, 3.0, 0.1, 0.0, -0.2])
     recording = log(sign * PUSH @ adjoint(inverse(POSE)).T + zero, frame)
-    mounting, remarks = find_mounting(
-        recording, UR5, disturbance(), WrenchChoice(sensor_pose=FIT)
-    )
+    fit = WrenchChoice(sensor_pose=FIT)
+    mounting, remarks = find_mounting(recording, UR5, disturbance(), fit)
     np.testing.assert_allclose(mounting.sensor.rotation, POSE.rotation, atol=1e-9)
     np.testing.assert_allclose(mounting.sensor.translation, POSE.translation, atol=1e-9)
     (remark,) = remarks

@@ -61,9 +61,8 @@ def test_a_wrench_at_the_flange_comes_back(robot):
     regular = ~found.hidden
     assert regular.sum() > 20
     # normal equations square the condition number, at most (2 m / 0.05 m)² ~ 2e3: 1e-12 of 20 N
-    np.testing.assert_allclose(
-        found.values[regular], np.tile(wrench, (regular.sum(), 1)), atol=1e-9
-    )
+    expected = np.tile(wrench, (regular.sum(), 1))
+    np.testing.assert_allclose(found.values[regular], expected, atol=1e-9)
 
 
 def test_pinv_of_seven_joints_is_numpys():
@@ -127,9 +126,8 @@ def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose):
     assert blown.sigma_min.max() < LEAST_SIGMA
     assert np.max(np.abs(held.values[:, :3])) < 4.0 * PRIOR[0]
     assert np.all(held.sd[:, :3] <= PRIOR[0] * (1 + 1e-9))
-    assert np.sqrt(np.mean(blown.values[:, :3] ** 2)) > 3 * np.sqrt(
-        np.mean(held.values[:, :3] ** 2)
-    )
+    rms = [np.sqrt(np.mean(one.values[:, :3] ** 2)) for one in (blown, held)]
+    assert rms[0] > 3 * rms[1]
 
 
 @pytest.mark.parametrize("robot", ["panda", "fr3"])
@@ -141,9 +139,8 @@ def test_a_tip_wrench_leaves_the_null_space_and_a_link_wrench_does_not(robot):
     before = null_space(parts, base[:, :, None])[:, :, 0]
     regular = parts.sigma_min > LEAST_SIGMA
     tip = base + torque_of(robot, q, np.array([30.0, -20.0, 25.0, 3.0, -2.0, 4.0]))
-    np.testing.assert_allclose(
-        null_space(parts, tip[:, :, None])[:, :, 0][regular], before[regular], atol=1e-9
-    )
+    after = null_space(parts, tip[:, :, None])[:, :, 0]
+    np.testing.assert_allclose(after[regular], before[regular], atol=1e-9)
 
     where = link_poses(chain, q)
     axes = where.rotation[:, :4, :, 2]
@@ -232,9 +229,7 @@ def test_an_answer_and_its_band_are_moved_to_the_frame_that_is_asked_for(frame):
 
 
 def test_a_frame_without_its_pose_says_how_to_give_it():
-    with pytest.raises(
-        ParameterError, match=r"no tool, so there is no Jacobian.*virtual-sensor.tool"
-    ):
+    with pytest.raises(ParameterError, match=r"no tool, so there is no .*virtual-sensor.tool"):
         VirtualSensor(frame="tool")
     with pytest.raises(ParameterError, match=r"virtual-sensor\.sensor"):
         VirtualSensor(frame="sensor")
@@ -254,9 +249,8 @@ def test_poses_are_read_as_three_or_six_numbers_or_a_name(tmp_path):
         with pytest.raises(ParameterError, match=words):
             read_pose(text, robot, "tool", "virtual-sensor.tool")
     path = tmp_path / "mine.toml"
-    path.write_text(
-        robot.path.read_text(encoding="utf-8") + "\n[tool.gripper]\nxyz = [0, 0, 0.15]\n"
-    )
+    own = "\n[tool.gripper]\nxyz = [0, 0, 0.15]\n"
+    path.write_text(robot.path.read_text(encoding="utf-8") + own)
     named = read_pose("gripper", load_robot(path), "tool", "virtual-sensor.tool")
     np.testing.assert_array_equal(named.translation, [0.0, 0.0, 0.15])
 
