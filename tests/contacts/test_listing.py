@@ -3,22 +3,25 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, UR10E, motion, true_wrench
 from contact_rows import contact
 from contact_scores import score, true_contacts
+from drawn_blocks import B, blocks
 from known_errors import shortened
 
 from vftcli.contacts.contact_list import ContactList
-from vftcli.contacts.listing import adjoining, list_contacts
+from vftcli.contacts.listing import adjoining, follows_stop, is_load, list_contacts, rests_around
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.reading import read
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.simulation import load_scenario, simulate
@@ -348,3 +351,156 @@ def test_a_row_without_a_size_belongs_to_the_one_that_it_adjoins():
     assert adjoining(runs, [hard, hard, hard]) == [[0], [1], [2]]
     assert adjoining([(10, 40), (42, 80), (80, 99)], [hard, tail, tail]) == [[0], [1, 2]]
     assert adjoining([], []) == []
+
+
+# Contacts that are a load
+
+
+def long_motion() -> Recording:
+    """An arm that moves from 2 s to 20 s, but for a rest from 8 s to 10.5 s."""
+    t = 0.01 * np.arange(2000)
+    moves = (t > 2.0) & ((t < 8.0) | (t > 10.5))
+    dq = np.where(moves, 0.3, 0.0)[:, None]
+    return Recording(t=t, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, torque=np.zeros_like(dq))
+
+
+DOWN, UP = np.array([0.0, 0.0, -27.0]), np.array([0.0, 0.0, 27.0])
+
+
+def aside(degrees: float) -> np.ndarray:
+    """A force of the size of `DOWN`, so far from it."""
+    angle = np.radians(degrees)
+    return 27.0 * np.array([np.sin(angle), 0.0, -np.cos(angle)])
+
+
+@pytest.mark.parametrize(
+    ("spans", "forces", "expected"),
+    [
+        ([], [], False),
+        ([(3.0, 19.0)], [DOWN], True),  # 16 of 18 s of motion
+        ([(3.0, 9.0), (10.0, 19.0)], [DOWN, 0.8 * DOWN], True),
+        ([(3.0, 9.0), (10.0, 19.0)], [DOWN, UP], False),  # pushes from two sides
+        # Half of the time since the first motion, 8.995 s.
+        ([(4.0, 7.0), (11.0, 16.9)], [DOWN, DOWN], False),
+        ([(4.0, 7.0), (11.0, 17.1)], [DOWN, DOWN], True),
+        # Two forces an angle apart add up to its half's cosine: .96, .94.
+        ([(3.0, 8.0), (12.0, 17.0)], [DOWN, aside(32.0)], True),
+        ([(3.0, 8.0), (12.0, 17.0)], [DOWN, aside(40.0)], False),
+        # Each counts by how long it lasts: 9.8 of 10.2, 9.2 of 10.8.
+        ([(3.0, 13.0), (18.0, 18.2)], [DOWN, UP], True),
+        ([(3.0, 13.0), (18.0, 18.8)], [DOWN, UP], False),
+        # It neither begins nor ends while the arm rests for a second on either side,
+        ([(9.02, 19.0)], [DOWN], False),
+        ([(8.98, 19.0)], [DOWN], True),
+        ([(9.48, 19.0)], [DOWN], False),
+        ([(9.52, 19.0)], [DOWN], True),
+        ([(1.2, 8.98), (11.0, 19.0)], [DOWN, DOWN], True),
+        ([(2.0, 9.1)], [DOWN], False),
+        # but within a second of an end of the log.
+        ([(0.98, 19.0)], [DOWN], True),
+    ],
+)
+def test_a_load_is_one_force_for_most_of_the_motion(spans, forces, expected):
+    rows = tuple(
+        replace(contact(), start=start, stop=stop, mean_force=force)
+        for (start, stop), force in zip(spans, forces, strict=True)
+    )
+    assert is_load(long_motion(), rows) is expected
+
+
+@pytest.mark.parametrize(("start", "is_one"), [(0.98, True), (1.02, False)])
+def test_a_push_may_begin_with_the_log(start, is_one):
+    """The arm rests until 4 s."""
+    t = 0.01 * np.arange(2000)
+    dq = np.where(t > 4.0, 0.3, 0.0)[:, None]
+    still = Recording(t=t, q=0.0 * dq, dq=dq, torque=np.zeros_like(dq))
+    row = replace(contact(), start=start, stop=19.5, mean_force=DOWN)
+    assert is_load(still, (row,)) is is_one
+
+
+# Abrupt stops, what is none, and the rest around a contact
+
+
+T = 0.01 * np.arange(400)
+
+
+def with_speed(speed: Array) -> Recording:
+    """One joint with this speed, and two at rest."""
+    dq = speed[:, None] * [1.0, 0.0, 0.0]
+    return Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, torque=np.zeros_like(dq))
+
+
+def braked(left=0.0, speed=0.3, after=2.0, again=9.0) -> Array:
+    """A joint's speed: a brake at 2 s leaves it to ring with so much; it may start again."""
+    ringing = left * np.cos(np.pi * 50.0 * T)
+    return np.where((after > T) | (again < T), speed, ringing)
+
+
+@pytest.mark.parametrize(
+    ("speed", "start", "lasts", "stops"),
+    [
+        (braked(), 1.98, 0.17, True),
+        (braked(speed=-0.3), 1.98, 0.17, True),
+        # It lasts .3 s and a block of .05 s at most.
+        (braked(), 1.98, 0.34, True),
+        (braked(), 1.98, 0.36, False),
+        # The arm moved most of the time from .25 s to .05 s before it, faster than 20 mrad/s,
+        (braked(), 2.135, 0.1, True),
+        (braked(), 2.165, 0.1, False),
+        (braked(speed=0.022), 1.98, 0.17, True),
+        (braked(speed=0.018), 1.98, 0.17, False),
+        # and rests from .12 s and a block behind its beginning to .35 s behind it.
+        (braked(), 1.835, 0.1, True),
+        (braked(), 1.815, 0.1, False),
+        (braked(again=2.335), 2.0, 0.1, False),
+        (braked(again=2.355), 2.0, 0.1, True),
+        # It may ring with 20 mrad/s, or a twentieth of its speed from .25 s before to .1 s behind.
+        (braked(0.018), 1.98, 0.17, True),
+        (braked(0.022), 1.98, 0.17, False),
+        (braked(0.028, 0.6), 1.98, 0.17, True),
+        (braked(0.032, 0.6), 1.98, 0.17, False),
+        (np.where(T < 1.725, 0.6, braked(0.028)), 1.98, 0.17, False),
+        (np.where(T < 1.745, 0.6, braked(0.028)), 1.98, 0.17, True),
+        (np.where(T < 2.075, braked(), np.where(T < 2.085, 0.6, 0.028)), 1.98, 0.17, False),
+        (np.where(T < 2.065, braked(), np.where(T < 2.075, 0.6, 0.028)), 1.98, 0.17, True),
+        # A knock on an arm that stood, an arm that goes on, and the ends of a log are none.
+        (np.where((T > 2.0) & (T < 2.1), 0.05, 0.0), 1.99, 0.16, False),
+        (np.full(400, 0.3), 1.98, 0.17, False),
+        (braked(after=3.9), 3.98, 0.01, False),
+        (braked(), -0.2, 0.2, False),
+    ],
+)
+def test_a_brief_row_where_the_arm_comes_to_rest_is_a_stop(speed, start, lasts, stops):
+    assert follows_stop(with_speed(speed), (start, start + lasts), 0.05) is stops
+
+
+def test_a_joint_that_moves_on_is_no_stop():
+    stopped = with_speed(braked())
+    both = np.column_stack([stopped.require("dq")[:, 0], np.full(400, 0.3), 0.0 * T])
+    moving = Recording(t=T, q=stopped.q, dq=both, torque=stopped.torque)
+    assert not follows_stop(moving, (1.98, 2.15), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "speed", "rests"),
+    [
+        (0.0, 9.0, 0.019, True),
+        (0.0, 9.0, -0.021, False),
+        # A twentieth of the 3 s from 1 s before the contact to 1 s behind it are 15 samples.
+        (3.0, 3.14, 0.3, True),
+        (3.0, 3.17, 0.3, False),
+        (1.8, 2.14, 0.3, True),
+        (1.8, 2.19, 0.3, False),
+        (4.86, 5.5, 0.3, True),
+        (4.81, 5.5, 0.3, False),
+    ],
+)
+def test_an_arm_rests_around_a_contact_from_3_to_4_s(start, stop, speed, rests):
+    """One joint moves from `start` to `stop`, the other never."""
+    t = 0.01 * np.arange(700)
+    moving = np.where((t >= start) & (t < stop), speed, 0.0)
+    run = SimpleNamespace(t=t, dq=np.column_stack([0.0 * t, moving]))
+    nothing = np.zeros((300, 2))
+    found = SimpleNamespace(log=SimpleNamespace(blocks=blocks(nothing, nothing)))
+    span = round(3.0 / B), round(4.0 / B)
+    assert rests_around(run, found, span) is rests
