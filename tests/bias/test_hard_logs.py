@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from known_errors import drawn_error, wrong_run
+from sound_logs import UR10E
 
 from vftcli.doctor.examination import Examiner
 from vftcli.observers import ObserverChoice
@@ -183,17 +184,14 @@ def test_a_bad_sample_is_said():
     assert [r.where.joints for r in said] == [(2,)]
 
 
-REAL = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["free_12harm", "free_14harm"])
 def test_an_hour_without_samples_stays_within_the_band(logs, name):
     """No free motion is given or repeats: the model's error comes from all of the log."""
     path = logs / "ur10e" / f"{name}.csv"
-    log = sound(path, "ur10e", REAL)[0]
+    log = sound(path, "ur10e", UR10E)[0]
     half = log.samples // 2
     later = np.where(np.arange(log.samples) < half, log.t, log.t + 3600.0)
-    ratio = changed(path, "ur10e", REAL, t=later)
+    ratio = changed(path, "ur10e", UR10E, t=later)
     far = np.abs(log.t - log.t[half]) > NEAR
     assert ratio[far].max() <= 1.0

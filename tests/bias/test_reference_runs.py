@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from sound_logs import UR10E
 
 from vftcli.analysis import Analysis
 from vftcli.bias.refine import refine
@@ -12,8 +13,6 @@ from vftcli.notebook import report
 from vftcli.observers import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, model, read, run_of
 from vftcli.simulation import load_scenario, simulate
-
-UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
 def mean_rmse(analysis: Analysis, observer: str) -> float:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from sound_logs import UR10E
 
 from vftcli.bias import AUTOMATIC, REMOVALS, RefinementChoice
 from vftcli.bias.baseline import Baseline, Baselines, baseline_of, free_reading
@@ -105,9 +106,8 @@ def test_the_band_holds_on_a_real_arm_with_planted_pushes(logs, monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "accuracy"))
     from planted_pushes import planted
 
-    columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
     robot = load_robot("ur10e")
-    pushed = planted(read(logs / "ur10e" / "free_12harm_40s.csv.gz", columns=columns), robot, 1)
+    pushed = planted(read(logs / "ur10e" / "free_12harm_40s.csv.gz", columns=UR10E), robot, 1)
     run = Run(recording=pushed.recording, robot=robot)
     base = baseline_of(FreeMotion(log=run, choice=FreeChoice(spans=((0.0, 8.0),))))
     assert base.load is None

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from known_errors import STEP, drawn_error, motion, shortened, ur10e, wrong_run
+from sound_logs import UR10E
 
 from vftcli.bias.model_error import smooth_motion, usual_friction
 from vftcli.bias.whole_log import stride_of, whole_log_bias
@@ -249,8 +250,7 @@ def test_real_pushes_come_out_better(logs):
     from vftcli.robots.run import RunSamples
 
     path = logs / "ur10e" / "free_12harm.csv"
-    columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
-    made = planted(Library([path]).open(path, ReadChoice.parsed(columns=columns)), ur10e(), 1)
+    made = planted(Library([path]).open(path, ReadChoice.parsed(columns=UR10E)), ur10e(), 1)
     run = Run(recording=made.recording, robot=ur10e())
     free = run.recording.t <= 8.0
     errors = []

@@ -13,9 +13,6 @@ from vftcli.signals.arrays import Array
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
-UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
-"""Columns of the UR10e logs."""
-
 
 def motion(recording, robot, free=None, run=None) -> FreeMotion:
     """A log with what is known of its free motion: a span of its own, or another log."""

@@ -7,11 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from contact_logs import FIXTURES, UR10E, motion, true_wrench
+from contact_logs import FIXTURES, motion, true_wrench
 from contact_rows import contact
 from contact_scores import score, true_contacts
 from drawn_blocks import B, blocks
 from known_errors import shortened
+from sound_logs import PRESS, UR10E
 
 from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.listing import adjoining, follows_stop, is_load, list_contacts, rests_around
@@ -323,8 +324,7 @@ def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap():
 @pytest.mark.parametrize("name", ["press_1", "press_4"])
 def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs, name):
     """Pressed for most of the log, with free motion before and behind."""
-    columns = "t=t,q=q{i},dq=dq{i},tau=tau{i},tau_ext=tau_ext{i}"
-    recording = read(logs / "panda_press" / f"{name}.csv.gz", columns=columns)
+    recording = read(logs / "panda_press" / f"{name}.csv.gz", columns=PRESS)
     (row,) = list_contacts(motion(recording, "panda")).contacts
     assert not row.is_load
 

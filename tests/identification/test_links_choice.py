@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sound_logs import BULLET
 
 from vftcli.evaluation.errors import rmse
 from vftcli.identification import Task
@@ -19,7 +20,6 @@ from vftcli.robots.terms import dynamics_terms
 pytestmark = pytest.mark.slow
 
 UR5 = load_robot("ur5")
-BULLET = "t=t,q=q{i},dq=dq{i},-tau=tau{i}"
 
 
 def with_other_links(recording, sines, share):

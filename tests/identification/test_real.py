@@ -5,6 +5,7 @@ Scored from the first to the last sample that moves, 8 Hz zero-phase on the log'
 
 import numpy as np
 import pytest
+from sound_logs import FR3, UR10E, panda_exciting
 
 from vftcli.identification import Task
 from vftcli.identification.fitting import REPEATED, identify, repeated_share
@@ -15,9 +16,6 @@ from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import root_mean_squares
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.recording import Recording
-
-COLUMNS = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +25,7 @@ def ur10e(logs):
 
     def open_log(name):
         if name not in kept:
-            kept[name] = read(logs / "ur10e" / f"{name}.csv", columns=COLUMNS)
+            kept[name] = read(logs / "ur10e" / f"{name}.csv", columns=UR10E)
         return kept[name]
 
     return open_log
@@ -36,16 +34,10 @@ def ur10e(logs):
 @pytest.fixture(scope="module")
 def panda(logs):
     """The exciting trajectory, its repeated rows dropped: first and second half."""
-    folder = logs / "panda_exciting"
-    t = np.loadtxt(folder / "exciting_traj_time.txt")
-    q, dq, torque = (
-        np.loadtxt(folder / f"exciting_traj_{name}.txt").reshape(-1, 7)
-        for name in ("positions", "velocity", "torques")
-    )
-    new = np.r_[True, np.any(np.diff(np.hstack([q, dq]), axis=0) != 0, axis=1)]
-    recording = Recording(t=t[new], q=q[new], dq=dq[new], torque=torque[new])
-    half = 0.5 * recording.t[-1]
-    return recording.between(0.0, half), recording.between(half, recording.t[-1])
+    log = panda_exciting(logs / "panda_exciting")
+    repeated = np.r_[False, np.all(np.diff(np.hstack([log.q, log.dq]), axis=0) == 0, axis=1)]
+    log = log.without(repeated)
+    return log.between(0.0, 0.5 * log.t[-1]), log.between(0.5 * log.t[-1], log.t[-1])
 
 
 def left(recording, robot):
@@ -148,7 +140,7 @@ def test_ur10e_payload_of_one_motion(ur10e):
 
 @pytest.mark.parametrize("name", ["run_a", "run_b"])
 def test_fr3_hand_of_one_motion(logs, name):
-    log = read(logs / "fr3" / f"{name}.npy", columns="t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13")
+    log = read(logs / "fr3" / f"{name}.npy", columns=FR3)
     found = identify([log], load_robot("fr3"), Task(method="payload"))
     (mass, sd), (z, z_sd) = weighed(found)
     # Franka's hand: .73 kg, its centre .03 m before the flange (Franka's FCI documentation)
@@ -173,7 +165,7 @@ def test_presliding_halves_what_an_observer_reads_on_other_days(ur10e, logs):
         "free_10harm.csv.gz": (0.66, 1.21),
     }
     for name, limits in required.items():
-        recording = read(logs / "ur10e" / name, columns=COLUMNS)
+        recording = read(logs / "ur10e" / name, columns=UR10E)
         assert np.all(window_floor(recording, found) <= np.array(limits)), name
     assert all(friction.parameters["presliding"] > 0 for friction in found.friction)
 
@@ -182,7 +174,7 @@ RIGHT = {
     "ur10_link4/link4.csv.gz": ("t,q:6,dq:6,current:6,_:6", "ur10e"),
     "mujoco_ur5e/circle.csv": (None, "mujoco_ur5e/robot.toml"),
     "libfranka_sim/pushes.csv.gz": (None, "libfranka_sim/robot.toml"),
-    "fr3/run_a.npy": ("t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13", "fr3"),
+    "fr3/run_a.npy": (FR3, "fr3"),
 }
 """Logs of arms whose gravity hardly varies, is rubbed over or pushed, and their right robots."""
 

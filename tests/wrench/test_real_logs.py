@@ -3,12 +3,12 @@
 import numpy as np
 import polars as pl
 import pytest
+from sound_logs import UR10E
 
 from vftcli.notebook import report
 from vftcli.wrench.sensor import DERIVED, fit_axes
 from vftcli.wrench.solvers import wrench_of
 
-UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 MUJOCO = "t=time,q=q{i},dq=qd{i},tau=tau{i},tau_ext=tau_ext{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz"
 
 

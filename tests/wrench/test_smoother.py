@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 from drawn_blocks import blocks, noise
 from made_runs import run_of
+from sound_logs import UR10E
 
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import Library
@@ -39,7 +40,6 @@ from vftcli.wrench.smoother import (
 from vftcli.wrench.solvers import LEAST_SIGMA, decompose
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
-UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 STEP = 0.01
 
 
