@@ -4,15 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_runs import analyse_log, run_of
+from made_runs import run_of
 
-from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
-from vftcli.observers import MomentumObserver, ObserverChoice
-from vftcli.pipeline import AnalysisChoice, prepared, read
-from vftcli.readers.reader import ReadChoice
+from vftcli.notebook import report
+from vftcli.observers import MomentumObserver
 from vftcli.readers.reading import read as read_file
-from vftcli.robots import RobotChoice, load_robot
+from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.run import Run, RunSamples
@@ -20,7 +18,7 @@ from vftcli.signals.arrays import resample_columns
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.wrench import WrenchChoice, ZeroChoice
+from vftcli.wrench import WrenchChoice
 from vftcli.wrench.sensing import (
     HALF,
     FreeLog,
@@ -42,35 +40,24 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 
 CIRCLE = "ur5_circle.csv"
-FIRST_SECONDS = {"interval": (0.0, 8.0), "free": ["0.3:4"]}
+FIRST_SECONDS = {"interval": "0:8", "free": "0.3:4"}
+SMOOTHED = {"virtual-sensor.solver": "smoother"}
 
 
-def asked(log, *names, interval=None, free=(), **wrench) -> AnalysisChoice:
-    return AnalysisChoice(
-        read=ReadChoice(interval=interval),
-        robot=RobotChoice(name="ur5" if log.startswith("ur5") else "panda"),
-        observers=ObserverChoice(names=names),
-        free=FreeChoice.parsed(free=free),
-        wrench=WrenchChoice(**wrench),
-    )
-
-
-def reading(log, *names, **choice) -> SensorReading:
-    sensed = analyse_log(FIXTURES / log, asked(log, *names, **choice)).virtual_sensor
+def reading(log, *names, frame="flange", **asked) -> SensorReading:
+    """What the virtual sensor of a UR5 reads by some observers."""
+    sensed = report(FIXTURES / log, "ur5", observer=names, frame=frame, **asked).virtual_sensor
     assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
     return sensed
-
-
-START = ZeroChoice(start=True)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", ["base", "flange"])
 def test_neither_order_nor_company_nor_frame_moves_the_zero(frame):
-    alone = reading("ur5_sensor.parquet", "gmo", zero=START, frame=frame)
+    alone = reading("ur5_sensor.parquet", "gmo", zero="start", frame=frame)
     orders = [("gmo", "fdo", "kfo-fe"), ("kfo-fe", "fdo", "gmo")]
     for names in orders:
-        found = reading("ur5_sensor.parquet", *names, zero=START, frame=frame)
+        found = reading("ur5_sensor.parquet", *names, zero="start", frame=frame)
         assert found.zero_span == alone.zero_span
         ours, theirs = (
             [remark for remark in each.remarks if remark.code.startswith("log-wrench")]
@@ -82,14 +69,13 @@ def test_neither_order_nor_company_nor_frame_moves_the_zero(frame):
         np.testing.assert_array_equal(same.values, alone.wrenches[0].values)
         known = ~found.masked
         np.testing.assert_array_equal(same.sd[known], alone.wrenches[0].sd[known])
-    base = reading("ur5_sensor.parquet", "gmo", zero=START, frame="base")
+    base = reading("ur5_sensor.parquet", "gmo", zero="start", frame="base")
     assert base.zero_span == alone.zero_span
 
 
 @pytest.mark.slow
 def test_further_spans_show_the_drift_and_only_the_first_is_removed():
-    zero = ZeroChoice(spans=((1.0, 2.0), (2.5, 3.5)))
-    found = reading(CIRCLE, "gmo", "fdo", zero=zero, frame="base")
+    found = reading(CIRCLE, "gmo", "fdo", zero=("1:2", "2.5:3.5"), frame="base")
     assert [(d.name, d.span[0], d.removed) for d in found.drifts] == [
         ("gmo", 1.0, True), ("fdo", 1.0, True), ("gmo", 2.5, False), ("fdo", 2.5, False),
     ]  # fmt: skip
@@ -107,7 +93,7 @@ def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded():
     assert found.drifts == ()
     assert found.zero_span is None
     assert ("pose-hides-wrench" in {r.code for r in found.remarks}) == found.masked.any()
-    zeroed = reading(CIRCLE, "gmo", zero=START)
+    zeroed = reading(CIRCLE, "gmo", zero="start")
     np.testing.assert_array_equal(found.free, zeroed.free)
     assert found.free.any()
 
@@ -116,11 +102,11 @@ def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded():
 @pytest.mark.parametrize(
     ("choice", "code"),
     [
-        ({"torque_sd": "0.5"}, "band-given"),
-        ({"torque_sd": "own"}, "no-covariance"),
-        ({"zero": START}, "band-from-free-part"),
+        ({"settings": {"virtual-sensor.torque-sd": "0.5"}}, "band-given"),
+        ({"settings": {"virtual-sensor.torque-sd": "own"}}, "no-covariance"),
+        ({"zero": "start"}, "band-from-free-part"),
         ({}, "no-wrench-band"),
-        ({"solver": "map"}, "no-wrench-band"),
+        ({"settings": {"virtual-sensor.solver": "map"}}, "no-wrench-band"),
     ],
 )
 def test_the_band_says_where_it_comes_from(choice, code):
@@ -129,7 +115,7 @@ def test_the_band_says_where_it_comes_from(choice, code):
 
 
 def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed():
-    found = reading(CIRCLE, "best", "gmo", "fdo", interval=(0.0, 2.0))
+    found = reading(CIRCLE, "best", "gmo", "fdo", interval="0:2")
     (unknown,) = [remark for remark in found.remarks if remark.code == "no-wrench-band"]
     assert unknown.where.about == "gmo, fdo"
     assert found.wrenches[0].sd is not None
@@ -161,14 +147,12 @@ def test_samples_that_a_pose_hides_are_counted_with_the_smallest_singular_value(
 @pytest.fixture(scope="module")
 def motion() -> FreeMotion:
     """8 s of the circle, free until 4 s."""
-    choice = asked(CIRCLE, "gmo", **FIRST_SECONDS)
-    recording = choice.library.open(FIXTURES / CIRCLE, choice.read)
-    return read(prepared(recording, choice), choice)
+    return report(FIXTURES / CIRCLE, "ur5", observer="gmo", **FIRST_SECONDS).motion
 
 
 @pytest.mark.slow
 def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion):
-    sensed = reading(CIRCLE, "gmo", "fdo", solver="smoother", frame="base", **FIRST_SECONDS)
+    sensed = reading(CIRCLE, "gmo", "fdo", frame="base", settings=SMOOTHED, **FIRST_SECONDS)
     assert sensed.solver == "smoother"
     log, (piece,) = motion.log, motion.part.pieces
     values, covariance = smooth_wrench(log, [piece]).at(log.t)
@@ -196,8 +180,7 @@ def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion):
 
 @pytest.mark.slow
 def test_a_zero_takes_its_mean_off_the_smoothed_wrench_too():
-    zero = ZeroChoice(spans=((0.3, 4.0),))
-    sensed = reading(CIRCLE, "gmo", solver="smoother", zero=zero, **FIRST_SECONDS)
+    sensed = reading(CIRCLE, "gmo", zero="0.3:4", settings=SMOOTHED, **FIRST_SECONDS)
     (wrench,) = sensed.wrenches
     np.testing.assert_allclose(wrench.values[sensed.free].mean(axis=0), 0.0, atol=1e-9)
 
@@ -325,7 +308,7 @@ def test_a_free_part_measures_the_spread_about_its_mean(moves):
 @pytest.mark.slow
 def test_two_observers_of_one_response_have_one_band():
     """FE and ZOH read nearly the same and get nearly the same error, whatever P₂₂ each has."""
-    found = reading(CIRCLE, "kfo-fe", "kfo-zoh", zero=START)
+    found = reading(CIRCLE, "kfo-fe", "kfo-zoh", zero="start")
     one, other = (wrench.sd[~wrench.hidden] for wrench in found.wrenches)
     np.testing.assert_allclose(one, other, rtol=0.02)
 
