@@ -44,6 +44,20 @@ def test_an_entry_with_pushes_is_two_logs(tmp_path: Path) -> None:
     assert dict(pushed.options) == {"robot": "ur5", "columns": "t,q:6"}
 
 
+def test_an_entry_has_the_keys_of_its_arm_and_its_own_go_before(tmp_path: Path) -> None:
+    arm = '[[arm]]\nname = "UR5"\nrobot = "ur5"\nlicence = "MIT"\nfree = ["0:0.1"]\n'
+    theirs, own = made(
+        tmp_path, arm + ENTRY + other("b", "tuesday") + 'licence = "GPL-3.0"\n'
+    ).logs
+    assert (dict(theirs.options), theirs.free, theirs.licence) == (
+        {"robot": "ur5"},
+        ("0:0.1",),
+        "MIT",
+    )
+    assert theirs.protocols == ("alone", "free")
+    assert (dict(own.options), own.licence) == ({"robot": "ur5"}, "GPL-3.0")
+
+
 @pytest.mark.parametrize("name", ["sim", "field"])
 def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
     manifest = load_manifest(name, tmp_path)
@@ -61,6 +75,11 @@ def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
     [
         ("", "no [[log]]"),
         ("[[logs]]\n", "Did you mean log?"),
+        ("[log]\n", "log is not a list of tables; write [[log]]"),
+        ("log = [3]\n", "log is not a list of tables; write [[log]]"),
+        (ENTRY + '[[arm]]\nname = "UR3"\n', "no log of arm 'UR3'; there is UR5"),
+        (ENTRY + '[[arm]]\nrobot = "ur3"\n', "no log of arm ''; there is UR5"),
+        (ENTRY + '[[arm]]\nname = "UR5"\nfole = 3\n', "log a.fole"),
         (ENTRY.replace("free", "guess"), "truth 'guess'"),
         (ENTRY + "fole = 3\n", "log a.fole"),
         (ENTRY + 'scenario = "ur5-circle"\n', "one of file, parts, scenario"),

@@ -1,7 +1,7 @@
 """A benchmark's manifest: logs with truth, their scoring, and training data.
 
-One entry is one log. It may have options of `vftcli estimate`, in the same words. No log
-comes with the package and none is downloaded.
+One entry is one log, and may leave to its arm what the arm's logs share. It may have options
+of `vftcli estimate`, in the same words. No log comes with the package and none is downloaded.
 """
 
 import re
@@ -274,13 +274,23 @@ def load_manifest(name: str, data: Path | None) -> Manifest:
     elif path.suffix != ".toml":
         check_known(name, (*BUILT_IN, "speed"), f"no FILE.toml and no benchmark {name!r}")
     tables = toml_file(path, "a manifest")
-    for key in tables:
-        check_known(key, ("log", "robot"), f"{path}: no table {key!r}")
+    for key, rows in tables.items():
+        check_known(key, ("log", "arm", "robot"), f"{path}: no table {key!r}")
+        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+            raise ParameterError(f"{path}: {key} is not a list of tables; write [[{key}]]")
     data = data or (Path() if name in BUILT_IN else path.parent)
-    logs = tuple(log for table in tables.get("log", ()) for log in logs_of(table, data))
-    robots = [section_from(TrainedRobot, table, "robot") for table in tables.get("robot", ())]
+    entries, robots = tables.get("log", []), tables.get("robot", [])
+    arms = [str(entry.get("arm")) for entry in entries]
+    shared = {str(row.pop("name", "")): row for row in tables.get("arm", [])}
+    for arm in shared:
+        check_known(arm, dict.fromkeys(arms), f"{path}: no log of arm {arm!r}")
+    whole = (shared.get(arm, {}) | entry for arm, entry in zip(arms, entries, strict=True))
+    fits = (section_from(TrainedRobot, row, "robot") for row in robots)
     return Manifest(
-        path=path, data=data, logs=logs, robots={robot.name: robot for robot in robots}
+        path=path,
+        data=data,
+        logs=tuple(log for entry in whole for log in logs_of(entry, data)),
+        robots={fit.name: fit for fit in fits},
     )
 
 
