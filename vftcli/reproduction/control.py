@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,17 @@ from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, Given
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
 
-#: Variant → how the sensor's Kalman filter reads R and Q.
-CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
+#: Variant → the observers' options.
+VARIANTS: dict[str, dict[str, Any]] = {
+    AS_PRINTED: {"as_printed": True},
+    CORRECTED: {},
+    DENSITY: {"settings": {"kfo.noise_convention": "density"}},
+}
+#: Variant → the observer of the paper's virtual sensor.
+OBSERVERS = {
+    variant: ObserverChoice.parsed(observer=["kfo-fe"], **words)
+    for variant, words in VARIANTS.items()
+}
 #: Variant → its name with a traditional controller under the whole force.
 UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
 #: Axes of force and displacement, of moment and rotation.
@@ -34,8 +44,14 @@ def closed_loop(
     seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
 ) -> Iterator[Given]:
     """Latencies of a controller in the loop; its force replayed with every α."""
-    for variant in CONVENTIONS:
-        run, found = looped(scenario, variant, alphas, seed)
+    for variant, observers in OBSERVERS.items():
+        control = ControlChoice(as_printed=variant == AS_PRINTED)
+        run, arm = loop_of(scenario, control, observers, seed=seed)
+        if not run.stable:
+            raise UnstableError(f"{scenario}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
+        # One force enters every controller.
+        laws = replace(control, alphas=tuple(alphas)).controllers(arm)
+        found = replay(run.wrench, run.q, arm, laws, source=fact("force-of-loop"))
         held = latencies(run)[:CONTACTS]
         forces = all(one.axis < 3 for one in held)
         dragged, other = (FORCE, MOMENT) if forces else (MOMENT, FORCE)
@@ -52,22 +68,6 @@ def closed_loop(
         if variant == CORRECTED:
             yield "", figures[0], loop_chart(run, found, dragged)
             yield "", figures[1], deviation_chart(found, dragged)
-
-
-def looped(
-    name: str, variant: str, alphas: Sequence[float], seed: int
-) -> tuple[ClosedLoop, Replay]:
-    """A scenario with Table III's controller in the loop, and force replays."""
-    control = ControlChoice(as_printed=variant == AS_PRINTED)
-    observers = ObserverChoice.parsed(
-        observer=["kfo-fe"], settings={"kfo.noise_convention": CONVENTIONS[variant]}
-    )
-    run, arm = loop_of(name, control, observers, seed=seed)
-    if not run.stable:
-        raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
-    # One force enters every controller.
-    laws = replace(control, alphas=tuple(alphas)).controllers(arm)
-    return run, replay(run.wrench, run.q, arm, laws, source=fact("force-of-loop"))
 
 
 def ungated(found: Replay) -> Replay:

@@ -20,8 +20,8 @@ from vftcli.observers.table import PAPER
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
-from vftcli.reproduction.control import deviation_chart
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, Given
+from vftcli.reproduction.control import OBSERVERS, VARIANTS, deviation_chart
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, FLOOR, Given
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array, Mask, rms_of_known
@@ -32,18 +32,6 @@ from vftcli.simulation import load_scenario, simulate
 from vftcli.wrench import WrenchChoice, ZeroChoice
 from vftcli.wrench.solvers import VirtualSensor
 
-#: Variant → its observers; the last has all at FDO's 10 rad/s.
-VARIANTS: dict[str, dict[str, Any]] = {
-    AS_PRINTED: {"as_printed": True},
-    CORRECTED: {},
-    DENSITY: {"settings": {"kfo.noise_convention": "density"}},
-    "at 1.59 Hz": {"gains": "bandwidth=1.59"},
-}
-#: Variant → the observer of the paper's virtual sensor.
-OBSERVERS = {
-    variant: ObserverChoice.parsed(observer=["kfo-fe"], **VARIANTS[variant])
-    for variant in (AS_PRINTED, CORRECTED, DENSITY)
-}
 UNTOUCHED = 0.5  #: The arm is untouched below this true flange force. [N]
 STEP_TIME = 3.0  #: Length of the step for response times. [s]
 REACHED = 0.9  #: A step is seen from this share on.
@@ -228,7 +216,8 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> Iterator[Given]
     free = FreeChoice(period=period, alignment="period", low_pass=None)
     reference, robot = ReferenceChoice(name="two-cycle"), load_robot("ur5")
     choice = AnalysisChoice(contacts=False, free=free, reference=reference)
-    for variant, chosen in VARIANTS.items():
+    # The last has all at FDO's 10 rad/s.
+    for variant, chosen in {**VARIANTS, "at 1.59 Hz": {"gains": "bandwidth=1.59"}}.items():
         observers = ObserverChoice.parsed(observer=PAPER, **chosen)
         choice = replace(choice, observers=observers)
         made = analyse(run_of(recording, robot, choice), choice)

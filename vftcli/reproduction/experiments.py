@@ -200,15 +200,14 @@ def wrapped(text: str) -> GridCell:
     return GridCell(text, html=f'<div class="words">{escape(text)}</div>')
 
 
-def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
+def seeds_line(jobs: Sequence[Job]) -> tuple[str, ...]:
     """Experiments and their seeds."""
     seeds: dict[str, list[int]] = {}
     for job in jobs:
-        seeds.setdefault(job.experiment.name, []).append(job.seed)
+        seeds.setdefault(job.experiment.title, []).append(job.seed)
     return tuple(
-        paper.experiments[name].title
-        + (f": seed{'s' * (len(own) > 1)} {', '.join(map(str, own))}" if own != [0] else "")
-        for name, own in seeds.items()
+        title + (f": seed{'s' * (len(own) > 1)} {', '.join(map(str, own))}" if own != [0] else "")
+        for title, own in seeds.items()
     )
 
 
@@ -223,7 +222,7 @@ def render_page(paper: Paper, found: Mapping[str, PaperItem], jobs: Sequence[Job
         ratios=RATIOS,
         found=found,
         item_grid=item_grid,
-        seeds=seeds_line(jobs, paper),
+        seeds=seeds_line(jobs),
     )
 
 
@@ -246,7 +245,7 @@ def render_markdown(
         if item.lines:
             parts.append(markdown(item_grid(item)))
     parts.append("## What was run\n")
-    parts.append("".join(f"- {line}\n" for line in seeds_line(jobs, paper)))
+    parts.append("".join(f"- {line}\n" for line in seeds_line(jobs)))
     return "\n".join(parts)
 
 

@@ -63,8 +63,9 @@ class PaperItem:
 
     label: str  #: Its name in the paper.
     title: str
-    why: str  #: Why ours differs, or why nothing can be compared, in a sentence.
-    verdict: str  #: Whether it is reproduced, in a few words.
+    #: Why ours differs, or why nothing can be compared, in a sentence.
+    why: str = "Photographs."
+    verdict: str = "a picture"  #: Whether it is reproduced, in a few words.
     experiments: Sequence[str] = ()  #: Those that it shows; none for a picture.
     lines: Sequence[PrintedLine] = ()
     #: Columns of ours between the print and the floor.

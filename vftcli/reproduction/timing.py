@@ -144,23 +144,21 @@ def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
         median_times(work, 1)  # of their first calls
         total = median_times(work, rounds)
 
-    def row(name: str) -> dict[str, float]:
-        return {"total_s": total[name], "per_sample_us": total[name] / samples * 1e6}
-
+    rows = {
+        name: {"total_s": seconds, "per_sample_us": seconds / samples * 1e6}
+        for name, seconds in total.items()
+    }
+    complete = [name for name in ("spectra", *LOOKING_BACK, SMOOTHER) if name in rows]
     return {
         "simd": simd(),
         "robot": robot.name,
         "samples": samples,
         "rounds": rounds,
         "observers": [
-            {"name": name, **row(name), "paper_s": PRINTED[f"seconds/{name}"]} for name in PAPER
+            {"name": name, **rows[name], "paper_s": PRINTED[f"seconds/{name}"]} for name in PAPER
         ],
-        "complete_log": [
-            {"name": name, **row(name)}
-            for name in ("spectra", *LOOKING_BACK, SMOOTHER)
-            if name in total
-        ],
-        "dynamics": row("dynamics"),
+        "complete_log": [{"name": name, **rows[name]} for name in complete],
+        "dynamics": rows["dynamics"],
         "ratios": {name: total[name] / total[RNEA] for name in cores},
     }
 
