@@ -273,7 +273,7 @@ ROWS = [
 WITHOUT_ROW: dict[str, tuple[str, ...]] = {
     "names only the option that is wrong, or the words it takes": (
         "no such admittance parameter. Sections", "--release … is not …", "--only names nothing",
-        "rad; it must be less than π", "holds no sample of the log",
+        "rad; it must be less than 10 m and π", "holds no sample of the log",
         "is not a positive number of false alarms per hour",
         "--gains … is not …, a positive number",
         "--set … is not …", "recording.detail=… is none of",

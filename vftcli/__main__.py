@@ -1,5 +1,10 @@
-"""``python -m vftcli``: the command line without its script on the path."""
+"""``vftcli`` in a shell and ``python -m vftcli``: an interrupt is no traceback while it loads."""
 
-from vftcli.cli import launch
+import signal
+from importlib import import_module
 
-launch()
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+launch = import_module("vftcli.cli").launch
+if __name__ == "__main__":
+    launch()

@@ -244,7 +244,9 @@ def force_of(
         return replay.stored_force(*of, stored)
     reading = analyse(log, choice).virtual_sensor
     assert reading is not None, "a wrench was asked for"
-    return replay.observed_force(reading)
+    wrench = replace(reading.wrenches[0], remarks=reading.remarks)
+    code = "force-smoothed" if wrench.name in reading.smoothed else "force-of-observer"
+    return replay.DrivingForce(wrench, fact(code, observer=wrench.name))
 
 
 def looped(

@@ -401,5 +401,7 @@ def test_release_deviation() -> None:
         with pytest.raises(ParameterError, match=f"axis of {', '.join(AXES)}"):
             release_deviation([text])
     np.testing.assert_array_equal(release_deviation(["rx=3.14"])[3], 3.14)
-    with pytest.raises(ParameterError, match="turns by 4 rad; it must be less than π"):
+    with pytest.raises(ParameterError, match="turns by 4 rad; it must be less than 10 m and π"):
         release_deviation(["rx=2.4,ry=-3.2"])
+    with pytest.raises(ParameterError, match="moves by 9e"):
+        release_deviation(["x=9e9"])

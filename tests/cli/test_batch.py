@@ -146,8 +146,8 @@ def test_what_describes_logs_is_passed_over_and_said_once(run, folder, tmp_path:
         shutil.copy(described, folder / name)
     (folder / "a" / "log.csv.scenario.toml").write_text("seed = 1\n")
     names = "log.csv.scenario.toml, meta.json, meta.json and 2 more"
-    for place, said in ((folder, f"5 files are not logs: {names}"),
-                        (folder / "b", "1 file is not a log: meta.json")):  # fmt: skip
+    for place, said in ((folder, f"left out, not a log: {names}"),
+                        (folder / "b", "left out, not a log: meta.json")):  # fmt: skip
         code, _, err = run("batch", place, *HERE, "-o", tmp_path / f"{place.name}-out")
         assert code == 0
         assert err.count("not logs") + err.count("not a log") == 1

@@ -130,6 +130,11 @@ def test_free_runs_are_examined_too_and_reported_by_name(turned: str, refused) -
     assert "turned.csv: effort-sign" in refused("estimate", CIRCLE, *UR5, *words)
 
 
+def test_an_error_after_the_examination_is_one_line(refused) -> None:
+    words = ("--observer", "gmo", "--free", "100:200", "-o", "out")
+    assert "holds 0 of its" in refused("estimate", CIRCLE, *UR5, *words)
+
+
 def test_inspect_examines_the_users_own_arm(turned: str, run) -> None:
     code, out, _ = run("inspect", turned, *UR5, "--json")
     assert code == 0

@@ -97,6 +97,24 @@ def test_without_streams_the_files_are_written(tmp_path: Path) -> None:
     assert (tmp_path / "x.csv").read_text(encoding="utf-8").startswith("t,")
 
 
+def test_an_interrupt_while_the_program_loads_is_no_traceback() -> None:
+    script = (
+        "import os, runpy, signal, sys\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'vftcli.cli':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "runpy.run_module('vftcli', run_name='__main__')\n"
+    )
+    done = launched("--version", begin=("-c", script))
+    assert (done.returncode, done.stdout, done.stderr) == (
+        -signal.SIGINT,
+        "",
+        "",
+    )  # 130 in a shell
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: int) -> None:
@@ -266,7 +284,7 @@ def logs(tmp_path: Path) -> tuple[Path, Path]:
 def test_a_report_writes_the_others_and_fails(logs, tmp_path: Path, run) -> None:
     out = tmp_path / "out"
     code, stdout, err = run("report", *logs, "--robot", "ur5", "-o", out)
-    assert code == 1
+    assert code == 3
     assert "error: bad.csv left out: " in err
     assert err.count("error: ") == 1
     assert (out / "good" / "index.html").exists()
@@ -280,10 +298,10 @@ def test_a_report_writes_the_others_and_fails(logs, tmp_path: Path, run) -> None
 def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run) -> None:
     words = (*logs, "--robot", "ur5")
     code, out, _ = run("contacts", *words, "--json")
-    assert code == 1
+    assert code == 3
     assert [record["recording"] for record in json.loads(out)["logs"]] == ["good.csv"]
     code, out, _ = run("compare", *words, "--observer", "gmo", "--reference", OF_TAPS, "--csv")
-    assert code == 1
+    assert code == 3
     rows = csv.DictReader(io.StringIO(out))
     assert {row["recording"] for row in rows} == {"good.csv"}
 

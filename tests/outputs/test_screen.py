@@ -295,7 +295,8 @@ def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
     assert np.isclose(force[(t >= 1.0) & (t <= 1.5)].max(), 30.0, rtol=0.05)  # between samples
     assert np.isclose(force[(t >= 2.0) & (t <= 2.2)].max(), 12.0, rtol=0.1)
     assert not force[(t < 1.0) | (t > 2.2) | ((t > 1.5) & (t < 2.0))].any()
-    for found in (None, contact_list()):
+    unknown = replace(rows[0], peak_band=40.0)  # which the list calls unknown: no bar
+    for found in (None, contact_list(), contact_list(unknown)):
         assert "┤" not in log_screen(replace(without_reference, contacts=found), Canvas())
 
 

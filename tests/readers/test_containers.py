@@ -74,13 +74,13 @@ def test_a_square_log_is_not_turned(path):
     np.testing.assert_array_equal(read(path).q, q)
 
 
-def test_a_signal_of_neither_length_is_not_turned(path):
-    """49 samples of six joints beside 50 times are refused; turned they would be left out."""
+@pytest.mark.parametrize("shape", [(49, 6), (6, 49), (6, 7)])
+def test_a_signal_of_neither_length_is_refused_by_name(path, shape):
+    """As columns it would be of another width than q, and left out without a word."""
+    held = {"t": motion()["t"][:50], "q": np.zeros((6, 50)), "gains": np.eye(4)}
     with path.open("wb") as file:
-        savemat(
-            file, {"t": motion()["t"][:50], "q": np.zeros((6, 50)), "current": np.ones((49, 6))}
-        )
-    with pytest.raises(LogError, match="t 50, q 50, current 49 rows"):
+        savemat(file, held | {"current": np.ones(shape)})
+    with pytest.raises(LogError, match=f"t 50, q 50, current {49 if 49 in shape else 7} rows"):
         read(path)
 
 

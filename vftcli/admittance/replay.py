@@ -45,7 +45,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.wrench import Wrench
 from vftcli.wrench import SMOOTHER, WrenchChoice
-from vftcli.wrench.sensor import SensorReading, without_zero
+from vftcli.wrench.sensor import without_zero
 from vftcli.wrench.solvers import VirtualSensor, logged_wrench
 
 LONGEST = 600.0  #: Longest release that is computed. [s]
@@ -192,9 +192,11 @@ def release_deviation(assignments: Sequence[str]) -> Array:
         if axis not in AXES or not value or not np.isfinite(value[0]):
             raise ParameterError(f"--release {part!r} is not {form}")
         x[AXES.index(axis)] = value[0]
-    if np.linalg.norm(x[3:]) >= np.pi:
+    moved, turned = np.linalg.norm(x.reshape(2, 3), axis=1)
+    if moved >= 10.0 or turned >= np.pi:
         raise ParameterError(
-            f"--release turns by {np.linalg.norm(x[3:]):.3g} rad; it must be less than π"
+            f"--release moves by {moved:.3g} m and turns by {turned:.3g} rad; it must be less "
+            "than 10 m and π"
         )
     return x
 
@@ -269,13 +271,6 @@ class DrivingForce(NamedTuple):
 
     wrench: Wrench  #: Force on the robot, base axes, about the flange point.
     source: Remark  #: Where it comes from.
-
-
-def observed_force(reading: SensorReading) -> DrivingForce:
-    """The virtual sensor's wrench of a run's single observer."""
-    wrench = replace(reading.wrenches[0], remarks=reading.remarks)
-    code = "force-smoothed" if wrench.name in reading.smoothed else "force-of-observer"
-    return DrivingForce(wrench, fact(code, observer=wrench.name))
 
 
 def stored_force(

@@ -18,7 +18,7 @@ import typer
 
 from vftcli.cli.commands import COMMANDS, with_command
 from vftcli.cli.help import GroupedCommand, JourneyGroup
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import STAGES, echo
 from vftcli.signals.errors import UnsettledRobotError, VftError
 from vftcli.signals.parsing import printable
 
@@ -180,5 +180,6 @@ def open_streams() -> None:
 
 def fail(message: str) -> None:
     """Print one line to stderr and exit with code 1."""
+    STAGES.waiting.clear()
     echo(f"error: {printable(' '.join(message.split()))}", err=True)
     raise SystemExit(1)

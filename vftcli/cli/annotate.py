@@ -11,7 +11,7 @@ from vftcli.observers import ObserverChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.signals.option import WRITE, Anyway, Asked, Option
-from vftcli.signals.parsing import check_known
+from vftcli.signals.parsing import check_known, counted
 from vftcli.wrench import WrenchChoice
 
 ADDED = ("wrench", "sd", "contact")  #: Values of ``--add``.
@@ -76,7 +76,6 @@ def annotate_dataset(
 def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
     """Lines on the written copy, and on its limits."""
     from vftcli.doctor.examination import doubt
-    from vftcli.signals.parsing import counted
 
     done, frames = record["status"], sum(one.get("frames", 0) for one in record["episodes"])
     count = ", ".join(f"{n} {status}" for status, n in done.items())

@@ -8,7 +8,7 @@ import typer
 
 from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.console import say
+from vftcli.cli.console import SOME_FAILED, say
 from vftcli.cli.progress import STAGES
 from vftcli.evaluation import ReferenceChoice
 from vftcli.outputs import OutputChoice
@@ -16,7 +16,6 @@ from vftcli.signals.option import Asked, Option, names_at
 
 #: Commands that compare logs with nothing.
 WITHOUT_REFERENCE = ("estimate", "contacts")
-SOME_FAILED = 3  #: Exit code if some logs failed, not all.
 MOST_NAMED = 10  #: Failures that are printed.
 
 
@@ -73,8 +72,7 @@ def batch(
     free = {*map(absolute, choice.free.logs)}
     found = [entry for entry in collection.find(logs) if entry.path not in free]
     if passed := sorted(path.name for path in collection.passed):
-        what = "1 file is not a log" if len(passed) == 1 else f"{len(passed)} files are not logs"
-        say(f"note: {what}: {listed(passed, 3)}")
+        say(f"note: left out, not a log: {listed(passed, 3)}")
     if not found:
         raise LogError(
             f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"

@@ -8,8 +8,7 @@ import typer
 
 from vftcli.batch import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.batch import SOME_FAILED
-from vftcli.cli.console import echo, echo_data, open_made, say, say_json, show
+from vftcli.cli.console import SOME_FAILED, echo, echo_data, open_made, say, say_json, show
 from vftcli.robots import RobotChoice
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import LOG, Anyway, Asked, Choice, Option

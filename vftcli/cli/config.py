@@ -62,11 +62,11 @@ def kept_words(ctx: Click, args: Sequence[str]) -> tuple[Path, list[str]] | None
     logs = [Path(log) for one in given for log in words_in(one)]
     keys, typed = keys_for(command, path), [param.name for param in params]
     asked = [word.partition("=")[0].strip() for word in opts.get("set") or ()]
-    choices = choices_of(command)
     words = [
         word
         for key, text in keys.items()
-        if "." in key and key not in asked and any(kind.takes(key) for kind in choices)
+        if "." in key and key not in asked
+        if any(kind.takes(key) for kind in choices_of(command))
         for word in ("--set", f"{key}={text}")
     ]
     for key, option in options_of(command).items():

@@ -16,7 +16,7 @@ from vftcli.cli.config import WORDS
 from vftcli.cli.progress import STAGES, is_terminal
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import check_installed
-from vftcli.signals.parsing import printable
+from vftcli.signals.parsing import counted, printable
 from vftcli.signals.progress import heard_by, nobody
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
         _level.reset(token)
 
 
+SOME_FAILED = 3  #: Exit code if some logs failed, not all.
 #: Remarks that only a part of a file is read, unasked.
 PARTS = frozenset({"episode-chosen", "episode-chosen-first", "arm-side-chosen"})
 
@@ -123,7 +124,7 @@ def canvas() -> "Canvas":
     from vftcli.outputs.screen import Canvas
 
     stream = sys.stdout
-    letters = (getattr(stream, "encoding", None) or "utf-8").lower().replace("-", "")
+    letters = (getattr(stream, "encoding", None) or "utf-8").lower()
     return Canvas.of(
         columns=shutil.get_terminal_size().columns,
         unicode=letters.startswith("utf"),
@@ -163,18 +164,15 @@ class LeftOut:
         echo(printable(f"error: {self._library.label(log)} left out: {reason}"), err=True)
 
     def end(self, done: int) -> None:
-        """Stop with exit code 1 if any was left out."""
-        if not self.reasons:
-            return
-        if not done:
+        """Stop with exit code 3 if any was left out, 1 if all were."""
+        if self.reasons and not done:
             echo("error: none of the logs can be analysed", err=True)
-        raise typer.Exit(1)
+        if self.reasons:
+            raise typer.Exit(SOME_FAILED if done else 1)
 
 
 def say_recording(recording: "Recording") -> None:
     """In details: one line on the log, then repairs and oddities."""
-    from vftcli.signals.parsing import counted
-
     source = recording.source
     rate = f", {1.0 / recording.median_step:.4g} Hz" if recording.samples > 1 else ""
     detail(
@@ -202,7 +200,10 @@ def health_of(
         if codes := dict.fromkeys(f.code for f in examination.refusals(fitting=fitting)):
             say(doubt(", ".join(codes)))
         line = health_line(examination, named=len(library) > 1 or bool(recording.source.part))
-        (detail if on_screen and not codes else say)(line)
+        if on_screen and not codes:
+            detail(line)
+        elif _level.get() > QUIET:
+            STAGES.waiting.append(line)
         for assumption in examination.assumptions:
             detail(f"note: {recording.name}: {assumption}")
 
@@ -210,9 +211,8 @@ def health_of(
 
 
 def say_robots(robots: "Iterable[Robot]") -> None:
-    """Print the limits of the robots' numbers."""
-    for remark in dict.fromkeys(str(remark) for robot in robots for remark in robot.remarks):
-        say(f"note: {remark}")
+    """Print the limits of the robots' numbers, each once; in details those that are usual."""
+    say_remarks({str(remark): remark for arm in robots for remark in arm.remarks}.values())
 
 
 def say_analysis(analysis: "Analysis") -> None:

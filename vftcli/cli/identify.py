@@ -127,8 +127,8 @@ def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None
     check_file(output, force)
     found = gains_of(log, choice, goal)
     notes, health = list(map(str, found.remarks)), found.examinations
-    said = [asked.line, f"goal: {goal.gains}", f"robot: {found.run.robot.name}", *notes]
-    heading = [*overridden_lines(health), *said]
+    said = asked.line, f"goal: {goal.gains}", f"robot: {found.run.robot.name}"
+    heading = [*overridden_lines(health), *said, *notes]
     write_tuned(output, heading, found.spectra, found.tuned, force=force, form=figures)
     if asked.words["json"]:
         rows = [line.record for line in found.tuned]

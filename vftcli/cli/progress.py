@@ -26,6 +26,7 @@ class Stages:
     def __init__(self) -> None:
         self._begun: float | None = None
         self._stage = ""
+        self.waiting: list[str] = []  # words for stderr before whatever is printed next
         self._share = 0.0
         self._from = (0.0, 0.0)  # time and share since which the speed is measured
         self._shown = 0  # characters of the line
@@ -60,6 +61,8 @@ class Stages:
             if self._shown:
                 typer.echo("\r" + " " * self._shown + "\r", err=True, nl=False)
                 self._shown = 0
+            while self.waiting:
+                self.echo(self.waiting.pop(0), err=True)
 
     def echo(
         self, text: str, *, err: bool = False, nl: bool = True, colour: bool | None = None

@@ -228,9 +228,8 @@ def tuning_drawing(
     """Expected error over frequency; chosen rates [rad/s] and errors [N·m]."""
     chart = tuning_chart(curves, lines_of_names(list(curves)))
     marks = {name: (rate / (2.0 * np.pi), least) for name, (rate, least) in chosen.items()}
-    below = "Natural frequency (Hz)"
-    draw = partial(line_figure, plots=plots_of(chart), marks=marks, below=below)
-    return Drawing(chart.title, draw)
+    plots, below = plots_of(chart), "Natural frequency (Hz)"
+    return Drawing(chart.title, partial(line_figure, plots=plots, marks=marks, below=below))
 
 
 def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:

@@ -125,8 +125,7 @@ def seal(
 
     Digests of recordings differ, since Rerun numbers rows by the clock.
     """
-    place = name.rpartition("/")[0]
-    files = folder.digests(place) if files is None else files
+    files = folder.digests(name.rpartition("/")[0]) if files is None else files
     text, digests = to_json(record), to_json({"files": files})
     # Joined as texts: to encode all anew would double the time.
     folder.write(name, f"{text.removesuffix(END)},{digests.removeprefix('{')}")

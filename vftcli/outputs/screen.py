@@ -128,9 +128,9 @@ def log_screen(
     """The screen of one log, of so many lines at most."""
     first, *answered = head_lines(analysis, canvas)
     listed, found, bars = analysis.contacts, grounds(analysis), list[str]()
-    if listed is not None and listed.hardest is not None:
-        shown = [] if listed.contacts[0].is_load else hardest_rows(listed.contacts)
-        force, _ = forces_along(listed.contacts, analysis.t)
+    if sized := [contact for contact in analysis.listed if contact.size_known]:
+        shown = [] if analysis.listed[0].is_load else hardest_rows(analysis.listed)
+        force, _ = forces_along(sized, analysis.t)
         bars = force_bars(analysis.t, np.nan_to_num(force), shown, canvas)
     tail, text = doubt_lines(analysis), ""
     for block in blocks(analysis.errors)[:1]:
@@ -348,8 +348,7 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
         letters = "".join(steps[k] for k in np.clip(height - row * full, 0, full))
         bar = canvas.painted(letters.rstrip(), "bar")
         lines.append(f"  {labels[row]:>{left}} {canvas.shown('┤')}{bar}")
-    indent = " " * (left + 4)
-    lines.append(f"{indent}{seconds(t, columns)}")
+    lines.append(f"{'':{left + 4}}{seconds(t, columns)}")
     share = columns / max(t[-1] - t[0], 1e-9)
     each = ((int((c.peak - t[0]) * share), str(c.number)) for c in contacts)
     if numbers := placed(each, columns):

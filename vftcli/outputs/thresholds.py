@@ -146,9 +146,9 @@ def thresholds_record(
 
 def check_rows(check: ThresholdDetection) -> list[Record]:
     """The contacts of a check, a row each."""
-    keys = (*CONTACTS, "alarm_was_on")
     return [
-        dict(zip(keys, (number, *c[:4], c.by or None, c.already_above), strict=True))
+        dict(zip(CONTACTS, (number, *c[:4], c.by or None), strict=True))
+        | {"alarm_was_on": c.already_above}
         for number, c in enumerate(check.contacts, start=1)
     ]
 

@@ -222,9 +222,8 @@ def picks_by_alias(
     # A group of another width is about something else: a gripper, a base.
     kept = {"t", "q", "wrench", *own, *columns.usual}
     picks = {s: p for s, p in picks.items() if not q or len(p.cells) == len(q) or s in kept}
-    each = columns.joints.items()
     if len(names) != len(q):
-        names = next((joints for stem, joints in each if columns.cells(stem) == q), ())
+        names = next((j for stem, j in columns.joints.items() if columns.cells(stem) == q), ())
     if effort_of(names) == "current" and own.keys().isdisjoint(EFFORTS) and "torque" in picks:
         efforts = [tuple(columns.groups.get(name, {}).values()) for name in ("effort", "eff")]
         if picks["torque"].cells in efforts:
@@ -264,8 +263,7 @@ def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
 
 def wrench_pick(table: Table) -> Item | None:
     """The six columns of a wrench or its column of lists, or None."""
-    there = enumerate(table.names)
-    names = ["" if column in table.lists else name.lower() for column, name in there]
+    names = ["" if c in table.lists else name.lower() for c, name in enumerate(table.names)]
     for text in WRENCHES:
         wanted = text.split()
         if all(names.count(name) == 1 for name in wanted):

@@ -207,10 +207,10 @@ def _read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
         if name.startswith(level) or "." not in name
     }
     lengths = {len(a) for name, a in columns.items() if a.ndim == 1 and _is_clock(name)}
-    turned = [
+    turned = [  # a signal of another length is refused then
         name
         for name, array in columns.items()
-        if array.ndim == 2 and len(array) not in lengths and array.shape[1] in lengths
+        if array.ndim == 2 and len(array) not in lengths and len(array) < array.shape[1]
     ]
     columns |= {name: columns[name].T for name in turned}
     remarks = (fact("signals-turned", signals=listed(turned)),) if turned else ()

@@ -179,19 +179,18 @@ def seconds(raw: RawLog) -> Array:
 def _without_empty_joints(raw: RawLog) -> RawLog:
     """The log without named joints with a signal of NaN, as a gripper's effort."""
     names, empty = np.array(raw.joint_names), np.zeros(len(raw.joint_names), dtype=bool)
-    each = raw.signals.items()
-    joints = {n: v for n, v in each if n != "wrench" and v.shape[1] == names.size}
+    joints = {n: v for n, v in raw.signals.items() if n != "wrench" and v.shape[1] == names.size}
     for value in joints.values():
         if np.isnan(value[0]).any():
             missing = np.isnan(value).all(axis=0)
             empty |= missing & ~missing.all()
     if "q" not in joints or not empty.any() or empty.all():
         return raw
-    parts = in_parts(raw.signals)
     return replace(
         raw,
         signals=joined(
-            {n: v[:, ~empty] if n in joints else v for n, v in part.items()} for part in parts
+            {n: v[:, ~empty] if n in joints else v for n, v in part.items()}
+            for part in in_parts(raw.signals)
         ),
         joint_names=tuple(names[~empty].tolist()),
         remarks=(*raw.remarks, fact("joints-empty", joints=names[empty].tolist())),

@@ -276,8 +276,7 @@ class EchoTable(TextTable):
 
 def joint_names(table: TextTable) -> Names:
     """The joints' names that the rows hold, in the order of the columns."""
-    each = enumerate(table.names)
-    columns = [k for k, name in each if name.removeprefix("field.")[:4] == "name"]
+    columns = [k for k, n in enumerate(table.names) if n.removeprefix("field.")[:4] == "name"]
     found = [table.words(column) for column in columns]
     for words in found:
         if len(words) > 1:

@@ -93,9 +93,12 @@ class Hdf5Table(ArrayTable):
 
     def within(self, group: str, *, top: bool = False) -> "Hdf5Table":
         """The datasets below a group, by paths from there, or of no group."""
-        each = self.columns.items()
-        own = {n: d for n, d in each if n.startswith(group) or (top and "/" not in n)}
-        return Hdf5Table(self.path, {n.removeprefix(group): d for n, d in own.items()})
+        own = {
+            name.removeprefix(group): dataset
+            for name, dataset in self.columns.items()
+            if name.startswith(group) or (top and "/" not in name)
+        }
+        return Hdf5Table(self.path, own)
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Read datasets as float64; whole stamps stay whole."""

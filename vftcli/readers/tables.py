@@ -143,7 +143,9 @@ class ArrayTable(Table):
         each = list(self.columns.items())
         if len({len(each[c][1]) for c in columns}) > 1:
             lengths = ", ".join(f"{each[c][0]} {len(each[c][1])}" for c in columns)
-            raise LogError(f"{self.path}: the arrays differ in length: {lengths} rows.")
+            raise LogError(
+                f"{self.path}: the arrays differ in length: {lengths} rows. Save them equally long."
+            )
         for start in range(0, max(len(each[columns[0]][1]), 1), BLOCK_ROWS):
             loaded = {}
             for c in columns:

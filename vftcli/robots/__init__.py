@@ -95,7 +95,7 @@ def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
     alike = [profile for profile in PROFILES if model_of(profile) == model_of(str(robot))]
     raise RobotError(
         f"no robot {str(robot)!r}.{did_you_mean(str(robot), alike)} "
-        f"Built in: {', '.join(PROFILES)}; or give a FILE.toml or FILE.urdf"
+        f"Built in: {', '.join(PROFILES)}; or give a .toml, .urdf, .xacro or .xml (MJCF) file"
     )
 
 

@@ -247,8 +247,9 @@ def tenth(number: int) -> str:
 
 def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:
     """The area between two lines as a path, broken at unknown values."""
-    x = scales.across(t)
-    above, below = (np.column_stack([x, scales.near(edge)]) for edge in (high, low))
+    above, below = (
+        np.column_stack([scales.across(t), scales.near(edge)]) for edge in (high, low)
+    )
     spans = (slice(*run) for run in runs_of(np.isfinite(low) & np.isfinite(high)))
     return "".join(f"{polyline(np.vstack([above[s], below[s][::-1]]))}Z" for s in spans)
 

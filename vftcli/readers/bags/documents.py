@@ -104,8 +104,8 @@ class Documents:
             clock = "log time of the recorder"
             columns["timestamp_ns"] = np.array(times, dtype=np.int64)
         table = ArrayTable(path=f"{self.path}: topic {channel.topic}", columns=columns)
-        names = names_of(rows[0])
-        return from_table(table, self.request, TABLE._replace(clock=clock), names=names)
+        layout = TABLE._replace(clock=clock)
+        return from_table(table, self.request, layout, names=names_of(rows[0]))
 
 
 def numbers_of(rows: Sequence[Document], paths: Sequence[str]) -> Array:
