@@ -197,9 +197,7 @@ def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
     assert shares[-1] < pipeline.WRITING == 0.7
 
 
-def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_online(
-    tmp_path: Path,
-) -> None:
+def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_online(tmp_path):
     kept = {f"actual_{name}_{j}": f"{name}_{j}" for name in ("q", "current") for j in range(6)}
     table = pl.read_csv(FIXTURE, separator=" ").rename({"timestamp": "t", **kept})
     path = tmp_path / "log.csv"

@@ -125,9 +125,7 @@ def check_robot(path: Path, reported: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-def test_every_entry_is_read_as_expected_or_refused_as_stated(
-    samples: Path, expected: dict[str, Any]
-) -> None:
+def test_every_entry_is_read_as_expected_or_refused_as_stated(samples, expected):
     pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
     for name, reported in expected.items():
         path = samples / "reach" / name
@@ -172,9 +170,7 @@ def free_torque(path: Path, robot: str | Path = "ur5", until: float = 3.9, **how
         ("ur5_position_only.csv", 3.9, {}),
     ],
 )
-def test_every_layout_gives_the_same_estimate(
-    samples: Path, name: str, until: float, how: dict[str, str]
-) -> None:
+def test_every_layout_gives_the_same_estimate(samples, name, until, how):
     reach = samples / "reach"
     found = free_torque(reach / name, until=until, **how)
     # Derived velocities may cost .08 N·m; all else is the same numbers in other clothes.
@@ -198,9 +194,7 @@ def test_an_arm_is_laid_on_its_log_by_name(samples: Path) -> None:
         ("ur5_degrees_turned.csv", "q[deg]=q{i},-tau=tau{i}", "velocity-unit.*deg/s"),
     ],
 )
-def test_what_is_not_what_it_is_called_is_refused_with_its_remedy(
-    samples: Path, name: str, columns: str | None, words: str
-) -> None:
+def test_what_is_not_what_it_is_called_is_refused_with_its_remedy(samples, name, columns, words):
     with pytest.raises(ExaminationError, match=words):
         free_torque(samples / "reach" / name, columns=columns)
 

@@ -135,9 +135,7 @@ BASE = WrenchChoice(frame="base")
         ({"wrench": replace(BASE, zero=ZeroChoice(spans=((0.0, 1.0),)))}, {}, False),
     ],
 )
-def test_what_needs_all_of_a_log_at_once_has_it(
-    asked: dict[str, Any], log: dict[str, Any], blocks: bool
-) -> None:
+def test_what_needs_all_of_a_log_at_once_has_it(asked, log, blocks):
     source = SimpleNamespace(derived=())
     long = SimpleNamespace(**{"samples": 100_001, "dq": True, "source": source} | log)
     plain = AnalysisChoice(observers=ObserverChoice(names=("gmo", "fdo")), contacts=False)

@@ -78,9 +78,7 @@ def test_a_second_run_does_what_is_left(run, folder: Path, tmp_path: Path) -> No
     assert failures.rows() == [("empty.csv", "reading", "LogError")]
 
 
-def test_a_failure_stands_for_every_log_of_equal_bytes_and_names_it_once(
-    run, folder: Path, tmp_path: Path
-) -> None:
+def test_a_failure_stands_for_every_log_of_equal_bytes_and_names_it_once(run, folder, tmp_path):
     """Here the second is found after the first has failed."""
     for name in ("bad.csv", "worse.csv"):
         (folder / name).write_text("a,b,c\n1,2,3\n4,5,6\n")

@@ -391,9 +391,7 @@ def test_one_table_alone(run, refused, tmp_path: Path) -> None:
     assert "--force" in refused(*words)
 
 
-def test_an_experiment_that_fails_is_a_row_and_exit_code_one(
-    run, monkeypatch, tmp_path: Path
-) -> None:
+def test_an_experiment_that_fails_is_a_row_and_exit_code_one(run, monkeypatch, tmp_path):
     def fail(seed: int):
         raise ParameterError(f"nothing moved with {seed}")
 

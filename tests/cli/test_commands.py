@@ -104,9 +104,7 @@ def test_it_says_what_was_written(run, tmp_path: Path) -> None:
     assert json.loads(again[1])["causal"] is False
 
 
-def test_a_load_is_sought_in_all_episodes_and_too_few_poses_are_refused(
-    refused, tmp_path
-) -> None:
+def test_a_load_is_sought_in_all_episodes_and_too_few_poses_are_refused(refused, tmp_path):
     error = refused("identify", EPISODES, "--method", "payload", "-o", tmp_path / "robot.toml")
     assert "panda_episodes episode 0, panda_episodes episode 1, panda_episodes episode 2" in error
     assert "the arm passes 2 different poses, and a load needs 4 at least" in error

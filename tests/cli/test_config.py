@@ -327,9 +327,7 @@ def test_every_setting_of_a_command_is_listed_once(helped) -> None:
         (("report", "--zzz", "x"), "No such option: --zzz"),
     ],
 )
-def test_what_there_is_not_names_the_nearest_if_it_is_near(
-    words: tuple[str, ...], said: str, run
-) -> None:
+def test_what_there_is_not_names_the_nearest_if_it_is_near(words, said, run):
     code, out, err = run(*words)
     assert (code, out) == (1 if words[0] == "help" else 2, "")
     assert said in " ".join(err.split())

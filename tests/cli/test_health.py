@@ -212,9 +212,7 @@ def test_blank_lines_are_no_binary_file(tmp_path: Path, refused) -> None:
     assert "a text of blank lines" in refused("inspect", saved(tmp_path / "log.csv", [[""]] * 3))
 
 
-def test_a_column_of_a_known_format_that_is_there_twice_is_not_chosen_from(
-    tmp_path: Path, refused
-) -> None:
+def test_a_column_of_a_known_format_that_is_there_twice_is_not_chosen_from(tmp_path, refused):
     head, *rows = CIRCLE.read_text().splitlines()
     text = [f"{head} actual_q_0", *(f"{row} 1.0" for row in rows), ""]
     (tmp_path / "log.csv").write_text("\n".join(text))
@@ -240,9 +238,7 @@ def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run) -> None:
 
 
 @pytest.mark.parametrize("samples", [2, 3])
-def test_an_arm_that_jumps_in_a_few_samples_is_no_motion_to_fit(
-    tmp_path: Path, run, samples: int
-) -> None:
+def test_an_arm_that_jumps_in_a_few_samples_is_no_motion_to_fit(tmp_path, run, samples):
     """Samples 12 s apart, the errors of the doctor overruled: time enough, samples too few."""
     rows = [[12.0 * k, *[0.5 * k] * 6, *[0.1] * 6, *[0.0] * 6] for k in range(samples)]
     log = saved(tmp_path / "log.csv", [[str(x) for x in row] for row in rows])
@@ -336,9 +332,7 @@ REFUSED: tuple[tuple[tuple[object, ...], str, str], ...] = (
     REFUSED,
     ids=[f"{begin[0]} {words}" for begin, words, _ in REFUSED],
 )
-def test_what_cannot_be_done_is_one_line_and_writes_nothing(
-    refused, here: Path, begin: tuple[object, ...], words: str, said: str
-) -> None:
+def test_what_cannot_be_done_is_one_line_and_writes_nothing(refused, here, begin, words, said):
     """Values that every command refuses are in tests/cli/test_options.py."""
     assert said in refused(*begin, *words.split())
     assert list(here.iterdir()) == []

@@ -135,9 +135,7 @@ def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: in
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("--rrd", "-v")])
-def test_a_full_disk_is_one_error_in_words_of_the_system(
-    tmp_path: Path, words: tuple[str, ...]
-) -> None:
+def test_a_full_disk_is_one_error_in_words_of_the_system(tmp_path, words):
     """Polars' own "File out of specification: underlying IO error" stood around them."""
     limit = limited("RLIMIT_FSIZE", 60_000)
     done = launched("estimate", CIRCLE, "-o", tmp_path / "out", *words, **limit)
@@ -171,9 +169,7 @@ def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> 
         (ParameterError("two\n  lines\x07"), "error: two lines\\x07\n"),
     ],
 )
-def test_what_goes_wrong_is_one_line(
-    run, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
-) -> None:
+def test_what_goes_wrong_is_one_line(run, monkeypatch, error, said):
     def fail(**_: object) -> None:
         raise error
 

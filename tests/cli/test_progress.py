@@ -77,9 +77,7 @@ def test_what_is_printed_takes_the_line_away_first(now, stages: Stages, capsys) 
     assert capsys.readouterr() == ("again\n", "")
 
 
-def test_the_line_comes_after_a_second_and_anew_each_second(
-    now: list[float], stages: Stages, shown, monkeypatch
-) -> None:
+def test_the_line_comes_after_a_second_and_anew_each_second(now, stages, shown, monkeypatch):
     waited: list[float] = []
     monkeypatch.setattr(Stages, "_wait", lambda _, seconds: waited.append(seconds))
     stage("one")
@@ -103,9 +101,7 @@ def test_the_line_comes_after_a_second_and_anew_each_second(
 
 @pytest.mark.usefixtures("stages")
 @pytest.mark.parametrize(("width", "length"), [(60, 59), (80, 79), (200, 79)])
-def test_a_long_stage_is_cut_to_the_terminal(
-    now: list[float], shown, monkeypatch, width: int, length: int
-) -> None:
+def test_a_long_stage_is_cut_to_the_terminal(now, shown, monkeypatch, width, length):
     monkeypatch.setenv("COLUMNS", str(width))
     stage("one")
     now[0] = 2.0
@@ -216,9 +212,7 @@ COMMANDS = (
 @pytest.mark.parametrize("width", [80, 120])
 @pytest.mark.parametrize("words", COMMANDS, ids=lambda words: " ".join(map(str, words))[-40:])
 @pytest.mark.usefixtures("here")
-def test_no_line_is_wider_than_the_terminal_or_printed_into_the_line(
-    words: tuple[object, ...], width: int
-) -> None:
+def test_no_line_is_wider_than_the_terminal_or_printed_into_the_line(words, width):
     """Commands and paths may be, which are copied."""
     lines = on_a_terminal(*words, COLUMNS=str(width))
     assert len(lines) > 1

@@ -39,9 +39,7 @@ def options(folder: Path) -> dict[str, object]:
         ("panda_bag", ("--robot", "panda"), {"robot": "panda", "reference": "sensor"}),
     ],
 )
-def test_what_is_written_gives_the_numbers_of_typed_options(
-    run, here: Path, log: str, given: tuple[str, ...], expected: dict[str, str]
-) -> None:
+def test_what_is_written_gives_the_numbers_of_typed_options(run, here, log, given, expected):
     code, _, err = run("inspect", FIXTURES / log, *given, "-o", NAME)
     assert (code, options(here)) == (0, expected)
     assert f"wrote {NAME}: robot, reference; read unasked" in err
@@ -102,9 +100,7 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     assert "note: vftcli.toml" not in err
 
 
-def test_an_effort_that_is_not_what_it_is_called_is_written(
-    run, here: Path, samples: Path
-) -> None:
+def test_an_effort_that_is_not_what_it_is_called_is_written(run, here, samples):
     log = samples / "reach" / "ros2_ur_effort_torque"
     assert run("inspect", log, "--robot", "ur5", "-o", NAME)[0] == 0
     assert options(here) == {"robot": "ur5", "log": {"effort": "torque-without-gravity"}}
@@ -193,9 +189,7 @@ def test_estimates_go_into_a_folder_here_named_after_the_log(run, refused, here:
         (("reproduce", "huang2025"), "huang2025.vft"),
     ],
 )
-def test_the_folder_s_name_and_nothing_is_read_before_it_is_refused(
-    refused, here: Path, words: tuple[str, ...], folder: str
-) -> None:
+def test_the_folder_s_name_and_nothing_is_read_before_it_is_refused(refused, here, words, folder):
     (here / "bag.d").mkdir()
     (here / folder).mkdir()
     (here / folder / "run.json").touch()

@@ -76,9 +76,7 @@ LOST = '{"samples": 8, "repairs": ["one dropped"]}'
         (2, attempt("inspect", family="options"), {"stderr": "Usage"}, "usage"),
     ],
 )
-def test_each_kind_of_failure_is_seen(
-    tmp_path: Path, monkeypatch, status: int, made: Attempt, files: dict[str, str], kind: str
-) -> None:
+def test_each_kind_of_failure_is_seen(tmp_path, monkeypatch, status, made, files, kind):
     # What ran in this process before is no part of it.
     monkeypatch.setattr(fuzz, "peak_memory", lambda: 0)
     for name, text in {**files, "attempt.json": json.dumps(made._asdict())}.items():

@@ -10,27 +10,15 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from drawings import drawn, names_in
 from unpacking import page_data
 
 from vftcli.admittance.closed_loop import Replayed
 from vftcli.admittance.law import controllers, from_table, variable
 from vftcli.admittance.replay import Replay, replay, replay_release
-from vftcli.outputs.admittance import (
-    COLUMNS,
-    FILES,
-    REPLAY_FIGURES,
-    admittance_record,
-    charts,
-    comparison_grid,
-    motion_table,
-    parameter_grid,
-    render_admittance,
-    replay_figures,
-    stability_grid,
-    write_admittance,
-)
+from vftcli.outputs import admittance
 from vftcli.outputs.charts import GREY
-from vftcli.outputs.paper import WIDTHS, paper_style
+from vftcli.outputs.paper import WIDTHS
 from vftcli.outputs.run_record import to_json
 from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError
@@ -65,29 +53,29 @@ def push() -> Replay:
 
 
 def test_a_replay_becomes_a_folder_of_unrounded_rows(release: Replay, tmp_path: Path) -> None:
-    write_admittance(tmp_path / "out", Replayed(release), "vftcli admit")
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
+    admittance.write_admittance(tmp_path / "out", Replayed(release), "vftcli admit")
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(admittance.FILES)
     record = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))
     assert record["command"] == "vftcli admit"
     assert record["input"] is None
     assert len(record["controllers"]) == len(release.controllers)
     with pytest.raises(OutputError, match="--force"):
-        write_admittance(tmp_path / "out", Replayed(release))
+        admittance.write_admittance(tmp_path / "out", Replayed(release))
     assert json.loads(to_json(release.rows)) == json.loads(json.dumps(list(release.rows)))
     with (tmp_path / "out/comparison.csv").open(encoding="utf-8") as file:
         read = list(csv.DictReader(file))
     assert [float(r["peak"]) for r in read] == [row["peak"] for row in release.rows]
-    write_admittance(tmp_path / "empty", Replayed(replace(release, drags=())))
+    admittance.write_admittance(tmp_path / "empty", Replayed(replace(release, drags=())))
     empty = (tmp_path / "empty/comparison.csv").read_text(encoding="utf-8")
-    assert empty.strip().split(",") == list(COLUMNS)
+    assert empty.strip().split(",") == list(admittance.COLUMNS)
 
 
 def test_record_and_motion_hold_the_force_its_source_and_every_controller(push: Replay) -> None:
-    record = json.loads(to_json(admittance_record(Replayed(push), "")))
+    record = json.loads(to_json(admittance.admittance_record(Replayed(push), "")))
     assert record["force"]["code"] == "force-of-sensor"
     assert record["force"]["values"] == {"frame": "a push"}
     assert len(record["remarks"]) == len(push.remarks) > 0
-    table = motion_table(push)
+    table = admittance.motion_table(push)
     assert len(table) == len(push.motion.t)
     label = push.controllers[1].name.replace(" ", "").replace("/", "-")
     np.testing.assert_array_equal(table[f"x/{label}/y"].to_numpy(), push.motion.x[:, 1, 1])
@@ -101,44 +89,41 @@ def test_controllers_stand_under_each_other_by_axis_and_drag(release: Replay) ->
     rows = [dict(row) for row in release.rows]
     along_z = [row | {"axis": "z"} for row in rows]
     late = [row | {"drag": 2} for row in along_z]
-    grid = comparison_grid([*late, *along_z, *rows])
-    keys, n = list(COLUMNS), len(rows)
+    grid = admittance.comparison_grid([*late, *along_z, *rows])
+    keys, n = list(admittance.COLUMNS), len(rows)
     axes = [(row[keys.index("axis")], row[keys.index("drag")]) for row in grid.rows]
     assert axes == [("x", 1)] * n + [("z", 1)] * n + [("z", 2)] * n
     # An overshoot is in per cent.
     row = rows[0] | {"overshoot": 0.0523, "peak": -0.1, "return_2_s": None}
-    (cells,) = comparison_grid([row]).cells
+    (cells,) = admittance.comparison_grid([row]).cells
     assert {"5.2", "−0.1000", "–"} <= {cell.text for cell in cells}
 
 
 def test_parameters_of_the_profile_and_an_axis_without_a_speed_limit(release: Replay) -> None:
     """Table III of the paper: 3 kg, 5 N·s/m, 8 N/m, threshold 20 N and 6 N·m."""
-    assert "8 ms, hard threshold" in parameter_grid(release).title
-    rows = {row[0]: row[1:] for row in parameter_grid(release).rows}
+    assert "8 ms, hard threshold" in admittance.parameter_grid(release).title
+    rows = {row[0]: row[1:] for row in admittance.parameter_grid(release).rows}
     assert rows["x"][:3] == (3.0, 5.0, 8.0)
     assert rows["x"][-2:] == ("20 N", "0.9 m/s")
     assert rows["rz"][-2:] == ("6 N·m", "1 rad/s")
     limit = np.array([np.inf, 2.0, 3.0, 4.0, 4.0, 4.0])
-    changed = replace(
-        release, controllers=controllers(replace(release.parameters, speed_limit=limit))
-    )
-    assert [row[-1] for row in parameter_grid(changed).rows][:2] == ["none", "2 m/s"]
+    slowed = controllers(replace(release.parameters, speed_limit=limit))
+    changed = replace(release, controllers=slowed)
+    assert [row[-1] for row in admittance.parameter_grid(changed).rows][:2] == ["none", "2 m/s"]
 
 
 def test_stability_is_reported_of_the_worst_axis(release: Replay) -> None:
     """The discrete number 2 Ts B/M + Ts² K/M; the traditional controller keeps it in recovery."""
     p = release.parameters
-    expected = np.max(
-        2 * p.period * p.damping[:3] / p.mass[:3] + p.period**2 * p.stiffness[:3] / p.mass[:3]
-    )
-    rows = stability_grid(release).rows
-    assert rows[0][2] == pytest.approx(expected)
+    numbers = (2 * p.period * p.damping + p.period**2 * p.stiffness) / p.mass
+    rows = admittance.stability_grid(release).rows
+    assert rows[0][2] == pytest.approx(max(numbers[:3]))
     assert [row[1] for row in rows] == ["position", "rotation"] * len(release.controllers)
 
 
 def page_of(replay: Replay, command: str = "", title: str = "r") -> str:
-    found = Replayed(replay)
-    return render_admittance(found, admittance_record(found, command), title)
+    made = Replayed(replay)
+    return admittance.render_admittance(made, admittance.admittance_record(made, command), title)
 
 
 def test_the_page_shows_every_part(release: Replay) -> None:
@@ -176,7 +161,7 @@ def test_the_page_says_what_limits_it(release: Replay) -> None:
 
 
 def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
-    found = charts(push)
+    found = admittance.charts(push)
     names = [controller.name for controller in push.controllers]
     bands = {"force": ("± threshold", [20.0] * 3 + [6.0] * 3),
              "v": ("± speed limit", [0.9] * 3 + [1.0] * 3)}  # fmt: skip
@@ -185,13 +170,12 @@ def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
     for chart in found:
         along, about = units.get(chart.key, ("J", "J"))
         assert chart.units == (along,) * 3 + (about,) * 3
-        label, band = bands.get(chart.key, ("", None))
-        assert chart.band_label == label
-        assert (None if chart.band is None else chart.band.tolist()) == band
-        entered = ["force", "force that enters the law"]
-        shown = entered if chart.key == "force" else names
+        band = None if chart.band is None else chart.band.tolist()
+        assert (chart.band_label, band) == bands.get(chart.key, ("", None))
+        of_force = chart.key == "force"
+        shown = ["force", "force that enters the law"] if of_force else names
         assert [line.name for line in chart.series] == shown
-        assert chart.series[0].colour == (GREY if chart.key == "force" else "ink")
+        assert chart.series[0].colour == (GREY if of_force else "ink")
         # none differs by its colour alone
         assert len({line.dash for line in chart.series}) == len(names)
         assert all(len(line.values) == len(chart.x) == 501 for line in chart.series)
@@ -202,7 +186,7 @@ def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
     assert np.isnan([force[-1], into_law[-1]]).all()
     unbounded = replace(push.parameters, speed_limit=np.full(6, np.inf))
     free = tuple(replace(controller, parameters=unbounded) for controller in push.controllers)
-    assert charts(replace(push, controllers=free))[2].band is None
+    assert admittance.charts(replace(push, controllers=free))[2].band is None
 
 
 def test_differences_from_the_paper_are_said_in_numbers_that_hold(release: Replay) -> None:
@@ -228,41 +212,37 @@ def test_the_page_draws_its_charts(release: Replay, opened: Any) -> None:
     assert tab.overflow <= 0
 
 
-def drawn(replay: Replay, width: str = "single") -> Any:
+def figure_of(replay: Replay, width: str = "single") -> Any:
     pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
-    found = replay_figures(replay)
-    assert list(found) == list(REPLAY_FIGURES)
-    with paper_style():
-        figure = found["release"].draw(WIDTHS[width])
-        figure.draw_without_rendering()
-    return figure
+    found = admittance.replay_figures(replay)
+    assert list(found) == list(admittance.REPLAY_FIGURES)
+    return drawn(found["release"], width)
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_release_is_a_plot_with_a_line_a_controller(release: Replay, width: str) -> None:
-    figure = drawn(release, width)
+    figure = figure_of(release, width)
     (axes,) = figure.axes
     assert (axes.get_ylabel(), axes.get_xlabel()) == ("x (m)", "Time (s)")
-    names = [controller.name for controller in release.controllers]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == names
+    assert names_in(figure) == [controller.name for controller in release.controllers]
     first = axes.lines[0].get_ydata()
     assert first[0] == pytest.approx(0.1)
     np.testing.assert_array_equal(first, release.motion.x[:, 0, 0])
 
 
 def test_a_push_has_its_force_above_with_the_threshold(push: Replay) -> None:
-    figure = drawn(push)
+    figure = figure_of(push)
     assert [axes.get_ylabel() for axes in figure.axes] == ["y (N)", "y (m)"]
     assert [axes.get_xlabel() for axes in figure.axes] == ["", "Time (s)"]
     levels = {line.get_ydata()[0] for line in figure.axes[0].lines if len(line.get_ydata()) == 2}
     assert levels == {20.0, -20.0}
-    assert "± threshold" in [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "± threshold" in names_in(figure)
 
 
 def test_what_never_moved_is_not_drawn(release: Replay) -> None:
     still = release.motion._replace(x=np.zeros_like(release.motion.x))
-    assert replay_figures(replace(release, motion=still, drags=())) == {}
+    assert admittance.replay_figures(replace(release, motion=still, drags=())) == {}
     both = np.array(release.motion.x)
     both[:, :, 4] = both[:, :, 0]
     tilted = replace(release, motion=release.motion._replace(x=both), drags=())
-    assert [axes.get_ylabel() for axes in drawn(tilted).axes] == ["x (m)", "ry (rad)"]
+    assert [axes.get_ylabel() for axes in figure_of(tilted).axes] == ["x (m)", "ry (rad)"]

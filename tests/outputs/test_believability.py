@@ -59,9 +59,7 @@ def examined(analysis: Analysis, *findings: Remark, misfit: float = 0.001) -> An
         (1.66, "bad", "166.0 %", "(does not fit: model error 166.0 %)"),
     ],
 )
-def test_an_arm_is_believed_by_its_misfit(
-    without_reference: Analysis, misfit: float, standing: str, sentence: str, shown: str
-) -> None:
+def test_an_arm_is_believed_by_its_misfit(without_reference, misfit, standing, sentence, shown):
     made = examined(without_reference, misfit=misfit)
     (ground,) = of(made, "robot, gravity")
     assert ground.standing == standing
@@ -99,9 +97,7 @@ TOUCHED = warning(
 )  # fmt: skip
 ZERO = ExternalTorque(name="zero", t=np.arange(600.0), tau=np.zeros((600, 6)), remarks=(TOUCHED,))
 OTHER = warning("other-robot", own="ur5 30 %", best="ur5e 1 %", robot="ur5e")
-COLD = fact(
-    "no-temperature", robot="ur5", reference_C=35.0, least_percent=20.0, most_percent=24.0
-)
+COLD = fact("no-temperature", robot="ur5", reference_C=35.0, least_percent=20, most_percent=24)
 UNTOLD = {"contacts": None, "remarks": (caution("contacts-not-listed", reason="no samples"),)}
 OF_VENDOR = listed(contact(vendor_force=61.2), contact(vendor_force=None))
 
@@ -109,8 +105,8 @@ OF_VENDOR = listed(contact(vendor_force=61.2), contact(vendor_force=None))
 @pytest.mark.parametrize(
     ("changed", "subject", "standing", "words", "remedy"),
     [
-        ({"findings": OTHER}, "robot", "bad", "", "--robot ur5e"),
-        ({"findings": COLD}, "temperature", "caution", "", ""),
+        ({"finding": OTHER}, "robot", "bad", "", "--robot ur5e"),
+        ({"finding": COLD}, "temperature", "caution", "", ""),
         (listed(contact()), "free motion", "good", "0 contacts listed in its 4 s", ""),
         (listed(false_on_free=1), "free motion", "caution", "1 contact listed in its 4 s", ""),
         (listed(basis="friction", free=()), "free motion", "caution", "none is given: pushes",
@@ -129,10 +125,11 @@ def test_a_ground_has_its_subject_its_words_and_its_remedy(
     without_reference: Analysis, changed: dict[str, Any], subject: str, standing: str, words: str,
     remedy: str,
 ) -> None:  # fmt: skip
-    findings = [value for key, value in changed.items() if key == "findings"]
-    rest = {key: value for key, value in changed.items() if key != "findings"}
-    made = examined(without_reference, *findings) if findings else without_reference
-    (ground,) = of(replace(made, **rest), subject)
+    if "finding" in changed:
+        made = examined(without_reference, changed["finding"])
+    else:
+        made = replace(without_reference, **changed)
+    (ground,) = of(made, subject)
     assert ground.standing == standing
     assert words in ground.sentence
     assert (ground.remedy or "").endswith(remedy)
@@ -143,12 +140,9 @@ def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> Non
     assert headline(made).endswith("they may be its weight.")
     dead = examined(made, warning("zero-effort", Where(joints=(3,)), signal="current"))
     assert headline(dead) == "No contact is listed: the current of J3 is zero in every sample."
-    for other in (
-        replace(made, contacts=contact_list(contact(is_load=True))),
-        replace(made, contacts=contact_list()),
-        replace(made, examinations=()),
-    ):
-        assert "weight" not in headline(other)
+    for rows in ([contact(is_load=True)], []):
+        assert "weight" not in headline(replace(made, contacts=contact_list(*rows)))
+    assert "weight" not in headline(replace(made, examinations=()))
     assert "no contacts are listed" in headline(replace(made, contacts=None))
 
 
@@ -221,19 +215,16 @@ def test_a_row_that_misses_the_sensor_by_more_than_its_band_is_a_caution(
 
 def test_a_check_and_a_caution_have_their_own_names(without_reference: Analysis, as_if) -> None:
     """The joints that a free part leaves still, and stamps that repeat between sound ones."""
-    found = contact_list(
-        contact(), remarks=(caution("free-part-misses-joints", Where(joints=(5,))),)
-    )
+    still = caution("free-part-misses-joints", Where(joints=(5,)))
+    found = contact_list(contact(), remarks=(still,))
     odd = warning("repeated-stamps", repeats=3, rows=603, share_percent=0.5)
     made = as_if(without_reference, sound(without_reference))
     made = replace(examined(made, odd), contacts=found)
-    names = {
-        side: {ground.subject for ground in grounds(made) if (ground.standing == "good") == side}
-        for side in (True, False)
-    }
-    assert {"clock", "free motion"} <= names[True]
-    assert {"time stamps", "not moved"} <= names[False]
-    assert not names[True] & names[False]
+    good = {ground.subject for ground in grounds(made) if ground.standing == "good"}
+    others = {ground.subject for ground in grounds(made) if ground.standing != "good"}
+    assert {"clock", "free motion"} <= good
+    assert {"time stamps", "not moved"} <= others
+    assert not good & others
 
 
 def test_the_references_error_is_the_mean_that_the_table_prints(analysis: Analysis) -> None:
@@ -244,20 +235,13 @@ def test_the_references_error_is_the_mean_that_the_table_prints(analysis: Analys
         reference_floor_Nm=pl.when(rests).then(5.0).otherwise(pl.col("reference_floor_Nm")),
     )
     bare = ExternalTorque(name="sensor", t=analysis.t, tau=np.zeros((len(analysis.t), 6)))
-    sentences = {
-        ground.sentence
-        for made in (
-            analysis,
-            replace(analysis, errors=errors),
-            replace(analysis, errors=None, reference=bare),
-        )
-        for ground in of(made, "reference")
-    }
-    assert sentences == {
-        "vendor, its own error 0.5 N·m a joint",
-        "vendor without J5, its own error 0.5 N·m a joint",
-        "sensor",
-    }
+    for made, words in (
+        (analysis, "vendor, its own error 0.5 N·m a joint"),
+        (replace(analysis, errors=errors), "vendor without J5, its own error 0.5 N·m a joint"),
+        (replace(analysis, errors=None, reference=bare), "sensor"),
+    ):
+        (ground,) = of(made, "reference")
+        assert ground.sentence == words
 
 
 def test_health_is_the_worst_of_the_log_itself(without_reference: Analysis) -> None:

@@ -30,10 +30,8 @@ def rows_of(
         "covered": (error <= 2.0) * CELLS,
         "penalties": (4.0 + 40.0 * max(error - 2.0, 0.0)) * CELLS,
     }  # fmt: skip
-    each = {name: values.tolist() for name, values in sums.items()}
-    return [
-        shared | each | {"joint": joint, "rmse_Nm": error, "l1_Nm": error} for joint in (1, 2)
-    ]
+    shared |= {name: values.tolist() for name, values in sums.items()}
+    return [shared | {"joint": joint, "rmse_Nm": error, "l1_Nm": error} for joint in (1, 2)]
 
 
 def counted(log: str, arm: str, **counts: Any) -> dict[str, Any]:
@@ -104,9 +102,8 @@ def test_every_row_has_its_errors_and_its_shift() -> None:
     # A band of ±2 N·m that misses by .2: its width of 4, and 40 times what it misses by.
     assert (contact["coverage_95"], contact["interval_score_Nm"]) == (0.0, pytest.approx(12.0))
     assert (contact["seconds"], contact["exact_model"], contact["missing"]) == (20.0, False, 0.0)
-    assert np.isnan(
-        [free["skill"], free["lag_s"], rows["UR5", "best", "free"]["over_best_low_Nm"]]
-    ).all()
+    best = rows["UR5", "best", "free"]
+    assert np.isnan([free["skill"], free["lag_s"], best["over_best_low_Nm"]]).all()
     # 1 + 3 at no shift, 1 at 30 ms.
     assert (whole["lag_s"], whole["rmse_at_lag"]) == (pytest.approx(0.03), pytest.approx(0.5))
 
@@ -120,10 +117,8 @@ def test_a_difference_within_the_truth_s_own_error_is_marked() -> None:
     assert (gmo["interval"], gmo["over_best"], gmo["lag"]) == ("2.2–2.2", "+0.2 to +0.2", "–")
     assert best["over_best"] == "–"
     assert not arm_texts(rows, 0.1)[1]["rmse"].mark
-    (whole,) = [
-        r for r in made().rows if (r["arm"], r["method"], r["part"]) == ("UR5", "gmo", "all")
-    ]
-    assert arm_texts([whole], 0.3)[0]["lag"] == "+0.03 (× 0.50)"
+    rows = {(row["arm"], row["method"], row["part"]): row for row in made().rows}
+    assert arm_texts([rows["UR5", "gmo", "all"]], 0.3)[0]["lag"] == "+0.03 (× 0.50)"
 
 
 def test_lists_are_pooled_by_arm() -> None:
@@ -140,9 +135,8 @@ def test_lists_are_pooled_by_arm() -> None:
 
 
 def test_every_arm_has_a_table() -> None:
-    titles = [
-        line for line in text_of(made(), "terminal", every=True).splitlines() if " s)" in line
-    ]
+    lines = text_of(made(), "terminal", every=True).splitlines()
+    titles = [line for line in lines if " s)" in line]
     parts = ["contact", "free", "all"]
     arms = [f"{arm}, online, {part} (20 s)" for arm in ("UR5", "Panda") for part in parts]
     assert titles == [*arms, "Simulated, online, contact (20 s)"]

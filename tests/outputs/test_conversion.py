@@ -152,18 +152,12 @@ def test_wrenches_in_base_axes_say_about_where(with_wrench: Analysis, tmp_path: 
     """The flange is where their moment refers to: the frame of base would be another."""
     write_mcap(tmp_path / "wrench.mcap", with_wrench)
     found = messages_of(tmp_path / "wrench.mcap")
-    frames = {
-        message.header.frame_id
-        for topic, each in found.items()
-        for _, message in each
-        if topic.startswith("/vftcli/wrench")
-    }
-    assert frames == {"base@flange"}
+    wrenches = [each for topic, each in found.items() if topic.startswith("/vftcli/wrench")]
+    assert {m.header.frame_id for each in wrenches for _, m in each} == {"base@flange"}
 
 
 def test_contacts_are_logged(messages: dict[str, list]) -> None:
-    logged = [(stamp, message) for stamp, message in messages["/vftcli/contacts/log"]]
-    start = messages["/joint_states"][0][0]
+    logged, start = messages["/vftcli/contacts/log"], messages["/joint_states"][0][0]
     seconds = [(stamp - start) / 1e9 for stamp, _ in logged]
     assert seconds == pytest.approx([1.0, 1.5, 2.2, 2.6])
     texts = [message.message for _, message in logged]

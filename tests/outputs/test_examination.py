@@ -75,9 +75,8 @@ def test_only_what_refuses_heads_an_output_and_another_arm_not_what_identify_mak
     (line,) = overridden_lines([examination(SLOW, WRONG)])
     assert line.startswith("MEANINGLESS")
     assert "milliamperes" in line
-    other = examination(
-        warning("no-robot-fits", robot="ur10e", misfit_percent=50.0, ranked="ur5 50 %")
-    )
+    misfit = {"robot": "ur10e", "misfit_percent": 50.0, "ranked": "ur5 50 %"}
+    other = examination(warning("no-robot-fits", **misfit))
     assert health_record([other])[0]["overridden"] == ["no-robot-fits"]
     assert health_record([other], fitting=False)[0]["overridden"] == []
 

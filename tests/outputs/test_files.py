@@ -92,9 +92,7 @@ def test_a_failing_folder_leaves_what_was_there(tmp_path: Path) -> None:
     assert (tmp_path / "a.txt").read_text() == "old"
 
 
-def test_an_existing_output_is_refused_at_once_an_undeclared_one_at_the_end(
-    tmp_path: Path,
-) -> None:
+def test_an_existing_output_is_refused_at_once_an_undeclared_one_at_the_end(tmp_path):
     (tmp_path / "a.txt").write_text("old")
     out = OutputFolder(tmp_path, names=["estimates.parquet", "a.txt"])
     with pytest.raises(OutputError, match=r"a\.txt exists.*--force"), out:

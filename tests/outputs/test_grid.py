@@ -81,15 +81,10 @@ def test_decimal_points_of_latex_stand_below_one_another() -> None:
     numbers = ("5.66", "12.3", "110", "−0.5", "< 6", "–", "1 N")
     grid = Grid(given=(Column("c"),), rows=tuple((text,) for text in numbers))
     body = latex(grid).split("\\midrule\n")[1].splitlines()[: len(numbers)]
-    assert body == [
-        r"5.66 \\",
-        r"12.3\phantom{0} \\",
-        r"110\phantom{.00} \\",
-        r"$-$0.5\phantom{0} \\",
-        r"$<$\,6\phantom{.00} \\",
-        r"-- \\",
-        r"1 N \\",
-    ]
+    assert [line.removesuffix(r" \\") for line in body] == [
+        "5.66", r"12.3\phantom{0}", r"110\phantom{.00}", r"$-$0.5\phantom{0}",
+        r"$<$\,6\phantom{.00}", "--", "1 N",
+    ]  # fmt: skip
 
 
 def test_a_table_too_wide_for_a_column_takes_both(grid: Grid) -> None:
@@ -114,8 +109,8 @@ def test_latex_takes_its_tables(grid: Grid, tmp_path: Path) -> None:
         latex(replace(joints, title="α − ξ ≤ τ", rows=((*row[:-1], "1234567890123"),))),
     ]
     above = r"\documentclass[twocolumn]{article}\usepackage{booktabs}"
-    above += r"\textwidth=7.16in\columnsep=.16in"
-    text = "\n".join([above, r"\begin{document}", *tables, r"\end{document}"])
+    above += r"\textwidth=7.16in\columnsep=.16in\begin{document}"
+    text = "\n".join([above, *tables, r"\end{document}"])
     (tmp_path / "tables.tex").write_text(text, encoding="utf-8")
     run([compiler, "-interaction=nonstopmode", "-halt-on-error", "tables.tex"], tmp_path)
     log = (tmp_path / "tables.log").read_text(encoding="latin-1")
@@ -156,15 +151,12 @@ def test_html_escapes_every_text_and_marks_best_floor_and_observers(grid: Grid) 
 
 
 def test_rows_for_machines_read_back() -> None:
-    rows = [{"a": 1.5e-7, "b": "x,y", "c": True}, {"a": float("nan"), "b": None, "c": np.False_}]
-    assert json.loads(to_json(rows)) == [
-        {"a": 1.5e-7, "b": "x,y", "c": True},
-        {"a": None, "b": None, "c": False},
-    ]
+    first, second = {"a": 1.5e-7, "b": "x,y", "c": True}, {"a": float("nan"), "c": np.False_}
+    rows = [first, second | {"b": None}]
+    assert json.loads(to_json(rows)) == [first, {"a": None, "b": None, "c": False}]
     read = list(csv.DictReader(io.StringIO(csv_rows(rows, ["a", "b", "c"]))))
-    assert float(read[0]["a"]) == 1.5e-7
-    assert read[0] | {"a": ""} == {"a": "", "b": "x,y", "c": "true"}
-    assert read[1] == {"a": "", "b": "", "c": "false"}
+    assert float(read[0].pop("a")) == 1.5e-7
+    assert read == [{"b": "x,y", "c": "true"}, {"a": "", "b": "", "c": "false"}]
 
 
 @pytest.mark.parametrize("first", ["=", "+", "-", "@", "\t", "\r"])
@@ -178,11 +170,8 @@ def test_a_name_that_a_spreadsheet_would_run_is_a_text_in_csv(first: str) -> Non
 
 
 def test_a_table_without_room_leaves_out_what_is_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
-    columns = (
-        Column("name", words=True),
-        Column("time to the peak", "m, rad", ".1f"),
-        Column("work of all", "J", ".1f", seldom=True),
-    )
+    time, work = Column("time to the peak", "m, rad", ".1f"), Column("work of all", "J", ".1f")
+    columns = (Column("name", words=True), time, work._replace(seldom=True))
     grid = Grid(given=columns, rows=(("a", 1.0, 2.0), ("b", 10.0, 20.0)))
     texts = []
     for width in ("80", "31", "15"):
@@ -190,10 +179,7 @@ def test_a_table_without_room_leaves_out_what_is_seldom(monkeypatch: pytest.Monk
         texts.append(terminal(grid))
     wide, narrow, least = texts
     assert wide.splitlines()[0] == "name  time to the peak [m, rad]  work of all [J]"
-    assert [line.split() for line in narrow.splitlines()[-2:]] == [
-        ["a", "1.0", "2.0"],
-        ["b", "10.0", "20.0"],
-    ]
+    assert narrow.split()[-6:] == ["a", "1.0", "2.0", "b", "10.0", "20.0"]
     assert "[m, rad]" in narrow
     assert max(map(len, narrow.splitlines())) <= 31
     assert least.splitlines()[-2:] == ["b         10.0", "No room for: work of all."]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from drawings import drawn, names_in
 from unpacking import Page, page_data
 
 from vftcli.doctor import examine
@@ -27,7 +28,6 @@ from vftcli.outputs.identification import (
     torque_charts,
     write_identification,
 )
-from vftcli.outputs.paper import WIDTHS, paper_style
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters, torque_regressor
@@ -150,12 +150,8 @@ def test_figures_are_of_the_torque_and_of_what_is_left(found: Any) -> None:
     pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
     drawings = identification_figures(found)
     assert list(drawings) == list(IDENTIFICATION_FIGURES)
-    with paper_style():
-        torque, left = (drawings[n].draw(WIDTHS["double"]) for n in IDENTIFICATION_FIGURES)
-        torque.draw_without_rendering()
-        left.draw_without_rendering()
-    named = [text.get_text() for text in torque.legends[0].get_texts()]
-    assert named == ["measured", "predicted"]
+    torque, left = map(drawn, drawings.values())
+    assert names_in(torque) == ["measured", "predicted"]
     assert {axes.get_ylabel() for axes in left.axes} == {"Residual rms (N·m)"}
     rows = found.residuals.filter(found.residuals["joint"] == 1)
     dots = [container.lines[0].get_ydata()[0] for container in left.axes[0].containers]

@@ -6,29 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawings import names_in
 
+from vftcli.outputs import paper
 from vftcli.outputs.charts import DASHES, INK, QUIET, REFERENCE, SPARE, Chart, ChartLine
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.paper import (
-    DotPlot,
-    Drawing,
-    Plot,
-    add_legend,
-    dot_figure,
-    figure_files,
-    line_figure,
-    paper_style,
-    plots_of,
-    sheet,
-    shortened,
-    write_figures,
-)
 
 matplotlib = pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
 
 def drawn(width: float) -> object:
-    figure, (axes,) = sheet(width, 1, 1, 1.0)
+    figure, (axes,) = paper.sheet(width, 1, 1, 1.0)
     axes.plot([0.0, 1.0], [-1.0, 1.0])
     axes.set_ylabel("costs $5 τ² (N·m)")
     return figure
@@ -36,7 +24,7 @@ def drawn(width: float) -> object:
 
 def written(folder: Path, form: str) -> dict[str, bytes]:
     with OutputFolder(folder) as place:
-        write_figures(place, {"a": Drawing("A $5 title", partial(drawn))}, form)
+        paper.write_figures(place, {"a": paper.Drawing("A $5 title", partial(drawn))}, form)
     return {path.name: path.read_bytes() for path in sorted((folder / "figures").iterdir())}
 
 
@@ -47,7 +35,7 @@ def test_a_figure_has_the_same_bytes_for_every_user(form: str, tmp_path: Path) -
     with matplotlib.rc_context({"font.size": 20.0, "font.family": "monospace"}):
         assert written(tmp_path / "two", form) == first
     assert list(first) == [f"a-double.{form}", f"a-single.{form}"]
-    assert [f"figures/{name}" for name in sorted(first)] == sorted(figure_files(form, ["a"]))
+    assert {f"figures/{name}" for name in first} == {*paper.figure_files(form, ["a"])}
     for content in first.values():
         assert b"CreationDate" not in content
         assert not re.search(rb"20\d\d-\d\d-\d\dT", content)
@@ -84,10 +72,10 @@ def test_a_command_without_figures_loads_no_matplotlib(loaded) -> None:
 
 
 def test_files_have_their_names_and_long_names_are_cut() -> None:
-    assert figure_files(None, ["a"]) == []
-    assert figure_files("svg", ["a"], "arm-") == ["arm-a-single.svg", "arm-a-double.svg"]
-    assert shortened("a" * 44) == "a" * 44
-    assert shortened("a" * 60) == "a" * 43 + "…"
+    assert paper.figure_files(None, ["a"]) == []
+    assert paper.figure_files("svg", ["a"], "arm-") == ["arm-a-single.svg", "arm-a-double.svg"]
+    assert paper.shortened("a" * 44) == "a" * 44
+    assert paper.shortened("a" * 60) == "a" * 43 + "…"
 
 
 def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
@@ -96,10 +84,10 @@ def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
 
     names = {f"abcd{k}": Line2D([], []) for k in range(7)}
     for width, columns, room in ((3.5, 4, 0.35), (7.16, 7, 0.2)):
-        figure, _ = sheet(width, 1, 1, 1.0)
+        figure, _ = paper.sheet(width, 1, 1, 1.0)
         bare = figure.get_figheight()
         assert figure.legends == []
-        add_legend(figure, names)
+        paper.add_legend(figure, names)
         assert figure.legends[0]._ncols == columns  # it has no public name
         assert figure.get_figheight() - bare == pytest.approx(room)
 
@@ -120,8 +108,8 @@ def chart(**changed: Any) -> Chart:
 
 
 def drawn_lines(width: float, *words: Any, **more: Any) -> Any:
-    with paper_style():
-        figure = line_figure(width, *words, **more)
+    with paper.paper_style():
+        figure = paper.line_figure(width, *words, **more)
         figure.draw_without_rendering()
     return figure
 
@@ -130,7 +118,7 @@ def drawn_lines(width: float, *words: Any, **more: Any) -> Any:
 def test_axes_have_units_and_figures_heights(width: float, rows: int, height: float) -> None:
     values = np.zeros((len(T), 6))
     values[1234, 0] = 5.0
-    made = plots_of(chart(series=(ChartLine("a", values),)))
+    made = paper.plots_of(chart(series=(ChartLine("a", values),)))
     figure = drawn_lines(width, made)
     line = figure.axes[0].lines[0]
     assert line.get_ydata().max() == 5.0  # a spike of one sample stays
@@ -147,7 +135,7 @@ def test_letters_and_lines_can_be_read_in_print() -> None:
     """Letters of 8 pt, 7 in legends and at ticks, 6.5 of numbers; no hair line, no bar."""
     made = chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")
     marks = {"a": (np.arange(6.0), np.zeros(6))}
-    lines = drawn_lines(7.16, plots_of(made), numbers={1: 1.0}, marks=marks)
+    lines = drawn_lines(7.16, paper.plots_of(made), numbers={1: 1.0}, marks=marks)
     assert [line.get_ydata()[0] for line in lines.axes[0].lines[-3:-1]] == [1.0, -1.0]  # the band
     for figure in (lines, drawn_dots([plot(), plot("b.csv")])):
         texts = [text for text in figure.findobj(matplotlib.text.Text) if text.get_text()]
@@ -162,11 +150,8 @@ def test_letters_and_lines_can_be_read_in_print() -> None:
             assert all(spine.get_linewidth() == 0.5 for spine in axes.spines.values())
             for collection in axes.collections:
                 filled = isinstance(collection, matplotlib.collections.PolyCollection)
-                assert (
-                    (0.0 if filled else 0.5)
-                    <= collection.get_linewidth()[0]
-                    <= 1.3 * (not filled)
-                )
+                least, most = (0.0, 0.0) if filled else (0.5, 1.3)
+                assert least <= collection.get_linewidth()[0] <= most
             assert all(patch.get_linewidth() == 0.0 for patch in axes.patches)
 
 
@@ -177,7 +162,7 @@ def test_lines_are_reported_apart_without_colour() -> None:
     def lightness(line: Any) -> float:
         return float(np.dot((0.299, 0.587, 0.114), to_rgb(line.get_color())))
 
-    (axes, *_) = drawn_lines(7.16, plots_of(chart())).axes
+    (axes, *_) = drawn_lines(7.16, paper.plots_of(chart())).axes
     assert len(axes.lines) == 7
     for one, other in combinations(axes.lines, 2):
         if one._dash_pattern == other._dash_pattern:
@@ -185,23 +170,19 @@ def test_lines_are_reported_apart_without_colour() -> None:
             assert one.get_linewidth() != other.get_linewidth()
 
 
-def named(figure: Any) -> list[str]:
-    return [text.get_text() for text in figure.legends[0].get_texts()]
-
-
 def test_a_legend_names_lines_bands_and_contacts_but_no_line_alone() -> None:
     first, *_ = lines = chart().series[1:]
     quiet = chart(series=(first._replace(quiet=T < 5.0),))
-    assert named(drawn_lines(7.16, plots_of(quiet))) == ["line 0", "95 % band", QUIET]
+    assert names_in(drawn_lines(7.16, paper.plots_of(quiet))) == ["line 0", "95 % band", QUIET]
     alone = chart(series=(first,))
-    assert named(drawn_lines(7.16, plots_of(alone))) == ["line 0", "95 % band"]
-    assert not drawn_lines(7.16, plots_of(chart(series=lines[1:2]))).legends
+    assert names_in(drawn_lines(7.16, paper.plots_of(alone))) == ["line 0", "95 % band"]
+    assert not drawn_lines(7.16, paper.plots_of(chart(series=lines[1:2]))).legends
 
 
 def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:
     made = chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")
-    figure = drawn_lines(3.5, plots_of(made))
-    names = named(figure)
+    figure = drawn_lines(3.5, paper.plots_of(made))
+    names = names_in(figure)
     assert names[0] == "reference"
     assert names[-3:] == ["95 % band", "± floor", "contact"]
     boxes = [axes.get_tightbbox() for axes in figure.axes]
@@ -215,7 +196,7 @@ def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:
 def test_contacts_are_numbered_where_there_is_room_and_a_second_chart_is_named_once() -> None:
     """10 s in 1.79 in: a digit takes .26 s, and what is between two .11 s, .37 s in all."""
     over, numbers = chart(title="|H|", units=("dB",) * 6), {1: 1.0, 2: 1.35, 3: 5.0, 4: 5.39}
-    figure = drawn_lines(7.16, plots_of(chart(), over), numbers=numbers)
+    figure = drawn_lines(7.16, paper.plots_of(chart(), over), numbers=numbers)
     texts = [[text.get_text() for text in axes.texts] for axes in figure.axes[:6]]
     assert texts == [["1", "3", "4"]] * 3 + [[]] * 3
     rights = [axes.get_ylabel() for axes in figure.axes[6:]]
@@ -223,7 +204,7 @@ def test_contacts_are_numbered_where_there_is_room_and_a_second_chart_is_named_o
 
 
 def test_frequencies_stand_on_a_logarithmic_axis_without_powers() -> None:
-    figure = drawn_lines(3.5, plots_of(chart(unit="Hz", log=True, x=T + 0.01), only=[0, 2]))
+    figure = drawn_lines(3.5, paper.plots_of(chart(unit="Hz", log=True, x=T + 0.01), only=[0, 2]))
     assert [axes.get_ylabel() for axes in figure.axes] == ["J1 (N·m)", "J3 (N·m)"]
     axes = figure.axes[0]
     assert axes.get_xscale() == "log"
@@ -234,14 +215,13 @@ def test_frequencies_stand_on_a_logarithmic_axis_without_powers() -> None:
 
 def test_marks_stand_where_they_are_reported_each_shape_its_own() -> None:
     marks = {"a": (np.arange(6.0), np.zeros(6)), "b": (np.ones(6), np.zeros(6))}
-    figure = drawn_lines(
-        7.16, [Plot(chart(), 0), Plot(chart(), 3)], marks=marks, below="Rate (Hz)"
-    )
+    plots = [paper.Plot(chart(), 0), paper.Plot(chart(), 3)]
+    figure = drawn_lines(7.16, plots, marks=marks, below="Rate (Hz)")
     one, other = figure.axes[1].lines[-2:]
     assert list(one.get_xdata()) == [3.0]
     assert one.get_marker() != other.get_marker()
     assert figure.axes[0].get_xlabel() == "Rate (Hz)"
-    assert named(figure)[-2:] == ["a, chosen", "b, chosen"]
+    assert names_in(figure)[-2:] == ["a, chosen", "b, chosen"]
 
 
 def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
@@ -249,7 +229,7 @@ def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
     values = np.zeros((len(T), 7))
     names = tuple(f"J{j}" for j in range(1, 8))
     made = chart(series=(ChartLine("a", values),), units=("N·m",) * 7, panels=names)
-    *plots, empty = drawn_lines(3.5, plots_of(made)).axes
+    *plots, empty = drawn_lines(3.5, paper.plots_of(made)).axes
     assert [axes.get_xlabel() for axes in plots] == [""] * 6 + ["Time (s)"]
     assert [text.get_text() for text in empty.texts] == ["Time (s)"]
     assert empty.get_xlim() == plots[0].get_xlim()
@@ -260,16 +240,16 @@ def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
 LARGE, SMALL = np.array([5.0, 2.0]), np.array([0.4, np.nan])
 
 
-def plot(title: str = "a.csv", joints: tuple[str, ...] = ("J1", "J2")) -> DotPlot:
+def plot(title: str = "a.csv", joints: tuple[str, ...] = ("J1", "J2")) -> paper.DotPlot:
     """Two observers on two joints; the second's number on J2 is not known."""
     rows = [("gmo", LARGE, np.outer((0.9, 1.2), LARGE)), ("best", SMALL, None)]
-    return DotPlot(title, joints, rows, np.array([0.5, np.nan]))
+    return paper.DotPlot(title, joints, rows, np.array([0.5, np.nan]))
 
 
-def drawn_dots(plots: list[DotPlot], width: float = 3.5) -> Any:
+def drawn_dots(plots: list[paper.DotPlot], width: float = 3.5) -> Any:
     paints = {"gmo": "#dd6415", "best": "#d3224b"}
-    with paper_style():
-        figure = dot_figure(width, plots, paints, "RMSE (N·m)")
+    with paper.paper_style():
+        figure = paper.dot_figure(width, plots, paints, "RMSE (N·m)")
         figure.draw_without_rendering()
     return figure
 
@@ -289,7 +269,7 @@ def test_dots_stand_side_by_side_with_their_intervals_and_the_floor() -> None:
     ends = gmo.lines[2][0].get_segments()[0][:, 1]
     assert ends == pytest.approx([4.5, 6.0])
     assert axes.get_yscale() == "log"  # 5 is more than ten times .4
-    assert named(figure) == ["gmo", "best", "floor of the reference"]
+    assert names_in(figure) == ["gmo", "best", "floor of the reference"]
     # They are told apart without colour, too.
     assert gmo.lines[0].get_marker() != best.lines[0].get_marker()
     assert gmo.lines[0].get_markerfacecolor() != best.lines[0].get_markerfacecolor()

@@ -86,9 +86,7 @@ def test_several_logs_get_folders(analysis: Analysis, as_if: Callable, tmp_path:
     assert (tmp_path / "out/errors.md").read_text(encoding="utf-8").count("run.csv against") == 2
 
 
-def test_a_failing_writer_leaves_nothing(
-    analysis: Analysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failing_writer_leaves_nothing(analysis, tmp_path, monkeypatch):
     def fail(_path: Path, _analysis: Analysis) -> None:
         raise OutputError("no")
 

@@ -30,17 +30,20 @@ def plot(path: str, values: np.ndarray, step: float = 1.0, *, family: int = 0) -
     return Chart(path, "what", ("N",), ("",), t, tuple(shown), (family,) * (family > 0))
 
 
+def written(folder: Path, *tabs: Tab) -> Path:
+    words, path = {"Summary": "words → here"}, folder / "r.rrd"
+    with rerun_file(path, "名 title", tabs, words, POSES, "Arm"):
+        return path
+
+
 def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:
     first = np.arange(8.0).reshape(4, 2)
     tabs = [Tab("one", [plot("/one", first)]), Tab("two", [plot("/two", first[:3, :1], 0.5)])]
-    words = {"Summary": "words → here"}
-    with rerun_file(tmp_path / "r.rrd", "名 title", tabs, words, POSES, "Arm"):
-        pass
-    assert rows_of(tmp_path / "r.rrd", "/one", "Scalars:scalars") == first.tolist()
-    assert len(rows_of(tmp_path / "r.rrd", "/two", "Scalars:scalars")) == 3
-    (text,) = rows_of(tmp_path / "r.rrd", "/summary", "TextDocument:text")
-    assert text == ["words -> here"]
-    assert len(rerun.chunk.RrdReader(str(tmp_path / "r.rrd")).blueprints()) == 1
+    path = written(tmp_path, *tabs)
+    assert rows_of(path, "/one", "Scalars:scalars") == first.tolist()
+    assert len(rows_of(path, "/two", "Scalars:scalars")) == 3
+    assert rows_of(path, "/summary", "TextDocument:text") == [["words -> here"]]
+    assert len(rerun.chunk.RrdReader(str(path)).blueprints()) == 1
 
 
 def test_the_viewer_gets_letters_it_can_draw() -> None:
@@ -65,14 +68,12 @@ def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
         LogLine("/remarks", 3.0, "last", "#102030", "WARN"),
         LogLine("/remarks", 1.0, "first", "#102030"),
     ]
-    tab = Tab("one", [force], log)
-    with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, POSES, "Arm"):
-        pass
-    found = rows_of(tmp_path / "r.rrd", "/force", "Scalars:scalars")
+    path = written(tmp_path, Tab("one", [force], log))
+    found = rows_of(path, "/force", "Scalars:scalars")
     assert np.ravel(found).tolist() == [0.0, 1.0, 2.0, 3.0]
-    assert rows_of(tmp_path / "r.rrd", "/force/points", "Scalars:scalars") == [[7.0]]
-    assert rows_of(tmp_path / "r.rrd", "/contacts/2", "TextLog:text") == [["second -> end"]]
-    assert rows_of(tmp_path / "r.rrd", "/remarks", "TextLog:text") == [["first"], ["last"]]
+    assert rows_of(path, "/force/points", "Scalars:scalars") == [[7.0]]
+    assert rows_of(path, "/contacts/2", "TextLog:text") == [["second -> end"]]
+    assert rows_of(path, "/remarks", "TextLog:text") == [["first"], ["last"]]
 
 
 def test_the_eye_sees_the_base_and_all_places_of_the_links() -> None:
@@ -80,18 +81,14 @@ def test_the_eye_sees_the_base_and_all_places_of_the_links() -> None:
     places = np.array([[[0.2, -0.4, 0.6], [-0.2, 0.4, 1.0]]])
     made = blueprint([], {"Summary": ""}, POSES._replace(translation=places), "Arm")
     eye = made.root_container.contents[0].contents[0].properties["EyeControls3D"]
-    (place,), (target,) = (
-        x.as_arrow_array().to_pylist() for x in (eye.position, eye.look_target)
-    )
-    np.testing.assert_allclose(target, [0.0, 0.0, 0.5])
+    (place,), (aim,) = (x.as_arrow_array().to_pylist() for x in (eye.position, eye.look_target))
+    np.testing.assert_allclose(aim, [0.0, 0.0, 0.5])
     away = 2.3 * 0.6708 * np.array([0.62, -0.66, 0.42])
-    np.testing.assert_allclose(np.subtract(place, target), away, atol=1e-4)
+    np.testing.assert_allclose(np.subtract(place, aim), away, atol=1e-4)
 
 
 def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:
-    small, large = (
-        plot("/a", np.array([[0.0], [high], [5.0]]), family=1) for high in (1.0, 10.0)
-    )
+    small, large = (plot("/a", np.array([[0.0], [x], [5.0]]), family=1) for x in (1.0, 10.0))
     alone = plot("/b", np.array([[0.0], [1.0]]))
     peak = ChartLine("peaks", np.array([[20.0]]), "#102030", x=np.array([1.0]))
     pointed = alone._replace(series=(*alone.series, peak), units=("m",))
@@ -132,10 +129,8 @@ def test_a_full_disk_is_one_error_at_once_and_no_more(tmp_path: Path, room: int)
     """Rerun's own writer logged four lines and was waited for without end, its output piped."""
     script = [sys.executable, "-c", FULL, str(tmp_path / "r.rrd"), str(room)]
     ended = subprocess.run(script, capture_output=True, text=True, timeout=60, check=False)
-    assert (ended.stdout, ended.stderr) == (
-        "r.rrd cannot be written: file too large; give another -o\n",
-        "",
-    )
+    said = "r.rrd cannot be written: file too large; give another -o\n"
+    assert (ended.stdout, ended.stderr) == (said, "")
 
 
 def test_a_recording_is_known_by_what_it_holds() -> None:

@@ -140,10 +140,8 @@ def test_the_summary_tells_log_and_arrow(touched: Analysis, without_reference: A
     assert notes[0] == r"- turned the sign of \<b\>one\</b\> (--columns)"
     assert lines[-1] == f"Log sha256 {'ab' * 32}"
     bare = replace(without_reference, contacts=None)
-    assert (
-        f"first observer; 1 m is {NEWTON_PER_METRE:g} N; none where the pose leaves it open"
-        in summary(bare)
-    )
+    scale = f"1 m is {NEWTON_PER_METRE:g} N"
+    assert f"first observer; {scale}; none where the pose leaves it open" in summary(bare)
 
 
 def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> None:
@@ -188,13 +186,10 @@ def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
     In those frames the arrow was the raw torque's: (1.96, 2.45, −.94) N over a span whose mean the
     table makes zero.
     """
-    zero = ZeroChoice(spans=((1.0, 2.5),))
-    tool, sensor = "0.05,0,0.15,0.3,-0.2,0.8", "0,0,0.03"
-    choice = AnalysisChoice(
-        robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("kfo-fe",)),
-        wrench=WrenchChoice(frame=frame, tool=tool, sensor_pose=sensor, zero=zero),
-    )
+    mounted = {"tool": "0.05,0,0.15,0.3,-0.2,0.8", "sensor_pose": "0,0,0.03"}
+    wrench = WrenchChoice(frame=frame, zero=ZeroChoice(spans=((1.0, 2.5),)), **mounted)
+    robot, observers = RobotChoice(name="ur5"), ObserverChoice(names=("kfo-fe",))
+    choice = AnalysisChoice(robot=robot, observers=observers, wrench=wrench)
     analysis = analyse_log(CIRCLE, choice)
     poses = motion(analysis.robot.chain, analysis.t, analysis.recording.q)
     rows = np.searchsorted(analysis.t, poses.t)
@@ -247,13 +242,11 @@ def test_a_line_of_the_log_stands_at_the_time_that_it_is_about() -> None:
         ("/remarks", 3.0, grey, "WARN"),
         ("/remarks", 0.0, grey, "WARN"),
     ]
-    assert (
-        lines[0].text == "1.50 s: contact 1 begins, for 3.28 s: 65 ± 7 N, +y, down, wrist (good)"
-    )
-    assert lines[1].text == (
+    assert [line.text for line in lines[:2]] == [
+        "1.50 s: contact 1 begins, for 3.28 s: 65 ± 7 N, +y, down, wrist (good)",
         "4.60 s: contact 2 begins, for 0.18 s: joint torques 0.0, 1.0, 2.0, 3.0, 4.0, 5.0 N·m, "
-        "link 2 … link 3 (weak)"
-    )
+        "link 2 … link 3 (weak)",
+    ]
     unknown = contact_list(remarks=(), unexplained=Unexplained(13.0, 4, 17.0))
     for empty in (contact_list(remarks=()), unknown):
         (nothing,) = contact_log(empty)

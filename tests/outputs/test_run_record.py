@@ -23,12 +23,9 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
     assert source["rate_hz"] == pytest.approx(1.0 / np.median(np.diff(t)))
     assert len(record["robot"]["sha256"]) == 64
     assert "ON the robot" in record["conventions"]["sign"]
-    assert [r["message"] for r in record["repairs"]] == [
-        "turned the sign of <b>one</b> (--columns)"
-    ]
-    assert [r["message"] for r in record["warnings"]] == [
-        "left out look & feel of /odd: it does not cover the joints' time"
-    ]
+    repairs, warnings = ([r["message"] for r in record[key]] for key in ("repairs", "warnings"))
+    assert repairs == ["turned the sign of <b>one</b> (--columns)"]
+    assert warnings == ["left out look & feel of /odd: it does not cover the joints' time"]
     assert record["reference"]["name"] == "vendor"
     assert (record["robot"]["name"], record["robot"]["file"]) == ("ur5", None)  # built in
     found = {o["name"]: o for o in record["observers"]}
@@ -62,14 +59,9 @@ def test_a_remark_is_recorded_as_data(analysis: Analysis) -> None:
     shift = caution("test-shift", Where("gmo", (2, 3), (1.0, 2.5)), shift_s=np.float64(0.25))
     record = json.loads(to_json(run_record(replace(analysis, remarks=(shift,)), "x")))
     assert record["remarks"][0] == {
-        "code": "test-shift",
-        "level": "caution",
-        "message": "gmo: shifted by 0.25 s",
-        "values": {"shift_s": 0.25},
-        "about": "gmo",
-        "joints": [2, 3],
-        "span_s": [1.0, 2.5],
-    }
+        "code": "test-shift", "level": "caution", "message": "gmo: shifted by 0.25 s",
+        "values": {"shift_s": 0.25}, "about": "gmo", "joints": [2, 3], "span_s": [1.0, 2.5],
+    }  # fmt: skip
 
 
 @pytest.mark.usefixtures("catalogue")

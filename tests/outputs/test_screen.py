@@ -10,7 +10,7 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import ForceCourse
+from vftcli.contacts.contact_list import Contact, ForceCourse
 from vftcli.outputs.believability import MARKS, Ground
 from vftcli.outputs.contacts import forces_along
 from vftcli.outputs.error_tables import blocks
@@ -96,9 +96,8 @@ def test_a_terminal_gets_its_letters_colours_and_width(analysis: Analysis) -> No
 def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> None:
     (block,) = blocks(analysis.errors)
     first = pl.col("joint") == 1
-    rests = analysis.errors.with_columns(
-        reference_trusted=~first, reference_floor_Nm=pl.when(first).then(9.0).otherwise(0.2)
-    )
+    floor = pl.when(first).then(9.0).otherwise(0.2)
+    rests = analysis.errors.with_columns(reference_trusted=~first, reference_floor_Nm=floor)
     (left,) = blocks(rests)
     assert against(left, analysis).startswith("Against vendor without J1 (floor 0.20 N·m): RMSE ")
     paper = replace(analysis, remarks=(fact("paper-gains-measured"),))
@@ -113,9 +112,8 @@ def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     bad = warning("effort-sign", signal="current", misfit_percent=190.0, healed_percent=3.0,
                   column="current", width=6)  # fmt: skip
     made = replace(analysis, examinations=(replace(own, findings=(bad,)),))
-    assert "MEANINGLESS if this finding is right (you chose --anyway): effort-sign" in log_screen(
-        made, CANVAS
-    )
+    doubt = "MEANINGLESS if this finding is right (you chose --anyway): effort-sign"
+    assert doubt in log_screen(made, CANVAS)
     assert "MEANINGLESS" in short_screen(made, CANVAS)
 
 
@@ -222,20 +220,13 @@ END = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("most", "weak", "lines"),
-    [
-        (2, 1, [HEADS, *EACH[1:], "  the 2 hardest of 3; --details shows all", *END]),
-        (None, 1, [
-            HEADS, *EACH, "",
-            "  Candidates, too little evidence or force to list:", HEADS, ROW.format(4), *END,
-        ]),
-    ],
-)  # fmt: skip
-def test_a_list_is_rows_and_a_word_on_more(most: int | None, weak: int, lines: list[str]) -> None:
-    rows = [contact(number=k, start=k * 1.0, peak_force=50.0 + k) for k in (1, 2, 3, 4)]
-    found = contact_list(*rows[:3], candidates=tuple(rows[3:][:weak]))
-    assert list_lines(found, most, Canvas(width=72)) == lines
+def test_a_list_is_rows_and_a_word_on_more() -> None:
+    *rows, weak = (contact(number=k, start=k * 1.0, peak_force=50.0 + k) for k in (1, 2, 3, 4))
+    found, canvas = contact_list(*rows, candidates=(weak,)), Canvas(width=72)
+    more = "  the 2 hardest of 3; --details shows all"
+    assert list_lines(found, 2, canvas) == [HEADS, *EACH[1:], more, *END]
+    weaker = ["", "  Candidates, too little evidence or force to list:", HEADS, ROW.format(4)]
+    assert list_lines(found, None, canvas) == [HEADS, *EACH, *weaker, *END]
 
 
 T = np.linspace(2.0, 20.0, 1801)
@@ -284,12 +275,7 @@ def test_every_sample_counts_in_a_column_and_a_gap_is_bridged() -> None:
 
 
 def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
-    rows = [
-        contact(start=1.0, stop=1.5, peak=1.25, peak_force=30.0, course=risen(1.0, 1.5, 30.0)),
-        contact(
-            start=2.0, stop=2.2, number=2, peak=2.1, peak_force=12.0, course=risen(2.0, 2.2, 12.0)
-        ),
-    ]
+    rows = [risen(1.0, 1.5, 30.0), risen(2.0, 2.2, 12.0)]
     t = without_reference.t
     force = np.nan_to_num(forces_along(rows, t)[0])
     assert np.isclose(force[(t >= 1.0) & (t <= 1.5)].max(), 30.0, rtol=0.05)  # between samples
@@ -300,7 +286,8 @@ def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
         assert "┤" not in log_screen(replace(without_reference, contacts=found), Canvas())
 
 
-def risen(start: float, stop: float, peak: float) -> ForceCourse:
-    """A force that rises to a peak and falls."""
-    force = np.array([0.0, peak, 0.0])
-    return ForceCourse(np.array([start, (start + stop) / 2, stop]), force, 0.1 * force)
+def risen(start: float, stop: float, peak: float) -> Contact:
+    """A contact whose force rises to a peak and falls."""
+    t, force = np.array([start, (start + stop) / 2, stop]), np.array([0.0, peak, 0.0])
+    course = ForceCourse(t, force, 0.1 * force)
+    return contact(start=start, stop=stop, peak=t[1], peak_force=peak, course=course)

@@ -45,9 +45,7 @@ STORY = ROOT / "docs" / "story.md"
 
 
 @pytest.mark.slow
-def test_the_story_quotes_what_its_commands_print(
-    logs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_story_quotes_what_its_commands_print(logs, tmp_path, monkeypatch):
     """Every command runs in one folder; what is quoted of it stands there, pieces in order."""
     for name, place in OF_STORY.items():
         (tmp_path / name).symlink_to(logs / place)

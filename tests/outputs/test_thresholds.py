@@ -138,9 +138,7 @@ def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
 
 def test_what_has_no_tail_has_no_upper_end_either() -> None:
     short = SignalThreshold(5.0, (5.0, NAN), 1.0, "short.csv", None)
-    one = Thresholds(
-        rate=1.0, joints=(short,), axes=(), force=(), of_vendor=True, logged_wrench=False
-    )
+    one = replace(made(1, axes=0), joints=(short,))
     record = json.loads(json.dumps(jsonable(thresholds_record(one, (), ())), allow_nan=False))
     assert record["joints"][0]["interval_Nm"] == [5.0, None]
     assert tomllib.loads(record["calls"]["toml"])["thresholds"]["joint_torque_upper_Nm"] == [5.0]

@@ -4,24 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from vftcli.signals import estimation
 from vftcli.signals import estimation as module
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.estimation import (
-    SPIKE,
-    LinearModel,
-    beside_errors,
-    correlation_time,
-    cross_validated,
-    filtered,
-    fit_column,
-    inverse_of,
-    left_out,
-    log_likelihood,
-    robust_sd,
-    smoothed,
-    solve,
-)
 
 # Filter, likelihood and smoother against a dense Gaussian solve of all blocks at once
 
@@ -29,7 +15,9 @@ from vftcli.signals.estimation import (
 BLOCKS = 40
 
 
-def models(count: int, seed: int, joints: int = 6, pinned: slice = slice(0)) -> LinearModel:
+def models(
+    count: int, seed: int, joints: int = 6, pinned: slice = slice(0)
+) -> estimation.LinearModel:
     """Models of a wrench and of one error a joint at random; the wrench certain where pinned."""
     rng = np.random.default_rng(seed)
     shape = (BLOCKS, count)
@@ -39,9 +27,9 @@ def models(count: int, seed: int, joints: int = 6, pinned: slice = slice(0)) -> 
     decay[pinned, :, :6] = added[pinned, :, :6] = 0.0
     if pinned.stop and pinned.stop < BLOCKS:
         decay[pinned.stop, :, :6] = 0.0
-    observation = beside_errors(rng.standard_normal((*shape, 6, joints)))
+    observation = estimation.beside_errors(rng.standard_normal((*shape, 6, joints)))
     observation[rng.random(shape) < 0.15] = 0.0
-    return LinearModel(
+    return estimation.LinearModel(
         d=5.0 * rng.standard_normal((*shape, joints)),
         observation=observation,
         white=rng.uniform(0.1, 1.0, (*shape, joints)),
@@ -50,7 +38,7 @@ def models(count: int, seed: int, joints: int = 6, pinned: slice = slice(0)) -> 
     )
 
 
-def dense(model: LinearModel) -> tuple[Array, Array, float]:
+def dense(model: estimation.LinearModel) -> tuple[Array, Array, float]:
     """Mean and covariance of every block, and ln p(d), from one joint normal distribution."""
     (blocks, size), n = model.decay.shape, model.d.shape[-1]
     prior = np.zeros((blocks, size, blocks, size))
@@ -74,31 +62,29 @@ def dense(model: LinearModel) -> tuple[Array, Array, float]:
 
 @pytest.mark.parametrize("joints", [6, 7])
 @pytest.mark.parametrize("pinned", [slice(0), slice(0, 12), slice(15, 25)])
-def test_side_by_side_they_are_the_dense_solve(
-    joints: int, pinned: slice, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_side_by_side_they_are_the_dense_solve(joints, pinned, monkeypatch):
     monkeypatch.setattr(module, "STRETCH", 16)
     made = models(3, 1, joints, pinned)
-    mean, covariance = smoothed(made)
+    mean, covariance = estimation.smoothed(made)
     assert not mean[pinned, :, :6].any()  # zero and certain
     assert not covariance[pinned, :, :6].any()
-    likely = log_likelihood(made) - 0.5 * made.d[:, 0].size * np.log(2.0 * np.pi)
+    likely = estimation.log_likelihood(made) - 0.5 * made.d[:, 0].size * np.log(2.0 * np.pi)
     for lane in range(3):
-        one = LinearModel(*(series[:, lane] for series in made))
+        one = estimation.LinearModel(*(series[:, lane] for series in made))
         exact, P, logarithm = dense(one)
         # 40 blocks of numbers up to 400, of which rounding leaves 1e-12
         np.testing.assert_allclose(mean[:, lane], exact, atol=1e-9)
         np.testing.assert_allclose(covariance[:, lane], P, atol=1e-9)
         np.testing.assert_allclose(likely[lane], logarithm, rtol=1e-9)
-        np.testing.assert_allclose(smoothed(one)[0], exact, atol=1e-9)
+        np.testing.assert_allclose(estimation.smoothed(one)[0], exact, atol=1e-9)
 
 
 def test_a_spike_counts_with_its_own_variance() -> None:
     """One block of variance 4 + 1 reads 10: the square is 20, the gain 4/5 or a 40th of it."""
     four, one = np.full((1, 1), 4.0), np.ones((1, 1))
-    block = LinearModel(10.0 * one, np.ones((1, 1, 1)), one, 0.0 * one, four)
-    for limit, share in ((21.0, 1.0), (19.0, 1.0 / SPIKE)):
-        found = next(filtered(block, np.full(1, limit)))
+    block = estimation.LinearModel(10.0 * one, np.ones((1, 1, 1)), one, 0.0 * one, four)
+    for limit, share in ((21.0, 1.0), (19.0, 1.0 / estimation.SPIKE)):
+        found = next(estimation.filtered(block, np.full(1, limit)))
         assert found.square == pytest.approx(20.0)
         assert found.spread[0, 0] == pytest.approx(5.0)
         assert found.mean[0] == pytest.approx(share * 8.0)
@@ -118,7 +104,7 @@ def problem(seed, samples=2000):
 @pytest.mark.parametrize("seed", range(3))
 def test_planted_values_lie_within_their_spread(seed):
     rng, A, x, y = problem(seed)
-    fit = fit_column(A, y + rng.normal(size=len(y)), np.ones(len(y)))
+    fit = estimation.fit_column(A, y + rng.normal(size=len(y)), np.ones(len(y)))
     # five standard deviations: one in a million
     assert np.all(np.abs(fit.values - x) < 5 * fit.sd)
     # white noise: sd = 1/(√N·scale) within the 3 % that 2000 samples allow, 20 % with Huber's loss
@@ -129,8 +115,8 @@ def test_outliers_hardly_count():
     rng, A, x, y = problem(5)
     spoilt = y + 0.1 * rng.normal(size=len(y))
     spoilt[100:200] += 50.0
-    robust = fit_column(A, spoilt, np.ones(len(y)))
-    plain = solve(A, spoilt)
+    robust = estimation.fit_column(A, spoilt, np.ones(len(y)))
+    plain = estimation.solve(A, spoilt)
     assert np.linalg.norm(robust.values - x) < 0.1 * np.linalg.norm(plain - x)
     assert np.all(robust.weights[100:200] < 0.05)
 
@@ -142,24 +128,24 @@ def test_samples_without_weight_do_not_count_at_all():
     y = y.copy()
     y[:1000] = 1e6
     # exact equations: rounding only
-    np.testing.assert_allclose(fit_column(A, y, weights).values, x, rtol=1e-6)
+    np.testing.assert_allclose(estimation.fit_column(A, y, weights).values, x, rtol=1e-6)
 
 
 def test_what_no_column_tells_stays_zero_and_an_inverse_is_that_of_those_that_tell():
     """Columns a hundredfold apart, one of nothing: the plain inverse, and zeros."""
     _, A, _, y = problem(7)
     A = np.hstack([A, np.zeros((len(y), 1))])
-    assert solve(A, y)[-1] == 0.0
+    assert estimation.solve(A, y)[-1] == 0.0
     expected = np.zeros((5, 5))
     expected[:4, :4] = np.linalg.inv(A[:, :4].T @ A[:, :4])
     # condition number 1e4: rounding below 1e-11
     scale = np.sqrt(np.diag(expected)).max()
-    np.testing.assert_allclose(inverse_of(A.T @ A), expected, atol=1e-9 * scale**2)
+    np.testing.assert_allclose(estimation.inverse_of(A.T @ A), expected, atol=1e-9 * scale**2)
 
 
 def test_too_few_samples_are_refused():
     with pytest.raises(IdentificationError, match="3 samples in motion for 4 unknowns"):
-        fit_column(np.ones((3, 4)), np.ones(3), np.ones(3))
+        estimation.fit_column(np.ones((3, 4)), np.ones(3), np.ones(3))
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
@@ -171,7 +157,7 @@ def test_correlation_time_of_an_autoregressive_series(rho):
     for k in range(1, len(noise)):
         series[k] = rho * series[k - 1] + noise[k]
     # the sum ends at the first non-positive estimate: some per cent of truncation
-    assert correlation_time(series) == pytest.approx((1 + rho) / (1 - rho), rel=0.1)
+    assert estimation.correlation_time(series) == pytest.approx((1 + rho) / (1 - rho), rel=0.1)
 
 
 def refitted(A, y, weights, parts):
@@ -192,11 +178,11 @@ def test_cross_validation_equals_fitting_each_time_anew():
     weights = rng.uniform(0.2, 1.0, len(y))
     parts = [np.arange(k, k + 80) for k in range(0, 400, 80)]
     expected = refitted(A, y, weights, parts)
-    found = left_out([400, 100], [True, False])
+    found = estimation.left_out([400, 100], [True, False])
     # normal equations square the condition number, here 1e2: rounding below 1e-11
-    assert cross_validated(A, y, weights, found) == pytest.approx(expected, rel=1e-9)
+    assert estimation.cross_validated(A, y, weights, found) == pytest.approx(expected, rel=1e-9)
     # sums of squares far below 1 count as they are
-    small = cross_validated(A, 1e-6 * y, weights, found)
+    small = estimation.cross_validated(A, 1e-6 * y, weights, found)
     assert small == pytest.approx(1e-6 * expected, rel=1e-9)
 
 
@@ -204,8 +190,8 @@ def test_the_robust_spread_of_normal_noise():
     # 100 000 samples: 0.4 % statistical
     sd = np.array([2.0, 0.5])
     noise = np.random.default_rng(1).normal(0, sd, (100_000, 2))
-    np.testing.assert_allclose(robust_sd(noise), sd, rtol=0.02)
-    np.testing.assert_array_equal(robust_sd(noise[:0]), [0.0, 0.0])
+    np.testing.assert_allclose(estimation.robust_sd(noise), sd, rtol=0.02)
+    np.testing.assert_array_equal(estimation.robust_sd(noise[:0]), [0.0, 0.0])
 
 
 def test_of_several_logs_each_is_left_out_whole() -> None:
@@ -215,7 +201,7 @@ def test_of_several_logs_each_is_left_out_whole() -> None:
     expected = refitted(A, y, weights, [np.arange(103), np.arange(103, 160)])
     for lengths, rows in (([103, 57, 40], np.arange(200)),
                           ([57, 103, 40], np.r_[103:160, 0:103, 160:200])):  # fmt: skip
-        parts = left_out(lengths, [True, True, False])
-        assert cross_validated(A[rows], y[rows], weights, parts) == pytest.approx(
+        parts = estimation.left_out(lengths, [True, True, False])
+        assert estimation.cross_validated(A[rows], y[rows], weights, parts) == pytest.approx(
             expected, rel=1e-9
         )

@@ -83,9 +83,7 @@ def test_rivals_of_the_closest_lag_are_valleys_that_overlap_longer() -> None:
 @pytest.mark.parametrize(
     ("lag", "found"), [(0.9, 0.9), (1.1, np.nan), (-0.1, -0.1), (-0.3, np.nan)]
 )
-def test_a_delay_is_looked_for_up_to_a_second_and_a_lead_up_to_a_fifth(
-    lag: float, found: float
-) -> None:
+def test_a_delay_is_looked_for_up_to_a_second_and_a_lead_up_to_a_fifth(lag, found):
     """White noise is like itself at its own delay alone."""
     early = np.random.default_rng(4).standard_normal((1000, 1))
     late = np.roll(early, round(lag / 0.01), axis=0)

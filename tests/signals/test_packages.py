@@ -9,9 +9,7 @@ from vftcli.signals.packages import PACKAGES, check_installed, installed, needed
 
 
 @pytest.mark.parametrize("module", PACKAGES)
-def test_a_missing_package_is_named_with_use_and_remedy(
-    module: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_package_is_named_with_use_and_remedy(module, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
     assert not installed(module)
     package, install = PACKAGES[module]
@@ -24,9 +22,7 @@ def test_a_missing_package_is_named_with_use_and_remedy(
     assert str(caught.value) == f"{line}; or leave it"
 
 
-def test_a_package_that_lacks_another_is_not_called_missing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_package_that_lacks_another_is_not_called_missing(monkeypatch):
     monkeypatch.setattr(
         "vftcli.signals.packages.import_module", lambda _: __import__("no_such_module")
     )

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vftcli.signals import parsing
 from vftcli.signals.arrays import one_each
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
@@ -22,14 +23,6 @@ from vftcli.signals.option import (
     set_value,
     settings_as_typed,
     settings_by_name,
-)
-from vftcli.signals.parsing import (
-    check_kind,
-    check_known,
-    did_you_mean,
-    printable,
-    toml_tables,
-    whole,
 )
 
 
@@ -57,8 +50,8 @@ def test_intervals_that_are_none(text: str) -> None:
 def test_an_endless_line_of_toml_is_refused_before_it_is_parsed() -> None:
     """50 000 dots took 15 s; so many letters in lines of their own are fine."""
     with pytest.raises(ParameterError, match="line 2 has 50001 letters; a line of TOML has at"):
-        toml_tables(f"a = 1\n{'.' * 50_000}a")
-    assert len(toml_tables("".join(f"a{k} = 1\n" for k in range(2_000)))) == 2_000
+        parsing.toml_tables(f"a = 1\n{'.' * 50_000}a")
+    assert len(parsing.toml_tables("".join(f"a{k} = 1\n" for k in range(2_000)))) == 2_000
 
 
 def test_numbers_and_assignments() -> None:
@@ -76,19 +69,19 @@ def test_assignments_that_are_none(text: str) -> None:
 
 
 def test_an_unknown_word_is_refused_with_what_there_is() -> None:
-    assert did_you_mean("gian", ("gain", "omega")) == " Did you mean gain?"
-    assert did_you_mean("speed", ("gain", "omega")) == ""
-    check_known("fe", {"fe": 1, "zoh": 2}, "unheard")
+    assert parsing.did_you_mean("gian", ("gain", "omega")) == " Did you mean gain?"
+    assert parsing.did_you_mean("speed", ("gain", "omega")) == ""
+    parsing.check_known("fe", {"fe": 1, "zoh": 2}, "unheard")
     with pytest.raises(ParameterError, match=r"^discretisation 'rk4'; there is fe, zoh$"):
-        check_known("rk4", {"fe": 1, "zoh": 2}, "discretisation 'rk4'")
+        parsing.check_known("rk4", {"fe": 1, "zoh": 2}, "discretisation 'rk4'")
 
 
 @pytest.mark.parametrize(("thing", "shown"), [("a", "'a'"), (np.zeros(3), "ndarray")])
 def test_a_thing_of_another_kind_is_refused_with_what_gives_one(thing, shown) -> None:
-    check_kind(True, int, "the count", "len(x)")  # a subclass is of the kind
+    parsing.check_kind(True, int, "the count", "len(x)")  # a subclass is of the kind
     words = rf"^the count is {shown}; expected int: len\(x\) is one$"
     with pytest.raises(ParameterError, match=words):
-        check_kind(thing, int, "the count", "len(x)")
+        parsing.check_kind(thing, int, "the count", "len(x)")
 
 
 ANY_TEXT = st.text(st.characters(codec=None, exclude_categories=[]))
@@ -108,16 +101,18 @@ ANY_TEXT = st.text(st.characters(codec=None, exclude_categories=[]))
     ],
 )
 def test_what_is_hidden_is_spelled(name: str, shown: str) -> None:
-    assert printable(name) == shown
+    assert parsing.printable(name) == shown
 
 
 @given(ANY_TEXT)
 def test_every_text_is_printable_and_fits_utf_8(text: str) -> None:
-    shown = printable(text)
+    shown = parsing.printable(text)
     shown.encode("utf-8")
     assert len(shown.splitlines()) <= 1
-    assert printable(shown) == shown
-    assert json.loads(json.dumps(whole(text), ensure_ascii=False).encode()) == whole(text)
+    assert parsing.printable(shown) == shown
+    assert json.loads(
+        json.dumps(parsing.whole(text), ensure_ascii=False).encode()
+    ) == parsing.whole(text)
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=4))
@@ -216,9 +211,7 @@ class Chosen(Choice):
         ({"name": None}, {"b.count": "5"}, Chosen(count=5)),
     ],
 )
-def test_words_and_settings_make_a_choice(
-    words: dict[str, object], settings: dict[str, str], chosen: Chosen
-) -> None:
+def test_words_and_settings_make_a_choice(words, settings, chosen):
     assert Chosen.parsed(settings=settings, **words) == chosen
 
 
