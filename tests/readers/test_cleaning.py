@@ -1,7 +1,6 @@
 """Cleaning: what is dropped, what is said of it, and what cannot be radians."""
 
-import re
-import tomllib
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,13 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import vftcli.readers
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import Library
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import WORDS
 
 ROWS = 300
 GARBAGE = 3e19
@@ -67,25 +64,21 @@ def test_a_clock_may_jump_back_behind_garbage_and_a_bad_value_later_is_none():
 
 
 @pytest.mark.parametrize(
-    ("joints", "reach", "refused"),
-    [(6, 12.9, False), (6, 13.1, True), (7, 6.3, False), (7, 6.5, True)],
+    ("joints", "least", "reach", "words"),
+    [
+        (6, 0.0, 12.9, None),
+        (6, 0.0, 13.1, "looks like degrees"),
+        (6, -6.8, 6.8, r"travel 13\.6"),
+        (7, 0.0, 6.3, None),
+        (7, 0.0, 6.5, "looks like degrees"),
+    ],
 )
-def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, reach, refused):
+def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, least, reach, words):
     """Two turns are 12.6 rad; joints of seven-joint arms stay within one, 6.28 rad."""
     q = np.zeros((10, joints))
-    q[5, 2] = reach
-    if not refused:
+    q[5, 2], q[6, 2] = reach, least
+    with pytest.raises(LogError, match=words) if words else nullcontext():
         assert made(np.arange(10.0), q, degrees_possible=True).joints == joints
-        return
-    with pytest.raises(LogError, match="looks like degrees"):
-        made(np.arange(10.0), q, degrees_possible=True)
-
-
-def test_a_span_wider_than_two_turns_is_refused_too():
-    q = np.zeros((10, 6))
-    q[3], q[6] = -6.8, 6.8
-    with pytest.raises(LogError, match=r"travel 13\.6"):
-        made(np.arange(10.0), q, degrees_possible=True)
 
 
 def test_a_named_joint_without_numbers_is_left_out_and_said():
@@ -95,9 +88,8 @@ def test_a_named_joint_without_numbers_is_left_out_and_said():
     named = {"joint_names": ("a", "finger", "b")}
     found = made(t, q, signals={"torque": effort}, **named)
     assert (found.joint_names, found.q.shape) == (("a", "b"), (ROWS, 2))
-    assert [(r.code, r.values["joints"]) for r in found.source.remarks] == [
-        ("joints-empty", ["finger"])
-    ]
+    (remark,) = found.source.remarks
+    assert (remark.code, remark.values["joints"]) == ("joints-empty", ["finger"])
     with pytest.raises(LogError, match="torque of joint 2 holds no numbers"):
         made(t, q, signals={"torque": effort})
     with pytest.raises(LogError, match="log: wrench axis 2 holds no numbers at all"):
@@ -137,16 +129,3 @@ def test_rows_with_an_unknown_value_are_left_out_and_counted(tmp_path, empty, fi
     rows = log.source.row_samples
     expected = [kept.index(k) if k in kept else -1 for k in range(20)]
     assert (list(range(20)) if rows is None else rows.tolist()) == expected
-
-
-MADE = re.compile(r"(?:fact|caution|warning)\(\s*\"([a-z-]+)\"")
-CHOSEN = re.compile(r"\"([a-z]+(?:-[a-z]+)*)\" if .* else \"([a-z]+(?:-[a-z]+)*)\"")
-
-
-def test_every_code_of_a_remark_has_words_and_every_word_a_use():
-    paths = Path(vftcli.readers.__file__).parent.rglob("*.py")
-    text = "".join(path.read_text(encoding="utf-8") for path in paths)
-    chosen = {code for pair in CHOSEN.findall(text) for code in pair}
-    words = set(tomllib.loads((WORDS / "readers.toml").read_text(encoding="utf-8")))
-    assert set(MADE.findall(text)) <= words
-    assert words <= set(MADE.findall(text)) | chosen

@@ -260,18 +260,15 @@ class TestHdf5:
         np.testing.assert_array_equal(read(two, columns="t=t,q=b/q").q, q)
 
     @pytest.mark.parametrize(
-        ("places", "words"),
+        ("one", "other", "words"),
         [
-            (
-                ("observations/qpos", "observation/robot_state/joint_positions"),
-                "could each be the positions",
-            ),
-            (("action", "sensor/ft"), r"among action, sensor/ft.*--columns"),
+            ("observations/qpos", "observation/robot_state/joint_positions", "could each be"),
+            ("action", "sensor/ft", r"among action, sensor/ft.*--columns"),
         ],
     )
-    def test_layouts_that_cannot_be_told_are_refused(self, path, places, words):
+    def test_layouts_that_cannot_be_told_are_refused(self, path, one, other, words):
         with pytest.raises(LogError, match=words):
-            read(seeds.hdf5(path, dict.fromkeys(places, motion(7)["q"])))
+            read(seeds.hdf5(path, dict.fromkeys((one, other), motion(7)["q"])))
 
     def test_without_h5py_the_file_is_named_with_the_remedy(self, path, monkeypatch):
         seeds.aloha(path)

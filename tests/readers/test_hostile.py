@@ -177,10 +177,7 @@ def test_nothing_is_written_beside_a_log(tmp_path):
         (lambda path: npz(path, time=np.array(1.0)), "no clock"),
         (lambda path: npz(path, q=np.zeros((7, ROWS))), "dq has 7 columns, q has 120"),
         (lambda path: table(path, lambda _: 1.0), "clock never moves: all 120 samples"),
-        (
-            lambda path: table(path, lambda k: k // 40),
-            "clock is coarser than the samples: 117 of",
-        ),
+        (lambda path: table(path, lambda k: k // 40), "coarser than the samples: 117 of"),
         (lambda path: table(path, lambda k: k * 5e-324), "which no robot's log is"),
         (lambda path: table(path, lambda k: k * 1e300), "which no robot's log is"),
         (lambda path: table(path, lambda k: 1e10 + k / 64), "starts at 1e+10 s, which no clock"),

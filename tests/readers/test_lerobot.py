@@ -136,7 +136,7 @@ def test_rows_count_and_not_what_is_said_of_them_beside(tmp_path):
     """Episodes are those of the rows; a file of one that holds another's is refused."""
     path = dataset(tmp_path, version=2)
     (path / "meta" / "episodes.jsonl").write_text('{"episode_index": 7}')
-    (first, second, third) = sorted(path.rglob("*.parquet"))
+    first, second, third = sorted(path.rglob("*.parquet"))
     third.rename(first)
     with pytest.raises(LogError, match="no row is of episode 0, which its name promises"):
         read(path, episode=0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from seed_logs import table_csv, ur_csv
 
-from vftcli.readers.reading import FORMATS, read, recognise
+from vftcli.readers.reading import read, recognise
 from vftcli.signals.errors import ClockError, LogError, UnknownFormatError
 from vftcli.signals.recording import Recording
 
@@ -105,9 +105,8 @@ def test_two_candidates_are_refused(path, names, words):
 
 @pytest.mark.parametrize(("name", "value"), [("tau_ext1", 2.5), ("tau_ext_hat_filtered_0", -2.5)])
 def test_vendor_residual_is_turned_and_plain_tau_ext_is_not(path, name, value):
-    recording = written(
-        path, table([f"{k / 100},0.1,2.5" for k in range(20)]).replace("q2", name)
-    )
+    text = table([f"{k / 100},0.1,2.5" for k in range(20)])
+    recording = written(path, text.replace("q2", name))
     assert recording.require("tau_ext")[0, 0] == value
     turned = any("turned the sign of tau_ext_hat_filtered" in r for r in recording.source.repairs)
     assert turned == (value < 0)
@@ -248,12 +247,6 @@ def test_what_is_no_text_is_refused_by_each_format_of_text(path, name):
     path.write_bytes(bytes(range(256)))
     with pytest.raises(LogError, match="not a table of text"):
         read(path, format=name)
-
-
-def test_every_format_is_described():
-    for name, form in FORMATS.items():
-        assert form.name == name
-        assert all(len(t) > 5 for t in (form.title, form.recording, form.takes, form.pitfalls))
 
 
 def test_a_text_loads_no_reader_of_another_container(path):

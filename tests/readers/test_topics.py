@@ -29,26 +29,20 @@ def write_joint_states(path: Path, messages: list[Message]) -> Path:
             message = {"topic": "/joint_states", "stamp": True} | given
             topic, time = message["topic"], message["time"]
             stamp = time + message.get("ahead", 0) if message["stamp"] else 0
-            header = types["std_msgs/msg/Header"](
-                seq=k,
-                stamp=types["builtin_interfaces/msg/Time"](
-                    sec=stamp // 10**9, nanosec=stamp % 10**9
-                ),
-                frame_id=message.get("frame", ""),
+            clock = types["builtin_interfaces/msg/Time"](
+                sec=stamp // 10**9, nanosec=stamp % 10**9
             )
+            frame = message.get("frame", "")
+            header = types["std_msgs/msg/Header"](seq=k, stamp=clock, frame_id=frame)
             if "force" in message:
                 kind = "geometry_msgs/msg/WrenchStamped"
-                vector = types["geometry_msgs/msg/Vector3"]
-                body = types["geometry_msgs/msg/Wrench"](
-                    force=vector(*message["force"]), torque=vector(0.0, 0.0, 0.0)
-                )
-                typed = types[kind](header=header, wrench=body)
+                vector, body = (types[f"geometry_msgs/msg/{x}"] for x in ("Vector3", "Wrench"))
+                wrench = body(force=vector(*message["force"]), torque=vector(0.0, 0.0, 0.0))
+                typed = types[kind](header=header, wrench=wrench)
             else:
                 kind = "sensor_msgs/msg/JointState"
-                fields = {
-                    name: np.array(message.get(name, []), dtype=float)
-                    for name in ("position", "velocity", "effort")
-                }
+                names = ("position", "velocity", "effort")
+                fields = {name: np.array(message.get(name, []), dtype=float) for name in names}
                 typed = types[kind](header=header, name=message["name"], **fields)
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)

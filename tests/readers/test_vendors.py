@@ -2,7 +2,6 @@
 
 import os
 import pickle
-import tomllib
 import zipfile
 from collections import OrderedDict
 from pathlib import Path
@@ -19,6 +18,7 @@ from seed_logs import (
     motion,
     panda_py_npz,
     panda_py_pickle,
+    rows_of,
     ur_binary,
     ur_csv,
 )
@@ -216,28 +216,17 @@ def test_a_pickle_cannot_fill_memory_through_ndarray(path):
 
 def test_a_format_that_nobody_has_yet_is_one_entry(path, monkeypatch):
     """A table of a maker's own names, unit, sign and payload: an entry as in layouts.toml."""
-    entry = tomllib.loads(
-        """
-        title = "ACME controller"
-        recording = "acme log"
-        takes = "angles, torques"
-        pitfalls = "none"
-        [reader]
-        module = "tables"
-        line = 'tick;ang_1;'
-        columns = "t[ms]=tick,q[deg]=ang_{i},-tau=trq_{i}"
-        payload = "load"
-        clock = "controller clock"
-        """
-    )
-    made = LogFormat(name="acme", **entry.pop("reader"), **entry)
-    monkeypatch.setitem(FORMATS, "acme", made)
+    acme = LogFormat(
+        name="acme", title="ACME controller", recording="acme log", takes="angles, torques",
+        pitfalls="none", module="tables", line="tick;ang_1;", payload="load",
+        columns="t[ms]=tick,q[deg]=ang_{i},-tau=trq_{i}", clock="controller clock",
+    )  # fmt: skip
+    monkeypatch.setitem(FORMATS, "acme", acme)
     log = motion()
     names = [f"{word}_{j}" for word in ("ang", "trq") for j in range(1, 7)]
-    lines = [";".join(["tick", *names, "load"])]
-    for k, row in enumerate(np.hstack([log["q"], log["tau"]])):
-        lines.append(";".join([str(8 * k), *map(repr, row.tolist()), "1.25"]))
-    path.write_text("\n".join(lines) + "\n")
+    ticks, load = 8.0 * np.arange(ROWS), np.full(ROWS, 1.25)
+    rows = rows_of(ticks, log["q"], log["tau"], load, separator=";")
+    path.write_text("\n".join([";".join(["tick", *names, "load"]), *rows]) + "\n")
     recording = read(path)
     assert (recording.source.format, recording.source.clock) == ("acme", "controller clock [ms]")
     assert recording.payload_mass == 1.25

@@ -33,28 +33,13 @@ def test_words_are_made_of_values_and_place() -> None:
     # A band is 1.96 deviations, and a minus is a minus.
     assert str(Remark("load", values={"load_kg": -1.5, "sd_kg": 0.1})) == "−1.50 ± 0.20 kg"
     record = as_record(Remark("left-out", "warning", {"topics": ["/a"]}, Where(joints=(2,))))
-    expected = {
-        "code": "left-out",
-        "level": "warning",
-        "values": {"topics": ["/a"]},
-        "joints": [2],
-    }
-    assert record.items() >= expected.items()
+    expected = {"code": "left-out", "level": "warning", "values": {"topics": ["/a"]}}
+    assert record.items() >= (expected | {"joints": [2]}).items()
 
 
 def test_an_unknown_code_is_an_error() -> None:
     with pytest.raises(LookupError, match="no-such-remark"):
         words("no-such-remark")
-
-
-def test_every_code_stands_once_and_its_templates_can_be_parsed() -> None:
-    codes = [code for text in remarks.catalogue() for code in remarks.parsed(text)]
-    assert len(codes) == len(set(codes))
-    for text in remarks.catalogue():
-        for entry in remarks.parsed(text).values():
-            assert set(entry) <= {"short", "long", "name", "consequence", "remedy"}
-            for template in entry.values():
-                assert list(string.Formatter().parse(template))
 
 
 #: A template's length as a reader meets it: a value counts as five characters.
@@ -69,7 +54,9 @@ RIDDLES = re.compile(
     [item for text in remarks.catalogue() for item in remarks.parsed(text).items()],
 )
 def test_words_are_short_and_plain(code: str, entry: dict[str, str]) -> None:
+    assert set(entry) <= {"short", "long", "name", "consequence", "remedy"}
     for key, template in entry.items():
+        assert list(string.Formatter().parse(template))  # it can be parsed
         riddle = RIDDLES.search(template)
         assert riddle is None, f"{code}.{key} says {riddle and riddle.group()!r}: say it plainly"
     parts = string.Formatter().parse(entry["short"])
