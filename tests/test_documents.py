@@ -33,9 +33,7 @@ DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 
 
 def blocks(path: Path, language: str) -> list[str]:
-    return re.findall(
-        rf"^```{language}\n(.*?)^```$", path.read_text("utf-8"), re.MULTILINE | re.DOTALL
-    )
+    return re.findall(rf"(?ms)^```{language}\n(.*?)^```$", path.read_text("utf-8"))
 
 
 def commands(path: Path, language: str = "sh") -> list[str]:
@@ -199,11 +197,8 @@ def test_the_site_has_a_row_of_every_finding_and_format() -> None:
 def test_every_sentence_of_the_page_on_troubles_is_printed() -> None:
     """Its pieces, between what differs from log to log, are in the code or its words."""
     page = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
-    source = "".join(
-        path.read_text("utf-8")
-        for end in ("py", "toml")
-        for path in ROOT.glob(f"vftcli/**/*.{end}")
-    )
+    files = (path for path in ROOT.glob("vftcli/**/*") if path.suffix in {".py", ".toml"})
+    source = "".join(path.read_text("utf-8") for path in files)
     source = re.sub(r'"\s*\n\s*f?"', "", source)  # a sentence over several lines
     rows = re.findall(r"^\| (`[^|]*)\|", page[: page.index("## Questions")], re.MULTILINE)
     assert len(rows) > 20

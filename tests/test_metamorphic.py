@@ -159,13 +159,11 @@ Ask = Callable[..., Numbers]
 
 def equal(one: Numbers, other: Numbers, but: tuple[str, ...] = ()) -> None:
     """Both have the same numbers, to `SAME` of the larger of a number and 1."""
-    one, other = (
-        {key: value for key, value in numbers.items() if not any(part in key for part in but)}
-        for numbers in (one, other)
-    )
-    assert one, "no numbers at all"
-    assert one.keys() == other.keys()
-    for key, value in one.items():
+    keys, others = ({k for k in x if not any(part in k for part in but)} for x in (one, other))
+    assert keys, "no numbers at all"
+    assert keys == others
+    for key in keys:
+        value = one[key]
         gap = abs(value - other[key])
         same = gap <= SAME * max(abs(value), 1.0) or (np.isnan(value) and np.isnan(other[key]))
         assert same, f"{key}: {value} or {other[key]}"
@@ -207,9 +205,7 @@ def renamed(ask: Ask, logs: Logs) -> None:
 
 def of_one_name(ask: Ask, logs: Logs) -> None:
     """Two logs of one file name in two folders are two logs."""
-    one, two = (
-        copied(x, folder, "log.parquet") for x, folder in ((logs.free, "a"), (logs.other, "b"))
-    )
+    one, two = copied(logs.free, "a", "log.parquet"), copied(logs.other, "b", "log.parquet")
     named, alike = ask(logs.free, logs.other), ask(one, two)
     # Labels differ, so rows differ by place: the order of the logs is the same.
     assert len(alike) == len(named)
@@ -225,13 +221,10 @@ def copy_is_no_free_run(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> Non
 
 
 def logs_permuted(ask: Ask, logs: Logs) -> None:
+    one, two = ask(logs.free, logs.other), ask(logs.other, logs.free)
     # Not identify's standard deviations: the memory of its errors is found over the logs' seam too,
     # and differs by a per cent or two with what stands there.
-    equal(
-        ask(logs.free, logs.other),
-        ask(logs.other, logs.free),
-        but=("/sd", "/determined", "log_index"),
-    )
+    equal(one, two, but=("/sd", "/determined", "log_index"))
 
 
 TUNED = ("--observer", "gmo", "--observer", "rts-auto")

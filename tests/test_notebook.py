@@ -27,9 +27,8 @@ def analysis() -> vft.Analysis:
 
 
 def test_contacts_are_those_of_the_pipeline() -> None:
-    choice = AnalysisChoice(
-        robot=RobotChoice.parsed(robot="ur5"), free=FreeChoice.parsed(free=["0.3:4"])
-    )
+    robot, free = RobotChoice.parsed(robot="ur5"), FreeChoice.parsed(free=["0.3:4"])
+    choice = AnalysisChoice(robot=robot, free=free)
     (made,) = analyse_logs([TAPS], choice, work=list_touches)
     found = vft.contacts(TAPS, robot="ur5", free=["0.3:4"])
     rows = [(contact.start, contact.stop, contact.peak_force) for contact in found]

@@ -25,12 +25,9 @@ def test_the_text_holds_what_holds_and_shows_the_rest() -> None:
         ]
     )
     assert tomllib.loads(text) == {
-        "robot": "ur5",
-        "columns": 'a"b\\c',
-        "free": ["a.csv", "b.csv"],
-        "sensor": {"delay": 0, "cutoff": 3},
-        "contacts": {"least": 1},
-    }
+        "robot": "ur5", "columns": 'a"b\\c', "free": ["a.csv", "b.csv"],
+        "sensor": {"delay": 0, "cutoff": 3}, "contacts": {"least": 1},
+    }  # fmt: skip
     assert "# why so\nrobot = " in text
     assert '\n# reference = "zero"\n' in text
     assert max(map(len, text.splitlines())) <= 100

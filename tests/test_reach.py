@@ -44,18 +44,11 @@ REFUSED = {
 }
 """Sample → what is said where nothing says how it is to be read."""
 
-SAID = {
-    "ur5_v5_struct.mat": "signals-turned",
-    "ros2_js_wrench": "joints-reordered",
-}
+SAID = {"ur5_v5_struct.mat": "signals-turned", "ros2_js_wrench": "joints-reordered"}
 """Sample → what is said of how it was read."""
 
-DIGITS = {
-    "ur5_sec_nsec.csv": 5e-7,
-    "ur5_position_only.csv": 5e-7,
-    "ur5_degrees_turned.csv": 1e-8,
-    "ur5_degrees_turned.csv torque": 4e-6,
-}
+DIGITS = {"ur5_sec_nsec.csv": 5e-7, "ur5_position_only.csv": 5e-7, "ur5_degrees_turned.csv": 1e-8,
+          "ur5_degrees_turned.csv torque": 4e-6}  # fmt: skip
 """Sample, or a signal of it → the digits that it was written with, if fewer than nine."""
 
 

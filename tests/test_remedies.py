@@ -38,6 +38,7 @@ from planted_spans import picked_up
 import vftcli
 from vftcli.readers.reading import read
 from vftcli.robots import PROFILES
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import WORDS
 from vftcli.signals.remarks import words as words_of
 
@@ -58,6 +59,12 @@ def sound(robot: str = "ur5") -> Table:
     signal, effort = ("current", log.current) if robot == "ur5" else ("tau", log.torque)
     return Table(t=log.t, q=log.q, dq=log.require("dq"), effort=effort, signal=signal,
                  tau_ext=log.tau_ext, robot=robot, given=robot)  # fmt: skip
+
+
+def measured(log: Recording) -> Table:
+    """What the drives measured of another motion."""
+    effort = log.require("current")
+    return replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=effort)
 
 
 def of(plant: Callable[[Table], Table], *words: str, robot: str = "ur5") -> Command:
@@ -160,10 +167,7 @@ def controlled(folder: Path, left_out: str = "") -> list[Any]:
 
 def checked_thresholds(folder: Path) -> list[Any]:
     """Thresholds of half a minute that nobody touches, checked on a log of six seconds."""
-    log = moving("ur5", seconds=30.0)
-    table = replace(
-        sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current")
-    )
+    table = measured(moving("ur5", seconds=30.0))
     check = table.between(0.0, 6.0).write(folder / "check.csv")
     return ["thresholds", table.write(folder / "free.csv"), "--robot", "ur5", "--rate", "100",
             "--check", check]  # fmt: skip
@@ -484,12 +488,11 @@ WITHOUT_ROW = {
 
 
 def test_every_remark_with_an_option_is_tried_or_says_why_not() -> None:
-    catalogue = {
-        code: " ".join(entry.values())
-        for path in WORDS.glob("*.toml")
-        for code, entry in tomllib.loads(path.read_text("utf-8")).items()
-    }
-    with_option = {code for code, said in catalogue.items() if re.search("--[a-z]", said)}
+    files = (tomllib.loads(path.read_text("utf-8")) for path in WORDS.glob("*.toml"))
+    catalogue = [
+        (code, " ".join(entry.values())) for file in files for code, entry in file.items()
+    ]
+    with_option = {code for code, said in catalogue if re.search("--[a-z]", said)}
     tried = {row.code for row in ROWS}
     assert with_option - tried - WITHOUT_ROW.keys() == set()
     assert WITHOUT_ROW.keys() & tried == set()
@@ -500,10 +503,7 @@ def test_every_remark_with_an_option_is_tried_or_says_why_not() -> None:
 def test_a_load_that_a_log_shows_is_found_and_mounted(tmp_path: Path) -> None:
     """The doctor's and the list's command, on a motion whose poses differ."""
     log = moving("ur5", load=2.8, seconds=12.0)
-    table = replace(
-        sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current")
-    )
-    path, own = table.write(tmp_path / "log.csv"), tmp_path / "loaded.toml"
+    path, own = measured(log).write(tmp_path / "log.csv"), tmp_path / "loaded.toml"
     said = reported("unmodelled-load", printed(["inspect", path, "--robot", "ur5"])[1])
     assert said is not None
     name, *how = re.search(r"(identify) (--method) (payload)", said).groups()  # type: ignore[union-attr]

@@ -23,9 +23,11 @@ from test_remedies import (
     WHOLE_LOG,
     Command,
     Row,
+    arm_of_five,
     check_error,
     dropped,
     free_log,
+    measured,
     of,
     printed,
     raised,
@@ -83,8 +85,7 @@ def released(without: str) -> Command:
 
 def moved(seconds: float = 4.0) -> Table:
     """A motion that the sound log does not hold, nobody touching the arm."""
-    log = moving("ur5", seconds=seconds)
-    return replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current"))
+    return measured(moving("ur5", seconds=seconds))
 
 
 def still(table: Table, seconds: float = 4.0) -> Table:
@@ -117,13 +118,10 @@ def touched_late(folder: Path) -> list[Any]:
 
 
 def of_five_joints(folder: Path) -> list[Any]:
-    text = (FIXTURES / "arm.urdf").read_text("utf-8")
-    fixed = text.replace('"hand" type="revolute"', '"hand" type="fixed"')
-    (folder / "five.urdf").write_text(fixed, "utf-8")
     table = sound().between(0.0, 4.0)
     five = {name: value[:, :5] for name, value in table.series()}
     made = replace(table, **five | {"effort": table.torque[:, :5]}, signal="tau")
-    return ["estimate", made.write(folder / "log.csv"), "--robot", folder / "five.urdf", *EST[1:],
+    return ["estimate", made.write(folder / "log.csv"), "--robot", arm_of_five(folder), *EST[1:],
             "--wrench", "--anyway"]  # fmt: skip
 
 

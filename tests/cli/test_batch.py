@@ -92,7 +92,7 @@ def test_a_failure_stands_for_every_log_of_equal_bytes_and_names_it_once(run, fo
 
 def test_what_failed_is_tried_again(run, folder: Path, tmp_path: Path) -> None:
     out, gone = tmp_path / "out", folder / "gone.csv"
-    words = ("batch", folder / "b" / "log.csv", gone, *HERE, "-o", out)
+    words = ("batch", folder / "b/log.csv", gone, *HERE, "-o", out)
     assert run(*words)[0] == 3
     assert pl.read_parquet(out / "failures.parquet")["stage"].to_list() == ["finding"]
     shutil.copy(CIRCLE, gone)

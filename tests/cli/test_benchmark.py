@@ -56,9 +56,8 @@ def record(manifest: Path) -> dict[str, object]:
 
 def check_colours(page: str) -> None:
     """A method has one colour in tables, legend and dots; zero, which has no dot, has none."""
-    tables = dict(
-        re.findall(r'\[data-swatch="(.+?)"\]::before{border-top:3px solid (.+?)}', page)
-    )
+    swatch = r'\[data-swatch="(.+?)"\]::before{border-top:3px solid (.+?)}'
+    tables = dict(re.findall(swatch, page))
     dots = set(re.findall(r"<title>UR5, (.+?): .*?<circle [^>]*fill=\"(.+?)\"", page))
     (legend,) = re.findall(r'<p class="legend">(<span data-swatch=.*?)</p>', page)
     assert dots == set(tables.items())
@@ -75,14 +74,14 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
     tau = truth.select(pl.col("^tau_ext/[0-9]+$"))
     assert run("estimate", CIRCLE, "--robot", "ur5", "-o", tmp_path / "e", "-q")[0] == 0
     estimates = pl.read_parquet(tmp_path / "e" / "estimates.parquet")
-    gmo = estimates.select(
-        "t", pl.col("^(tau_ext|band)/gmo/.*$").name.map(lambda n: n.replace("/gmo", ""))
+    gmo, best = (
+        estimates.select("t", pl.col(f"^(tau_ext|band)/{x}/.*$").name.replace(f"/{x}", ""))
+        for x in ("gmo", "best")
     )
-    best = estimates.select("t", pl.col("^(tau_ext|band)/best/.*$"))
     late = pl.DataFrame({x.name: np.interp(t - 0.05, t, x.to_numpy()) for x in tau})
     files = {
         "copy": gmo,
-        "bands": best.rename(lambda name: name.replace("/best", "")),
+        "bands": best,
         "true": tau.with_columns(t=pl.Series(t)),
         "silent": gmo.select("t", pl.exclude("t") * None),
         "late": late.with_columns(t=pl.Series(t)),
@@ -112,9 +111,8 @@ def test_rivals_are_rows_and_copies_score_alike(run, manifest: Path, tmp_path: P
     assert rows["copy", "all"]["observer_us"] is rows["zero", "all"]["command_us"] is None
     code, out, err = run(*asked(manifest, *words))  # on the screen that everybody sees
     assert code == 0, err
-    assert [line for line in out.splitlines() if "no answer" in line] == [
-        "silent, alone: no answer for 100.0 % of the time, read as 0"
-    ]
+    (silent,) = [line for line in out.splitlines() if "no answer" in line]
+    assert silent == "silent, alone: no answer for 100.0 % of the time, read as 0"
     check_colours((manifest.with_name("out") / "index.html").read_text("utf-8"))
 
 
@@ -140,9 +138,8 @@ def test_a_second_run_does_what_is_left_and_the_same_bytes(run, manifest, monkey
     assert record(manifest)["tasks"] == []
     sums = pl.col("seconds", "squares", "sizes", "truth").list.sum()
     table = pl.read_parquet(folder / "scores.parquet").drop_nulls("joint").with_columns(sums)
-    each = table.group_by("method", "part", "joint").agg(
-        pl.col("seconds", "squares", "truth").sum()
-    )
+    summed = pl.col("seconds", "squares", "truth").sum()
+    each = table.group_by("method", "part", "joint").agg(summed)
     root = (pl.col("squares", "truth") / pl.col("seconds")).sqrt()
     means = each.with_columns(root).group_by("method", "part").mean()
     mine = {(r["method"], r["part"]): r for r in means.to_dicts()}
@@ -315,9 +312,7 @@ def test_a_log_that_fails_leaves_the_others(run, manifest: Path) -> None:
     """Where every log fails the code is that of an error."""
     broken = manifest.with_name("broken.csv")
     broken.write_text("t,q1\n0,nothing\n")
-    entry = (
-        f'[[log]]\nname = "b"\narm = "UR5"\nfile = "{broken}"\nrobot = "ur5"\ntruth = "free"\n'
-    )
+    entry = f'[[log]]\nname = "b"\narm = "a"\nfile = "{broken}"\nrobot = "ur5"\ntruth = "free"\n'
     for text, expected in ((MANIFEST + entry, 3), (entry, 1)):
         manifest.write_text(text)
         code, out, err = run(*asked(manifest, "-o", manifest.with_name(str(expected))))

@@ -1,4 +1,4 @@
-"""The examination in every command: a health line, refusal, --anyway, and what outputs carry.
+"""The examination in every command, and bad input in one line.
 
 The log is the UR5 fixture (its truth is known, so it is sound); the fault is its currents turned.
 """
@@ -157,6 +157,10 @@ def saved(path: Path, rows: list[list[str]], end: str = "\n") -> Path:
     return path
 
 
+def sound(folder: Path, every: int = 1) -> Path:
+    return saved(folder / "log.csv", table()[::every])
+
+
 def changed(folder: Path, rows: range, column: int, text: str) -> Path:
     """A log with other text in some cells of a column."""
     cells = table()
@@ -170,19 +174,11 @@ CASES: dict[str, tuple[Callable[[Path], Path], str, str]] = {
     "empty file": (lambda d: saved(d / "log.csv", [], end=""), COLUMNS, "empty"),
     "folder": (lambda d: d, COLUMNS, ""),
     "no such file": (lambda d: d / "nothing.csv", COLUMNS, "nothing.csv"),
-    "unknown signal described": (
-        lambda d: saved(d / "log.csv", table()), "t,q:6,speed:6,current:6", "--columns"
-    ),
-    "missing current": (
-        lambda d: saved(d / "log.csv", table()), "t,q:6,dq:6,_:6", "no motor currents"
-    ),
-    "missing velocity": (
-        # At 125 Hz they would be derived from the positions, and that be said.
-        lambda d: saved(d / "log.csv", table()[::5]), "t,q:6,_:6,current:6", "no joint velocities"
-    ),
-    "all-NaN column": (
-        lambda d: changed(d, range(400), 14, "nan"), COLUMNS, "current of joint 2"
-    ),
+    "unknown signal described": (sound, "t,q:6,speed:6,current:6", "--columns"),
+    "missing current": (sound, "t,q:6,dq:6,_:6", "no motor currents"),
+    # At 125 Hz they would be derived from the positions, and that be said.
+    "missing velocity": (lambda d: sound(d, 5), "t,q:6,_:6,current:6", "no joint velocities"),
+    "all-NaN column": (lambda d: changed(d, range(400), 14, "nan"), COLUMNS, "current of joint 2"),
     "NaN in the middle": (lambda d: changed(d, SOME, 3, "nan"), COLUMNS, "q of joint 3"),
     "time backwards": (lambda d: changed(d, SOME, 0, "0.5"), COLUMNS, "backwards"),
     "one sample": (lambda d: saved(d / "log.csv", table(rows=1)), COLUMNS, "samples is 1"),
@@ -223,9 +219,8 @@ def test_a_column_of_a_known_format_that_is_there_twice_is_not_chosen_from(tmp_p
 
 @pytest.mark.parametrize("span", ["5:2", "3:3"])
 def test_a_free_span_that_ends_before_it_begins_is_no_file_name(refused, span: str) -> None:
-    assert f"interval '{span}' is not A:B with A < B" in refused(
-        "contacts", CIRCLE, "--free", span
-    )
+    said = refused("contacts", CIRCLE, "--free", span)
+    assert f"interval '{span}' is not A:B with A < B" in said
 
 
 def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run) -> None:

@@ -153,13 +153,10 @@ def on_a_terminal(*words: object, **variables: str) -> list[str]:
 
     reader = threading.Thread(target=read)
     reader.start()
-    subprocess.run(
-        [sys.executable, "-c", PROGRAM, *map(str, words)],
-        stdout=its,
-        stderr=its,
-        check=False,
-        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1", **variables},
-    )
+    command = [sys.executable, "-c", PROGRAM, *map(str, words)]
+    terminal = {"TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1"}
+    env = os.environ | terminal | variables
+    subprocess.run(command, stdout=its, stderr=its, check=False, env=env)
     os.close(its)
     reader.join()
     os.close(mine)

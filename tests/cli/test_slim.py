@@ -79,16 +79,12 @@ def test_what_needs_none_of_them_works(words: tuple[str, ...], folder: Path) -> 
     [
         (("simulate", "ur5-circle", "-o", "x.csv"), "vftcli simulate needs pin"),
         (("admit", "--release", "x=0.3", "--robot", "ur5"), "vftcli admit needs pin"),
-        (
-            ("estimate", CIRCLE, "--robot", "ur5", "--rrd", "-o", "x"),
-            "recording.rrd (--rrd, --open) needs rerun-sdk",
-        ),
-        (
-            ("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--as-printed"),
-            "a Pinocchio model (simulation, replay, --as-printed) needs pin",
-        ),
+        (("estimate", CIRCLE, "--robot", "ur5", "--rrd", "-o", "x"),
+         "recording.rrd (--rrd, --open) needs rerun-sdk"),
+        (("compare", CIRCLE, "--robot", "ur5", "--reference", "zero", "--as-printed"),
+         "a Pinocchio model (simulation, replay, --as-printed) needs pin"),
     ],
-)
+)  # fmt: skip
 def test_the_others_say_what_is_missing(words: tuple[str, ...], line: str) -> None:
     done = launched(*words)
     package = line.rsplit(maxsplit=1)[-1]
