@@ -6,20 +6,10 @@ import numpy as np
 import pytest
 
 from vftcli.outputs.charts import QUIET, Chart, ChartLine, Span, families_of
-from vftcli.outputs.page.shell import (
-    Box,
-    Scales,
-    label,
-    part,
-    path_of,
-    polyline,
-    ribbon,
-    stripes,
-    ticks,
-)
+from vftcli.outputs.page import shell
 
-SCALES = Scales(
-    Box(128, 112, left=20, bottom=5, top=7, right=8), Span(2.0, 12.0), Span(-1.0, 4.0)
+SCALES = shell.Scales(
+    shell.Box(128, 112, left=20, bottom=5, top=7, right=8), Span(2.0, 12.0), Span(-1.0, 4.0)
 )
 """A plot of 100 by 100 with another room on each side."""
 
@@ -30,37 +20,37 @@ def test_values_have_their_places_and_stripes_stay_in_the_plot() -> None:
     flat = SCALES._replace(x=Span(3.0, 3.0), y=Span(1.0, 1.0))
     assert (flat.across(3.0), flat.up(1.0)) == (20.0, 107.0)
     assert SCALES.inside((7.0, 99.0)).tolist() == [70.0, 120.0]
-    found = stripes(SCALES, [(2.0, 3.0), (7.0, 7.0)])
+    found = shell.stripes(SCALES, [(2.0, 3.0), (7.0, 7.0)])
     assert found == "M20.0 7h10.0v100h-10.0zM70.0 7h0.5v100h-0.5z"
 
 
 def test_ticks_are_round_and_never_few() -> None:
-    np.testing.assert_allclose(ticks(Span(0.0, 18.4), 9), np.arange(0.0, 20.0, 2.0))
-    np.testing.assert_allclose(ticks(Span(-7.0, 12.0), 3), [-5.0, 0.0, 5.0, 10.0])
-    assert ticks(Span(1.0, 1.0), 3) == pytest.approx([1.0])
+    np.testing.assert_allclose(shell.ticks(Span(0.0, 18.4), 9), np.arange(0.0, 20.0, 2.0))
+    np.testing.assert_allclose(shell.ticks(Span(-7.0, 12.0), 3), [-5.0, 0.0, 5.0, 10.0])
+    assert shell.ticks(Span(1.0, 1.0), 3) == pytest.approx([1.0])
     for high in (1.0, 1.7, 3.3, 6.1, 14.0):
-        assert 3 <= len(ticks(Span(-0.4 * high, high), 3)) <= 7
-    assert (label(-0.5), label(-0.0), label(1e6)) == ("−0.5", "0", "1e+06")
+        assert 3 <= len(shell.ticks(Span(-0.4 * high, high), 3)) <= 7
+    assert (shell.label(-0.5), shell.label(-0.0), shell.label(1e6)) == ("−0.5", "0", "1e+06")
 
 
 def test_a_line_breaks_where_nothing_is_known_and_stays_near() -> None:
     t = np.arange(5.0)
-    assert path_of(SCALES, t, np.array([0.0, 5.0, np.nan, 5.0, 0.0])).count("M") == 2
-    assert path_of(SCALES, t, np.array([np.nan, 1.0, np.nan, 5.0, 0.0])).count("h.01") == 1
-    half = ribbon(SCALES, t, np.zeros(5), np.array([1.0, 1.0, np.nan, 1.0, 1.0]))
+    assert shell.path_of(SCALES, t, np.array([0.0, 5.0, np.nan, 5.0, 0.0])).count("M") == 2
+    assert shell.path_of(SCALES, t, np.array([np.nan, 1.0, np.nan, 5.0, 0.0])).count("h.01") == 1
+    half = shell.ribbon(SCALES, t, np.zeros(5), np.array([1.0, 1.0, np.nan, 1.0, 1.0]))
     assert half.count("Z") == 2
     t = np.array([2.0, 3.0])
-    assert path_of(SCALES, t, np.array([-1.0, 1e9])) == "M20 107l10-200"
-    assert path_of(SCALES, t, np.array([-1.0, -1e9])) == "M20 107l10 100"
+    assert shell.path_of(SCALES, t, np.array([-1.0, 1e9])) == "M20 107l10-200"
+    assert shell.path_of(SCALES, t, np.array([-1.0, -1e9])) == "M20 107l10 100"
 
 
 def test_a_path_is_drawn_to_a_tenth_without_its_errors_adding_up() -> None:
     """Moves of 0.04 are nothing, ten of them 0.4."""
-    assert polyline([[0.0, 0.0], [0.5, -1.1], [0.6, 9.0]]) == "M0 0l.5-1.1 .1 10.1"
+    assert shell.polyline([[0.0, 0.0], [0.5, -1.1], [0.6, 9.0]]) == "M0 0l.5-1.1 .1 10.1"
     points = np.column_stack([0.04 * np.arange(11), np.zeros(11)])
-    moves = re.findall(r"-?[\d.]+", polyline(points).partition("l")[2])[::2]
+    moves = re.findall(r"-?[\d.]+", shell.polyline(points).partition("l")[2])[::2]
     assert sum(map(float, moves)) == pytest.approx(0.4)
-    assert polyline([[3.0, 4.0]]) == "M3 4h.01"
+    assert shell.polyline([[3.0, 4.0]]) == "M3 4h.01"
 
 
 def chart(t: np.ndarray, *lines: ChartLine, **kind: object) -> Chart:
@@ -71,7 +61,7 @@ def chart(t: np.ndarray, *lines: ChartLine, **kind: object) -> Chart:
 def test_a_ribbon_goes_along_both_edges_and_is_grey_where_no_contact_is_listed() -> None:
     """Between two level lines it fills its whole box: the area of its outline, by Gauss."""
     line = ChartLine("best", np.zeros((6, 1)), "#112233", half=np.full((6, 1), 2.0))
-    html = part("svg/multiples", chart(np.arange(6.0), line))
+    html = shell.part("svg/multiples", chart(np.arange(6.0), line))
     assert QUIET not in html
     (outline,) = set(re.findall(r'"(M[^"]*)Z"', html))
     steps = np.array([float(number) for number in re.findall(r"-?\d*\.?\d+", outline)])
@@ -79,7 +69,7 @@ def test_a_ribbon_goes_along_both_edges_and_is_grey_where_no_contact_is_listed()
     area = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
     assert 1.0 < area == pytest.approx(np.ptp(x) * np.ptp(y))
     quiet = line._replace(quiet=np.array([True, True, False, False, True, True]))
-    html = part("svg/multiples", chart(np.arange(6.0), quiet))
+    html = shell.part("svg/multiples", chart(np.arange(6.0), quiet))
     assert html.count('class="rim"/>') == 1 + 1  # one more in the legend
     assert html.count('class="floor"/>') == 1
     assert QUIET in html
@@ -102,19 +92,20 @@ def test_a_scale_holds_ribbons_and_bands_and_neighbours_of_one_drive_size_share_
 
 def test_only_what_is_shown_stands_in_the_small_pictures_and_names_are_words() -> None:
     t, ones = np.arange(3.0), np.ones((3, 2))
-    lines = (
-        ChartLine("first", ones, "#112233"),
-        ChartLine("<i>", ones, "#445566"),
-        ChartLine("later", ones, "#778899", shown=False),
-    )
-    html = part("svg/multiples", chart(t, *lines))
+    named = {"first": "#112233", "<i>": "#445566", "later": "#778899"}
+    lines = [ChartLine(name, ones, paint, shown=name != "later") for name, paint in named.items()]
+    html = shell.part("svg/multiples", chart(t, *lines))
     assert html.count("<figure") == 2
     # Each line has a switch, those that are shown a place in the legend.
     assert html.count('stroke="#112233"') == 2 + 1 + 1
     assert html.count('stroke="#778899"') == 1
     assert html.count('aria-pressed="false"') == 1
     assert "legend" in html
-    assert "legend" not in part("svg/multiples", chart(t, lines[0]))  # one line needs none
-    for text in (html, part("svg/axes", SCALES, "<i>"), part("svg/svg", Box(), "<i>", "<g/>")):
+    assert "legend" not in shell.part("svg/multiples", chart(t, lines[0]))  # one line needs none
+    for text in (
+        html,
+        shell.part("svg/axes", SCALES, "<i>"),
+        shell.part("svg/svg", shell.Box(), "<i>", "<g/>"),
+    ):
         assert "<i>" not in text
         assert "&lt;i&gt;" in text

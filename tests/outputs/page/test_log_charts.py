@@ -6,19 +6,12 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.charts import REFERENCE
-from vftcli.outputs.page.log_charts import (
-    LOWEST,
-    force_chart,
-    highest,
-    response_charts,
-    torque_chart,
-    wrench_chart,
-)
+from vftcli.outputs.page import log_charts
 from vftcli.outputs.page.pages import render
 
 
 def test_every_line_has_its_look_and_drives_of_a_size_a_scale(analysis: Analysis) -> None:
-    chart = torque_chart(analysis)
+    chart = log_charts.torque_chart(analysis)
     assert len({line.dash for line in chart.series[1:]}) == 5  # none differs by its colour alone
     assert chart.series[0].colour == REFERENCE
     assert chart.panels == tuple(f"J{j}" for j in range(1, 7))
@@ -30,7 +23,7 @@ def test_a_reference_at_rest_is_another_line(analysis: Analysis) -> None:
     moving = np.ones((len(analysis.t), 6), dtype=bool)
     moving[100:200, 2] = False
     partly = replace(analysis, reference=replace(analysis.reference, moving=moving))
-    whole, resting = torque_chart(partly).series[:2]
+    whole, resting = log_charts.torque_chart(partly).series[:2]
     assert "rests" in resting.name
     assert np.isnan([whole.values[150, 2], resting.values[150, 1]]).all()
     assert np.isfinite(resting.values[150, 2])
@@ -38,18 +31,18 @@ def test_a_reference_at_rest_is_another_line(analysis: Analysis) -> None:
 
 def test_a_first_order_response_is_3_db_down_at_its_cutoff(analysis: Analysis) -> None:
     """fdo.omega of the UR5 is 10 rad/s: 1.59 Hz."""
-    gain, _, delay = response_charts(analysis)
+    gain, _, delay = log_charts.response_charts(analysis)
     fdo = next(line for line in gain.series if line.name == "fdo")
     found = np.interp(10.0 / (2.0 * np.pi), gain.x, fdo.values[:, 0])
     # the bilinear rule warps 1.59 Hz by 0.05 % at 125 Hz; interpolation adds less than 0.04 dB
     assert found == pytest.approx(-3.01, abs=0.05)
-    assert gain.lowest == LOWEST
+    assert gain.lowest == log_charts.LOWEST
     slow = next(line for line in delay.series if line.name == "fdo").values[0, 0]
     assert slow == pytest.approx(100.0, rel=0.01)  # 1/ω at frequencies far below it
 
 
 def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
-    chart = wrench_chart(with_wrench)
+    chart = log_charts.wrench_chart(with_wrench)
     assert chart.panels == ("fx", "fy", "fz", "mx", "my", "mz")
     assert chart.units == ("N",) * 3 + ("N·m",) * 3
     assert chart.ends(0) == chart.ends(2) != chart.ends(3) == chart.ends(5)
@@ -62,13 +55,13 @@ def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
     assert html.count('data-panel="5"') == 2  # J6 and mz
     assert "ON the robot in base axes" in html
     bare = replace(with_wrench, virtual_sensor=None)
-    assert wrench_chart(bare) is None
+    assert log_charts.wrench_chart(bare) is None
     assert "Wrench axes" not in render(bare)
 
 
 def test_the_force_is_that_of_the_contacts_and_has_their_peaks(pushed: Analysis) -> None:
     found = pushed.contacts
-    chart = force_chart(pushed, found)
+    chart = log_charts.force_chart(pushed, found)
     (line,) = chart.series
     force, t = line.values[:, 0], pushed.t
     inside = np.zeros(len(t), dtype=bool)
@@ -81,17 +74,17 @@ def test_the_force_is_that_of_the_contacts_and_has_their_peaks(pushed: Analysis)
     assert np.isfinite(force[inside]).all()
     assert np.isnan(force[~inside]).all()
     assert chart.spans == tuple((c.start, c.stop) for c in found.contacts)
-    assert chart.ends(0) == (0.0, highest(found))
+    assert chart.ends(0) == (0.0, log_charts.highest(found))
 
 
 def test_the_axis_of_the_force_holds_every_peak_with_its_band(pushed: Analysis) -> None:
     found = pushed.contacts
-    assert highest(found) > max(c.peak_force + c.peak_band for c in found.contacts)
-    assert highest(replace(found, contacts=())) == 2.5 * found.detectable_force
-    assert highest(replace(found, contacts=(), smallest_force=None)) == 1.0
+    assert log_charts.highest(found) > max(c.peak_force + c.peak_band for c in found.contacts)
+    assert log_charts.highest(replace(found, contacts=())) == 2.5 * found.detectable_force
+    assert log_charts.highest(replace(found, contacts=(), smallest_force=None)) == 1.0
     # A band wider than its force stretches no axis.
     wide = replace(found.contacts[0], peak_force=88.0, peak_band=900.0)
-    assert highest(replace(found, contacts=(wide,))) < 250.0
+    assert log_charts.highest(replace(found, contacts=(wide,))) < 250.0
 
 
 def test_all_of_a_loads_force_is_in_its_chart_which_begins_at_zero(pushed: Analysis) -> None:
@@ -102,7 +95,7 @@ def test_all_of_a_loads_force_is_in_its_chart_which_begins_at_zero(pushed: Analy
     size = 26.0 + 6.0 * np.sin(9.0 * first.course.t)
     course = first.course._replace(force=size, band=np.full(len(size), 6.0))
     only = replace(found, contacts=(replace(load, course=course),))
-    chart = force_chart(pushed, only)
+    chart = log_charts.force_chart(pushed, only)
     low, high = chart.ends(0)
     assert low == 0.0
     assert high >= size.max() + 6.0
@@ -116,7 +109,10 @@ def test_the_force_stands_before_the_logs_own_wrench(pushed: Analysis, as_if: Ca
     silent, felt = (
         as_if(pushed, replace(pushed.recording, wrench=w)) for w in (0 * wrench, wrench)
     )
-    chart, bare = force_chart(felt, pushed.contacts), force_chart(silent, pushed.contacts)
+    chart, bare = (
+        log_charts.force_chart(felt, pushed.contacts),
+        log_charts.force_chart(silent, pushed.contacts),
+    )
     own, best = chart.series
     assert (own.colour, best.name) == (REFERENCE, "best")
     np.testing.assert_allclose(own.values, 50.0)
@@ -126,7 +122,7 @@ def test_the_force_stands_before_the_logs_own_wrench(pushed: Analysis, as_if: Ca
 
 def test_the_band_is_grey_where_no_contact_is_listed(pushed: Analysis) -> None:
     """The twelve pushes of the circle and their edges of a block; a wrench without a list: none."""
-    (line,) = wrench_chart(pushed).series
+    (line,) = log_charts.wrench_chart(pushed).series
     t, inside = pushed.t, np.zeros(len(pushed.t), dtype=bool)
     for row in pushed.contacts.contacts:
         inside |= (t > row.start) & (t < row.stop)

@@ -115,10 +115,8 @@ def test_the_data_of_ten_minutes_are_small() -> None:
     t = 1e-3 * np.arange(600_000)
     wave = 20.0 * np.sin(t[:, None] * np.linspace(0.3, 1.1, 6)) ** 9
     names = ("reference", "best", "fdo", "gmo", "kfo-fe", "kfo-zoh")
-    lines = [
-        ChartLine(name, wave + RNG.normal(0.0, 0.2, wave.shape), shown=k < 2)
-        for k, name in enumerate(names)
-    ]
+    noisy = [wave + RNG.normal(0.0, 0.2, wave.shape) for _ in names]
+    lines = [ChartLine(names[k], noisy[k], shown=k < 2) for k in range(len(names))]
     lines[1] = lines[1]._replace(half=np.full(wave.shape, 0.7))
     charts = [chart(t, *lines), chart(t, lines[1])]
     # A page of 1 MB has 350 kB for drawings, style, script and tables.

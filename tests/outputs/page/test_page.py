@@ -166,9 +166,7 @@ def test_the_files_beside_it_are_named_with_their_sizes(analysis: Analysis) -> N
     assert '<section id="files">' not in render(analysis)
 
 
-def test_grounds_have_sign_and_remedy(
-    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_grounds_have_sign_and_remedy(analysis, monkeypatch):
     """What nothing is known of is no caution."""
     found = (
         Ground("bad", "load", "heavy <b>", "vftcli x '<i>'"),
@@ -182,12 +180,10 @@ def test_grounds_have_sign_and_remedy(
     text = Page(html).text
     assert "3 cautions, 1 check passed" in text
     pieces = (
-        "Load Heavy <b> vftcli x '<i>'",
-        "Free motion free_14harm.csv is short",
-        "Free motion --free names",
-        "Free motion The sizes",
+        "Load Heavy <b> vftcli x '<i>'", "Free motion free_14harm.csv is short",
+        "Free motion --free names", "Free motion The sizes",
         "Clock of the UR Vendor's own, ur5.toml",
-    )
+    )  # fmt: skip
     places = [text.index(words) for words in pieces]
     assert places == sorted(places)
     assert '<b class="sign bad">✗</b>' in html
@@ -291,11 +287,8 @@ def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
 def test_the_worst_comes_first(pushed: Analysis) -> None:
     hard = index_line("b", pushed)._replace(standing="good")
     lines = [hard._replace(page="a", force=0.0), hard, hard._replace(page="c", standing="bad")]
-    assert [line.page for line in sorted(lines, key=lambda line: line.rank)] == [
-        "c",
-        "b/index.html",
-        "a",
-    ]
+    ranked = sorted(lines, key=lambda line: line.rank)
+    assert [line.page for line in ranked] == ["c", "b/index.html", "a"]
     html = render_index([("first", replace(pushed, contacts=None)), ("second", pushed)])
     assert html.index("second/index.html") < html.index("first/index.html")
 

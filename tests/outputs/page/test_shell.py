@@ -4,7 +4,6 @@ import re
 import shutil
 import sys
 from html import unescape
-from pathlib import Path
 
 import pytest
 from jinja2 import FileSystemBytecodeCache, UndefinedError
@@ -73,12 +72,8 @@ def test_a_name_that_could_end_a_rule_has_no_swatch() -> None:
 def test_an_option_is_one_word_and_the_text_stays() -> None:
     text = "Name it (--free a-b.csv, -o x_-y) or --no-contacts <i>--a</i>."
     html = part("parts/lead", text)
-    assert re.findall(r'<span class="option">([^<]*)</span>', html) == [
-        "--free",
-        "-o",
-        "--no-contacts",
-        "--a",
-    ]
+    options = re.findall(r'<span class="option">([^<]*)</span>', html)
+    assert options == ["--free", "-o", "--no-contacts", "--a"]
     assert unescape(re.sub(r"<[^>]*>", "", html)) == text
 
 
@@ -89,9 +84,7 @@ def test_what_a_template_misses_is_an_error_and_none_is_loaded_without_a_page(lo
 
 
 @pytest.mark.parametrize("room", [True, False])
-def test_compiled_templates_are_kept_and_a_full_disk_costs_no_page(
-    room: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_compiled_templates_are_kept_and_a_full_disk_costs_no_page(room, tmp_path, monkeypatch):
     """As Python's own, beside their texts; what cannot be kept is compiled again."""
 
     def full(*_: object) -> None:
