@@ -112,7 +112,7 @@ def test_columns_on_another_clock_are_interpolated_one_by_one(seed: int) -> None
     t = np.cumsum(rng.uniform(0.1, 1.0, 20))
     x = rng.standard_normal((20, 3))
     at = rng.uniform(t[0] - 1.0, t[-1] + 1.0, 15)
-    expected = np.array([[np.interp(time, t, x[:, k]) for k in range(3)] for time in at])
+    expected = np.column_stack([np.interp(at, t, column) for column in x.T])
     assert np.array_equal(arrays.resample_columns(at, t, x), expected)
     away = (at < t[0]) | (at > t[-1])
     open_ended = arrays.resample_columns(at, t, x, outside=np.nan)
@@ -136,10 +136,6 @@ def test_bridging_then_resampling_reads_the_line_between_known_samples(seed: int
     assert not bridge_unknown(t, np.full((30, 1), np.nan)).any()
 
 
-T = 0.1 * np.arange(8)
-MASK = np.array([1, 0, 1, 0, 0, 0, 1, 0], dtype=bool)
-
-
 @given(st.lists(st.booleans(), max_size=60))
 def test_runs_are_the_true_samples_and_nothing_else(flags: list[bool]) -> None:
     mask = np.array(flags, dtype=bool)
@@ -148,6 +144,10 @@ def test_runs_are_the_true_samples_and_nothing_else(flags: list[bool]) -> None:
     assert np.array_equal(arrays.covered(runs, len(mask)), mask)
     # Unbroken: between two runs lies at least one false sample.
     assert all(second[0] > first[1] for first, second in pairwise(runs))
+
+
+T = 0.1 * np.arange(8)
+MASK = np.array([1, 0, 1, 0, 0, 0, 1, 0], dtype=bool)
 
 
 def test_runs_are_joined_across_short_gaps_and_may_last_long_enough_together() -> None:

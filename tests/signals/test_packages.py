@@ -23,12 +23,9 @@ def test_a_missing_package_is_named_with_use_and_remedy(module, monkeypatch):
 
 
 def test_a_package_that_lacks_another_is_not_called_missing(monkeypatch):
-    monkeypatch.setattr(
-        "vftcli.signals.packages.import_module", lambda _: __import__("no_such_module")
-    )
-    with pytest.raises(
-        PackageError, match=r"cannot be loaded \(No module named 'no_such_module'"
-    ):
+    place, words = "vftcli.signals.packages.import_module", r"\(No module named 'no_such_module'"
+    monkeypatch.setattr(place, lambda _: __import__("no_such_module"))
+    with pytest.raises(PackageError, match=f"cannot be loaded {words}"):
         needed("rerun", "a thing")
 
 

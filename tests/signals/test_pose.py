@@ -66,9 +66,8 @@ def test_product_is_that_of_matrices() -> None:
 
 def test_quaternions_against_scipy() -> None:
     """Random turns, and half turns, where three of the four ways divide by zero."""
-    half = Rotation.from_rotvec(
-        np.pi * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.6, 0.8, 0]])
-    )
+    axes = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.6, 0.8, 0]])
+    half = Rotation.from_rotvec(np.pi * axes)
     turns = Rotation.concatenate([Rotation.random(500, rng=np.random.default_rng(5)), half])
     found, expected = matrix_quaternion(turns.as_matrix()), turns.as_quat(scalar_first=True)
     agreement = np.abs(np.sum(found * expected, axis=1))  # q and −q are the same turn

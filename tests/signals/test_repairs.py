@@ -79,8 +79,7 @@ def moving(noise: float = 0.05) -> Recording:
 def with_sample(log: Recording, signal: str, row: int, joint: int, off: float) -> Recording:
     values = np.array(getattr(log, signal))
     values[row, joint] += off
-    kept = {name: getattr(log, name) for name in ("t", "q", "dq", "torque")}
-    return Recording(**{**kept, signal: values})
+    return replace(log, **{signal: values})
 
 
 @pytest.mark.parametrize("row", [0, 1, 2, 400, ROWS - 2, ROWS - 1])
@@ -89,14 +88,9 @@ def with_sample(log: Recording, signal: str, row: int, joint: int, off: float) -
     ("signal", "off", "left"),
     # left: at an end a line of six samples misses 4 rad/s² by ½(3 Ts)² of it, 1.8 mrad, and its
     # change by less than .01 rad/s; of the torque 6 sd of its noise
-    [
-        ("q", 2.0 * np.pi, 2e-3),
-        ("q", -0.05, 2e-3),
-        ("dq", 5.0, 1e-2),
-        ("torque", 200.0, 0.3),
-        ("torque", -200.0, 0.3),
-    ],
-)
+    [("q", 2.0 * np.pi, 2e-3), ("q", -0.05, 2e-3), ("dq", 5.0, 1e-2), ("torque", 200.0, 0.3),
+     ("torque", -200.0, 0.3)],
+)  # fmt: skip
 def test_one_bad_sample_is_drawn_to_its_neighbours(signal, off, left, row, joint) -> None:
     log = moving()
     found = without_isolated(with_sample(log, signal, row, joint, off))
@@ -122,18 +116,13 @@ def test_what_a_sample_is_worth_falls_back_without_a_jump(sign: float) -> None:
     assert abs(left[-1]) < 0.3  # 6 sd of the noise
 
 
-def with_torque(torque: np.ndarray) -> Recording:
-    log = moving()
-    return Recording(t=log.t, q=log.q, dq=log.dq, torque=torque)
-
-
 @pytest.mark.parametrize("rows", [3, 6, 12])
 def test_a_tap_and_a_step_are_no_isolated_samples(rows: int) -> None:
     """A half sine of 30, 60 or 120 ms, and a torque that jumps and stays."""
     torque = np.array(moving().torque)
     torque[500 : 500 + rows, 0] += 30.0 * np.sin(np.pi * (np.arange(rows) + 0.5) / rows)
     torque[700:, 1] += 5.0
-    found = without_isolated(with_torque(torque))
+    found = without_isolated(replace(moving(), torque=torque))
     np.testing.assert_allclose(found.torque, torque, rtol=0, atol=1e-12)
 
 
@@ -143,7 +132,7 @@ def test_a_sound_log_is_left_as_it_is_and_numbers_beyond_all_bounds_are_no_warni
     torque = np.array(log.torque)
     torque[10:20] = 1e308
     torque[30] = -np.inf
-    without_isolated(with_torque(torque))
+    without_isolated(replace(log, torque=torque))
 
 
 def test_the_one_odd_current_of_a_real_log_goes(logs: Path) -> None:

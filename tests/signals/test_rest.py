@@ -1,5 +1,7 @@
 """Where a joint stands still: stops long enough for stiction, with their moments around."""
 
+from itertools import groupby
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,9 +49,7 @@ def test_durations_add_up_to_the_still_samples(still: list[bool]) -> None:
     dq = np.where(still, 0.0, 1.0)[:, None]
     found = rest.duration(t, dq)[:, 0]
     assert np.array_equal(found > 0, still)
-    k, runs = 0, []
-    for value in [*still, False]:
-        k = k + 1 if value else (runs.append(k) or 0)
+    runs = [len(list(run)) for value, run in groupby(still) if value]
     assert np.isclose(found.sum(), STEP * sum(k * k for k in runs))
 
 

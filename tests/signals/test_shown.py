@@ -31,9 +31,8 @@ class Thing(Shown):
 
 def things() -> list[Shown]:
     recording = Recording(t=T, q=Q, wrench=Q, source=Source(path=Path("log.csv")))
-    torque = ExternalTorque(
-        name="gmo", t=T, tau=np.where(Q > 5.5, np.nan, Q), error_sd=0.0 * Q + 1
-    )
+    tau = np.where(Q > 5.5, np.nan, Q)
+    torque = ExternalTorque(name="gmo", t=T, tau=tau, error_sd=np.ones_like(Q))
     wrench = Wrench(name="best", t=T, values=Q, sd=Q, frame="base", masked=T > 0.5)
     return [Thing(few=T[:3], many=Q, words=("x", "y")), recording, recording.source, torque,
             wrench, Remarks([fact("as-printed")]), fact("as-printed")]  # fmt: skip

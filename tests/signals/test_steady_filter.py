@@ -34,9 +34,7 @@ def test_constant_coefficients_are_the_plain_loop(samples: int, m: int) -> None:
     np.testing.assert_allclose(end, states[:, -1], atol=1e-11)
 
 
-@pytest.mark.parametrize(
-    "samples", [1, 2, 35, 36, 37, 47, 48, 49, 63, 64, 65, 1000, 1296, 1297, 5003]
-)
+@pytest.mark.parametrize("samples", [1, 2, 35, 36, 37, 47, 48, 49, 63, 64, 65, 1296, 1297, 5003])
 @pytest.mark.parametrize("m", [1, 2])
 def test_agrees_with_a_plain_loop(samples: int, m: int) -> None:
     rng = np.random.default_rng(samples + m)

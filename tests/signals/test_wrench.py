@@ -36,9 +36,8 @@ def test_a_converted_log_of_an_earlier_version_states_no_frame(notation: object)
 
 
 def test_a_frame_in_words_and_the_factor_to_force_on_the_robot() -> None:
-    assert str(FRANKA_FRAME) == (
-        "base axes at the base's origin, as force BY the robot ON the environment"
-    )
+    words = "base axes at the base's origin, as force BY the robot ON the environment"
+    assert str(FRANKA_FRAME) == words
     tool = WrenchFrame("base", "tool")
     assert str(tool) == "base axes at the tool's point, as force on the robot"
     assert (FRANKA_FRAME.factor, tool.factor) == (-1.0, 1.0)
@@ -65,18 +64,12 @@ def test_hidden_samples_are_not_known() -> None:
 
 def test_the_size_of_a_force_has_the_deviation_along_it() -> None:
     """(3, 0, 4) N: sd = √((.6 · 1)² + (.8 · 2)²); no force: the largest; hidden: unknown."""
-    values = np.zeros((3, 6))
+    values, t = np.zeros((3, 6)), np.arange(3.0)
     values[0, [0, 2]] = 3.0, 4.0
-    wrench = Wrench(
-        name="best",
-        t=np.arange(3.0),
-        values=values,
-        frame="flange",
-        sd=np.tile([1.0, 5.0, 2.0, 9.0, 9.0, 9.0], (3, 1)),
-        masked=np.array([False, False, True]),
-    )
+    sd, masked = np.tile([1.0, 5.0, 2.0, 9.0, 9.0, 9.0], (3, 1)), np.array([False, False, True])
+    wrench = Wrench(name="best", t=t, values=values, frame="flange", sd=sd, masked=masked)
     np.testing.assert_allclose(wrench.size, [5.0, 0.0, np.nan])
     assert wrench.size_sd is not None
     # rounding
     np.testing.assert_allclose(wrench.size_sd, [np.hypot(0.6, 1.6), 5.0, np.nan], rtol=1e-12)
-    assert Wrench(name="gmo", t=np.arange(3.0), values=values, frame="flange").size_sd is None
+    assert Wrench(name="gmo", t=t, values=values, frame="flange").size_sd is None
