@@ -20,17 +20,10 @@ from vftcli.outputs.files import (
 from vftcli.signals.errors import OutputError
 
 
-def names(folder: Path) -> list[str]:
-    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*"))
-
-
-def test_a_file_appears_whole(tmp_path: Path) -> None:
-    with atomic(tmp_path / "a.txt") as temporary:
-        temporary.write_text("half")
-        assert not (tmp_path / "a.txt").exists()
-        temporary.write_text("whole")
-    assert names(tmp_path) == ["a.txt"]
-    assert (tmp_path / "a.txt").read_text() == "whole"
+def texts(folder: Path) -> dict[str, str]:
+    """All that there is, by name; of a folder no text."""
+    found = {path: path.read_text() if path.is_file() else "" for path in folder.rglob("*")}
+    return {path.relative_to(folder).as_posix(): text for path, text in found.items()}
 
 
 def cut_short(path: Path) -> None:
@@ -38,12 +31,15 @@ def cut_short(path: Path) -> None:
     raise KeyboardInterrupt
 
 
-def test_a_failing_block_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
-    write_text(tmp_path / "a.txt", "old")
+def test_a_file_appears_whole_or_the_old_one_stays_and_nothing_else(tmp_path: Path) -> None:
+    with atomic(tmp_path / "a.txt") as temporary:
+        temporary.write_text("half")
+        assert not (tmp_path / "a.txt").exists()
+        temporary.write_text("whole")
+    assert texts(tmp_path) == {"a.txt": "whole"}
     with pytest.raises(KeyboardInterrupt), atomic(tmp_path / "a.txt", force=True) as temporary:
         cut_short(temporary)
-    assert names(tmp_path) == ["a.txt"]
-    assert (tmp_path / "a.txt").read_text() == "old"
+    assert texts(tmp_path) == {"a.txt": "whole"}
 
 
 def test_an_existing_file_needs_force_and_no_file_is_no_place_for_one(tmp_path: Path) -> None:
@@ -76,20 +72,19 @@ def test_a_folder_gets_all_files_at_once(tmp_path: Path) -> None:
         (folder / "a.txt").write_text("a")
         (folder / "sub/b.txt").write_text("b")
         assert not (out / "a.txt").exists()
-    assert names(out) == ["a.txt", "sub", "sub/b.txt"]
+    assert texts(out) == {"a.txt": "a", "sub": "", "sub/b.txt": "b"}
 
 
 def test_a_failing_folder_leaves_what_was_there(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), OutputFolder(tmp_path / "new" / "out") as folder:
         cut_short(folder / "a.txt")
-    assert names(tmp_path) == []
+    assert texts(tmp_path) == {}
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / "a.txt").write_text("old")
     out = OutputFolder(tmp_path, force=True, names=["a.txt"])
     with pytest.raises(KeyboardInterrupt), out as folder:
         cut_short(folder / "a.txt")
-    assert names(tmp_path) == ["a.txt", "mine.txt"]
-    assert (tmp_path / "a.txt").read_text() == "old"
+    assert texts(tmp_path) == {"a.txt": "old", "mine.txt": "mine"}
 
 
 def test_an_existing_output_is_refused_at_once_an_undeclared_one_at_the_end(tmp_path):
@@ -99,8 +94,7 @@ def test_an_existing_output_is_refused_at_once_an_undeclared_one_at_the_end(tmp_
         pytest.fail("the block ran")
     with pytest.raises(OutputError, match="exists"), OutputFolder(tmp_path) as folder:
         (folder / "a.txt").write_text("new")
-    assert names(tmp_path) == ["a.txt"]
-    assert (tmp_path / "a.txt").read_text() == "old"
+    assert texts(tmp_path) == {"a.txt": "old"}
 
 
 def test_force_leaves_no_declared_file_of_an_earlier_run(tmp_path: Path) -> None:
@@ -108,7 +102,7 @@ def test_force_leaves_no_declared_file_of_an_earlier_run(tmp_path: Path) -> None
         (tmp_path / name).write_text("old")
     with OutputFolder(tmp_path, force=True, names=["run.json", "errors.csv"]) as folder:
         (folder / "run.json").write_text("new")
-    assert names(tmp_path) == ["mine.txt", "run.json"]
+    assert texts(tmp_path) == {"mine.txt": "old", "run.json": "new"}
 
 
 @pytest.mark.parametrize(
@@ -118,7 +112,7 @@ def test_at_or_below_a_file_there_is_no_folder(tmp_path: Path, place: str, words
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match=words), OutputFolder(tmp_path / place):
         pytest.fail("the block ran")
-    assert names(tmp_path) == ["file"]
+    assert texts(tmp_path) == {"file": ""}
 
 
 def test_an_error_of_the_system_becomes_one_line(tmp_path: Path) -> None:
@@ -126,7 +120,7 @@ def test_an_error_of_the_system_becomes_one_line(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no space left on device") as caught, out:
         raise OSError(28, "No space left on device")
     assert "\n" not in str(caught.value)
-    assert names(tmp_path) == []
+    assert texts(tmp_path) == {}
 
 
 def test_a_move_that_fails_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,8 +139,7 @@ def test_a_move_that_fails_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyP
     out = OutputFolder(tmp_path, force=True, names=declared)
     with pytest.raises(OutputError, match="input/output error"), out as folder:
         fill(folder, dict.fromkeys(declared[:3], "new"))
-    assert names(tmp_path) == ["a.txt", "b.txt", "stale.txt"]
-    assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}
+    assert texts(tmp_path) == dict.fromkeys(("a.txt", "b.txt", "stale.txt"), "old")
 
 
 def test_equal_names_get_numbers_that_are_free() -> None:
@@ -170,18 +163,14 @@ def test_files_of_the_run_before_go_if_nobody_changed_them(tmp_path: Path) -> No
     sealed(tmp_path, {"a.txt": "a", "b.txt": "b", "sub/c.txt": "c", "mine.txt": "run's"})
     (tmp_path / "mine.txt").write_text("mine")
     sealed(tmp_path, {"b.txt": "new"})
-    assert names(tmp_path) == ["b.txt", "mine.txt", "run.json"]
+    assert texts(tmp_path).keys() == {"b.txt", "mine.txt", "run.json"}
 
 
 def test_a_seal_is_not_believed_outside_its_folder(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "precious.txt").write_text("precious")
-    lies = {
-        "../precious.txt": digest(tmp_path / "precious.txt"),
-        "": "",
-        "\0": "x",
-        "run.json": 3,
-    }
+    precious = digest(tmp_path / "precious.txt")
+    lies = {"../precious.txt": precious, "": "", "\0": "x", "run.json": 3}
     for files in (lies, [], None, "text"):
         (tmp_path / "out" / "run.json").write_text(json.dumps({"files": files}))
         sealed(tmp_path / "out", {"a.txt": "a"})
@@ -189,21 +178,16 @@ def test_a_seal_is_not_believed_outside_its_folder(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "written", "refused"),
+    ("given", "refused", "free"),
     [
-        ("log.csv", "log.csv", True),
-        ("log.csv", "other.csv", False),
-        ("log.csv", "link.csv", True),
-        (".", "log.csv", True),
-        (".", "sub/inner.csv", True),
-        (".", "run.json", False),  # a report may be in the folder of its log
-        (".", "made.csv", False),
-        (".", "batch.run.json", False),
-        ("sub", "log.csv", False),
-        ("gone", "log.csv", False),
+        ("log.csv", "log.csv link.csv", "other.csv"),
+        # A report may be in the folder of its log.
+        (".", "log.csv sub/inner.csv", "run.json made.csv batch.run.json"),
+        ("sub", "sub/inner.csv", "log.csv"),
+        ("gone", "", "log.csv"),
     ],
 )
-def test_what_is_read_is_kept(tmp_path: Path, given: str, written: str, refused: bool) -> None:
+def test_what_is_read_is_kept(tmp_path: Path, given: str, refused: str, free: str) -> None:
     """By whatever name; but what an earlier run wrote into a folder that is read."""
     sealed(tmp_path, {"made.csv": "made"})
     (tmp_path / "sub").mkdir()
@@ -211,12 +195,13 @@ def test_what_is_read_is_kept(tmp_path: Path, given: str, written: str, refused:
         (tmp_path / name).write_text(name)
     (tmp_path / "link.csv").symlink_to(tmp_path / "log.csv")
     with protected([tmp_path / given]):
-        if refused:
+        for name in refused.split():
             with pytest.raises(OutputError, match="is what this command reads"):
-                refuse_existing(tmp_path / written, force=True)
-        else:
-            refuse_existing(tmp_path / written, force=True)
-    refuse_existing(tmp_path / written, force=True)
+                refuse_existing(tmp_path / name, force=True)
+        for name in free.split():
+            refuse_existing(tmp_path / name, force=True)
+    for name in refused.split():
+        refuse_existing(tmp_path / name, force=True)
 
 
 def test_the_seal_goes_first_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -252,7 +237,7 @@ def test_a_failed_run_clears_nothing(tmp_path: Path) -> None:
     (tmp_path / ".vftcli-999999999-00000000.partial").mkdir()
     with pytest.raises(KeyboardInterrupt), OutputFolder(tmp_path) as folder:
         cut_short(folder / "a.txt")
-    assert len(names(tmp_path)) == 1
+    assert len(texts(tmp_path)) == 1
 
 
 def test_half_a_letter_is_refused_in_a_name_but_not_in_a_text(tmp_path: Path) -> None:

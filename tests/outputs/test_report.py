@@ -18,13 +18,10 @@ def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
     text = write_report(tmp_path / "out", [analysis], command="vftcli report x")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
     written = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))
-    files = written.pop("files")
+    assert written.pop("files") | {"run.json": ""} == digests(tmp_path / "out") | {"run.json": ""}
     assert written == json.loads(text)
-    found = digests(tmp_path / "out")
-    found.pop("run.json")
-    assert files == found
-    assert json.loads(text)["command"] == "vftcli report x"
-    assert "rerun-sdk" in json.loads(text)["versions"]  # which wrote the recording
+    assert written["command"] == "vftcli report x"
+    assert "rerun-sdk" in written["versions"]  # which wrote the recording
     assert "vftcli report x" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
 
 

@@ -73,6 +73,10 @@ def leads_out(path: Path) -> Path:
     return path
 
 
+def inflating(megabytes: int) -> bytes:
+    return zlib.compress(bytes(megabytes * 10**6))
+
+
 def one_chunk(path: Path, packed: bytes, rows: int = ROWS, deflated: int = 1) -> Path:
     """Positions in one chunk of some rows, with a content that need not fit."""
     with h5py.File(path, "w") as file:
@@ -85,21 +89,6 @@ def one_chunk(path: Path, packed: bytes, rows: int = ROWS, deflated: int = 1) ->
         q = h5py.h5d.create(file.id, b"q", h5py.h5t.NATIVE_DOUBLE, space, settings)
         q.write_direct_chunk((0, 0), packed)
     return path
-
-
-def large_chunk(path: Path) -> Path:
-    """Some rows in a chunk of ten million, which is unpacked whole."""
-    return one_chunk(path, zlib.compress(b""), rows=10_000_000)
-
-
-def lying_chunk(path: Path) -> Path:
-    """A chunk of the rows that are there, whose content inflates to 480 MB."""
-    return one_chunk(path, zlib.compress(bytes(480_000_000)))
-
-
-def deflated_twice(path: Path) -> Path:
-    """Some kilobytes that inflate to half a megabyte, and these to 480 MB."""
-    return one_chunk(path, zlib.compress(zlib.compress(bytes(480_000_000))), deflated=2)
 
 
 def matlab_bomb(path: Path, *, inside: bool = False) -> Path:
@@ -124,15 +113,6 @@ def zeros() -> pa.Table:
     """144 MB, which pages hold in some kilobytes."""
     column = pa.array(np.zeros(9_000_000))
     return pa.table({"t": column, "q1": column})
-
-
-def arrow_bomb(path: Path) -> Path:
-    return seeds.write_arrow(path, zeros(), codec="zstd", rows=9_000_000)
-
-
-def parquet_bomb(path: Path) -> Path:
-    write_table(zeros(), path)
-    return path
 
 
 def arrow_lies(path: Path) -> Path:
@@ -217,19 +197,24 @@ OF_HDF5: Hostile = {
     "claim": (lambda p: claimed(p, t=GIGANTIC[:1], q=GIGANTIC), TOO_MUCH),
     "claims_of_many": (claims_of_many, TOO_MUCH),
     "claim_of_matlab": (claim_of_matlab, TOO_MUCH),
-    "large_chunk": (large_chunk, "its chunks unpack to 457 MiB each"),
-    "lying_chunk": (lying_chunk, "a chunk unpacks to more than"),
-    "deflated_twice": (deflated_twice, "packed by HDF5's filters [1, 1]"),
+    # Some rows in a chunk of ten million, which is unpacked whole.
+    "large_chunk": (lambda p: one_chunk(p, zlib.compress(b""), rows=10_000_000),
+                    "its chunks unpack to 457 MiB each"),
+    # A chunk of the rows that are there, whose content inflates to 480 MB.
+    "lying_chunk": (lambda p: one_chunk(p, inflating(480)), "a chunk unpacks to more than"),
+    # Some kilobytes that inflate to half a megabyte, and these to 480 MB.
+    "deflated_twice": (lambda p: one_chunk(p, zlib.compress(inflating(480)), deflated=2),
+                       "packed by HDF5's filters [1, 1]"),
     "leads_out": (leads_out, "no joint positions (q) among t"),
     "circle": (circle, ROWS),
-}
+}  # fmt: skip
 HOSTILE = OF_HDF5 | {
     "matlab_bomb": (matlab_bomb, TOO_MUCH),
     "matlab_struct_bomb": (lambda p: matlab_bomb(p, inside=True), TOO_MUCH),
     "matlab_claim": (matlab_claim, TOO_MUCH),
-    "arrow_bomb": (arrow_bomb, TOO_MUCH),
+    "arrow_bomb": (lambda p: seeds.write_arrow(p, zeros(), codec="zstd", rows=10**7), TOO_MUCH),
     "arrow_lies": (arrow_lies, TOO_MUCH),
-    "parquet_bomb": (parquet_bomb, TOO_MUCH),
+    "parquet_bomb": (lambda p: write_table(zeros(), p) or p, TOO_MUCH),
     "json_deep": (lambda p: held(p, b'{"q": ' + b"[" * 3_000_000), "nested too deeply"),
     "json_endless_line": (endless_line, 1),  # its cut end is dropped and said
     "empty_array": (lambda p: mcap_of_type(p, EMPTY_ARRAY), "more parts than bytes"),

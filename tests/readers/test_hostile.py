@@ -92,7 +92,7 @@ def parquet(path: Path, **changed: object) -> Path:
     return path
 
 
-def lists(first: object = None) -> list[object]:
+def lists(first: object) -> list[object]:
     """The positions as lists, the first replaced."""
     return [first, *motion(7)["q"].tolist()[1:]]
 
