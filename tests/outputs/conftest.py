@@ -40,23 +40,18 @@ def recording() -> Recording:
     q = 0.5 * np.sin(t[:, None] * rate) - np.array([0.0, 1.2, -1.0, 1.0, 1.5, 0.0])
     robot = load_robot("ur5")
     held = momentum_terms(robot.chain, q, np.zeros_like(q)).gravity / robot.torque_constant
+    odd = caution("topic-too-short", signal="look & feel", topic="/odd")
+    source = Source(
+        path=Path(HOSTILE), format="table", sha256="ab" * 32, t0=100.25, rows=600,
+        remarks=(fact("sign-turned", signal="<b>one</b>"), odd),
+    )  # fmt: skip
     return Recording(
         t=t,
         q=q,
         dq=0.5 * rate * np.cos(t[:, None] * rate),
         current=held + rng.normal(0.0, 1.0, (samples, 6)),
         tau_ext=rng.normal(0.0, 2.0, (samples, 6)),
-        source=Source(
-            path=Path(HOSTILE),
-            format="table",
-            sha256="ab" * 32,
-            t0=100.25,
-            rows=600,
-            remarks=(
-                fact("sign-turned", signal="<b>one</b>"),
-                caution("topic-too-short", signal="look & feel", topic="/odd"),
-            ),
-        ),
+        source=source,
     )
 
 
@@ -111,10 +106,8 @@ def as_if() -> Callable[..., Analysis]:
 def pushed() -> Analysis:
     """The simulated UR5 on a circle, pushed twelve times, judged by the two-cycle difference."""
     log = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
-    choice = AnalysisChoice(
-        robot=RobotChoice(name="ur5"), reference=ReferenceChoice(name="two-cycle")
-    )
-    return analyse_log(log, choice)
+    two_cycle = ReferenceChoice(name="two-cycle")
+    return analyse_log(log, AnalysisChoice(robot=RobotChoice(name="ur5"), reference=two_cycle))
 
 
 BROWSERS = "chromium", "chromium-browser", "google-chrome"

@@ -22,16 +22,11 @@ NANOSECOND = 1e-9
 
 def full(joints: int = 7, *, names: tuple[str, ...] = ()) -> Recording:
     rng = np.random.default_rng(joints)
-    samples = 50
-    signals = {name: rng.normal(size=(samples, joints)) for name in JOINT_SIGNALS}
-    return Recording(
-        t=0.004 * np.arange(samples),
-        **signals,
-        wrench=rng.normal(size=(samples, 6)),
-        wrench_frame=WrenchFrame("base", "tool", "by-robot"),
-        joint_names=names,
-        source=Source(t0=1_700_000_000.25, t0_ns=1_700_000_000_250_000_000),
-    )
+    signals = {name: rng.normal(size=(50, joints)) for name in JOINT_SIGNALS}
+    signals |= {"t": 0.004 * np.arange(50), "wrench": rng.normal(size=(50, 6))}
+    frame = WrenchFrame("base", "tool", "by-robot")
+    source = Source(t0=1_700_000_000.25, t0_ns=1_700_000_000_250_000_000)
+    return Recording(wrench_frame=frame, joint_names=names, source=source, **signals)
 
 
 FRANKA = tuple(f"fr3_joint{j}" for j in range(1, 8))
@@ -41,9 +36,8 @@ FRANKA = tuple(f"fr3_joint{j}" for j in range(1, 8))
 @pytest.mark.parametrize("names", [(), FRANKA])
 def test_every_signal_reads_back(tmp_path: Path, ending: str, names: tuple[str, ...]) -> None:
     recording = full(names=names)
-    path = tmp_path / f"x{ending}"
-    convert(recording, path)
-    back = read(path)
+    convert(recording, tmp_path / f"x{ending}")
+    back = read(tmp_path / f"x{ending}")
     assert back.signals == recording.signals
     for name in (*JOINT_SIGNALS, "wrench"):
         np.testing.assert_array_equal(getattr(back, name), getattr(recording, name))

@@ -220,8 +220,8 @@ def test_the_seal_goes_first_comes_last(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(tmp_path: Path) -> None:
-    dead = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"],
-                          check=True, capture_output=True, text=True).stdout.strip()  # fmt: skip
+    print_id = [sys.executable, "-c", "import os; print(os.getpid())"]
+    dead = subprocess.check_output(print_id, text=True).strip()
     for name in (f".vftcli-{dead}-00000000.partial", ".vftcli-x-00000000.partial", ".a.partial"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "half.txt").write_text("half")
@@ -281,8 +281,8 @@ def test_a_kill_mixes_no_sealed_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     old = report("ab", "old")
     monkeypatch.setattr(Path, "replace", copied)
     new = report("bc", "new")
-    assert new.keys() == {"index.html", "run.json", *(f"{p}/{f}" for p in "bc" for f in
-                                                      ("page.html", "run.json"))}  # fmt: skip
+    inner = {f"{place}/{name}" for place in "bc" for name in ("page.html", "run.json")}
+    assert new.keys() == {"index.html", "run.json"} | inner
     monkeypatch.undo()
     for copy in copies:
         again = shutil.copytree(copy, tmp_path / "again")

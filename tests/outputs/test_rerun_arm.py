@@ -47,12 +47,8 @@ def test_an_unknown_force_has_no_arrow(path: Path) -> None:
     force = np.array([[2.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [0.0, 0.0, -400.0]])
     with opened(path) as stream:
         send_force(stream, "/force", np.arange(3.0), np.zeros((3, 3)), force)
-    # 200 N are a metre
-    assert rows_of(path, "/force", "Arrows3D:vectors") == [
-        [[pytest.approx(0.01), 0.0, 0.0]],
-        [],
-        [[0.0, 0.0, -2.0]],
-    ]
+    along, down = [[pytest.approx(0.01), 0.0, 0.0]], [[0.0, 0.0, -2.0]]  # 200 N are a metre
+    assert rows_of(path, "/force", "Arrows3D:vectors") == [along, [], down]
     radii = np.concatenate(rows_of(path, "/force", "Arrows3D:radii"))
     assert 0.005 < radii.min() == radii.max() < 0.03  # thinner than a link, seen beside it
 
@@ -107,9 +103,8 @@ def test_meshes_are_the_arm_where_all_of_a_link_are_found(tmp_path: Path, path: 
     assert bytes(blob[0]) == file.read_bytes()
     assert rows_of(path, "/robot/link_5/mesh_0", "Asset3D:media_type") == [["model/stl"]]
     ((matrix,),) = rows_of(path, "/robot/link_2/mesh_0", "Transform3D:mat3x3")
-    assert rows_of(path, "/robot/link_2/mesh_0", "Transform3D:translation") == [
-        [[pytest.approx(0.1), 0.0, 0.0]]
-    ]
+    ((place,),) = rows_of(path, "/robot/link_2/mesh_0", "Transform3D:translation")
+    assert place == [pytest.approx(0.1), 0.0, 0.0]
     # Columns: the file's x goes to y, its y, of double size, to −x.
     np.testing.assert_allclose(matrix, [0, 1, 0, -2, 0, 0, 0, 0, 3], atol=1e-7)  # float32
     ((half,),) = rows_of(path, "/robot/link_3/mesh_0", "Transform3D:mat3x3")

@@ -105,8 +105,7 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 from vftcli.outputs.charts import Chart, ChartLine, Span
-from vftcli.outputs.rerun_file import ArmPoses
-from vftcli.outputs.rerun_file import Tab, rerun_file
+from vftcli.outputs.rerun_file import ArmPoses, Tab, rerun_file
 from vftcli.signals.errors import OutputError
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
 values = np.random.default_rng(1).normal(size=(20000, 1))

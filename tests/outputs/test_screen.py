@@ -109,8 +109,8 @@ def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> 
 
 def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     (own, *_) = analysis.examinations
-    bad = warning("effort-sign", signal="current", misfit_percent=190.0, healed_percent=3.0,
-                  column="current", width=6)  # fmt: skip
+    percent = {"misfit_percent": 190.0, "healed_percent": 3.0}
+    bad = warning("effort-sign", signal="current", column="current", width=6, **percent)
     made = replace(analysis, examinations=(replace(own, findings=(bad,)),))
     doubt = "MEANINGLESS if this finding is right (you chose --anyway): effort-sign"
     assert doubt in log_screen(made, CANVAS)
@@ -166,8 +166,8 @@ def test_a_hundred_logs_are_one_screen(without_reference: Analysis, as_if) -> No
     assert len(lines) == 33 <= MOST_LINES - FILE_LINES
     assert lines[:2] == ["100 logs · ur5", ""]
     assert [line.split()[0] for line in lines[3:23]] == [f"log{k}.csv" for k in range(20)]
-    assert lines[23:26] == ["  the 20 worst and hardest of 100; --details shows all", "",
-                            "Can it be believed?"]  # fmt: skip
+    more = "  the 20 worst and hardest of 100; --details shows all"
+    assert lines[23:26] == [more, "", "Can it be believed?"]
     assert lines[-1] == "  and 97 more: --details"
     lines = logs_screen(logs[:20], CANVAS, {}).splitlines()
     assert lines[23:25] == ["", "Can it be believed?"]

@@ -25,9 +25,8 @@ def sphere(radius: float, rings: int = 80) -> np.ndarray:
     """Triangles of a sphere that face outwards. (F, 3, 3)"""
     polar, round_ = np.linspace(0.0, np.pi, rings + 1), np.linspace(0.0, 2 * np.pi, 2 * rings + 1)
     theta, phi = np.meshgrid(polar, round_, indexing="ij")
-    points = radius * np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
-    )
+    round_about = [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+    points = radius * np.stack(round_about, axis=-1)
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate([np.stack([a, b, c], -2), np.stack([a, c, d], -2)]).reshape(-1, 3, 3)
 
@@ -152,8 +151,8 @@ def test_a_link_has_a_surface_where_all_of_its_meshes_are_read(tmp_path: Path) -
     assert lacking == ["gone.stl", "bad.stl"]
     assert list(surfaces) == [2]
     corners = surfaces[2].corners
-    np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)],
-                               [[0, 0, 0], [0.6, 0.1, 0.1]], atol=1e-9)  # fmt: skip
+    np.testing.assert_allclose(corners.min(axis=0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(corners.max(axis=0), [0.6, 0.1, 0.1], atol=1e-9)
     assert link_surfaces(load_robot("ur5")) == ({}, [])
 
 

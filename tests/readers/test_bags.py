@@ -11,18 +11,9 @@ from pathlib import Path
 import lz4.frame
 import numpy as np
 import pytest
+import seed_logs
 import zstandard
 from message_mutants import bag_bytes, bag_records
-from seed_logs import (
-    ROWS,
-    bare_db3,
-    bare_mcap,
-    motion,
-    patched,
-    rosbag1,
-    rosbag2,
-    write_mcap,
-)
 
 from vftcli.readers.bags.container import ReadBudget, unpacked
 from vftcli.readers.reading import read
@@ -30,17 +21,17 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.recording import Recording
 
 BAGS = {
-    "rosbag1": (rosbag1, {}),
-    "rosbag1 lz4": (rosbag1, {"compression": "LZ4"}),
-    "rosbag1 bz2": (rosbag1, {"compression": "BZ2"}),
-    "rosbag2 mcap": (rosbag2, {"storage": "mcap"}),
-    "rosbag2 sqlite3": (rosbag2, {"storage": "sqlite3"}),
-    "rosbag2 mcap file": (rosbag2, {"storage": "mcap", "mode": "FILE"}),
-    "rosbag2 mcap storage": (rosbag2, {"storage": "mcap", "mode": "STORAGE"}),
-    "rosbag2 sqlite3 file": (rosbag2, {"storage": "sqlite3", "mode": "FILE"}),
-    "rosbag2 sqlite3 message": (rosbag2, {"storage": "sqlite3", "mode": "MESSAGE"}),
-    "mcap": (bare_mcap, {}),
-    "db3": (bare_db3, {}),
+    "rosbag1": (seed_logs.rosbag1, {}),
+    "rosbag1 lz4": (seed_logs.rosbag1, {"compression": "LZ4"}),
+    "rosbag1 bz2": (seed_logs.rosbag1, {"compression": "BZ2"}),
+    "rosbag2 mcap": (seed_logs.rosbag2, {"storage": "mcap"}),
+    "rosbag2 sqlite3": (seed_logs.rosbag2, {"storage": "sqlite3"}),
+    "rosbag2 mcap file": (seed_logs.rosbag2, {"storage": "mcap", "mode": "FILE"}),
+    "rosbag2 mcap storage": (seed_logs.rosbag2, {"storage": "mcap", "mode": "STORAGE"}),
+    "rosbag2 sqlite3 file": (seed_logs.rosbag2, {"storage": "sqlite3", "mode": "FILE"}),
+    "rosbag2 sqlite3 message": (seed_logs.rosbag2, {"storage": "sqlite3", "mode": "MESSAGE"}),
+    "mcap": (seed_logs.bare_mcap, {}),
+    "db3": (seed_logs.bare_db3, {}),
 }
 """Format, storage and compression → how a bag is made."""
 
@@ -56,14 +47,14 @@ def test_a_chunk_unpacks_to_the_size_that_it_claims_or_not_at_all(name):
 
 
 def assert_is_the_motion(recording: Recording) -> None:
-    log = motion(7, step=0.001)
+    log = seed_logs.motion(7, step=0.001)
     np.testing.assert_array_equal(recording.q, log["q"])
     np.testing.assert_array_equal(recording.dq, log["dq"])
     np.testing.assert_array_equal(recording.target_dq, log["dq"])
     np.testing.assert_array_equal(recording.torque, log["tau"])
     np.testing.assert_array_equal(recording.tau_ext, 0.0 - log["tau_ext"])
     assert not recording.require("wrench").any()
-    np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), atol=1e-12)
+    np.testing.assert_allclose(recording.t, 1e-3 * np.arange(seed_logs.ROWS), atol=1e-12)
     assert recording.robot_hint == "panda"
     assert recording.payload_mass == 0.5
     assert recording.source.t0 == pytest.approx(100)
@@ -80,7 +71,7 @@ def test_every_kind_of_bag_holds_the_motion(path, name):
 
 
 def test_metadata_is_not_needed_and_cannot_choose_a_path(tmp_path):
-    metadata = rosbag2(tmp_path / "x") / "metadata.yaml"
+    metadata = seed_logs.rosbag2(tmp_path / "x") / "metadata.yaml"
     text = metadata.read_text()
     (tmp_path / "secret.mcap").write_bytes(b"not to be opened")
     metadata.write_text(text.replace("x.mcap", "../secret.mcap"))
@@ -95,7 +86,7 @@ def test_metadata_is_not_needed_and_cannot_choose_a_path(tmp_path):
         read(tmp_path / "x")
 
 
-@pytest.mark.parametrize("make", [rosbag1, bare_mcap])
+@pytest.mark.parametrize("make", [seed_logs.rosbag1, seed_logs.bare_mcap])
 def test_cut_files_are_read_up_to_their_last_whole_chunk(path, make):
     make(path)
     content = path.read_bytes()
@@ -108,8 +99,8 @@ def test_cut_files_are_read_up_to_their_last_whole_chunk(path, make):
         assert cut.code == "bag-cut"
         # Two topics of one rate, of which the second may have lost its last message.
         assert 2 * recording.samples - cut.values["kept"] in {0, 1}
-        np.testing.assert_array_equal(recording.q, motion(7)["q"][: recording.samples])
-    assert ROWS > lengths[0] > lengths[1] > lengths[2] > 1
+        np.testing.assert_array_equal(recording.q, seed_logs.motion(7)["q"][: recording.samples])
+    assert seed_logs.ROWS > lengths[0] > lengths[1] > lengths[2] > 1
     path.write_bytes(content[:2000])
     with pytest.raises(LogError, match="no messages in any whole chunk"):
         read(path)
@@ -117,7 +108,7 @@ def test_cut_files_are_read_up_to_their_last_whole_chunk(path, make):
 
 def changed_index(path: Path, change: Callable[[bytes], bytes] | None) -> Path:
     """A closed ROS 1 bag whose records behind each chunk, its index, are changed or gone."""
-    content, out = rosbag1(path).read_bytes(), []
+    content, out = seed_logs.rosbag1(path).read_bytes(), []
     for fields, body in bag_records(content[13:]):
         if fields[b"op"] != b"\x04":
             out.append(bag_bytes(fields, body))
@@ -131,7 +122,7 @@ def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path):
     """A recorder that stopped between a chunk and its index, and never closed the bag."""
     path = changed_index(tmp_path / "x", None)
     assert_is_the_motion(read(path))
-    path = patched(rosbag1(tmp_path / "y"), b"index_pos=", bytes(8))
+    path = seed_logs.patched(seed_logs.rosbag1(tmp_path / "y"), b"index_pos=", bytes(8))
     recording = read(path)
     assert_is_the_motion(recording)
     assert any("was never closed" in reported for reported in recording.source.warnings)
@@ -139,12 +130,12 @@ def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path):
 
 def test_a_bag_cut_within_the_index_of_a_chunk_is_read(path):
     """Behind each chunk is a record of index a topic; the last one is gone."""
-    content = rosbag1(path).read_bytes()
+    content = seed_logs.rosbag1(path).read_bytes()
     records = list(bag_records(content[13:]))
     places = [k for k, (fields, _) in enumerate(records) if fields[b"op"] == b"\x04"]
     path.write_bytes(content[:13] + b"".join(bag_bytes(*r) for r in records[: places[3]]))
     recording = read(path)
-    np.testing.assert_array_equal(recording.q, motion(7)["q"][: recording.samples])
+    np.testing.assert_array_equal(recording.q, seed_logs.motion(7)["q"][: recording.samples])
     assert [r.code for r in recording.source.remarks if r.level == "warning"] == ["bag-cut"]
 
 
@@ -166,7 +157,7 @@ def test_an_index_that_points_elsewhere_or_leaves_out_is_damage(path, change, wo
 
 
 def test_databases_without_definitions_know_the_usual_types(path):
-    bare_db3(path)
+    seed_logs.bare_db3(path)
     with closing(sqlite3.connect(path)) as db, db:
         db.execute("DROP TABLE message_definitions")
     with pytest.raises(LogError, match="no definition of franka_msgs/FrankaState"):
@@ -174,12 +165,12 @@ def test_databases_without_definitions_know_the_usual_types(path):
     with closing(sqlite3.connect(path)) as db, db:
         db.execute("DELETE FROM messages WHERE topic_id = 1")
         db.execute("DELETE FROM topics WHERE id = 1")
-    np.testing.assert_array_equal(read(path).q, motion(7)["q"])
+    np.testing.assert_array_equal(read(path).q, seed_logs.motion(7)["q"])
 
 
 def test_a_definition_is_read_once_for_all_topics_of_its_type(path):
     """More definitions than the file has bytes, if each topic came with its own."""
-    bare_db3(path)
+    seed_logs.bare_db3(path)
     with closing(sqlite3.connect(path)) as db, db:
         first = db.execute("SELECT * FROM topics WHERE id = 1").fetchone()
         rows = [(k, f"{first[1]}_{k}", *first[2:]) for k in range(10, 1010)]
@@ -215,7 +206,7 @@ def varint(value: int) -> bytes:
 def test_foxglove_joint_states(path):
     messages = (("/joints", k, foxglove_joint_states(k)) for k in range(30))
     schemas = {"/joints": ("foxglove.JointStates", "protobuf", b"")}
-    path = write_mcap(path, messages, encoding="protobuf", schemas=schemas)
+    path = seed_logs.write_mcap(path, messages, encoding="protobuf", schemas=schemas)
     recording = read(path)
     np.testing.assert_allclose(recording.q[5], [1.05, 2.05, 3.05], rtol=1e-15)
     assert recording.require("torque")[0].tolist() == [-1, -2, -3]

@@ -8,20 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import seed_logs
 from seed_containers import json_arrays, json_lines
-from seed_logs import (
-    HEADERLESS_COLUMNS,
-    ROWS,
-    libfranka_csv,
-    libfranka_json,
-    matrix_npy,
-    motion,
-    panda_py_npz,
-    panda_py_pickle,
-    rows_of,
-    ur_binary,
-    ur_csv,
-)
 
 from vftcli.readers.reading import FORMATS, LogFormat, read
 from vftcli.signals.errors import LogError
@@ -33,7 +21,7 @@ SIX_DIGITS = 1e-5
 
 @pytest.mark.parametrize("end", ["\r\n", "\r\r\n", "\r", "\n"])
 def test_official_text_keeps_every_digit(path, end):
-    recording, log = read(ur_csv(path, end=end)), motion()
+    recording, log = read(seed_logs.ur_csv(path, end=end)), seed_logs.motion()
     assert (recording.source.format, recording.source.t0) == ("ur-csv", 1000)
     np.testing.assert_array_equal(recording.q, log["q"])
     np.testing.assert_array_equal(recording.current, log["current"])
@@ -50,7 +38,7 @@ def test_official_text_keeps_every_digit(path, end):
 )
 def test_the_point_of_the_controllers_moment(path, field, shift, point):
     """Of actual_TCP_force: the TCP on CB3, by its sensor on e-Series; fields or clock say which."""
-    head, *lines = ur_csv(path, separator=",", end="\n").read_text().splitlines()
+    head, *lines = seed_logs.ur_csv(path, separator=",", end="\n").read_text().splitlines()
     out = [",".join([head, *(f"actual_TCP_force_{k}" for k in range(6)), field])]
     for k, line in enumerate(lines):
         _, *cells = line.split(",")  # the clock is the first
@@ -64,7 +52,7 @@ def test_the_point_of_the_controllers_moment(path, field, shift, point):
 
 
 def test_payload_that_the_controller_was_reported_of(path):
-    head, *lines = ur_csv(path, separator=",", end="\n").read_text().splitlines()
+    head, *lines = seed_logs.ur_csv(path, separator=",", end="\n").read_text().splitlines()
     head += ",payload,payload_cog_0,payload_cog_1,payload_cog_2"
     path.write_text("\n".join([head, *(f"{line},1.5,0,0.01,0.05" for line in lines)]) + "\n")
     recording = read(path)
@@ -80,7 +68,7 @@ def test_payload_that_the_controller_was_reported_of(path):
     ],
 )
 def test_missing_positions_or_clock_say_what_to_record(path, name, other, words):
-    ur_csv(path)
+    seed_logs.ur_csv(path)
     path.write_text(path.read_text().replace(name, other))
     with pytest.raises(LogError, match=words):
         read(path)
@@ -98,12 +86,12 @@ def test_a_table_with_targets_of_its_own_is_no_recording_of_ur(tmp_path):
 
 
 def test_binary_records(path):
-    ur_binary(path)
-    np.testing.assert_array_equal(read(path).q, motion()["q"])
+    seed_logs.ur_binary(path)
+    np.testing.assert_array_equal(read(path).q, seed_logs.motion()["q"])
     content = path.read_bytes()
     path.write_bytes(content[:-10])
     recording = read(path)
-    assert recording.samples == ROWS - 1
+    assert recording.samples == seed_logs.ROWS - 1
     assert "dropped the last record, 50 bytes" in recording.source.repairs[0]
     names, types, body = content.split(b"\n", 2)
     records = np.frombuffer(body, dtype="V60")
@@ -111,25 +99,25 @@ def test_binary_records(path):
     joined = b"".join(b"\1" + record.tobytes() for record in records[:119])
     path.write_bytes(b"\n".join([names, types, joined]))
     recording = read(path)
-    np.testing.assert_array_equal(recording.q, motion()["q"][:119])
+    np.testing.assert_array_equal(recording.q, seed_logs.motion()["q"][:119])
     assert "recipe id" in recording.source.repairs[0]
 
 
 @pytest.mark.parametrize("old", [False, True])
 def test_libfranka_csv_turns_the_residual(path, old):
-    recording = read(libfranka_csv(path, old=old))
-    log = motion(7)
+    recording = read(seed_logs.libfranka_csv(path, old=old))
+    log = seed_logs.motion(7)
     assert recording.source.format == ("libfranka-csv-old" if old else "libfranka-csv")
     assert [remark.code for remark in recording.source.remarks] == ["residual-turned"]
     np.testing.assert_allclose(recording.tau_ext, -log["tau_ext"], atol=SIX_DIGITS)
     np.testing.assert_allclose(recording.torque, log["tau"], atol=10 * SIX_DIGITS)
-    np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), rtol=1e-12)
+    np.testing.assert_allclose(recording.t, 1e-3 * np.arange(seed_logs.ROWS), rtol=1e-12)
 
 
 def test_states_as_json_lines(path):
-    libfranka_json(path)
+    seed_logs.libfranka_json(path)
     recording = read(path)
-    np.testing.assert_array_equal(recording.q, motion(7)["q"])
+    np.testing.assert_array_equal(recording.q, seed_logs.motion(7)["q"])
     assert recording.wrench_frame == WrenchFrame("base", "base", "by-robot")
     lines = path.read_text().splitlines()
     lines[50] = lines[50].replace('"q": [', '"q": [nan, ', 1)
@@ -145,24 +133,30 @@ def test_json_that_is_nested_or_endless_is_refused(path, state):
         read(path)
 
 
-@pytest.mark.parametrize("make", [panda_py_npz, panda_py_pickle, json_arrays, json_lines])
+@pytest.mark.parametrize(
+    "make", [seed_logs.panda_py_npz, seed_logs.panda_py_pickle, json_arrays, json_lines]
+)
 def test_panda_pys_log_reads_the_same_in_every_container(path, make):
-    recording, log = read(make(path)), motion(7)
+    recording, log = read(make(path)), seed_logs.motion(7)
     for signal in ("q", "dq"):
         np.testing.assert_array_equal(getattr(recording, signal), log[signal])
     np.testing.assert_array_equal(recording.torque, log["tau"])
     np.testing.assert_array_equal(recording.tau_ext, 0.0 - log["tau_ext"])  # libfranka's sign
-    np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), atol=1e-12)  # ms as float64
+    np.testing.assert_allclose(
+        recording.t, 1e-3 * np.arange(seed_logs.ROWS), atol=1e-12
+    )  # ms as float64
 
 
 def test_array_files(path):
-    matrix_npy(path)
-    np.testing.assert_array_equal(read(path, columns=HEADERLESS_COLUMNS).q, motion()["q"])
+    seed_logs.matrix_npy(path)
+    np.testing.assert_array_equal(
+        read(path, columns=seed_logs.HEADERLESS_COLUMNS).q, seed_logs.motion()["q"]
+    )
     with pytest.raises(LogError, match="without a header"):
         read(path)
     path.write_bytes(path.read_bytes()[:-8])
     with pytest.raises(LogError, match="it is cut"):
-        read(path, columns=HEADERLESS_COLUMNS)
+        read(path, columns=seed_logs.HEADERLESS_COLUMNS)
 
 
 def test_arrays_of_objects_are_refused(tmp_path):
@@ -222,10 +216,10 @@ def test_a_format_that_nobody_has_yet_is_one_entry(path, monkeypatch):
         columns="t[ms]=tick,q[deg]=ang_{i},-tau=trq_{i}", clock="controller clock",
     )  # fmt: skip
     monkeypatch.setitem(FORMATS, "acme", acme)
-    log = motion()
+    log = seed_logs.motion()
     names = [f"{word}_{j}" for word in ("ang", "trq") for j in range(1, 7)]
-    ticks, load = 8.0 * np.arange(ROWS), np.full(ROWS, 1.25)
-    rows = rows_of(ticks, log["q"], log["tau"], load, separator=";")
+    ticks, load = 8.0 * np.arange(seed_logs.ROWS), np.full(seed_logs.ROWS, 1.25)
+    rows = seed_logs.rows_of(ticks, log["q"], log["tau"], load, separator=";")
     path.write_text("\n".join([";".join(["tick", *names, "load"]), *rows]) + "\n")
     recording = read(path)
     assert (recording.source.format, recording.source.clock) == ("acme", "controller clock [ms]")
