@@ -11,18 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import container_mutants as containers
 import numpy as np
-from container_mutants import (
-    archive_mutant,
-    arrow_mutant,
-    dataset_mutant,
-    hdf5_mutant,
-    json_mutant,
-    matlab_mutant,
-    parquet_mutant,
-    pickle_mutant,
-    record_mutant,
-)
 from long_mutants import long_mutant, long_words
 from message_mutants import bag_mutant, folder_mutant, mcap_mutant
 from option_mutants import option_words
@@ -43,12 +33,14 @@ BROKEN = 70
 """Exit code of a command that ended in an exception."""
 
 MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
-    "table": table_mutant, "lines": lines_mutant, "parquet": parquet_mutant, "arrow": arrow_mutant,
-    "json": json_mutant, "mat": matlab_mutant, "hdf5": hdf5_mutant, "npz": archive_mutant,
-    "npy": archive_mutant, "pickle": pickle_mutant, "records": record_mutant,
-    "mcap": mcap_mutant, "bag": bag_mutant, "folder": folder_mutant, "dataset": dataset_mutant,
-    "robot": settings_mutant, "gains": settings_mutant, "scenario": settings_mutant,
-    "urdf": urdf_mutant, "mjcf": urdf_mutant, "long": long_mutant,
+    "table": table_mutant, "lines": lines_mutant, "parquet": containers.parquet_mutant,
+    "arrow": containers.arrow_mutant, "json": containers.json_mutant,
+    "mat": containers.matlab_mutant, "hdf5": containers.hdf5_mutant,
+    "npz": containers.archive_mutant, "npy": containers.archive_mutant,
+    "pickle": containers.pickle_mutant, "records": containers.record_mutant,
+    "mcap": mcap_mutant, "bag": bag_mutant, "folder": folder_mutant,
+    "dataset": containers.dataset_mutant, "robot": settings_mutant, "gains": settings_mutant,
+    "scenario": settings_mutant, "urdf": urdf_mutant, "mjcf": urdf_mutant, "long": long_mutant,
 }  # fmt: skip
 WEIGHTS = {
     "table": 15, "lines": 5, "parquet": 8, "npz": 6, "npy": 2, "pickle": 5, "records": 4,

@@ -127,9 +127,8 @@ def recast(column: Any, rng: Rng) -> Any:
     )  # fmt: skip
     kind = rng.random()
     if kind < 0.3:
-        return pa.array(
-            [pick(rng, ([], [[]], None, [None], {}, "x", 3, [[1.0], [2.0]]))] * len(column)
-        )
+        odd = pick(rng, ([], [[]], None, [None], {}, "x", 3, [[1.0], [2.0]]))
+        return pa.array([odd] * len(column))
     if kind < 0.6:
         return pa.array(list(map(pick(rng, wraps), column.to_pylist())))
     return column.cast(pick(rng, types), safe=False)

@@ -102,11 +102,8 @@ def mcap_records(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 def mcap_record_changed(record: list[Any], rng: Rng) -> list[Any]:
     op, content = record
-    return (
-        [int(rng.integers(1, 20)), content]
-        if rng.random() < 0.15
-        else [op, odd_bytes(content, rng)]
-    )
+    other = rng.random() < 0.15
+    return [int(rng.integers(1, 20)), content] if other else [op, odd_bytes(content, rng)]
 
 
 def messages_changed(messages: list[Message], rng: Rng) -> str:

@@ -42,16 +42,15 @@ SAMPLES = {
     "frankapy.pkl": ("pickle", 7, 100, 100),
 }
 
+UR10E = (
+    ("free_12harm", 5457), ("free_14harm", 5375), ("free_repeat_a", 759), ("free_repeat_b", 912),
+    ("free_repeat_c", 660), ("jointwise_2", 6030), ("jointwise_4", 6288), ("load_14harm", 5307),
+    ("push_pose", 1727),
+)  # fmt: skip
+"""Tables of 31 columns and their samples."""
+
 LOGS = {
-    "ur10e/free_12harm.csv": (TABLE_31, "headerless", 6, 5457, 100),
-    "ur10e/free_14harm.csv": (TABLE_31, "headerless", 6, 5375, 100),
-    "ur10e/free_repeat_a.csv": (TABLE_31, "headerless", 6, 759, 100),
-    "ur10e/free_repeat_b.csv": (TABLE_31, "headerless", 6, 912, 100),
-    "ur10e/free_repeat_c.csv": (TABLE_31, "headerless", 6, 660, 100),
-    "ur10e/jointwise_2.csv": (TABLE_31, "headerless", 6, 6030, 100),
-    "ur10e/jointwise_4.csv": (TABLE_31, "headerless", 6, 6288, 100),
-    "ur10e/load_14harm.csv": (TABLE_31, "headerless", 6, 5307, 100),
-    "ur10e/push_pose.csv": (TABLE_31, "headerless", 6, 1727, 100),
+    **{f"ur10e/{name}.csv": (TABLE_31, "headerless", 6, samples, 100) for name, samples in UR10E},
     "fr3/run_a.npy": (FR3, "npy", 7, 10384, 974),
     "fr3/run_b.npy": (FR3, "npy", 7, 10048, 983),
     "franka_bags/calib_0108.bag": (None, "rosbag1", 7, 32, 29.4),
@@ -76,11 +75,9 @@ REFUSED = {
     "logs/panda_ati/press_1.csv": r"no joint positions .*compare --reference sensor --wrench",
     "logs/panda_ati/traj_raw.csv": r"no joint positions .*compare --reference sensor --wrench",
     "logs/libfranka_sim/pushes_truth.csv.gz": "no joint positions",
-    "logs/panda_exciting/exciting_traj_positions.txt": "single column",
-    "logs/panda_exciting/exciting_traj_time.txt": "single column",
-    "logs/panda_exciting/exciting_traj_torques.txt": "single column",
-    "logs/panda_exciting/exciting_traj_velocity.txt": "single column",
-}
+    **{f"logs/panda_exciting/exciting_traj_{name}.txt": "single column"
+       for name in ("positions", "time", "torques", "velocity")},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SAMPLES)
@@ -181,15 +178,15 @@ def test_ur3_repeats_differ_by_noise_once_the_sign_is_turned(logs):
         assert np.sqrt(np.mean(difference**2)) < 1.5 * floor[j]
 
 
-@pytest.mark.parametrize(
-    ("name", "episodes"),
-    [("lerobot_v3_effort", [700, 600, 650]), ("lerobot_v21_effort", [700, 600])],
-)
-def test_a_lerobot_sample_is_read_by_episode(name, episodes, samples):
+LEROBOT = {"lerobot_v3_effort": [700, 600, 650], "lerobot_v21_effort": [700, 600]}
+
+
+@pytest.mark.parametrize("name", LEROBOT)
+def test_a_lerobot_sample_is_read_by_episode(name, samples):
     import pyarrow.parquet as pq
 
     logs = list(Library().open_each([samples / name], ReadChoice(episode=ALL)))
-    assert [log.samples for log in logs] == episodes
+    assert [log.samples for log in logs] == LEROBOT[name]
     files = sorted((samples / name / "data").rglob("*.parquet"))
     tables = [pq.read_table(file).to_pydict() for file in files]
     columns = {key: [v for table in tables for v in table[key]] for key in tables[0]}

@@ -105,16 +105,12 @@ def test_columns_say_what_effort_is(path, columns, signal, sign):
 def test_merged_topics_with_a_gripper_and_changing_order(path):
     """Messages of one topic in two orders, with fingers, and gripper-only ones in between."""
     arm = [f"panda_joint{j}" for j in range(1, 8)]
-    messages = []
+    fingers, messages = ["panda_finger_joint1", "panda_finger_joint2"], []
     for k in range(40):
-        time = START + k * 1_000_000
         values = [float(j) + 0.001 * k for j in range(7)]
-        if k % 2:
-            messages.append({"time": time, "name": arm[::-1], "position": values[::-1]})
-        else:
-            fingers = ["panda_finger_joint1", "panda_finger_joint2"]
-            messages.append({"time": time, "name": fingers + arm, "position": [9, 9, *values]})
-    messages = [m | {"velocity": m["position"], "effort": m["position"]} for m in messages]
+        names, values = (arm[::-1], values[::-1]) if k % 2 else (fingers + arm, [9, 9, *values])
+        message = dict.fromkeys(("position", "velocity", "effort"), values)
+        messages.append(message | {"time": START + k * 1_000_000, "name": names})
     messages += [{"time": START + 10**9 + k, "name": ["f"], "position": [1.0]} for k in range(5)]
     recording = recorded(path, messages)
     expected = np.arange(7.0) + 0.001 * np.arange(40)[:, None]
@@ -264,12 +260,12 @@ def test_what_other_topics_command_is_no_measurement(path):
 @pytest.mark.parametrize(("lead", "other"), [(0, 0), (5, 5), (5, None), (None, 5), (None, None)])
 def test_stamps_are_compared_with_stamps_of_one_clock(path, lead, other):
     """Headers that run 5 s ahead of the recorder, or are unset: what is of one instant meets."""
-    arm, wrench = (
-        arm_topic(name, count, step=step, stamp=ahead is not None, ahead=(ahead or 0) * 10**9)
-        for name, count, step, ahead in (
-            ("/arm", 50, 8_000_000, lead), ("/wrench", 200, 2_000_000, other)
-        )
-    )  # fmt: skip
+
+    def stamped(ahead: int | None) -> Message:
+        return {"stamp": ahead is not None, "ahead": (ahead or 0) * 10**9}
+
+    arm = arm_topic("/arm", 50, **stamped(lead))
+    wrench = arm_topic("/wrench", 200, step=2_000_000, **stamped(other))
     for k, message in enumerate(wrench):
         message["force"] = (0.002 * k, 0.0, 0.0)
     found = recorded(path, arm, wrench).require("wrench")[:, 0]
@@ -332,5 +328,5 @@ def test_messages_of_the_leading_topic_with_other_signals_are_left_out(path):
         message["velocity"] = []
     recording = recorded(path, messages)
     assert recording.samples == 46
-    (said,) = (r for r in recording.source.remarks if r.code == "messages-left-out")
+    (said,) = [r for r in recording.source.remarks if r.code == "messages-left-out"]
     assert (said.values["messages"], said.values["signals"]) == (4, ("q",))
