@@ -77,6 +77,10 @@ def of(plant: Callable[[Table], Table], *words: str, robot: str = "ur5") -> Comm
     return command
 
 
+def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
+    return of(lambda table: table.between(start, stop), *words, robot=robot)
+
+
 def planted(name: str, *words: str, robot: str = "ur5") -> Command:
     return of(FAULTS[name].plant, *words, robot=robot)
 
@@ -208,8 +212,18 @@ def gripping(plant: Callable[[Table], Table], kg: float, *words: str) -> Command
     ]
 
 
-THIRD_IN_DEGREES = np.array([1.0, 1.0, np.rad2deg(1.0), 1.0, 1.0, 1.0])
 SWAPPED = ("1", "3", "2", "4", "5", "6")
+TURNED_TORQUE = of(lambda table: replace(table, effort=-table.torque))
+TURNED_CURRENT = of(lambda table: replace(table, effort=-table.effort, signal="tau"))
+
+
+def third_in_degrees(table: Table) -> Table:
+    return replace(table, dq=table.dq * [1.0, 1.0, np.rad2deg(1.0), 1.0, 1.0, 1.0])
+
+
+def elsewhere(table: Table) -> Table:
+    """Currents of zero, and what they were in the place of the estimate."""
+    return replace(table, effort=0.0 * table.effort, tau_ext=table.effort)
 
 
 def rehomed(table: Table) -> Table:
@@ -221,13 +235,11 @@ ROWS = [
     Row("gaps", of(dropped_span), "interval", "0:9"),
     Row("load-changes", of(partial(picked_up, mass=3.0)), "interval", "0:9"),
     Row("position-jump", of(rehomed), "interval", "0:11"),
-    Row("velocity-of-another-kind", of(lambda t: replace(t, dq=t.dq * THIRD_IN_DEGREES)),
-        "log.derive"),
+    Row("velocity-of-another-kind", of(third_in_degrees), "log.derive"),
     Row("no-effort", lambda f: renamed(sound(), "current", "pull", f), "columns",
         "current=pull{i}"),
-    Row("zero-effort", lambda f: renamed(
-        replace(sound(), effort=0.0 * sound().effort, tau_ext=sound().effort), "tau_ext", "pull", f
-        ), "columns", "current=pull{i}"),
+    Row("zero-effort", lambda f: renamed(elsewhere(sound()), "tau_ext", "pull", f), "columns",
+        "current=pull{i}"),
     Row("milliamperes", planted("current_mA"), "columns"),
     Row("velocity-unit", of(velocities_in_degrees), "columns", "dq[deg/s]=dq{i}"),
     Row("velocity-order", planted("velocity_swapped_J2_J3"), "columns", one_by_one("dq", SWAPPED)),
@@ -252,13 +264,10 @@ ROWS = [
         "log.effort=torque-without-gravity"), "log.effort"),
     Row("current-as-torque", planted("torque_called_current"), "log.effort"),
     Row("torque-as-current", planted("current_called_torque"), "log.effort"),
-    Row("current-as-turned-torque", of(lambda t: replace(t, effort=-t.torque)), "log.effort"),
-    Row("current-as-turned-torque", of(lambda t: replace(t, effort=-t.torque)), "columns",
-        "-tau=current{i}"),
-    Row("torque-as-turned-current", of(lambda t: replace(t, effort=-t.effort, signal="tau")),
-        "log.effort"),
-    Row("torque-as-turned-current", of(lambda t: replace(t, effort=-t.effort, signal="tau")),
-        "columns", "-current=tau{i}"),
+    Row("current-as-turned-torque", TURNED_TORQUE, "log.effort"),
+    Row("current-as-turned-torque", TURNED_TORQUE, "columns", "-tau=current{i}"),
+    Row("torque-as-turned-current", TURNED_CURRENT, "log.effort"),
+    Row("torque-as-turned-current", TURNED_CURRENT, "columns", "-current=tau{i}"),
     Row("upside-down", planted("ceiling_mount"), "robot",
         partial(robot_file, gravity="[-0.17, 0.03, 9.81]")),
     Row("tilted-base", planted("wall_mount_30deg"), "robot",
@@ -266,21 +275,16 @@ ROWS = [
     Row("vendor-sign", planted("tau_ext_inverted", robot="panda"), "columns"),
     Row("effort-sign", planted("all_signs"), "columns"),
     Row("time-reset", planted("time_reset"), "columns"),
-    Row("no-free-part", of(lambda t: t.between(4.5, 9.0), *PUSHED, *WHOLE_LOG),
-        "free-part", "0:0.5"),
-    Row("no-free-part", of(lambda t: t.between(4.5, 9.0), *PUSHED, *WHOLE_LOG),
-        "free", free_log),
-    Row("no-spectra", of(lambda t: t.between(0.0, 8.0), *PUSHED[:3], "--observer", "rts-auto",
-                         "--json", "--free", "0.3:0.35"), "free", "0.3:3.9"),
+    Row("no-free-part", cut(4.5, 9, *PUSHED, *WHOLE_LOG), "free-part", "0:0.5"),
+    Row("no-free-part", cut(4.5, 9, *PUSHED, *WHOLE_LOG), "free", free_log),
+    Row("no-spectra", cut(0, 8, *PUSHED[:3], "--observer", "rts-auto", "--json", "--free",
+                          "0.3:0.35"), "free", "0.3:3.9"),
     Row("free-part-loaded", gripping(lambda t: payload(t.between(0.0, 12.0)), 2.8, *PUSHED,
                                      "--free", "0.3:6", "--anyway"), "payload", "gripper"),
-    Row("wrench-noise-assumed", of(lambda t: t.between(4.5, 9.0), *PUSHED[:3], "--wrench",
-                                   "--json"), "free", free_log),
-    Row("no-wrench-band", of(lambda t: t.between(0.0, 5.0), *PUSHED, "--wrench"), "zero", "0.3:3"),
-    Row("no-wrench-band", of(lambda t: t.between(0.0, 5.0), *PUSHED, "--wrench"), "free",
-        "0.3:3"),
-    Row("no-wrench-band", of(lambda t: t.between(0.0, 5.0), *PUSHED, "--wrench"),
-        "virtual-sensor.torque-sd", "1"),
+    Row("wrench-noise-assumed", cut(4.5, 9, *PUSHED[:3], "--wrench", "--json"), "free", free_log),
+    Row("no-wrench-band", cut(0, 5, *PUSHED, "--wrench"), "zero", "0.3:3"),
+    Row("no-wrench-band", cut(0, 5, *PUSHED, "--wrench"), "free", "0.3:3"),
+    Row("no-wrench-band", cut(0, 5, *PUSHED, "--wrench"), "virtual-sensor.torque-sd", "1"),
     Row("reference-zero-touched", of(lambda t: t, "compare", "--reference", "zero", "--observer",
                                      "gmo", "--details"), "interval"),
     Row("travel-implausible-hard", of(touched, "admit", "--anyway", "--details"),
@@ -301,8 +305,7 @@ ROWS = [
         "samples/reach/aloha_episode_0.hdf5")], "arm", "right"),
     Row("no-profile", unnamed(lambda t: replace(
         t, q=t.q[:, :5], dq=t.dq[:, :5], effort=t.effort[:, :5])), "robot", arm_of_five),
-    Row("free-by-the-fit", of(lambda t: t.between(4.5, 20.0), *PUSHED[:3], "--json",
-                              *NO_LIST), "free", free_log),
+    Row("free-by-the-fit", cut(4.5, 20, *PUSHED[:3], "--json", *NO_LIST), "free", free_log),
     Row("check-without-truth", checked_thresholds, "reference", "zero"),
     Row("payload-not-mounted", lambda f: ["inspect", rtde(f), "--robot", "ur5"], "payload"),
     Row("controller-point-without-tool", controlled, "virtual-sensor.tool", "0,0,0.1"),
@@ -563,9 +566,8 @@ REFUSALS = [
     Row("never moves: all", of(lambda t: replace(t, t=0.0 * t.t)), "columns", "t@125Hz"),
     Row("no joint positions (q)", lambda f: renamed(sound(), "q", "zz", f), "columns",
         "q=zz{i},dq=dzz{i}"),
-    Row("no repetition found", of(lambda t: t.between(4.5, 9.0), *TWO_CYCLE), "free", free_log),
-    Row("there is no Jacobian for it", of(
-        lambda t: t.between(0.0, 4.0), *PUSHED, "--frame", "tool"),
+    Row("no repetition found", cut(4.5, 9, *TWO_CYCLE), "free", free_log),
+    Row("there is no Jacobian for it", cut(0, 4, *PUSHED, "--frame", "tool"),
         "virtual-sensor.tool", "0,0,0.1"),
     Row("a release needs an arm", lambda _: ["admit", "--release", "x=0.3"], "robot", "ur5"),
 ]  # fmt: skip

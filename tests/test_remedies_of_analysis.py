@@ -25,6 +25,7 @@ from test_remedies import (
     Row,
     arm_of_five,
     check_error,
+    cut,
     dropped,
     free_log,
     measured,
@@ -41,10 +42,6 @@ from vftcli.robots.chain import flange_jacobian
 ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", "outputs",
          "bias", "free_motion", "reproduction", "simulation", "wrench",
          "answering.py", "notebook.py", "pipeline.py", "proposal.py")  # fmt: skip
-
-
-def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
-    return of(lambda table: table.between(start, stop), *words, robot=robot)
 
 
 def fixture(name: str, span: str, *words: str) -> Command:
@@ -215,8 +212,7 @@ ROWS = [
     Row("exists; give another -o", before(cut(0, 4, *TUNE)), "force", FLAG),
     Row("exists; give another -o", before(simulated("ur5-circle", "-o", "sim.csv")), "force",
         FLAG),
-        Row("writes no recording", NO_RECORDING, "recording.detail",
-        LEFT_OUT),
+    Row("writes no recording", NO_RECORDING, "recording.detail", LEFT_OUT),
     Row("add --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1"), "set",
         "alarm.threshold=5"),
     Row("raise --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1", "--set",

@@ -225,8 +225,7 @@ ROWS = [
     Row("leave --frame away", on(same, "admit", *GMO, "--frame", "tool"), "--frame", LEFT_OUT),
     Row("holds still over a span", lambda f: [
         "admit", short_scenario(f), "--zero", "start"], "--zero", "0:1"),
-    Row("the closed loop runs", lambda f: [
-        "admit", short_scenario(f), "--observer", "gmo"], "--observer",
+    Row("the closed loop runs", lambda f: ["admit", short_scenario(f), *GMO[2:]], "--observer",
         "kfo-zoh"),
     Row("--do compare needs --reference", on(same, "batch", *GMO, "--do", "compare", "-o", "out",
                                              "--jobs", "0"), "--reference", "zero"),
@@ -234,8 +233,7 @@ ROWS = [
         same, "compare", *GMO, "--reference", "zero", "--figures", "svg"), "-o", "out"),
     Row("choose one of --details, --quiet", converted(same, "--details", "--quiet"), "--quiet",
         LEFT_OUT),
-    Row("choose one of --json, --csv", on(
-        same, "contacts", "--robot", "ur5", "--json", "--csv"), "--csv",
+    Row("choose one of --json, --csv", on(same, "contacts", *GMO[:2], "--json", "--csv"), "--csv",
         LEFT_OUT),
     Row("--set log.derive=dq belongs to an estimate", converted(same, "--set", "log.derive=dq"),
         "log.derive", LEFT_OUT),
@@ -301,8 +299,8 @@ ROWS = [
     Row("which no robot's log is", converted(
         with_columns(t=1e9 * pl.col("t")), "--columns", PLAIN.replace("t=t", "t[s]=t", 1)),
         "--columns", PLAIN.replace("t=t", "t[ns]=t", 1)),
-    Row("the clock is coarser than the samples", converted(
-        with_columns(t=pl.col("t").round(1))), "--columns", PLAIN.replace("t=t", "t@125Hz", 1)),
+    Row("the clock is coarser", converted(with_columns(t=pl.col("t").round(1))), "--columns",
+        PLAIN.replace("t=t", "t@125Hz", 1)),
     # readers: which part of a file
     Row("no episode", lambda _: ["convert", EPISODES, "-o", "out.csv", "--episode", "9"],
         "--episode", "1"),

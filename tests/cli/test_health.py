@@ -67,9 +67,7 @@ def test_a_log_with_temperatures_is_modelled_by_them(run) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_meaningless_log_is_refused_in_one_line_and_nothing_is_written(
-    command: str, turned: str, refused, here: Path
-) -> None:
+def test_a_meaningless_log_is_one_line_and_nothing_is_written(command, turned, refused, here):
     line = refused(*command.split(), turned, *COMMANDS[command])
     assert "effort-sign" in line
     assert "--anyway" in line

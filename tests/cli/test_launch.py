@@ -244,9 +244,7 @@ def test_lines_stay_lines_and_what_a_terminal_obeys_is_shown(capsys) -> None:
     ("variables", "colour"),
     [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
 )
-def test_colours_and_letters_are_those_of_a_terminal_that_wants_them(
-    monkeypatch, variables: dict[str, str], colour: bool
-) -> None:
+def test_colours_and_letters_are_those_that_a_terminal_wants(monkeypatch, variables, colour):
     monkeypatch.delenv("NO_COLOR", raising=False)
     for name, value in {"TERM": "xterm", **variables}.items():
         monkeypatch.setenv(name, value)

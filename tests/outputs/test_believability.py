@@ -197,9 +197,7 @@ def test_friction_is_measured_from_the_free_log_as_read(without_reference: Analy
         ({"sensor_force": 3.0, "peak_band": 65.0}, "good"),
     ],
 )
-def test_a_row_that_misses_the_sensor_by_more_than_its_band_is_a_caution(
-    without_reference: Analysis, row: dict[str, object], standing: str
-) -> None:
+def test_a_row_that_misses_the_sensor_by_its_band_is_a_caution(without_reference, row, standing):
     listed = contact_list(contact(sensor_force=64.0), contact(number=2, **row), remarks=())
     made = replace(without_reference, contacts=listed)
     (ground,) = of(made, "force sensor")

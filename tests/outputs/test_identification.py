@@ -80,9 +80,7 @@ def test_all_files_are_written_and_it_loads(found: Any, log: Recording, tmp_path
     assert sorted(p.name for p in tmp_path.iterdir()) == names
 
 
-def test_a_failure_at_the_last_file_leaves_everything_as_it_was(
-    found: Any, log: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failure_at_the_last_file_leaves_all_as_it_was(found, log, tmp_path, monkeypatch):
     """The files were written one by one: a full disk left a page beside another run's robot."""
     path = tmp_path / "mine.toml"
     path.write_text("earlier", encoding="utf-8")

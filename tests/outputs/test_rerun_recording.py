@@ -1,6 +1,5 @@
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -164,9 +163,7 @@ def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> 
             assert not arrow
 
 
-def test_without_a_reference_is_no_residual_and_odd_names_do_no_harm(
-    without_reference: Analysis, as_if: Callable, tmp_path: Path
-) -> None:
+def test_no_reference_is_no_residual_and_odd_names_do_no_harm(without_reference, as_if, tmp_path):
     log = without_reference.recording
     source = replace(log.source, path=Path("日志 ᵀ.csv"), label="日志 ᵀ.csv")
     write_rrd(tmp_path / "odd.rrd", as_if(without_reference, replace(log, source=source)))

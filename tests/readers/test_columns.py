@@ -1,7 +1,5 @@
 """The --columns grammar, and the tables it describes."""
 
-from pathlib import Path
-
 import numpy as np
 import polars as pl
 import pytest
@@ -215,9 +213,7 @@ def test_a_torque_without_gravity_is_no_torque(path):
         ("t[ms]=time", "torque", 5.0),
     ],
 )
-def test_a_text_without_positions_says_something_of_its_signals_alone(
-    path: Path, columns: str, signal: str, value: float
-) -> None:
+def test_a_text_without_positions_is_of_its_signals_alone(path, columns, signal, value):
     rows = "\n".join(f"{k / 10},0.1,0.2,0.3,0.4,5,6" for k in range(5))
     path.write_text("time,q_0,q_1,dq_0,dq_1,effort_0,effort_1\n" + rows + "\n")
     recording = read(path, columns=columns)

@@ -31,9 +31,7 @@ def paths(tmp_path):
     return found
 
 
-def test_a_log_is_read_once_however_it_is_spelt_and_whatever_part_is_asked_for(
-    paths, monkeypatch
-):
+def test_a_log_is_read_once_however_it_is_spelt_and_whatever_part_is_asked(paths, monkeypatch):
     really = Mock(wraps=vftcli.readers.reading.read_chosen)
     monkeypatch.setattr(vftcli.readers.reading, "read_chosen", really)
     library = Library()

@@ -235,9 +235,7 @@ def test_one_of_two_arms_is_read_where_columns_name_it(path):
         ("abcdef", "velocity", None),
     ],
 )
-def test_another_topic_gives_the_velocities_of_the_leading_one_s_joints(
-    path: Path, joints: str, given: str, found: list[int] | None
-) -> None:
+def test_another_topic_gives_velocities_of_the_leading_one_s_joints(path, joints, given, found):
     """By their names, whatever their order and whatever other joints it has."""
     count = len(joints) or 6 + given.endswith("more")
     values = {name: [1.0 + j for j in range(count)] for name in given.split()}
@@ -277,9 +275,7 @@ def test_stamps_are_compared_with_stamps_of_one_clock(path, lead, other):
     ("first", "last", "kept"),
     [(0, 320, True), (0, 300, False), (76, 396, True), (84, 404, False)],
 )
-def test_a_wrench_is_held_where_it_misses_no_more_than_a_twentieth_of_the_motion(
-    path: Path, first: int, last: int, kept: bool
-) -> None:
+def test_a_wrench_is_held_where_it_misses_a_twentieth_of_the_motion(path, first, last, kept):
     """Joints every 8 ms up to 392 ms, a wrench every 20 ms: 4 or 6 % lie more than 60 ms away."""
     wrench = [
         {"topic": "/wrench", "time": START + 10**6 * time, "force": (float(time), 0.0, 0.0)}

@@ -105,9 +105,7 @@ def place_of(page: Any, chart: str, t: float, panel: int = 0) -> tuple[float, fl
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["pushed", "analysis", "with_wrench", "touched", "unlisted"])
-def test_nothing_is_asked_for_nor_reported_and_everything_is_drawn(
-    opened: Callable, request: pytest.FixtureRequest, name: str, without_reference: Analysis
-) -> None:
+def test_nothing_is_asked_for_and_everything_is_drawn(opened, request, name, without_reference):
     unlisted = replace(without_reference, contacts=None, virtual_sensor=None)
     text = render(unlisted if name == "unlisted" else request.getfixturevalue(name))
     words = text.partition('<script type="module">')[0]
