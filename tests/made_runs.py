@@ -24,12 +24,10 @@ def run_of(terms: DynamicsTerms, q: Array | None = None, robot: Robot | None = N
 
 
 def samples_of(terms: DynamicsTerms, inside: Mask, q: Array | None = None) -> RunSamples:
-    """Some samples of such a run."""
     return RunSamples(run_of(terms, q), inside)
 
 
 def analyse_log(log: Path, choice: AnalysisChoice) -> Analysis:
-    """The analysis of one log."""
     return next(analyse_logs([log], choice))
 
 

@@ -107,7 +107,6 @@ def as_file(name: str) -> str | None:
 
 
 def functions(file: str) -> Iterator[ast.FunctionDef]:
-    """Every function and method of a file."""
     for node in ast.walk(modules()[file]):
         if isinstance(node, ast.FunctionDef):
             yield node
@@ -303,7 +302,6 @@ def codes() -> Counter[str]:
 
 
 def catalogue() -> Counter[str]:
-    """The codes of the catalogue, all rooms together."""
     each = (tomllib.loads(p.read_text("utf-8")) for p in sorted(WORDS.glob("*.toml")))
     return Counter(code for words in each for code in words)
 

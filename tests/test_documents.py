@@ -43,7 +43,6 @@ def commands(path: Path, language: str = "sh") -> list[str]:
 
 
 def in_the_menu() -> list[Path]:
-    """The README, then the pages as the index lists them."""
     text = (ROOT / "docs" / "index.md").read_text("utf-8")
     listed = dict.fromkeys(re.findall(r"\]\(([\w-]+\.md)\)", text))
     return [ROOT / "README.md", *(ROOT / "docs" / name for name in listed)]

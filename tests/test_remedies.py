@@ -62,7 +62,6 @@ def sound(robot: str = "ur5") -> Table:
 
 
 def measured(log: Recording) -> Table:
-    """What the drives measured of another motion."""
     effort = log.require("current")
     return replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=effort)
 
@@ -126,7 +125,6 @@ def free_log(folder: Path) -> str:
 
 
 def arm_of_five(folder: Path) -> str:
-    """The invented arm with its hand held fast."""
     text, path = (FIXTURES / "arm.urdf").read_text(), folder / "five.urdf"
     path.write_text(text.replace('"hand" type="revolute"', '"hand" type="fixed"'))
     return str(path)
@@ -386,7 +384,6 @@ def value_of(option: str, said: str) -> str:
 
 
 def typed(option: str, value: object) -> list[Any]:
-    """The words of an option or a setting with a value."""
     return ["--set", f"{option}={value}"] if "." in option else [named(option), value]
 
 

@@ -139,7 +139,6 @@ def by_jacobian(sensor: str, *words: str) -> Command:
 
 
 def stored(folder: Path) -> list[Any]:
-    """A replay of estimates that a command wrote."""
     before(cut(0, 4, *EST))(folder)
     return ["admit", folder / "out" / "estimates.parquet", "--robot", "ur5", "--observer", "gmo",
             "--set", "virtual-sensor.solver=smoother"]  # fmt: skip
@@ -151,7 +150,6 @@ def gains(folder: Path) -> Path:
 
 
 def tuned(folder: Path) -> str:
-    """What `vftcli identify --method gains` writes."""
     before(cut(0, 4, *TUNE))(folder)
     return "g.toml"
 

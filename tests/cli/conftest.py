@@ -41,6 +41,5 @@ def refused(run):
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
-    """A working folder."""
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -165,7 +165,6 @@ def test_estimates_are_listed_as_they_were_written(run, refused, tmp_path: Path)
 
 @pytest.fixture(scope="module")
 def excitation(tmp_path_factory):
-    """A simulated log of free motion."""
     path = tmp_path_factory.mktemp("logs") / "free.csv"
     words = ["simulate", "free-excitation", "-o", str(path), "--seed", "1"]
     result = CliRunner().invoke(make_app(), words)

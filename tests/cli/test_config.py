@@ -231,7 +231,6 @@ def helped(run, monkeypatch):
 
 
 def commands() -> dict[str, Any]:
-    """Name → command."""
     return vars(typer.main.get_command(make_app()))["commands"]
 
 

@@ -36,7 +36,6 @@ def launched(
 
 
 def limited(which: str, size: int) -> dict[str, Any]:
-    """How a process is begun with a limit."""
     resource = pytest.importorskip("resource")
     return {"preexec_fn": lambda: resource.setrlimit(getattr(resource, which), (size, size))}
 

@@ -98,7 +98,6 @@ def parameters(command: str) -> dict[str, Any]:
 
 
 def typed(name: str, value: str) -> tuple[str, ...]:
-    """The words for a value of an option or a setting."""
     # A negative number would be taken for an option if it stood alone.
     return (f"{name}={value}",) if name.startswith("-") else ("--set", f"{name}={value}")
 
@@ -276,7 +275,6 @@ pytestmark = pytest.mark.usefixtures("here")
 
 @pytest.fixture(scope="module")
 def commands() -> dict[str, Any]:
-    """Name → command."""
     return vars(typer.main.get_command(make_app()))["commands"]
 
 

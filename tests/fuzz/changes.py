@@ -157,7 +157,6 @@ def numbers_changed(value: np.ndarray, rng: Rng) -> np.ndarray:
 
 
 def shape_changed(value: np.ndarray, rng: Rng) -> np.ndarray:
-    """The array in another shape."""
     if value.ndim == 0 or value.size == 0:
         return np.zeros((3, 3))
     half, number = value[: len(value) // 2], value.reshape(-1)[0]
@@ -167,7 +166,6 @@ def shape_changed(value: np.ndarray, rng: Rng) -> np.ndarray:
 
 
 def type_changed(value: np.ndarray, rng: Rng) -> np.ndarray:
-    """The array as another type."""
     dtype = pick(rng, DTYPES)
     with np.errstate(all="ignore"):
         try:

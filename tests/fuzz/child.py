@@ -194,6 +194,5 @@ def odd_numbers(made: Attempt, folder: Path) -> str:
 
 
 def clear(folder: Path) -> None:
-    """Empty the folder of one input."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)

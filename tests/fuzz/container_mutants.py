@@ -148,7 +148,6 @@ def parquet_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
 
 @taken_apart(0.4)
 def arrow_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """An Arrow file or stream."""
     import pyarrow as pa
     from seed_containers import write_arrow
 
@@ -162,7 +161,6 @@ def arrow_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
 
 @taken_apart(0.3)
 def json_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """A document with one thing in it changed."""
     log = tree_changed(json.loads(seed.path.read_bytes()), rng)
     path.write_text(json.dumps(log, default=str), encoding="utf-8", errors="replace")
     return Mutant("tree")
@@ -250,7 +248,6 @@ IN_DATASET = {
 
 
 def dataset_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """A data set with one of its files changed, gone, or called like another."""
     shutil.copytree(seed.path, path)
     files = sorted(file for file in path.rglob("*") if file.is_file())
     file, kind = pick(rng, files), rng.random()

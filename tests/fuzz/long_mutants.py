@@ -62,7 +62,6 @@ def long_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
 
 
 def long_words(seed: Seed, place: Path, rng: Rng, folder: Path) -> list[str]:
-    """A command on a mutant."""
     if seed.model is None:
         words = ["annotate", str(place), "--robot", "panda", "--jobs", "0"]
     else:

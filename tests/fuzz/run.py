@@ -265,7 +265,6 @@ def batch(
 
 
 def keep(verdict: Verdict, asked: argparse.Namespace, folder: Path) -> None:
-    """Keep the folder of an input that failed."""
     if verdict.kind not in READ and asked.keep is not None:
         target = asked.keep / f"{asked.seed}-{verdict.index}"
         shutil.copytree(folder, target, dirs_exist_ok=True)

@@ -139,7 +139,6 @@ def jacobian_table(path: Path) -> Path:
 
 
 def robot_seeds(folder: Path) -> Iterator[Seed]:
-    """Robot files, gains and scenarios."""
     import vftcli.robots
     import vftcli.simulation.scenario
 
@@ -194,7 +193,6 @@ def sample_seeds(samples: Path, folder: Path) -> Iterator[Seed]:
 
 
 def bag_seeds(path: Path, name: str, target: Path) -> Iterator[Seed]:
-    """A sample that holds messages."""
     if path.suffix in {".mcap", ".db3"} and (path.parent / "metadata.yaml").is_file():
         shutil.copytree(path.parent, target)
         for file in [target, *target.iterdir()]:

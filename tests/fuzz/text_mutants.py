@@ -11,7 +11,6 @@ from tokens import NUMBERS, WORDS, Mutant, Rng, Seed, pick, some
 
 
 def bytes_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """The file with some of its bytes changed."""
     data, how = bytes_changed(seed.path.read_bytes(), rng)
     path.write_bytes(data)
     return Mutant(how)
@@ -97,7 +96,6 @@ KEPT = {"byte order mark", "no last end"}
 
 
 def lines_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """JSON lines with one thing changed."""
     if rng.random() < 0.15:
         return bytes_mutant(seed, rng, path)
     lines = seed.path.read_bytes().decode(errors="replace").splitlines()
@@ -155,7 +153,6 @@ def new_value(old: str, rng: Rng) -> str:
 
 
 def settings_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """A TOML file with one or two things changed."""
     if rng.random() < 0.1:
         return bytes_mutant(seed, rng, path)
     text, how = settings_changed(seed.path.read_text("utf-8"), rng)

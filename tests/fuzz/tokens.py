@@ -44,7 +44,6 @@ class Mutant(NamedTuple):
 
 
 def pick(rng: Rng, items: Any) -> Any:
-    """One of the items."""
     return items[int(rng.integers(len(items)))]
 
 

@@ -115,7 +115,6 @@ def table_csv(path: Path) -> Path:
 
 
 def table_gz(path: Path) -> Path:
-    """The headed table, gzipped."""
     path.write_bytes(gzip.compress(table_csv(path).read_bytes(), mtime=0))
     return path
 
@@ -280,7 +279,6 @@ def write_messages(
 
 
 def rosbag2(folder: Path, *, storage: str = "mcap", mode: str = "", method: str = "") -> Path:
-    """A ROS 2 bag folder."""
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
     store, messages = bag_messages(ros1=False)

@@ -154,7 +154,6 @@ def computed(path: Path) -> Path:
 
 
 def viewed(path: Path) -> Path:
-    """A bag whose messages are a view."""
     return database(
         path,
         "CREATE VIEW messages AS SELECT 1 id, 1 topic_id, 1 timestamp, zeroblob(900000000) data",
@@ -181,7 +180,6 @@ def pickled_texts(path: Path) -> Path:
 
 
 def pickled_itself(path: Path) -> Path:
-    """A list that holds itself."""
     held: list[object] = []
     held.append(held)
     path.write_bytes(pickle.dumps({"time": held, "q": np.zeros((3, 6))}))

@@ -85,7 +85,6 @@ def database(path: Path, messages: str, *more: str) -> Path:
 
 
 def parquet(path: Path, **changed: object) -> Path:
-    """A table with columns of lists, some of them changed."""
     log = motion(7)
     columns: dict[str, object] = {"t": log["t"], "q": log["q"].tolist(), "dq": log["dq"].tolist()}
     write_table(pa.table(columns | changed), path)
@@ -98,7 +97,6 @@ def lists(first: object) -> list[object]:
 
 
 def npz(path: Path, **changed: object) -> Path:
-    """panda-py's arrays, some of them changed."""
     with path.open("wb") as file:
         np.savez(file, **(panda_py_log() | changed))
     return path

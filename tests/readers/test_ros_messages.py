@@ -15,7 +15,6 @@ TIMES = np.array([0, 1_700_000_000_123_456_789, 4_000_000_000], dtype=np.int64)
 
 
 def header(time, frame):
-    """The header that rosbags makes of a stamp [ns]."""
     stamp = STORE.types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
     return STORE.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
 

@@ -16,7 +16,6 @@ HEAD = "t,q1,q2"
 
 
 def written(path: Path, text: str | bytes) -> Recording:
-    """What is read of a text."""
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return read(path)
 
