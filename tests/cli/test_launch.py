@@ -23,7 +23,6 @@ from vftcli.signals.errors import ParameterError
 
 # The program as the shell calls it: it leaves at once, all written, with the right code.
 
-TRUTH = f"file:{CIRCLE}.truth.parquet"
 PROGRAM = "import sys; sys.argv[0] = 'vftcli'; from vftcli.cli import launch; launch()"
 
 
@@ -51,9 +50,9 @@ def test_exit_codes(words: tuple[str, ...], code: int) -> None:
 
 @pytest.mark.slow
 def test_long_output_arrives_whole_through_a_pipe() -> None:
-    done = launched("compare", CIRCLE, "--robot", "ur5", "--reference", TRUTH, "--json")
-    assert done.returncode == 0
-    assert done.stdout.rstrip().endswith("}")
+    truth = f"file:{CIRCLE}.truth.parquet"
+    done = launched("compare", CIRCLE, "--robot", "ur5", "--reference", truth, "--json")
+    assert (done.returncode, done.stdout.rstrip()[-1:]) == (0, "}")
 
 
 @pytest.mark.slow
@@ -248,11 +247,9 @@ def test_colours_and_letters_are_those_that_a_terminal_wants(monkeypatch, variab
     for name, value in {"TERM": "xterm", **variables}.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setattr("sys.stdout", Terminal())
-    assert canvas().colour is colour
-    assert canvas().unicode
+    assert (canvas().colour, canvas().unicode) == (colour, True)
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BytesIO(), encoding="ascii"))
-    assert not canvas().colour
-    assert not canvas().unicode
+    assert (canvas().colour, canvas().unicode) == (False, False)
 
 
 @pytest.fixture
@@ -293,9 +290,8 @@ def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run) -> None:
     bad = [tmp_path / name for name in ("one.csv", "two.csv")]
     for path in bad:
         path.write_text("# no log\n")
-    out = tmp_path / "out"
-    for words in (("report", "-o", out), ("contacts",), ("compare", "--reference", "zero")):
-        name, *options = words
+    out, zero = tmp_path / "out", ("--reference", "zero")
+    for name, *options in (("report", "-o", out), ("contacts",), ("compare", *zero)):
         code, stdout, err = run(name, *bad, *options)
         assert (code, stdout) == (1, "")
         assert "none of the logs can be analysed" in err
