@@ -71,10 +71,8 @@ PARSES = {"partition", "rpartition", "removeprefix", "removesuffix", "startswith
 @cache
 def modules() -> dict[str, ast.Module]:
     """Every file of the package, parsed, by its path in it."""
-    return {
-        str(path.relative_to(PACKAGE)): ast.parse(path.read_text(encoding="utf-8"))
-        for path in sorted(PACKAGE.rglob("*.py"))
-    }
+    paths = sorted(PACKAGE.rglob("*.py"))
+    return {str(p.relative_to(PACKAGE)): ast.parse(p.read_text(encoding="utf-8")) for p in paths}
 
 
 def room(file: str) -> str:

@@ -181,9 +181,8 @@ def test_the_steps_of_a_log_fill_its_work_without_a_gap() -> None:
     with heard_by(lambda *step: heard.append(step)):
         assert analyse_log(FIXTURE, choice).contacts is not None
     words, begins = zip(*[step for step in heard if step[0]], strict=True)
-    assert [each.rpartition(": ")[2].split()[0] for each in words] == [
-        *("reading", "examining", "looking", "listing", "running", "comparing")
-    ]
+    verbs = ["reading", "examining", "looking", "listing", "running", "comparing"]
+    assert [each.rpartition(": ")[2].split()[0] for each in words] == verbs
     assert begins == (0.0, 0.05, 0.15, 0.25, 0.4, 0.5)
     shares = [share for _, share in heard]
     assert sorted(shares) == shares
@@ -242,10 +241,8 @@ def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> N
 def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
     """Real, free motion: all that is estimated is error. Prototype .259 .575 .234 .274 …"""
     folder = logs / "panda_exciting"
-    t, q, dq, torque = (
-        np.loadtxt(folder / f"exciting_traj_{name}.txt")
-        for name in ("time", "positions", "velocity", "torques")
-    )
+    files = (f"exciting_traj_{name}.txt" for name in ("time", "positions", "velocity", "torques"))
+    t, q, dq, torque = (np.loadtxt(folder / name) for name in files)
     shaped = {"q": q.reshape(-1, 7), "dq": dq.reshape(-1, 7), "torque": torque.reshape(-1, 7)}
     recording = vft.Recording(t=t, **shaped)
     run = vft.Run(recording=recording, robot=vft.load_robot("panda"))

@@ -43,9 +43,8 @@ def test_a_long_test_fails_unless_it_is_marked(tmp_path: Path) -> None:
     words += ["--cpu-limit", "0.2", "--cpu-record", "times.tsv"]
     outer = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_XDIST")}
     bare = outer | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
-    done = subprocess.run(
-        words, cwd=tmp_path, env=bare, capture_output=True, text=True, check=False
-    )
+    how = {"cwd": tmp_path, "env": bare, "capture_output": True, "text": True}
+    done = subprocess.run(words, check=False, **how)
     assert "FAILED test_a.py::test_first - Failed: " in done.stdout
     assert "1 failed, 3 passed" in done.stdout
     lines = (tmp_path / "times.tsv").read_text("utf-8").splitlines()

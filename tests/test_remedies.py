@@ -113,9 +113,8 @@ def with_wrench(folder: Path, *words: str) -> list[Any]:
 
 def robot_file(folder: Path, gravity: str = "[0.0, 0.0, -9.81]", more: str = "") -> str:
     """A copy of the UR5's profile with another gravity and more sections."""
-    text = re.sub(
-        r"gravity = \[.*?\]", f"gravity = {gravity}", PROFILES["ur5"].read_text("utf-8")
-    )
+    profile = PROFILES["ur5"].read_text("utf-8")
+    text = re.sub(r"gravity = \[.*?\]", f"gravity = {gravity}", profile)
     (folder / "my.toml").write_text(text + more, encoding="utf-8")
     return str(folder / "my.toml")
 
@@ -489,10 +488,8 @@ WITHOUT_ROW = {
 
 def test_every_remark_with_an_option_is_tried_or_says_why_not() -> None:
     files = (tomllib.loads(path.read_text("utf-8")) for path in WORDS.glob("*.toml"))
-    catalogue = [
-        (code, " ".join(entry.values())) for file in files for code, entry in file.items()
-    ]
-    with_option = {code for code, said in catalogue if re.search("--[a-z]", said)}
+    catalogue = (item for file in files for item in file.items())
+    with_option = {c for c, entry in catalogue if re.search("--[a-z]", " ".join(entry.values()))}
     tried = {row.code for row in ROWS}
     assert with_option - tried - WITHOUT_ROW.keys() == set()
     assert WITHOUT_ROW.keys() & tried == set()

@@ -189,10 +189,8 @@ def peak_memory(samples: int, folder: Path) -> int:
     log = folder / f"{samples}.parquet"
     pl.DataFrame(columns).write_parquet(log, row_group_size=50_000)
     words = ("estimate", log, "--causal", "--robot", "ur5", "-o", folder / f"of_{samples}")
-    done = subprocess.run(
-        [sys.executable, "-c", MEASURED, *map(str, words)], capture_output=True, check=True
-    )
-    return int(done.stdout.split()[-1]) * 1024
+    printed = subprocess.check_output([sys.executable, "-c", MEASURED, *map(str, words)])
+    return int(printed.split()[-1]) * 1024
 
 
 @pytest.mark.slow

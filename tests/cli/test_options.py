@@ -93,9 +93,8 @@ def parameters(command: str) -> dict[str, Any]:
     """Name as it is typed → what typer knows of it; of a setting, the setting."""
     group: Any = typer.main.get_command(make_app())
     found = group.commands[command]
-    return {p.opts[-1]: p for p in found.params} | settings_by_name(
-        vars(found.callback)["choices"]
-    )
+    settings = settings_by_name(vars(found.callback)["choices"])
+    return {p.opts[-1]: p for p in found.params} | settings
 
 
 def typed(name: str, value: str) -> tuple[str, ...]:
@@ -249,9 +248,8 @@ def test_an_arm_that_is_not_settled_is_asked_for(run) -> None:
     code, out, err = run(*words)
     assert code == 1
     assert out.startswith("push.csv: headerless\n  joints    6\n")
-    assert re.fullmatch(
-        r"error: Which arm\? Best fits: ur5 .*%\), .*%\)\. Add --robot ur5\n", err
-    )
+    said = r"error: Which arm\? Best fits: ur5 .*%\), .*%\)\. Add --robot ur5\n"
+    assert re.fullmatch(said, err)
     assert run(*words, "--json") == (code, "", err)
 
 

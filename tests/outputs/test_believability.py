@@ -228,10 +228,8 @@ def test_a_check_and_a_caution_have_their_own_names(without_reference: Analysis,
 def test_the_references_error_is_the_mean_that_the_table_prints(analysis: Analysis) -> None:
     """Over the joints at which the reference can be trusted, as in the screen's last line."""
     rests = pl.col("joint") == 5
-    errors = analysis.errors.with_columns(
-        reference_trusted=~rests,
-        reference_floor_Nm=pl.when(rests).then(5.0).otherwise(pl.col("reference_floor_Nm")),
-    )
+    floor = pl.when(rests).then(5.0).otherwise(pl.col("reference_floor_Nm"))
+    errors = analysis.errors.with_columns(reference_trusted=~rests, reference_floor_Nm=floor)
     bare = ExternalTorque(name="sensor", t=analysis.t, tau=np.zeros((len(analysis.t), 6)))
     for made, words in (
         (analysis, "vendor, its own error 0.5 N·m a joint"),

@@ -114,10 +114,8 @@ def test_a_detail_that_nobody_knows_has_no_table() -> None:
 
 @pytest.fixture
 def errors() -> pl.DataFrame:
-    return pl.DataFrame(
-        [row("fdo", 1, 0.55), row("fdo", 2, 12.346), row("gmo", 1, 2.0), row("gmo", 2, None)],
-        schema=SCHEMA,
-    )
+    known = [("fdo", 1, 0.55), ("fdo", 2, 12.346), ("gmo", 1, 2.0), ("gmo", 2, None)]
+    return pl.DataFrame([row(*numbers) for numbers in known], schema=SCHEMA)
 
 
 def test_terminal_table(errors: pl.DataFrame) -> None:
@@ -144,10 +142,8 @@ def test_two_logs_of_one_label_stay_two_tables(errors: pl.DataFrame, show: Calla
     assert text.count("123") == 1
     assert text.count("a_b.csv against") + text.count(r"a\_b.csv against") == 2
     fewer = errors.filter(pl.col("joint") == 1)
-    assert [len(rows) for rows in error_tables.logs_of(pl.concat([errors, fewer]), "joint")] == [
-        4,
-        2,
-    ]
+    logs = error_tables.logs_of(pl.concat([errors, fewer]), "joint")
+    assert [len(rows) for rows in logs] == [4, 2]
 
 
 def test_pairs_name_the_better_first() -> None:
@@ -191,9 +187,8 @@ def test_latex(errors: pl.DataFrame) -> None:
 
 def test_logs_share_a_latex_table_where_the_same_joints_rest(errors: pl.DataFrame) -> None:
     other = errors.with_columns(recording=pl.lit("b.csv"))
-    resting = other.with_columns(
-        recording=pl.lit("c.csv"), reference_trusted=pl.col("joint") != 2
-    )
+    trusted = pl.col("joint") != 2
+    resting = other.with_columns(recording=pl.lit("c.csv"), reference_trusted=trusted)
     text = tables.to_latex(pl.concat([errors, other, resting], how="diagonal"))
     shared, alone = text.split(r"\end{table}")[:2]
     assert text.count(r"\begin{table}") == 2

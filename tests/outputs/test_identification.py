@@ -178,9 +178,8 @@ def test_one_row_a_log_role_and_model_with_its_mean(found: Any, log: Recording) 
 
 def test_what_is_not_determined_is_said_and_what_is_no_number_is_a_dash(found: Any) -> None:
     """A profile without a term read "nan", a spread that nothing bounds "inf"."""
-    doubted = found.parameters.with_columns(
-        determined=pl.lit(False), profile=pl.lit(float("nan")), sd=pl.lit(float("inf"))
-    )
+    odd = {"determined": False, "profile": float("nan"), "sd": float("inf")}
+    doubted = found.parameters.with_columns(**{name: pl.lit(x) for name, x in odd.items()})
     heads, *lines = terminal(parameter_grid(found._replace(parameters=doubted))).splitlines()
     assert heads.split() == ["number", "joint", "value", "sd", "profile", "unit"]
     for line in lines:

@@ -72,10 +72,8 @@ def mcap_of_type(path: Path, definition: str | None = None, position: float = 0.
 def database(path: Path, messages: str, *more: str) -> Path:
     """A bag in SQLite whose table of messages is made by a statement, with one topic."""
     with closing(sqlite3.connect(path)) as db:
-        db.execute(
-            "CREATE TABLE topics (id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
-            "serialization_format TEXT)"
-        )
+        columns = "id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT"
+        db.execute(f"CREATE TABLE topics ({columns})")
         db.execute("INSERT INTO topics VALUES (1, '/j', 'sensor_msgs/msg/JointState', 'cdr')")
         db.execute(messages)
         for statement in more:

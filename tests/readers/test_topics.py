@@ -29,9 +29,8 @@ def write_joint_states(path: Path, messages: list[Message]) -> Path:
             message = {"topic": "/joint_states", "stamp": True} | given
             topic, time = message["topic"], message["time"]
             stamp = time + message.get("ahead", 0) if message["stamp"] else 0
-            clock = types["builtin_interfaces/msg/Time"](
-                sec=stamp // 10**9, nanosec=stamp % 10**9
-            )
+            sec, nanosec = divmod(stamp, 10**9)
+            clock = types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
             frame = message.get("frame", "")
             header = types["std_msgs/msg/Header"](seq=k, stamp=clock, frame_id=frame)
             if "force" in message:
@@ -301,10 +300,8 @@ def test_a_wrench_is_held_where_it_misses_a_twentieth_of_the_motion(path, first,
     ],
 )
 def test_the_sensor_s_fullest_topic_gives_the_wrench(path, topics, taken):
-    forces = [
-        arm_topic(name, count, step=10_000_000, force=(float(count), 0.0, 0.0))
-        for name, count in topics.items()
-    ]
+    slow = {"step": 10_000_000}
+    forces = [arm_topic(name, n, force=(float(n), 0, 0), **slow) for name, n in topics.items()]
     recording = recorded(path, arm_topic("/arm", 50), *forces)
     assert recording.require("wrench")[0, 0] == topics[taken]
     left = sorted(topics.keys() - {taken})

@@ -142,16 +142,14 @@ def test_panda_pys_log_reads_the_same_in_every_container(path, make):
         np.testing.assert_array_equal(getattr(recording, signal), log[signal])
     np.testing.assert_array_equal(recording.torque, log["tau"])
     np.testing.assert_array_equal(recording.tau_ext, 0.0 - log["tau_ext"])  # libfranka's sign
-    np.testing.assert_allclose(
-        recording.t, 1e-3 * np.arange(seed_logs.ROWS), atol=1e-12
-    )  # ms as float64
+    t = 1e-3 * np.arange(seed_logs.ROWS)
+    np.testing.assert_allclose(recording.t, t, atol=1e-12)  # ms as float64
 
 
 def test_array_files(path):
     seed_logs.matrix_npy(path)
-    np.testing.assert_array_equal(
-        read(path, columns=seed_logs.HEADERLESS_COLUMNS).q, seed_logs.motion()["q"]
-    )
+    found = read(path, columns=seed_logs.HEADERLESS_COLUMNS)
+    np.testing.assert_array_equal(found.q, seed_logs.motion()["q"])
     with pytest.raises(LogError, match="without a header"):
         read(path)
     path.write_bytes(path.read_bytes()[:-8])

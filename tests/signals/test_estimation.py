@@ -23,10 +23,8 @@ def models(count: int, joints: int, pinned: slice) -> estimation.LinearModel:
         decay[pinned.stop, :, :6] = 0.0
     observation = estimation.beside_errors(rng.standard_normal((*shape, 6, joints)))
     observation[rng.random(shape) < 0.15] = 0.0
-    d, white = (
-        5.0 * rng.standard_normal((*shape, joints)),
-        rng.uniform(0.1, 1.0, (*shape, joints)),
-    )
+    d = 5.0 * rng.standard_normal((*shape, joints))
+    white = rng.uniform(0.1, 1.0, (*shape, joints))
     return estimation.LinearModel(d, observation, white, decay, added)
 
 
@@ -194,6 +192,5 @@ def test_of_several_logs_each_is_left_out_whole() -> None:
     for lengths, rows in (([103, 57, 40], np.arange(200)),
                           ([57, 103, 40], np.r_[103:160, 0:103, 160:200])):  # fmt: skip
         parts = estimation.left_out(lengths, [True, True, False])
-        assert estimation.cross_validated(A[rows], y[rows], weights, parts) == pytest.approx(
-            expected, rel=1e-9
-        )
+        found = estimation.cross_validated(A[rows], y[rows], weights, parts)
+        assert found == pytest.approx(expected, rel=1e-9)

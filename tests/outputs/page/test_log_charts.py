@@ -106,13 +106,9 @@ def test_all_of_a_loads_force_is_in_its_chart_which_begins_at_zero(pushed: Analy
 def test_the_force_stands_before_the_logs_own_wrench(pushed: Analysis, as_if: Callable) -> None:
     wrench = np.zeros((len(pushed.t), 6))
     wrench[:, 1:3] = 30.0, -40.0
-    silent, felt = (
-        as_if(pushed, replace(pushed.recording, wrench=w)) for w in (0 * wrench, wrench)
-    )
-    chart, bare = (
-        log_charts.force_chart(felt, pushed.contacts),
-        log_charts.force_chart(silent, pushed.contacts),
-    )
+    logs = (replace(pushed.recording, wrench=w) for w in (0 * wrench, wrench))
+    silent, felt = (as_if(pushed, log) for log in logs)
+    bare, chart = (log_charts.force_chart(x, pushed.contacts) for x in (silent, felt))
     own, best = chart.series
     assert (own.colour, best.name) == (REFERENCE, "best")
     np.testing.assert_allclose(own.values, 50.0)
