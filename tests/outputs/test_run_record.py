@@ -18,8 +18,8 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
     assert record["versions"]["numpy"] == np.__version__
     assert record["input"]["sha256"] == "ab" * 32
     t, source = analysis.recording.t, record["input"]
-    assert (source["samples"], source["joints"], source["duplicates"]) == (600, 6, 0)
-    assert (source["start_s"], source["end_s"]) == (t[0], t[-1])
+    known = {"samples": 600, "joints": 6, "duplicates": 0, "start_s": t[0], "end_s": t[-1]}
+    assert source.items() >= known.items()
     assert source["rate_hz"] == pytest.approx(1.0 / np.median(np.diff(t)))
     assert len(record["robot"]["sha256"]) == 64
     assert "ON the robot" in record["conventions"]["sign"]
@@ -32,9 +32,8 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
     assert list(found) == ["best", "fdo", "gmo", "kfo-fe", "kfo-zoh"]
     assert found["gmo"]["parameters"]["gain"] == [5.0, 3.0, 4.0, 10.0, 10.0, 10.0]
     assert found["fdo"]["zeta"] == [None] * 6
-    for observer in found.values():
-        for key in ("omega_n_rad_s", "delay_s", "bandwidth_hz"):
-            assert len(observer[key]) == 6
+    keys = ("omega_n_rad_s", "delay_s", "bandwidth_hz")
+    assert {len(observer[key]) for observer in found.values() for key in keys} == {6}
 
 
 def test_lists_stand_on_one_line_and_what_is_not_finite_becomes_null() -> None:

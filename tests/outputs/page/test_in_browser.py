@@ -76,8 +76,8 @@ def click(page: Any, place: str) -> None:
     page.wait_for_timeout(60)
 
 
-def press(page: Any, key: str) -> None:
-    page.keyboard.press(key)
+def pointed(page: Any, x: float, y: float) -> None:
+    page.mouse.move(x, y)
     page.wait_for_timeout(60)
 
 
@@ -301,8 +301,7 @@ def test_a_line_is_broken_at_a_gap_of_the_clock(opened: Callable, analysis: Anal
 def test_a_look_shows_one_moment_and_ends(page: Any, pushed: Analysis) -> None:
     before = number(page), page.locator("#clock").inner_text()
     t = 13.0
-    page.mouse.move(*place_of(page, "#torques", t, 2))
-    page.wait_for_timeout(60)
+    pointed(page, *place_of(page, "#torques", t, 2))
     now = page.evaluate("vftcli.clock.now")
     pixel = np.diff(page.evaluate("vftcli.clock.view"))[0] / 400.0
     assert abs(now - t) < pixel
@@ -319,8 +318,7 @@ def test_a_look_shows_one_moment_and_ends(page: Any, pushed: Analysis) -> None:
     assert "contact 7" in said(page)
     force = np.interp(now, contact.course.t, contact.course.force)
     assert float(number(page).split()[0]) == pytest.approx(force, abs=3.0)  # 8 ms of a push
-    page.mouse.move(5, 5)
-    page.wait_for_timeout(60)
+    pointed(page, 5, 5)
     assert (number(page), page.locator("#clock").inner_text()) == before
 
 
@@ -328,8 +326,7 @@ def test_a_look_shows_one_moment_and_ends(page: Any, pushed: Analysis) -> None:
 def test_a_click_stays_a_drag_zooms(page: Any, pushed: Analysis) -> None:
     x, y = place_of(page, "#force", 6.3)
     page.mouse.click(x, y)
-    page.mouse.move(5, 5)
-    page.wait_for_timeout(60)
+    pointed(page, 5, 5)
     assert page.evaluate("vftcli.clock.now") == pytest.approx(6.3, abs=0.02)
     (left, y), (right, _) = (place_of(page, "#force", t) for t in (6.0, 8.0))
     page.mouse.move(left, y)
@@ -400,12 +397,10 @@ def test_the_keyboard_reaches_and_does_everything(opened: Callable, html: str) -
 def test_keys_go_play_zoom_and_turn(opened: Callable, html: str) -> None:
     page = live(opened(html, reduced_motion="reduce"))
     page.locator(".contacts a").nth(4).focus()
-    press(page, "Enter")
-    assert "contact 5" in said(page)
-    press(page, "n")
-    assert "contact 6" in said(page)
-    press(page, "p")
-    assert "contact 5" in said(page)
+    for key, number in (("Enter", 5), ("n", 6), ("p", 5)):
+        page.keyboard.press(key)
+        page.wait_for_timeout(60)
+        assert f"contact {number}" in said(page)
     page.keyboard.press("+")
     low, high = page.evaluate("vftcli.clock.view")
     assert high - low == pytest.approx(0.67 * 20.0, rel=1e-6)
