@@ -113,7 +113,7 @@ def test_a_log_is_told_with_what_it_holds() -> None:
         "  signals   q, wrench",
         f"  wrench    {frame}",
         "  payload   0.735 kg, as the controller assumes",
-        "  robot     not settled by the log",
+        "  robot     not named in the log",
         "",
         "nothing suspicious found",
     ]

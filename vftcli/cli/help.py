@@ -229,7 +229,7 @@ def observers() -> Iterator[str]:
     rows = []
     for name, entry in OBSERVERS.items():
         numbers = ", ".join(f"{entry.section}.{each}" for each in PARAMETERS[entry.section])
-        rows += [(name, f"{entry.title} {entry.equations}"), ("", entry.summary)]
+        rows += [(name, f"{entry.title}, {entry.equations}"), ("", entry.summary)]
         rows.append(("", f"--set {numbers}"))
     yield from two_columns(rows)
 

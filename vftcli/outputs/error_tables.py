@@ -222,6 +222,8 @@ def marks_in_words(found: Sequence[Block]) -> list[str]:
     lines = []
     if any(table.has_floor for table in found):
         lines.append("floor: RMSE that the reference itself is known to have")
+    if any(np.isfinite([*table.means.skill.values()]).any() for table in found):
+        lines.append("L1: mean |error|; skill: 1 is exact, 0 no better than an estimate of zero")
     if any(np.any(table.at_floor) for table in found):
         lines.append(
             f"*: within {AT_FLOOR:g} × the floor; the reference is no more accurate than that"

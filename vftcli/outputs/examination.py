@@ -86,7 +86,7 @@ def examination_text(examination: Examination) -> str:
     """The report for people."""
     recording, source = examination.recording, examination.recording.source
     lines = holdings(recording)
-    lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
+    lines.append(f"  robot     {recording.robot_hint or 'not named in the log'}")
     # With a misread effort the misfits of arms mean nothing.
     misread = examination.refusals(fitting=False)
     lines += [
