@@ -22,6 +22,7 @@ from vftcli.simulation.experiment import simulate
 UR10E, PANDA = load_robot("ur10e"), load_robot("panda")
 K = np.asarray(UR10E.torque_constant)
 ALL = (1, 2, 3, 4, 5, 6)
+POSE = np.array([0.3, -1.4, 1.6, -1.8, -1.4, 0.2])
 MOTION = moving()
 CURRENT = MOTION.require("current")
 
@@ -100,6 +101,16 @@ def test_of_arms_that_fit_alike_one_that_carries_much_less_is_it(name, load, own
     assert [f.code for f in made.findings if f.level != "fact"] == [code]
     misfit = {match.robot: match.misfit for match in made.robots}
     assert 0.6 < misfit[name] / misfit[own] < 0.8
+
+
+@pytest.mark.parametrize("load", [0.0, 2.0])
+def test_in_one_pose_a_load_is_no_other_arm(load):
+    """2 kg on a resting UR10 leave what a UR10e's heavier links do: which, no log of it says."""
+    arm = carrying(load_robot("ur10"), load)
+    still = replace(MOTION, q=np.tile(POSE, (len(MOTION.t), 1)), dq=np.zeros_like(MOTION.q))
+    held = gravity(arm, still) + np.array([1.0, 5.0, -4.0, 1.0, 0.5, 0.0])
+    log = replace(still, current=held / arm.torque_constant)
+    assert codes(log, load_robot("ur10")) == []
 
 
 def test_the_vendor_s_residual_tells_a_panda_from_an_fr3():

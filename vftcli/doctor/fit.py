@@ -222,7 +222,11 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
         share = AMBIGUOUS  # a factor disguises another generation's masses as a load does
     else:
         share = 1 / AMBIGUOUS if own.load > other.load + GENERATION else ANOTHER
-    return other.fits and other.misfit < share * diagnosis.healed.misfit
+    healed = diagnosis.healed
+    # What a load explains, known or not, is no other arm's.
+    hidden = 0 < healed.loaded.values[0] < HEAVY
+    loaded = healed.loaded.size / healed.size if hidden else np.inf
+    return other.fits and other.misfit < share * min(healed.misfit, loaded)
 
 
 def explained(diagnosis: Diagnosis, robots: Sequence[RobotMatch]) -> Iterator[Remark]:
