@@ -151,16 +151,36 @@ def test_four_hands_on_a_held_pose_with_free_motion_and_without(logs):
     assert "wrist" not in (third.where, fourth.where)
 
 
-def test_a_payload_hung_on_a_moving_arm_is_one_load():
-    """The free circle of 4 s four times over, with 2.8 kg from 4.1 s on, at 31 Hz."""
+def circle_carrying(carries: Callable[[np.ndarray], np.ndarray]) -> Recording:
+    """The free circle of 4 s four times over, at 31 Hz, with 2.8 kg where `carries` of t says."""
     whole, robot = read(FIXTURES / "ur5_circle.csv"), load_robot("ur5")
     rows = np.tile(np.arange(0, 500, 4), 4)
     signals = {name: whole.require(name)[rows] for name in ("q", "dq", "current")}
     t = 0.032 * np.arange(len(rows))
     weight = load_regressor(robot.chain, signals["q"]) @ np.array([2.8, 0.0, 0.0, 0.1])
-    signals["tau_ext"] = (t > 4.1)[:, None] * weight
+    signals["tau_ext"] = carries(t)[:, None] * weight
     signals["current"] = signals["current"] - signals["tau_ext"] / robot.torque_constant
-    found = list_contacts(motion(Recording(t=t, **signals), "ur5", "0.3:4"))
+    return Recording(t=t, **signals)
+
+
+def test_parts_carried_one_after_another_are_no_load_of_the_arm():
+    """2.8 kg are picked up thrice, and set down while the arm moves: for 8.9 of 16 s."""
+    spans = ((4.4, 7.2), (8.4, 11.3), (12.3, 15.5))
+    log = circle_carrying(lambda t: np.any([(t > a) & (t < b) for a, b in spans], axis=0))
+    found = list_contacts(motion(log, "ur5", "0.3:4"))
+    assert not any(row.is_load for row in found.contacts)
+    assert [(row.start, row.stop) for row in found.contacts] == [
+        pytest.approx(span, abs=0.15) for span in spans
+    ]
+    for row in found.contacts:
+        assert row.mean_force == pytest.approx([0.0, 0.0, -27.5], abs=4.0)
+
+
+def test_a_payload_hung_on_a_moving_arm_is_one_load():
+    """2.8 kg from 4.1 s on."""
+    log = circle_carrying(lambda t: t > 4.1)
+    t = log.t
+    found = list_contacts(motion(log, "ur5", "0.3:4"))
     (row,) = found.contacts
     assert found.remarks[-1].code == "contact-is-load"
     assert (row.is_load, row.number, row.where) == (True, 1, "wrist")

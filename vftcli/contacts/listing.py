@@ -77,9 +77,9 @@ def list_contacts(
     found = by_smoother(free, proven=referenced or free.basis == "free motion")
     if log.robot.joints < 6:
         return found.without_forces()
-    if is_load(log.recording, found.contacts):
+    if is_load(log.recording, found.contacts) and (row := load_row(motion, found.contacts)):
         remarks = (*found.remarks, caution("contact-is-load"))
-        found = replace(found, contacts=(load_row(motion, found.contacts),), remarks=remarks)
+        return replace(found, contacts=(row,), remarks=remarks)
     return found
 
 
@@ -305,16 +305,21 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
     return len(contacts) == 1 or bool(np.linalg.norm(forces.sum(axis=0)) > ONE_SIDE * sizes)
 
 
-def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
+def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:
     """One row for contacts that are a load: mean of the ungated wrench, and band.
 
-    Standard deviation of the mean: √(s²/m + (3 % of it)²), s the spread of m means over 5 s.
+    None if less than half of their force acts between them. Standard deviation of the mean:
+    √(s²/m + (3 % of it)²), s the spread of m means over 5 s.
     """
     part = free_part(motion)
     wrench = smooth_wrench(motion.log, () if part is None else part.pieces)
     start, stop = contacts[0].start, contacts[-1].stop
     inside = (wrench.t >= start) & (wrench.t <= stop)
     values, t = wrench.values[inside], wrench.t[inside]
+    on = np.any([(t >= contact.start) & (t <= contact.stop) for contact in contacts], axis=0)
+    felt = values[on, :3].mean(axis=0)
+    if not on.all() and values[~on, :3].mean(axis=0) @ felt < SHARE * felt @ felt:
+        return None
     mean, number = values.mean(axis=0), ((t - t[0]) / PIECE).astype(int)
     pieces = np.array([values[number == k].mean(axis=0) for k in np.unique(number)])
     error = wrench.sd[inside].mean(axis=0)
