@@ -289,11 +289,9 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 
     A load neither begins nor ends while the arm rests; a push may.
     """
-    if not contacts:
-        return False
     moving = np.any(faster(recording.require("dq"), REST), axis=1)
     t = recording.t
-    first = t[np.argmax(moving)] if moving.any() else t[0]
+    first = t[np.argmax(moving)]
     lasts = np.array([contact.stop - contact.start for contact in contacts])
     if lasts.sum() <= SHARE * (t[-1] - first):
         return False
@@ -302,7 +300,7 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
             return False
     forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
     sizes = np.linalg.norm(forces, axis=1).sum()
-    return len(contacts) == 1 or bool(np.linalg.norm(forces.sum(axis=0)) > ONE_SIDE * sizes)
+    return bool(np.linalg.norm(forces.sum(axis=0)) > ONE_SIDE * sizes)
 
 
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:

@@ -222,11 +222,10 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
         share = AMBIGUOUS  # a factor disguises another generation's masses as a load does
     else:
         share = 1 / AMBIGUOUS if own.load > other.load + GENERATION else ANOTHER
-    healed = diagnosis.healed
     # What a load explains, known or not, is no other arm's.
-    hidden = 0 < healed.loaded.values[0] < HEAVY
-    loaded = healed.loaded.size / healed.size if hidden else np.inf
-    return other.fits and other.misfit < share * min(healed.misfit, loaded)
+    healed, load = diagnosis.healed, diagnosis.healed.loaded
+    fit = load if 0 < load.values[0] < HEAVY else healed.best
+    return other.fits and other.misfit < share * fit.size / healed.size
 
 
 def explained(diagnosis: Diagnosis, robots: Sequence[RobotMatch]) -> Iterator[Remark]:
