@@ -185,7 +185,7 @@ def free_part(motion: FreeMotion) -> FreePart | None:
         if motion.cycles.whole < LEAST_CYCLES or not motion.free_cycles.numbers:
             return None
         # Touched: beyond friction, and no quieter than the rest.
-        if (beyond_threshold(log, None) & own).any():
+        if (beyond_threshold(log, LEAST_ERROR) & own).any():
             with suppress(ParameterError):  # too short for a spectrum
                 if not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)])):
                     return None
@@ -193,14 +193,14 @@ def free_part(motion: FreeMotion) -> FreePart | None:
     return part._replace(remarks=(*part.remarks, *runs))
 
 
-def beyond_threshold(run: Run, level: Array | None) -> Mask:
+def beyond_threshold(run: Run, level: Array | float) -> Mask:
     """Samples with a joint's torque beyond `LEVEL` SDs for a while.
 
     (T,) The standard deviation is that of the observer's torque in free motion, the level
-    (n,) [N·m], None if unknown; at rest and around it stiction adds to it.
+    (n,) [N·m]; at rest and around it stiction adds to it.
     """
     t, dry = run.t, dry_torques(run.robot)
-    sd = np.maximum(LEAST_ERROR if level is None else level, DRY_SHARE * dry)
+    sd = np.maximum(level, DRY_SHARE * dry)
     close = near(slower(run.dq), max(round(NEAR_REST / median_step(t)), 1))
     sd = np.where(close, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
     above = np.any(abs(observed(run)) > LEVEL * sd, axis=1)
@@ -233,8 +233,8 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
     if not len(torque):
         return np.zeros(torque.shape[1])
     moving |= moving.sum(axis=0) < LEAST_MOVING
-    pairs = zip(torque.T, moving.T, strict=True)
-    return np.array([np.quantile(column[some], 0.95) / Z_95 for column, some in pairs])
+    within = np.where(moving, torque, np.nan)
+    return np.asarray(np.nanquantile(within, 0.95, axis=0) / Z_95)
 
 
 class PseudoContactTest(NamedTuple):

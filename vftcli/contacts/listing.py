@@ -306,7 +306,7 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:
     """One row for contacts that are a load: mean of the ungated wrench, and band.
 
-    None if less than half of their force acts between them. Standard deviation of the mean:
+    None if less than half of their force acts between them. SD of the mean:
     √(s²/m + (3 % of it)²), s the spread of m means over 5 s.
     """
     part = free_part(motion)
