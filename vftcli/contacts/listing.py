@@ -306,7 +306,7 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
 def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:
     """One row for contacts that are a load: mean of the ungated wrench, and band.
 
-    None if less than half of their force acts between them. SD of the mean:
+    None if less than half of it acts between them. SD of the mean:
     √(s²/m + (3 % of it)²), s the spread of m means over 5 s.
     """
     part = free_part(motion)
@@ -314,7 +314,7 @@ def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact | None:
     start, stop = contacts[0].start, contacts[-1].stop
     inside = (wrench.t >= start) & (wrench.t <= stop)
     values, t = wrench.values[inside], wrench.t[inside]
-    on = np.any([(t >= contact.start) & (t <= contact.stop) for contact in contacts], axis=0)
+    on = np.any([(t >= c.start) & (t <= c.stop) for c in contacts], axis=0)
     felt = values[on, :3].mean(axis=0)
     if not on.all() and values[~on, :3].mean(axis=0) @ felt < SHARE * felt @ felt:
         return None

@@ -222,7 +222,7 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
         share = AMBIGUOUS  # a factor disguises another generation's masses as a load does
     else:
         share = 1 / AMBIGUOUS if own.load > other.load + GENERATION else ANOTHER
-    # What a load explains, known or not, is no other arm's.
+    # What a load explains is no other arm's.
     healed, load = diagnosis.healed, diagnosis.healed.loaded
     fit = load if 0 < load.values[0] < HEAVY else healed.best
     return other.fits and other.misfit < share * fit.size / healed.size
