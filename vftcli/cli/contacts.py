@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.console import LeftOut, canvas, echo, echo_data, say_analysis, say_json
+from vftcli.evaluation import ReferenceChoice
 from vftcli.free_motion import FreeChoice
 from vftcli.signals.option import OUTPUT, Anyway, Asked, Choice, Option
 
@@ -26,11 +27,11 @@ class ListForm(Choice):
     all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.")]
 
 
-@opt.command(*opt.OF_LOG, FreeChoice, ListForm, Anyway, opt.Talk)
+@opt.command(ReferenceChoice, *opt.OF_LOG, FreeChoice, ListForm, Anyway, opt.Talk)
 def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     """List what touched the arm. The default command.
 
-    Needs no reference. Name contact-free motion (--free LOG or A:B) to find weaker contacts.
+    Name contact-free motion (--free LOG or A:B) to find weaker contacts.
 
     Example: vftcli contacts fixtures/ur5_circle.csv --robot ur5 --free 0.3:4
     """
@@ -38,7 +39,7 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     if json and csv:
         raise typer.BadParameter("choose one of --json, --csv")
 
-    from vftcli.pipeline import analyse_logs, list_touches
+    from vftcli.pipeline import analyse, analyse_logs, list_touches
     from vftcli.readers.reading import Library
     from vftcli.readers.references import stored_observers
 
@@ -47,9 +48,9 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
         return
     library = Library(logs)
     choice = opt.choice_for(asked, library, on_screen=not (json or csv))
-    left_out = LeftOut(library, logs)
-    found = []
-    for made in analyse_logs(logs, choice, left_out.add, list_touches):
+    left_out, found = LeftOut(library, logs), []
+    work = list_touches if choice.reference is None else analyse
+    for made in analyse_logs(logs, choice, left_out.add, work):
         say_analysis(made)
         found.append(made)
     if found:
