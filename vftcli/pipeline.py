@@ -108,8 +108,7 @@ def choice_of(
     wrench = asked.words.get("wrench") or asked.states(WrenchChoice)
     reference, refinement = None, asked.of(RefinementChoice)
     if asked.words.get("reference") is not None:
-        judged = bool(asked.words.get("details"))
-        reference = replace(asked.of(ReferenceChoice), contacts=judged)
+        reference = replace(asked.of(ReferenceChoice), contacts=bool(asked.words.get("details")))
     return AnalysisChoice(
         read=asked.of(ReadChoice),
         robot=asked.of(RobotChoice),

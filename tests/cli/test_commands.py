@@ -142,6 +142,13 @@ def test_the_answer_is_on_stdout_and_nothing_is_written(run, here: Path) -> None
     assert not list(here.iterdir())
 
 
+def test_a_reference_is_one_more_line(run) -> None:
+    words = ("contacts", FIXTURES / "ur5_circle.csv", "--robot", "ur5", "--reference", "two-cycle")
+    code, out, _ = run(*words)
+    assert (code, "no reference" in out) == (0, False)
+    assert "Against two-cycle without J5 (floor " in out
+
+
 def test_a_free_part_that_is_not_there_is_refused(refused) -> None:
     assert "free part" in refused("contacts", TAPS, "--robot", "ur5", "--free", "90:95")
 

@@ -71,7 +71,7 @@ class ForceChoice(AnalysisChoice):
     @property
     def suffix(self) -> str:
         """Suffix of the columns' names: the arm, of a dataset of two."""
-        return f"_{self.read.arm}" if self.read.arm is not None else ""
+        return f"_{self.read.arm}" if self.read.arm else ""
 
 
 class EpisodesTask(NamedTuple):

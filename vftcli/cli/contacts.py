@@ -49,7 +49,7 @@ def list_contacts(logs: opt.Logs, asked: Asked) -> None:
     library = Library(logs)
     choice = opt.choice_for(asked, library, on_screen=not (json or csv))
     left_out, found = LeftOut(library, logs), []
-    work = list_touches if choice.reference is None else analyse
+    work = analyse if choice.reference else list_touches
     for made in analyse_logs(logs, choice, left_out.add, work):
         say_analysis(made)
         found.append(made)

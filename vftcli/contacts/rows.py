@@ -164,7 +164,7 @@ class ContactMeasurement:
         """The contacts, numbered, in the order of time; better places may be given."""
         runs, J, wrenches = self.found.runs, self.found.places[0].jacobian, [*self.wrenches]
         chain, q = self.run.robot.loaded_chain, self.log.blocks.q
-        locations = self.locations if locations is None else locations
+        locations = locations or self.locations
         moved = {
             i: jacobian_of(lambda a, b: link_poses(chain, q[a:b]), *where.fits[0][:2])
             for i, where in enumerate(locations)

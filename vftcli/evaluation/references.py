@@ -154,7 +154,7 @@ def judge_jacobian(
     The wrench is in the axes and about the point of the log's own Jacobian; the sensor's
     axes, their order and signs, are fitted to it.
     """
-    zero = asked.zero if asked is not None else ZeroChoice()
+    zero = asked.zero if asked else ZeroChoice()
     if asked is not None and asked != WrenchChoice(zero=ZeroChoice(spans=zero.spans)):
         raise ParameterError(
             f"{log.name}: the log has no positions, so its wrench is least squares in the axes of "

@@ -90,7 +90,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
         if deviation <= RETURNS * spread and seconds > 0.5 * lag * step:
             return Period(seconds, deviation)
         closest = min(closest, (seconds, deviation), key=lambda c: c[1])
-    wanted = f" near {stated:g} s" if stated is not None else ""
+    wanted = f" near {stated:g} s" if stated else ""
     seconds, deviation = closest
     near = (
         f" (closest after {seconds:.4g} s, where three quarters of them are more than "

@@ -33,7 +33,7 @@ class Hdf5Dataset:
 
     def files(self) -> Iterator[DataFile]:
         """The files with their episodes, by name."""
-        for path in [self._only] if self._only is not None else files_below(self.folder):
+        for path in [self._only] if self._only else files_below(self.folder):
             numbers = FORMATS["hdf5"].numbers(open_log(path))
             yield DataFile(path.relative_to(self.folder), path, numbers)
 
