@@ -143,7 +143,14 @@ def test_the_answer_is_on_stdout_and_nothing_is_written(run, here: Path) -> None
 
 
 def test_a_reference_is_one_more_line(run) -> None:
-    words = ("contacts", FIXTURES / "ur5_circle.csv", "--robot", "ur5", "--reference", "two-cycle")
+    words = (
+        "contacts",
+        FIXTURES / "ur5_circle.csv",
+        "--robot",
+        "ur5",
+        "--reference",
+        "two-cycle",
+    )
     code, out, _ = run(*words)
     assert (code, "no reference" in out) == (0, False)
     assert "Against two-cycle without J5 (floor " in out
