@@ -244,14 +244,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_866,
+    "lines of Python": 50_848,
     "files": 210,
-    "functions": 2718,
-    "functions over 60 lines": 9,
-    "names, operators, numbers": 365_907,
+    "functions": 2715,
+    "functions over 60 lines": 8,
+    "names, operators, numbers": 365_906,
     "characters a line that is not blank": 50.19,
     "noqa": 70,
-    "lines of TOML, JavaScript, CSS": 7392,
+    "lines of TOML, JavaScript, CSS": 7290,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 
