@@ -68,7 +68,7 @@ def test_each_option_stands_under_its_reason(run, here: Path) -> None:
 
 
 def test_an_arm_is_looked_for_where_it_is_named_or_tells_what_an_effort_is(run) -> None:
-    words = ("inspect", FIXTURES / "ur5_circle.csv")
+    words = ("inspect", FIXTURES / "ur5_circle.csv", "--details")
     assert "robot guessed" not in run(*words)[2]
     assert "note: robot guessed: ur5" in run(*words, "--set", "log.effort=auto")[2]
     assert "note: torque_constant: " in run(*words, "--robot", "ur5")[2]  # of its profile
