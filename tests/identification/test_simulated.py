@@ -118,5 +118,9 @@ def test_a_motion_that_repeats_itself_does_not_spoil_the_profile(train, other):
     (count,) = [r for r in found.remarks if r.code == "undetermined-base-parameters"]
     assert count.level == "caution"
     elsewhere = next(t for t in found.traces if t.role == "held-out")
-    # It is .79 N·m of the profile's .70, which a remark says; with a pull of .01 it was 5.0.
+    # With a pull of .01 it was 5.0 N·m, seven times the profile's .70.
     assert np.mean(elsewhere.rms) <= 1.25 * np.mean(elsewhere.before)
+    if np.mean(elsewhere.rms) > np.mean(elsewhere.before):
+        pytest.xfail(
+            "still worse elsewhere than the profile (.79 of .70 N·m), and a remark says so"
+        )
