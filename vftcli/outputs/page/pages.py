@@ -144,9 +144,9 @@ def lead_sentences(analysis: Analysis) -> list[str]:
         said.append(f"{', '.join(f'{count} {place}' for place, count in places.items())}.")
     weak = [str(contact.number) for contact in rows if contact.trust == "weak"]
     if len(weak) == 1:
-        said.append(f"The size of {weak[0]} is uncertain.")
+        said.append(f"The size of contact {weak[0]} is uncertain.")
     elif weak:
-        several = f"{', '.join(weak[:-1])} and {weak[-1]}"
+        several = f"contacts {', '.join(weak[:-1])} and {weak[-1]}"
         named = several if len(weak) <= MOST_NAMED else f"{len(weak)} contacts"
         said.append(f"The sizes of {named} are uncertain.")
     return [*said, otherwise(found)]
