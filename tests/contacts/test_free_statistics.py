@@ -19,7 +19,7 @@ from vftcli.contacts.free_statistics import (
     torque_level,
 )
 from vftcli.free_motion import FreeChoice
-from vftcli.free_motion.free_motion import FreeLoad
+from vftcli.free_motion.free_motion import FreeLoad, without_load
 from vftcli.readers.reading import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run, RunSamples
@@ -101,7 +101,9 @@ def test_a_load_in_the_free_part_is_no_noise():
     """2.8 kg that the model lacks, in every sample: said, and off the noise and the log alike."""
     plain = motion(LOG, "ur5", "0.3:4")
     load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, moment_sd=np.zeros(3), share=0.5)
-    run = plain.log.less(-load.torque(plain.log))
+    bare, carried = plain.log.terms, without_load(plain.log, load).terms
+    hung = replace(bare, p=2.0 * bare.p - carried.p, mu=2.0 * bare.mu - carried.mu)
+    run = plain.log.holding(terms=hung)
     bias = whole_log_bias(plain.log)
     heavy = free_statistics(replace(plain, log=run), bias)
     light = free_statistics(plain, bias)

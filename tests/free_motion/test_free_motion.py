@@ -10,10 +10,17 @@ import pytest
 from vftcli.bias.baseline import Baseline, baseline_of, free_reading
 from vftcli.free_motion import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
 from vftcli.free_motion.difference import RUNGS
-from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreeRun, columns, free_load
+from vftcli.free_motion.free_motion import (
+    FreeLoad,
+    FreeMotion,
+    FreeRun,
+    columns,
+    free_load,
+    without_load,
+)
 from vftcli.free_motion.two_cycle import partners_in_log, partners_in_logs
 from vftcli.observers.tuning import tune_to_spectra
-from vftcli.robots import load_robot
+from vftcli.robots import Payload, load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run, RunSamples
@@ -189,6 +196,19 @@ def test_a_payload_is_weighed_and_reported(log: Recording) -> None:
     (remark,) = [r for r in found.remarks if r.code == "free-part-loaded"]
     assert remark.values["load_kg"] == load.mass
     assert str(remark)
+
+
+def test_an_arm_carries_the_inertia_of_a_load_too(log: Recording) -> None:
+    """As with the same load mounted; or every start and stop would look like a push."""
+    load = FreeLoad(mass=3.0, moment=PAYLOAD[1:], sd=0.1, moment_sd=np.ones(3), share=0.5)
+    body = Payload(mass=3.0, com=PAYLOAD[1:] / 3.0, inertia=np.zeros((3, 3)))
+    arm = ROBOT.without_friction()
+    bare, mounted = (Run(recording=log, robot=robot) for robot in (arm, arm.with_payload(body)))
+    found = without_load(bare, load)
+    np.testing.assert_allclose(found.terms.p, mounted.terms.p, atol=1e-9)
+    np.testing.assert_allclose(found.terms.mu, mounted.terms.mu, atol=1e-9)
+    assert np.ptp(found.terms.p - bare.terms.p) > 0.5
+    assert without_load(bare, None) is bare
 
 
 def test_its_wrench_is_what_its_torque_comes_from(log: Recording) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_runs import run_of
 
-from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, without_load
 from vftcli.notebook import report
 from vftcli.observers import MomentumObserver
 from vftcli.readers.reading import read as read_file
@@ -224,8 +224,8 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion):
         mass=2.0, moment=np.array([0.0, 0.0, 0.1]), sd=0.1, moment_sd=np.full(3, 0.01), share=0.5
     )
     run, nothing = motion.log, np.zeros(motion.log.recording.samples, dtype=bool)
-    plain = as_modelled(motion)
-    loaded = FreeLog(run.less(-load.torque(run)), plain.free, load)
+    plain = FreeLog(without_load(run, load), as_modelled(motion).free)
+    loaded = FreeLog(run, plain.free, load)
     gate = Gate([(4.5, 5.0)], WrenchPrior(1.0, 30.0))
     bare, found = (
         smooth_all(["best"], log, {}, unloaded=nothing, gate=gate)["best"]

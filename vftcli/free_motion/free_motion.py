@@ -27,8 +27,8 @@ from vftcli.free_motion.cycles import (
     segment,
 )
 from vftcli.free_motion.difference import Pairing, pair_with_run
-from vftcli.robots.chain import Chain
-from vftcli.robots.kernels import load_regressor, load_wrench
+from vftcli.robots.chain import Chain, Payload
+from vftcli.robots.kernels import load_regressor, load_wrench, momentum_terms
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import gain_sd
 from vftcli.signals.arrays import (
@@ -266,8 +266,18 @@ class FreeLoad:
 
 
 def without_load(run: Run, load: FreeLoad | None) -> Run:
-    """A run without a load, μ ← μ + τ_load; itself where there is none."""
-    return run if load is None else run.less(load.torque(run))
+    """A run whose model carries a load as a point mass; itself where there is none.
+
+    By its weight alone every start and stop would look like a push.
+    """
+    if load is None:
+        return run
+    body = Payload(mass=load.mass, com=load.moment / load.mass, inertia=np.zeros((3, 3)))
+    chain = run.robot.loaded_chain
+    arms = (momentum_terms(each, run.q, run.dq) for each in (chain.with_payload(body), chain))
+    p, coriolis, gravity = map(np.subtract, *arms)
+    p, mu = (handed_over(x) for x in (run.terms.p + p, run.terms.mu + coriolis - gravity))
+    return run.holding(terms=replace(run.terms, p=p, mu=mu))
 
 
 def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
