@@ -57,14 +57,14 @@ def test_the_band_is_what_the_equation_says(worked_up):
 
 def test_what_limits_the_log_is_said_joint_by_joint(worked_up):
     found = worked_up.refinement
-    budget = found.budgets[-1]
+    budget = found.budget["rts-auto"]
     limits = found.remarks[-1]
     assert (limits.code, limits.where.about) == ("limits", "rts-auto")
     assert limits.values["causes"][4] == "stiction at rest"  # J5 rests
-    assert all(np.all(part >= 0.0) for part in budget.parts.values())
+    assert all(np.all(part >= 0.0) for part in budget.values())
     # its parts but bandwidth are the free rms, cause by cause
     read = np.mean(worked_up.estimates[-1].tau[found.baselines.plain.part.own] ** 2, axis=0)
-    parts = sum(budget.parts[cause] ** 2 for cause in ("noise", "friction", "model"))
+    parts = sum(budget[cause] ** 2 for cause in ("noise", "friction", "model"))
     np.testing.assert_allclose(parts, read, rtol=1e-9)
 
 

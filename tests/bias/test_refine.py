@@ -12,7 +12,6 @@ from vftcli.bias import AUTOMATIC, REMOVALS, RefinementChoice
 from vftcli.bias.baseline import Baseline, Baselines, baseline_of, free_reading
 from vftcli.bias.refine import (
     STICTION,
-    Budget,
     band_remarks,
     friction_share,
     limits_remark,
@@ -138,32 +137,29 @@ def test_friction_beside_another_error_is_its_share_of_the_power():
     assert not friction_share(DQ, np.zeros_like(DQ)).any()
 
 
-def budget() -> Budget:
+def test_the_largest_cause_of_each_joint_is_named():
     sizes = {
         "noise": [3.0, 0.1],
         "friction": [4.0, 0.2],
         "model": [0.0, 0.1],
         "bandwidth": [0.0, 0.5],
+        STICTION: [9.0, 7.0],
     }
-    return Budget(
-        "gmo", {**{k: np.array(v) for k, v in sizes.items()}, STICTION: np.array([9.0, 7.0])}
-    )
-
-
-def test_the_largest_cause_of_each_joint_is_named():
-    np.testing.assert_allclose(budget().total, [5.0, np.sqrt(0.31)])  # stiction is no part of it
-    free = limits_remark(budget(), np.array([False, False]))
+    causes = {cause: np.array(size) for cause, size in sizes.items()}
+    free = limits_remark("gmo", causes, np.array([False, False]))
     assert free.values["causes"] == ["friction", "bandwidth"]
     assert free.values["size_Nm"] == [4.0, 0.5]
-    stuck = limits_remark(budget(), np.array([True, False]))
+    # stiction is no part of what moves
+    np.testing.assert_allclose(free.values["total_Nm"], [5.0, np.sqrt(0.31)])
+    stuck = limits_remark("gmo", causes, np.array([True, False]))
     assert stuck.values["causes"] == [STICTION, "bandwidth"]
     assert stuck.values["size_Nm"][0] == 9.0
     # 9 N·m beside the 5 of the other causes, and nothing beside the joint that moves
     together = np.sqrt([9.0**2 + 5.0**2, 0.31])
     np.testing.assert_allclose(stuck.values["total_Nm"], together)
-    found = budget()
-    found.parts[STICTION][0] = 0.0
-    assert limits_remark(found, np.array([True, True])).values["causes"] == ["friction", STICTION]
+    causes[STICTION][0] = 0.0
+    both = limits_remark("gmo", causes, np.array([True, True]))
+    assert both.values["causes"] == ["friction", STICTION]
 
 
 @pytest.mark.parametrize(

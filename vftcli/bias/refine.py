@@ -5,7 +5,6 @@ Bands come from the log's own free samples and spectra, without a reference.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -34,8 +33,8 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     called = fitted_error(found, reading)
     if spectra is not None and len(reading.samples):
-        f, step, n = spectra.frequency, spectra.step, spectra.joints
-        missed = spectra.missed(reading.observer.frequency_response(f, step, n))
+        asked = spectra.frequency, spectra.step, spectra.joints
+        missed = spectra.missed(reading.observer.frequency_response(*asked))
         error = free_error(reading.samples, reading.resting, run.dry_friction)
         if called is not None and found.by_fit:
             error = called  # the free part is these samples, and loads in them are no error
@@ -99,29 +98,16 @@ def band_remarks(found: Baseline) -> list[Remark]:
     return [fact("band"), stuck] if found.stuck.any() else [fact("band")]
 
 
-class Budget(NamedTuple):
-    """Sources of one observer's error, estimated on the log itself."""
-
-    name: str  #: The observer.
-    parts: dict[str, Array]  #: Cause → RMS. (n,) [N·m]
-
-    @property
-    def total(self) -> Array:
-        """Root sum of squares of all causes but stiction at rest. (n,) [N·m]"""
-        squares = [v**2 for cause, v in self.parts.items() if cause != STICTION]
-        return np.asarray(np.sqrt(np.sum(squares, axis=0)))
-
-
-def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
-    """Divide an observer's error into its causes, each estimated from the log.
+def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> dict[str, Array]:
+    """RMS of an observer's error by each cause, estimated from the log. (n,) [N·m]
 
     Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. Other readings
     on the free part are model error: friction as far as sign and size of a joint's
     velocity explain it, else the rest of the model. Stiction at rest is the dry friction
     a resting joint may hide, F_c/√3, times its share of time at rest.
     """
-    f, step, n = spectra.frequency, spectra.step, spectra.joints
-    response = reading.observer.frequency_response(f, step, n)
+    asked = spectra.frequency, spectra.step, spectra.joints
+    response = reading.observer.frequency_response(*asked)
     read = rms_of_known(reading.samples) ** 2
     share = abs(response) ** 2
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
@@ -136,8 +122,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
         "bandwidth": spectra.missed(response),
         STICTION: hidden**2 * log.standing.mean(axis=0),
     }
-    parts = {cause: np.sqrt(value) for cause, value in squares.items()}
-    return Budget(reading.observer.name, parts)
+    return {cause: np.sqrt(value) for cause, value in squares.items()}
 
 
 def friction_share(dq: Array, tau: Array) -> Array:
@@ -151,22 +136,16 @@ def friction_share(dq: Array, tau: Array) -> Array:
     return np.clip(shares, 0.0, 1.0)
 
 
-def limits_remark(found: Budget, stuck: Mask) -> Remark:
-    """Limits of a log: each joint's largest cause, and its part of the error.
+def limits_remark(name: str, causes: Mapping[str, Array], stuck: Mask) -> Remark:
+    """Each joint's largest cause of error, and its part of all.
 
-    Hidden stiction is added to the error of a standing joint, one of `stuck`. (n,)
+    Hidden stiction is an error of a standing joint, one of `stuck`. (n,)
     """
-    stiction = found.parts[STICTION]
-    moving = {cause: part for cause, part in found.parts.items() if cause != STICTION}
-    decided = stuck & (stiction > 0.0)  # no friction known: nothing known of stiction
-    named = [
-        STICTION if rests else max(moving, key=lambda cause: float(moving[cause][j]))
-        for j, rests in enumerate(decided)
-    ]
-    size = [found.parts[cause][j] for j, cause in enumerate(named)]
-    total = np.hypot(found.total, np.where(stuck, stiction, 0.0))
-    where = Where(about=found.name)
-    return fact("limits", where, causes=named, size_Nm=size, total_Nm=total)
+    felt = {**causes, STICTION: np.where(stuck, causes[STICTION], 0.0)}
+    sizes = np.array([*felt.values()])
+    named = [list(felt)[k] for k in sizes.argmax(axis=0)]
+    size, total = sizes.max(axis=0), np.linalg.norm(sizes, axis=0)
+    return fact("limits", Where(about=name), causes=named, size_Nm=size, total_Nm=total)
 
 
 @record
@@ -176,8 +155,8 @@ class Refinement(Shown):
     estimates: tuple[ExternalTorque, ...]  #: The estimates with their bands.
     baselines: Baselines  #: The log's free part and spectra, as the observers have them.
     curves: Mapping[str, Curve]  #: Observer that was tuned → the curve that was minimised.
-    #: Where each observer's error comes from, one an observer; none without spectra.
-    budgets: tuple[Budget, ...]
+    #: Best observer → RMS of its error by cause; none without spectra. (n,) [N·m]
+    budget: Mapping[str, Mapping[str, Array]]
     removed: str  #: What ``bias.method`` asked for.
     remarks: tuple[Remark, ...]  #: What the reader of the estimates should know.
 
@@ -189,29 +168,27 @@ def refine(
     removed: str = AUTOMATIC,
 ) -> Refinement:
     """The observers' estimates, in this order, with their bands and what limits them."""
-    remarks, budgets, shown, plain = [*found.remarks], list[Budget](), [], found.plain
+    remarks, causes, shown, plain = [*found.remarks], {}, [], found.plain
+    *_, leading = sorted(observers, key=lambda observer: observer.name == BEST)
     for observer, estimate in zip(observers, estimates, strict=True):
         # Observers may run on different terms: each is measured on its own.
         on = found.of(observer.name)
         reading = free_reading(on, observer, estimate)
-        if on.spectra is not None:
-            budgets.append(budget(on, on.spectra, reading))
+        if observer is leading and on.spectra is not None:
+            causes = {observer.name: budget(on, on.spectra, reading)}
         shown.append(with_band(on, reading))
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
     for name, curve in curves.items():
-        values = {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
-        remarks.append(fact("tuned", Where(name), **values))
-    for name, curve in curves.items():
+        least = {"expected_rmse_Nm": curve.least}
+        remarks.append(fact("tuned", Where(name), omega_n_rad_s=curve.best, **least))
         remarks += bound_remarks(name, curve.best, curve.omega_n)
     remarks += band_remarks(plain)
-    # Of the most accurate estimate: of `best` if it ran, else of the last.
-    leading = [one for one in budgets if one.name == BEST] or budgets[-1:]
-    remarks += [limits_remark(one, plain.stuck) for one in leading]
+    remarks += [limits_remark(name, each, plain.stuck) for name, each in causes.items()]
     return Refinement(
         estimates=tuple(shown),
         baselines=found,
         curves=curves,
-        budgets=tuple(budgets),
+        budget=causes,
         removed=removed,
         remarks=tuple(remarks),
     )

@@ -106,13 +106,13 @@ def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | 
     part = free_part(motion)
     if part is None:
         return None
-    log = bias.corrected(motion.log)
-    pieces = tuple(
-        p._replace(run=log if p.run is motion.log else bias.of(p.run)) for p in part.pieces
-    )
     load = free_load(part.pieces)
     # An unknown load is no noise: contacts are found beside it.
-    pieces = tuple(p._replace(run=without_load(p.run, load)) for p in pieces)
+    log = without_load(bias.corrected(motion.log), load)
+    pieces = tuple(
+        p._replace(run=log if p.run is motion.log else without_load(bias.of(p.run), load))
+        for p in part.pieces
+    )
     noise = noise_of(log, pieces, contact_block(log.t), known=True)
     if noise is None:
         return None
@@ -120,7 +120,7 @@ def free_statistics(motion: FreeMotion, bias: WholeLogBias) -> FreeStatistics | 
         noise=noise,
         level=torque_level(pieces),
         own=part.own,
-        log=without_load(log, load),
+        log=log,
         free=pieces,
         load=load if part.own.any() else None,
         remarks=part.remarks if load is None else (*part.remarks, load.remark),

@@ -249,7 +249,7 @@ def refinement_record(analysis: Analysis) -> Record | None:
             name: {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
             for name, curve in found.curves.items()
         },
-        "error_budget_Nm": {budget.name: budget.parts for budget in found.budgets},
+        "error_budget_Nm": found.budget,
         "band_sd_Nm": {
             e.name: root_mean_squares(e.error_sd)
             for e in analysis.estimates

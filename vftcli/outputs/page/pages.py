@@ -91,11 +91,9 @@ def render(analysis: Analysis, sizes: Mapping[str, int | None] = {}) -> str:
         grids = [drift_grid(sensed.drifts)] if sensed.drifts else []
         grids += contact_grids(analysis.errors)
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
-    if (refined := analysis.refinement) is not None and refined.budgets:
-        # Stiction at rest is a bound, so the sum leaves it out.
-        first = refined.budgets[0]
-        each = {**first.parts, "all but stiction at rest": first.total}.items()
-        rows: Rows = [(first.name, cause, *values) for cause, values in each]
+    if (refined := analysis.refinement) is not None and refined.budget:
+        ((name, causes),) = refined.budget.items()
+        rows: Rows = [(name, cause, *values) for cause, values in causes.items()]
         view["budget"] = Grid(("observer", "cause", *joint_columns(log.joints)), rows)
     if analysis.published is not None:
         view["printed"] = print_grid(analysis.published)
