@@ -167,7 +167,7 @@ def refine(
     estimates: Sequence[ExternalTorque],
     removed: str = AUTOMATIC,
 ) -> Refinement:
-    """The observers' estimates, in this order, with their bands and what limits them."""
+    """The observers' estimates, in this order, with bands and limits."""
     remarks, causes, shown, plain = [*found.remarks], {}, [], found.plain
     *_, leading = sorted(observers, key=lambda observer: observer.name == BEST)
     for observer, estimate in zip(observers, estimates, strict=True):
