@@ -31,13 +31,10 @@ from vftcli.observers.tuning import tune_to_spectra
 from vftcli.pipeline import AnalysisChoice, analyse, run_of
 from vftcli.readers.reading import read
 from vftcli.reproduction.timing import (
-    FREE_SECONDS,
     SAMPLES,
     SCRIPT_SAMPLES,
-    TUNED,
     circle,
     dense_kalman_loop,
-    estimate_tuned,
     first_order_loops,
     jittering,
     one_core,
@@ -64,6 +61,11 @@ RATIOS = {
     "memory_bytes_per_sample": "B a sample beyond the log's own, a million samples of a Panda",
 }
 """Name → what is over what."""
+
+FREE_SECONDS = 8.0
+"""Length of the free part for observers tuned to the log. [s]"""
+TUNED = ("kfo-auto", "rts-auto")
+"""Observers that are timed with their tuning."""
 
 FILLED = "output_double_register"
 """Columns that fill the wide log and that no command reads begin so."""
@@ -152,7 +154,7 @@ def core_ratios(robot: Robot, samples: int, rounds: int) -> dict[str, float]:
         smoother.estimate(terms)
         found = spectra(terms)
         for name in TUNED:
-            estimate_tuned(name, terms, found)
+            tune_to_spectra(name, found).estimate(terms)
 
     timings.measure("cold core", core)
     terms = core()

@@ -356,7 +356,7 @@ def test_a_wrong_word_is_one_error(run, words: str, complaint: str) -> None:
 def test_times_are_printed_in_the_form_that_is_asked_for(run, monkeypatch) -> None:
     row = {"total_s": 1.5, "per_sample_us": 1250.0}
     observers = [{"name": "gmo", **row, "paper_s": 10.541}]
-    made = {"simd": "AVX9", "robot": "ur5", "dynamics": row, "complete_log": []}
+    made = {"simd": "AVX9", "robot": "ur5", "dynamics": row}
     made |= {"observers": observers, "ratios": {"even": 1.234, "jittering": 2.345}}
     monkeypatch.setattr("vftcli.reproduction.timing.benchmark", lambda *_: made)
     title = "ur5, 30060 samples, median of 7 rounds, NumPy with AVX9"
@@ -382,7 +382,7 @@ def test_one_table_alone(run, refused, tmp_path: Path) -> None:
     assert "Table IV" in out
     assert "a picture" in out
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"index.html", "reproduction.md", "run.json"}
+    assert names == {"index.html", "run.json"}
     assert "--force" in refused(*words)
 
 
@@ -402,8 +402,8 @@ def test_an_experiment_that_fails_is_a_row_and_exit_code_one(run, monkeypatch, t
     code, out, err = run("reproduce", "p", "-o", tmp_path / "out")
     assert code == 1
     assert "the experiment, seed 1: nothing moved with 1" in out + err
-    text = (tmp_path / "out" / "reproduction.md").read_text("utf-8")
-    assert "## Fig. 1: t" in text
+    text = (tmp_path / "out" / "index.html").read_text("utf-8")
+    assert "Fig. 1: t</h2>" in text
 
 
 # `vftcli simulate` as a user calls it.

@@ -27,9 +27,8 @@ def test_the_keys_that_scripts_read(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row["name"] for row in found["observers"]] == ["fdo", "gmo", "kfo-fe", "kfo-zoh"]
     assert [row["paper_s"] for row in found["observers"]] == [10.869, 10.541, 17.578, 58.363]
     once = {"total_s": 1.0, "per_sample_us": pytest.approx(1e6 / 1200)}
-    for row in (*found["observers"], *found["complete_log"], found["dynamics"]):
+    for row in (*found["observers"], found["dynamics"]):
         assert {key: row[key] for key in once} == once
-    assert found["complete_log"][-1]["name"] == "wrench smoother"
     assert found["simd"] == simd()
     names = ["core_over_rnea_loop", "core_over_rnea_loop_jittering"]
     assert found["ratios"] == (dict.fromkeys(names, 1.0) if find_spec("pinocchio") else {})

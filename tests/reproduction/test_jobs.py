@@ -2,33 +2,35 @@
 
 import pytest
 
-from vftcli.reproduction.experiments import gather, jobs_of, run_jobs
-from vftcli.reproduction.paper import CORRECTED, PAPERS, Job
+from vftcli.reproduction.experiments import experiments_of, gather, run_jobs
+from vftcli.reproduction.paper import CORRECTED, PAPERS
 from vftcli.signals.progress import heard_by
 
 HUANG = PAPERS["huang2025"]
 
 
 def test_items_share_their_runs() -> None:
-    """Table I, Fig. 3 and the guidelines are one circle a seed, the guidelines time too."""
-    jobs = jobs_of(HUANG, ("table1", "fig3", "guidelines"), fast=False)
-    assert [job.experiment.name for job in jobs] == ["circle"] * 5 + ["time"]
-    assert [job.seed for job in jobs[:5]] == list(HUANG.experiments["circle"].seeds)
+    """Table I and Fig. 3 are one circle a seed."""
+    circle, time = experiments_of(HUANG, ("table1", "fig3", "table2"), fast=False)
+    assert [circle, time] == [HUANG.experiments[name] for name in ("circle", "time")]
     # An experiment that states no seeds of its own has five.
-    assert [job.seed for job in jobs_of(HUANG, ("fig9",), fast=False)] == [1, 2, 3, 4, 5]
+    (twist,) = experiments_of(HUANG, ("fig9",), fast=False)
+    assert twist.seeds == (1, 2, 3, 4, 5)
 
 
 def test_fast_takes_the_first_seed_of_each() -> None:
-    jobs = jobs_of(HUANG, tuple(HUANG.items), fast=True)
-    assert len(jobs) == len(HUANG.experiments)
-    assert jobs_of(HUANG, ("fig1",), fast=True) == []
+    found = experiments_of(HUANG, tuple(HUANG.items), fast=True)
+    assert {e.name: [*e.seeds] for e in found} == {
+        name: [e.seeds[0]] for name, e in HUANG.experiments.items()
+    }
+    assert experiments_of(HUANG, ("fig1",), fast=True) == []
 
 
 def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
-    jobs, reported = jobs_of(cheap, tuple(cheap.items), fast=False), []
+    experiments, reported = experiments_of(cheap, tuple(cheap.items), fast=False), []
     with heard_by(lambda *words: reported.append(words)):
-        results = run_jobs(jobs, workers=0)
-    assert [job for job, _ in results] == jobs
+        results = run_jobs(experiments, workers=0)
+    assert [name for name, _ in results] == ["works"] * 3 + ["fails"] * 2 + ["timed"]
     # What takes the time has the machine for itself.
     assert reported[-1] == ("6 of 6 runs done: timed, seed 0", 1.0)
     found = gather(cheap, tuple(cheap.items), results)
@@ -49,10 +51,6 @@ def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
 
 @pytest.mark.slow
 def test_numbers_do_not_depend_on_how_many_run_at_once() -> None:
-    jobs = [Job(HUANG.experiments[name], 0) for name in ("release-ur5", "release-panda")]
-
-    def nobody(done: int, of: int, what: str) -> None:
-        pass
-
-    one, two = (run_jobs(jobs, workers=n) for n in (0, 2))
+    experiments = [HUANG.experiments[name] for name in ("release-ur5", "release-panda")]
+    one, two = (run_jobs(experiments, workers=n) for n in (0, 2))
     assert one == two

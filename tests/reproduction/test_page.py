@@ -1,5 +1,7 @@
-"""How a reproduction reads: spreads, ratios, failures, and the same tables on page and in text."""
+"""How a reproduction reads: spreads, ratios, failures, and the page."""
 
+import json
+import re
 from pathlib import Path
 
 import pytest
@@ -8,12 +10,10 @@ from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import DASH, terminal
 from vftcli.reproduction.experiments import (
     beside_print,
+    experiments_of,
     files_of,
     gather,
-    jobs_of,
     overview,
-    render_markdown,
-    render_page,
     run_jobs,
     spread,
     write_reproduction,
@@ -22,9 +22,9 @@ from vftcli.reproduction.experiments import (
 
 @pytest.fixture
 def made(cheap):
-    jobs = jobs_of(cheap, tuple(cheap.items), fast=False)
-    results = run_jobs(jobs, workers=0)
-    return gather(cheap, tuple(cheap.items), results), jobs
+    experiments = experiments_of(cheap, tuple(cheap.items), fast=False)
+    results = run_jobs(experiments, workers=0)
+    return gather(cheap, tuple(cheap.items), results), experiments
 
 
 @pytest.mark.parametrize(
@@ -56,31 +56,35 @@ def test_ours_stands_over_the_print_and_in_the_terminal(made) -> None:
     assert left_out == "No room for: what it shows, ours."
 
 
-def test_page_and_text_have_every_item_and_what_failed(made, cheap) -> None:
-    found, jobs = made
-    page, text = (
-        render_page(cheap, found, jobs),
-        render_markdown(cheap, found, jobs, "vftcli reproduce cheap"),
-    )
-    for name in found:
-        assert f'<h2 id="{name}">' in page
-        assert f"## {cheap.items[name].label}:" in text
+def test_the_page_has_every_item_and_what_failed(made, cheap, tmp_path: Path) -> None:
+    found, experiments = made
+    with OutputFolder(tmp_path / "out", False, files_of(cheap, (), None)) as folder:
+        write_reproduction(folder, cheap, found, experiments, "vftcli reproduce cheap")
+    page = (tmp_path / "out" / "index.html").read_text("utf-8")
+    for name, item in cheap.items.items():
+        assert f'<h2 id="{name}">{item.label}: ' in page
     assert "A &lt;figure&gt;" in page
+    assert "<strong>In size.</strong> Because." in page
     assert page.count("nothing moved with 2") == 2  # in its row and at its item
-    assert "**Failed:** what fails, seed 2: nothing moved with 2" in text
-    assert "| alpha | N | 2 | 3 | 4 (3 … 5) | 0.500 |" in text
-    assert "- what works: seeds 1, 2, 3" in text
-    assert "Made by `vftcli reproduce cheap`." in text
+    (row,) = re.findall('<th scope="row">alpha</th>(.*?)</tr>', page, re.DOTALL)[:1]
+    texts = re.findall("<td.*?>(.*?)</td>", row)
+    assert texts == ["N", "2", "3", "4 (3 … 5)", "0.500"]
+    assert "what works: seeds 1, 2, 3<" in page
+    assert "what takes the time<" in page
     assert "src=" not in page  # nothing is loaded from anywhere
-    assert "- what takes the time\n" in text
+    record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
+    assert record["command"] == "vftcli reproduce cheap"
+    assert record["runs"][-1] == {"experiment": "timed", "seed": 0}
+    assert record["values"]["fig1"]["a"]["corrected"] == [3.0, 4.0, 5.0]
+    assert len(record["failures"]["fig3"]) == 2
 
 
 def test_all_that_is_written_was_reported_before(made, cheap, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
-    found, jobs = made
+    found, experiments = made
     names = files_of(cheap, tuple(cheap.items), "svg")
     with OutputFolder(tmp_path / "out", False, names) as folder:
-        write_reproduction(folder, cheap, found, jobs, "command", "svg")
+        write_reproduction(folder, cheap, found, experiments, "command", "svg")
     there = {p.relative_to(tmp_path / "out").as_posix() for p in (tmp_path / "out").rglob("*.*")}
     assert there == set(names)
     assert "figures/fig1-single.svg" in there

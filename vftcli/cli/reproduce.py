@@ -25,18 +25,17 @@ def reproduce(
 ) -> None:
     """Run the paper's experiments beside its numbers.
 
-    On simulated equivalents, with stated seeds. Writes PATH/index.html, reproduction.md and
-    run.json. An experiment that fails says so in its row; the others are written, and the
-    exit code is 1.
+    On simulated equivalents, with stated seeds. Writes PATH/index.html and run.json. An
+    experiment that fails says so in its row; the others are written, and the exit code is 1.
 
     Example: vftcli reproduce huang2025 --only table3
     """
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.grid import terminal
     from vftcli.reproduction.experiments import (
+        experiments_of,
         files_of,
         gather,
-        jobs_of,
         overview,
         run_jobs,
         write_reproduction,
@@ -50,10 +49,10 @@ def reproduce(
     output = output or Path(f"{paper}.vft")
     folder = OutputFolder(output, force, files_of(wanted, names, figures))
     folder.check()
-    jobs = jobs_of(wanted, names, fast)
-    found = gather(wanted, names, run_jobs(jobs))
+    chosen = experiments_of(wanted, names, fast=fast)
+    found = gather(wanted, names, run_jobs(chosen))
     with folder:
-        write_reproduction(folder, wanted, found, jobs, asked.line, figures)
+        write_reproduction(folder, wanted, found, chosen, asked.line, figures)
     show(terminal(overview(found)))
     say(f"wrote {output}: open {output / 'index.html'}")
     if any(item.failures for item in found.values()):

@@ -121,7 +121,7 @@ def bench_grid(result: Record) -> Grid:
         "per_sample_us": Column("per sample", "µs", ".3f"),
         "paper_s": Column("paper, its laptop", "s", ".3f"),
     }
-    return keyed_grid(columns, [dynamics, *result["observers"], *result["complete_log"]])
+    return keyed_grid(columns, [dynamics, *result["observers"]])
 
 
 def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:

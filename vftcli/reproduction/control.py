@@ -9,10 +9,11 @@ import numpy as np
 from vftcli.admittance import ControlChoice
 from vftcli.admittance.closed_loop import ClosedLoop, Latency, latencies, loop_of
 from vftcli.admittance.law import AXES, UnstableError
-from vftcli.admittance.motion import release, releases_of, rows_of
+from vftcli.admittance.motion import release
 from vftcli.admittance.motion import run as follow_force
-from vftcli.admittance.replay import Replay, replay, settling
+from vftcli.admittance.replay import Replay, replay, replay_release
 from vftcli.observers import ObserverChoice
+from vftcli.outputs import Record
 from vftcli.outputs.admittance import charts as replay_charts
 from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, Given
@@ -30,6 +31,8 @@ OBSERVERS = {
     variant: ObserverChoice.parsed(observer=["kfo-fe"], **words)
     for variant, words in VARIANTS.items()
 }
+#: Parameters of Tables III and IV.
+PARAMETERS = ("mass", "damping", "stiffness", "alpha", "threshold", "speed_limit", "xi")
 #: Variant → its name with a traditional controller under the whole force.
 UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
 #: Axes of force and displacement, of moment and rotation.
@@ -82,31 +85,35 @@ def ungated(found: Replay) -> Replay:
 def return_values(variant: str, found: Replay, held: Sequence[Latency]) -> Iterator[Given]:
     """By contact and α: lead of the peak and the turn, and time back."""
     for k, one in enumerate(held, start=1):
+        axes = AXES[FORCE if one.axis < 3 else MOMENT]
         rows = [
             row
             for row in found.rows
-            if one.force - 0.1 <= row["start_s"] <= one.force + HOLD
-            and (AXES.index(row["axis"]) < 3) == (one.axis < 3)
+            if one.force - 0.1 <= row["start_s"] <= one.force + HOLD and row["axis"] in axes
         ]
-        traditional = [row for row in rows if row["controller"] == "traditional"]
-        if not traditional:
+        first = [row for row in rows if row["alpha"] is None]
+        if not first:
             continue
-        before = max(traditional, key=lambda row: abs(row["peak"]))
+        before = max(first, key=lambda row: abs(row["peak"]))
+        # A row of every controller.
         same = [row for row in rows if all(row[x] == before[x] for x in ("axis", "drag"))]
-        turned = turn_after(found, 0, before)
-        yield variant, f"back/traditional/{k}", before["return_10_s"]
-        for n, controller in enumerate(found.controllers[1:], start=1):
-            alpha = controller.alpha[AXES.index(before["axis"])]
-            row = next(row for row in same if row["alpha"] == alpha)
-            yield variant, f"peak/{alpha:g}/{k}", row["peak_advance_s"]
-            yield variant, f"turn/{alpha:g}/{k}", turned - turn_after(found, n, row)
-            yield variant, f"back/{alpha:g}/{k}", row["return_10_s"]
+        turns = [turn_after(found, n, row) for n, row in enumerate(same)]
+        for row, turn in zip(same, turns, strict=True):
+            if row is not before:
+                yield variant, f"peak/{law_of(row)}/{k}", row["peak_advance_s"]
+                yield variant, f"turn/{law_of(row)}/{k}", turns[0] - turn
+            yield variant, f"back/{law_of(row)}/{k}", row["return_10_s"]
 
 
-def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
+def law_of(row: Record) -> str:
+    """The controller of a row: its α, or "traditional"."""
+    return "traditional" if row["alpha"] is None else f"{row['alpha']:g}"
+
+
+def turn_after(found: Replay, n: int, row: Record) -> float:
     """Time from release until an axis stops moving away from its target. [s]"""
-    t, axis = found.motion.t, AXES.index(str(row["axis"]))
-    start = int(t.searchsorted(float(str(row["release_s"])) - 1e-9))
+    t, axis = found.motion.t, AXES.index(row["axis"])
+    start = int(t.searchsorted(row["release_s"] - 1e-9))
     outward = np.sign(found.motion.x[start, n, axis]) * found.motion.v[start:, n, axis]
     return float(t[start + np.argmax(outward <= 0.0)] - t[start])
 
@@ -140,45 +147,38 @@ def released(
     _seed: int, *, robot: str, deviation: float, alphas: Sequence[float] = ()
 ) -> Iterator[Given]:
     """Parameters of a table; its return from a deviation [m] at rest."""
-    arm = load_robot(robot)
-    x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
+    arm, x = load_robot(robot), np.eye(6)[0] * deviation
     for variant, xi in ((CORRECTED, ()), ("ξ = 1", ("admittance.xi=1",))):
         control = ControlChoice(assignments=xi, alphas=tuple(alphas))
         laws = control.controllers(arm)
-        motion = release(laws, x, settling(laws, x))
-        drags = releases_of(x, len(motion.t))
-        for row in rows_of(laws, motion, drags, np.zeros((len(motion.t) - 1, 6))):
-            name = "traditional" if row["alpha"] is None else f"{row['alpha']:g}"
+        found = replay_release(x, arm, laws, start=control.start_pose(arm))
+        for row in found.rows:
             for key in ("return_10_s", "return_2_s"):
-                yield variant, f"{key}/{name}", row[key]
-            yield variant, f"overshoot/{name}", 100.0 * (row["overshoot"] or 0.0)
-        if not xi:
-            parameters = laws[0].parameters
-            keys = "mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"
-            table = {key: getattr(parameters, key) for key in keys}
-            for key, values in {**table, "xi": parameters.xi}.items():
-                for axis, value in zip(AXES, values, strict=True):
-                    yield variant, f"{key}/{axis}", value
+                yield variant, f"{key}/{law_of(row)}", row[key]
+            yield variant, f"overshoot/{law_of(row)}", 100.0 * (row["overshoot"] or 0.0)
+        for key in PARAMETERS if not xi else ():
+            values = np.asarray(getattr(found.parameters, key))
+            yield from (
+                (variant, f"{key}/{axis}", v) for axis, v in zip(AXES, values, strict=True)
+            )
 
 
 def loop_chart(run: ClosedLoop, found: Replay, part: slice) -> Chart:
     """Force and motion of the loop: sensor, command and truth."""
     true = np.column_stack([run.truth[:, part], run.moved[:, part]])
     ours = np.column_stack([run.estimate[:, part], run.commanded[:, part]])
-    lines = (
-        ChartLine("true force, flange", true, "#8a929a", "5 3"),
-        ChartLine("virtual sensor, command", ours, "#0b6fb8"),
-    )
     letter, *units = ("F", "N", "m") if part == FORCE else ("M", "N·m", "rad")
-    band = np.concatenate([found.parameters.threshold[part], np.full(3, np.nan)])
     return Chart(
         "loop",
         "",
-        (units[0],) * 3 + (units[1],) * 3,
+        tuple(np.repeat(units, 3).tolist()),
         (*(f"{letter}_{axis}" for axis in "xyz"), *AXES[part]),
         run.t,
-        lines,
-        band=band,
+        (
+            ChartLine("true force, flange", true, "#8a929a", "5 3"),
+            ChartLine("virtual sensor, command", ours, "#0b6fb8"),
+        ),
+        band=np.append(found.parameters.threshold[part], np.full(3, np.nan)),
         band_label="± threshold",
     )
 

@@ -3,8 +3,10 @@
 A paper is a TOML file beside this one; all run and are shown alike.
 """
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any, NamedTuple
 
 from vftcli.evaluation.published import TABLES
@@ -15,9 +17,9 @@ from vftcli.signals.parsing import check_known, tables_beside
 #: Variants of a value: printed formulas; corrected ones; these with R and Q as densities;
 #: the reference's own error.
 AS_PRINTED, CORRECTED, DENSITY, FLOOR = "as printed", "corrected", "R density", "floor"
-#: One result: a variant, a line's key and its value, None where it did not happen; or "",
-#: an item's name, its traces.
-Given = tuple[str, str, float | Chart | None]
+Value = float | Chart | None  #: A number, traces, or None for what did not happen.
+#: One result: a variant, a line's key and its number; or "", an item's name, its traces.
+Given = tuple[str, str, Value]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,15 +30,8 @@ class Experiment:
     title: str  #: Its content, with its scenario.
     run: str  #: Name of the function that runs it.
     given: Mapping[str, Any] = field(default_factory=dict)  #: Its arguments beside the seed.
-    seeds: Sequence[int] = (1, 2, 3, 4, 5)  #: Those of a full run; ``--fast`` takes the first.
+    seeds: Sequence[int] = (1, 2, 3, 4, 5)
     alone: bool = False  #: Whether it measures time, so that nothing may run beside it.
-
-
-class Job(NamedTuple):
-    """One experiment with one seed."""
-
-    experiment: Experiment
-    seed: int
 
 
 class PrintedLine(NamedTuple):
@@ -78,11 +73,6 @@ class PaperItem:
     chart: Chart | None = None  #: Its traces, of the first seed.
     failures: Sequence[str] = ()  #: One line for each run that failed.
 
-    @property
-    def answer(self) -> str:
-        """The verdict as a sentence."""
-        return f"{self.verdict[:1].upper()}{self.verdict[1:]}."
-
 
 @dataclass(frozen=True, kw_only=True)
 class Paper:
@@ -110,40 +100,36 @@ class Paper:
 def load_paper(name: str) -> Paper:
     """The paper of a TOML file beside this one."""
     declared = dict(tables_beside(__file__, f"{name}.toml"))
-    each, items = declared.pop("each"), {}
+    each = declared.pop("each")
+    items = {}
     for key, entry in declared.pop("items").items():
-        lines = [line for row in entry.pop("lines", ()) for line in lines_of(row, each)]
-        if published := entry.pop("published", None):
-            lines += [
-                PrintedLine(
-                    f"{name}/{j}", f"{each['observer'][name]}, J{j}", "N·m", f"{rmse:.4f}"
-                )
-                for name, numbers in TABLES[published].rmse.items()
-                for j, rmse in enumerate(numbers, start=1)
-            ]
-        items[key] = PaperItem(**entry, lines=lines)
+        lines = [line for row in entry.get("lines", ()) for line in lines_of(row, each)]
+        items[key] = PaperItem(**entry | {"lines": lines})
     experiments = {
         key: Experiment(name=key, **entry) for key, entry in declared.pop("experiments").items()
     }
     return Paper(name=name, experiments=experiments, items=items, **declared)
 
 
-def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> list[PrintedLine]:
-    """The lines of a row: one for each key of a name in braces."""
+def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> Iterator[PrintedLine]:
+    """The lines of a row: one for every choice of the names in braces."""
     line = PrintedLine(*row)
-    name = next((name for name in each if f"{{{name}}}" in line.key), None)
-    if name is None:
-        return [line]
-    one = isinstance(line.printed, str)
-    numbers = [line.printed] * len(each[name]) if one else line.printed
-    return [
-        line._replace(
-            key=line.key.format(**{name: key}),
-            label=line.label.format(**{name: word}),
+    names = re.findall(r"{(\w+)}", line.key)
+    choices = list(product(*(each[name].items() for name in names)))
+    numbers: Any = line.printed
+    if isinstance(numbers, str) and (table := TABLES.get(numbers)):
+        numbers = [f"{rmse:.4f}" for own in table.rmse.values() for rmse in own]
+    elif isinstance(numbers, str):
+        numbers = [numbers] * len(choices)
+    for choice, number in zip(choices, numbers, strict=True):
+        each_name = dict(zip(names, choice, strict=True))
+        keys = {name: key for name, (key, _) in each_name.items()}
+        words = {name: word for name, (_, word) in each_name.items()}
+        yield line._replace(
+            key=line.key.format(**keys),
+            label=line.label.format(**words),
             printed=number,
         )
-        for (key, word), number in zip(each[name].items(), numbers, strict=True)
-    ]
 
 
 #: Name at the command line → the paper.

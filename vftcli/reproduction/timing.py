@@ -1,4 +1,4 @@
-"""Computing times: Table II by the paper's way and by ours, and the benchmark.
+"""Computing times: Table II by the paper's way and by ours, and `benchmark speed`.
 
 Rounds of all are interleaved, so that a machine's drift of speed affects all. Medians
 over the rounds are reported.
@@ -6,7 +6,7 @@ over the rounds are reported.
 
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -15,40 +15,31 @@ from typing import Any, TypeVar
 import numpy as np
 
 from vftcli.observers import KalmanObserver, ObserverChoice
-from vftcli.observers.spectra import Spectra, spectra_of
-from vftcli.observers.table import BEST, PAPER
-from vftcli.observers.tuning import tune_to_spectra
+from vftcli.observers.observer import Observer
+from vftcli.observers.table import PAPER
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, Given
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.packages import installed, needed
 from vftcli.signals.recording import Recording
-from vftcli.wrench.smoother import smooth_wrench
 
 SAMPLES = 30_060  #: Samples of the paper's Table II.
-#: Length of the free part for observers tuned to the log. [s]
-FREE_SECONDS = 8.0
-TUNED = ("kfo-auto", "rts-auto")  #: Observers that are timed with their tuning.
-SMOOTHER = "wrench smoother"  #: Name of the smoother of the whole log's wrench.
-LOOKING_BACK = (BEST, "kfo-rts", *TUNED)  #: Observers that need a complete log.
-RNEA = "rnea loop"  #: Name of the yardstick, a loop of Pinocchio's `rnea`.
-#: Dynamics and four observers over a loop of `rnea`, on two clocks.
-RATIOS = ("core_over_rnea_loop", "core_over_rnea_loop_jittering")
-JITTER = 0.05  #: Jitter of a step, as a share of the mean step. [1]
-#: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
-PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
 #: Samples of the paper's own loop; its time is scaled to all.
 SCRIPT_SAMPLES = 1_500
 ROUNDS = 3  #: Interleaved repetitions for Table II; the median counts.
-
+JITTER = 0.05  #: Jitter of a step, as a share of the mean step. [1]
+RNEA = "rnea loop"  #: Name of the yardstick, a loop of Pinocchio's `rnea`.
+#: Dynamics and four observers over it, on an even and a jittering clock.
+RATIOS = ("core_over_rnea_loop", "core_over_rnea_loop_jittering")
+#: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
+PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
 
 Name = TypeVar("Name")
+Work = Callable[[], object]  #: What is timed.
 
 
-def median_times(work: Mapping[Name, Callable[[], object]], rounds: int) -> dict[Name, float]:
+def median_times(work: Mapping[Name, Work], rounds: int) -> dict[Name, float]:
     """Name → median time of its call over the rounds. [s]"""
     seconds = np.zeros((rounds, len(work)))
     for own in seconds:
@@ -87,10 +78,8 @@ def circle(robot: Robot, samples: int) -> Recording:
 
 def jittering(motion: Recording) -> Recording:
     """A motion on a clock that jitters by 5 %, seed 1."""
-    strayed = (
-        np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples) * motion.median_step
-    )
-    return replace(motion, t=motion.t + 0.5 * strayed)
+    strayed = np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples)
+    return replace(motion, t=motion.t + 0.5 * (strayed * motion.median_step))
 
 
 def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401 - Pinocchio is untyped
@@ -107,65 +96,71 @@ def simd() -> str:
     return str((found.get("SIMD Extensions", {}).get("found") or ["baseline"])[-1])
 
 
+def observers_of(log: Recording, robot: Robot) -> Sequence[Observer]:
+    """The paper's observers for a log."""
+    return ObserverChoice(names=PAPER).build(robot, log.median_step)[0]
+
+
+def our_way(log: Recording, robot: Robot) -> dict[str, Work]:
+    """The dynamics of a log and the paper's observers, each alone."""
+    terms = dynamics_terms(log, robot)
+    work: dict[str, Work] = {"dynamics": partial(dynamics_terms, log, robot)}
+    return work | {each.name: partial(each.estimate, terms) for each in observers_of(log, robot)}
+
+
+def core(log: Recording, robot: Robot, observers: Sequence[Observer]) -> None:
+    """Run the dynamics of a log and observers on it."""
+    terms = dynamics_terms(log, robot)
+    for observer in observers:
+        observer.estimate(terms)
+
+
+def printed_way(log: Recording, robot: Robot) -> dict[str, Work]:
+    """The same, sample by sample; both first-order observers run in one loop."""
+    terms, step = dynamics_terms(log, robot), log.median_step
+    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
+    dense = partial(dense_kalman_loop, terms.p, terms.mu, step, kalman)
+    both = partial(first_order_loops, terms.p, terms.mu, step)
+    literal = partial(literal_momentum_terms, robot.model, log.q, log.require("dq"))
+    loops: dict[str, Work] = {
+        "fdo": both,
+        "gmo": both,
+        "kfo-fe": dense,
+        "kfo-zoh": partial(dense, rebuild=True),
+    }
+    return {"dynamics": literal, **loops}
+
+
 def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
     """Times of dynamics and observers, each alone, and what was run.
 
-    ``complete_log`` has observers with their tuning, but for ``best``; ``ratios`` are over a loop
-    of `pin.rnea`, where Pinocchio is installed.
+    ``ratios`` are those of all together over a loop of `pin.rnea`, where Pinocchio is installed.
     """
     robot = load_robot(robot_name)
-    recording = circle(robot, samples)
-    observers, _ = ObserverChoice(names=(*PAPER, "kfo-rts")).build(robot, recording.median_step)
-    run = Run(recording=recording, robot=robot)
-    free = recording.t < FREE_SECONDS
-    part = [RunSamples(run, free)]
-    spectra = partial(spectra_of, RunSamples(run, ~free), part)
-    logs = (recording, jittering(recording)) if installed("pinocchio") else ()
-    cores = dict(zip(RATIOS, logs, strict=False))
+    log = circle(robot, samples)
     with one_core():
-        terms, found = run.terms, spectra()
-
-        def core(log: Recording) -> None:
-            own = dynamics_terms(log, robot)
-            for observer in observers[: len(PAPER)]:
-                observer.estimate(own)
-
-        work: dict[str, Callable[[], object]] = {
-            **{name: partial(core, log) for name, log in cores.items()},
-            "dynamics": partial(dynamics_terms, recording, robot),
-            **{observer.name: partial(observer.estimate, terms) for observer in observers},
-            "spectra": spectra,
-            BEST: partial(tune_to_spectra(BEST, found).estimate, terms),
-            **({SMOOTHER: partial(smooth_wrench, run, part)} if robot.joints >= 6 else {}),
-            **{name: partial(estimate_tuned, name, terms, found) for name in TUNED},
-        }
-        if cores:
-            work[RNEA] = partial(rnea_loop, robot.model, recording.q, recording.require("dq"))
+        work, observers = our_way(log, robot), observers_of(log, robot)
+        if installed("pinocchio"):
+            motions = zip(RATIOS, (log, jittering(log)), strict=True)
+            work |= {ratio: partial(core, x, robot, observers) for ratio, x in motions}
+            work[RNEA] = partial(rnea_loop, robot.model, log.q, log.require("dq"))
         median_times(work, 1)  # of their first calls
         total = median_times(work, rounds)
 
-    rows = {
-        name: {"total_s": seconds, "per_sample_us": seconds / samples * 1e6}
-        for name, seconds in total.items()
-    }
-    complete = [name for name in ("spectra", *LOOKING_BACK, SMOOTHER) if name in rows]
+    def row(name: str) -> dict[str, float]:
+        return {"total_s": total[name], "per_sample_us": total[name] / samples * 1e6}
+
     return {
         "simd": simd(),
         "robot": robot.name,
         "samples": samples,
         "rounds": rounds,
         "observers": [
-            {"name": name, **rows[name], "paper_s": PRINTED[f"seconds/{name}"]} for name in PAPER
+            {"name": name, **row(name), "paper_s": PRINTED[f"seconds/{name}"]} for name in PAPER
         ],
-        "complete_log": [{"name": name, **rows[name]} for name in complete],
-        "dynamics": rows["dynamics"],
-        "ratios": {name: total[name] / total[RNEA] for name in cores},
+        "dynamics": row("dynamics"),
+        "ratios": {name: total[name] / total[RNEA] for name in RATIOS if name in total},
     }
-
-
-def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
-    """Tune an observer to spectra and run it."""
-    tune_to_spectra(name, found).estimate(terms)
 
 
 def computing_time(_seed: int) -> Iterator[Given]:
@@ -173,32 +168,18 @@ def computing_time(_seed: int) -> Iterator[Given]:
     log = circle(robot := load_robot("ur5"), SAMPLES)
     # The printed way runs over fewer samples and is scaled.
     few = log.between(0.0, float(log.t[SCRIPT_SAMPLES - 1]))
-    q, dq, step, scale = few.q, few.require("dq"), few.median_step, SAMPLES / few.samples
-    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
     with one_core():
-        terms, short = dynamics_terms(log, robot), dynamics_terms(few, robot)
-        dense = partial(dense_kalman_loop, short.p, short.mu, step, kalman)
-        # Both first-order observers run in one loop: each is half of it.
-        both = partial(first_order_loops, short.p, short.mu, step)
-        built, _ = ObserverChoice(names=PAPER).build(robot, step)
-        own: dict[str, Callable[[], object]] = {"dynamics": partial(dynamics_terms, log, robot)}
-        own |= {observer.name: partial(observer.estimate, terms) for observer in built}
-        printed: dict[str, Callable[[], object]] = {
-            "dynamics": partial(literal_momentum_terms, robot.model, q, dq),
-            **dict.fromkeys(("fdo", "gmo"), both),
-            "kfo-fe": dense,
-            "kfo-zoh": partial(dense, rebuild=True),
-        }
-        variants = {CORRECTED: own, AS_PRINTED: printed}
-        work = {(v, name): call for v, calls in variants.items() for name, call in calls.items()}
+        ways = {CORRECTED: our_way(log, robot), AS_PRINTED: printed_way(few, robot)}
+        work = {(v, name): call for v, calls in ways.items() for name, call in calls.items()}
         total = median_times(work, ROUNDS)
-    for name in printed:
-        total[AS_PRINTED, name] *= 0.5 * scale if name in {"fdo", "gmo"} else scale
-    for variant in (AS_PRINTED, CORRECTED):
-        cost = {name: total[variant, "dynamics"] + total[variant, name] for name in PAPER}
-        for name, seconds in cost.items():
-            yield variant, f"seconds/{name}", seconds
-            yield variant, f"cost/{name}", 1e6 * seconds / SAMPLES
+    for variant in ways:
+        scale = SAMPLES / few.samples if variant == AS_PRINTED else 1.0
+        cost = {}
+        for name in PAPER:
+            # Each of those that run in one loop is half of it.
+            share = 0.5 if variant == AS_PRINTED and name in {"fdo", "gmo"} else 1.0
+            cost[name] = scale * (total[variant, "dynamics"] + share * total[variant, name])
+            yield variant, f"seconds/{name}", cost[name]
         for name in ("fdo", "kfo-fe"):
             yield variant, f"zoh/{name}", cost["kfo-zoh"] / cost[name]
 
@@ -228,9 +209,7 @@ def taylor_exponential(A: Array) -> Array:
 def held_matrices(step: float, q_p: Array, q_tau: Array) -> tuple[Array, Array, Array]:
     """A, B (43) and Q (44, corrected) of the zero-order hold, by Taylor series."""
     n = len(q_p)
-    eye, zero = np.eye(n), np.zeros((n, n))
-    A_c = np.block([[zero, eye], [zero, zero]])
-    B_c = np.vstack([eye, zero])
+    A_c, B_c = np.eye(2 * n, k=n), np.eye(2 * n, n)
     both = taylor_exponential(np.block([[A_c, B_c], [np.zeros((n, 3 * n))]]) * step)
     Q_c = np.diag(np.concatenate([q_p, q_tau]))
     M = taylor_exponential(np.block([[A_c, Q_c], [np.zeros_like(A_c), -A_c.T]]) * step)
