@@ -382,7 +382,7 @@ def test_one_table_alone(run, refused, tmp_path: Path) -> None:
     assert "Table IV" in out
     assert "a picture" in out
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"index.html", "run.json"}
+    assert names == {"index.html", "reproduction.md", "run.json"}
     assert "--force" in refused(*words)
 
 

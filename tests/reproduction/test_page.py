@@ -72,6 +72,9 @@ def test_the_page_has_every_item_and_what_failed(made, cheap, tmp_path: Path) ->
     assert "what works: seeds 1, 2, 3<" in page
     assert "what takes the time<" in page
     assert "src=" not in page  # nothing is loaded from anywhere
+    text = (tmp_path / "out" / "reproduction.md").read_text("utf-8")
+    assert "**Fig. 1: A \\<figure\\>**" in text
+    assert "| alpha | N | 2 | 3 | 4 (3 … 5) | 0.500 |" in text
     record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
     assert record["command"] == "vftcli reproduce cheap"
     assert record["runs"][-1] == {"experiment": "timed", "seed": 0}

@@ -25,8 +25,9 @@ def reproduce(
 ) -> None:
     """Run the paper's experiments beside its numbers.
 
-    On simulated equivalents, with stated seeds. Writes PATH/index.html and run.json. An
-    experiment that fails says so in its row; the others are written, and the exit code is 1.
+    On simulated equivalents, with stated seeds. Writes PATH/index.html, its tables as
+    reproduction.md, and run.json. An experiment that fails says so in its row; the others are
+    written, and the exit code is 1.
 
     Example: vftcli reproduce huang2025 --only table3
     """

@@ -1,7 +1,7 @@
 """Experiments of a paper, each once a seed, and their results beside its print.
 
-A run has its own seed, so its numbers do not depend on the others. A page and figures
-show them.
+A run has its own seed, so its numbers do not depend on the others. A page, its tables as
+Markdown and figures show them.
 """
 
 from collections import defaultdict
@@ -19,7 +19,16 @@ from vftcli.batch import WorkersChoice
 from vftcli.batch.cluster import perform, run_tasks
 from vftcli.outputs.charts import Chart
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import DASH, Column, Grid, GridCell, Rows, minus, significant
+from vftcli.outputs.grid import (
+    DASH,
+    Column,
+    Grid,
+    GridCell,
+    Rows,
+    markdown,
+    minus,
+    significant,
+)
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import Drawing, figure_files, line_figure, plots_of, write_figures
 from vftcli.outputs.run_record import envelope, seal
@@ -42,7 +51,7 @@ RUNS: dict[str, Callable[..., Iterator[Given]]] = {
         tapped_circle,
     )
 }
-PAGE = "index.html"
+PAGE, TABLES = "index.html", "reproduction.md"  #: The page, and its tables.
 Job = tuple[Experiment, int]  #: An experiment and one of its seeds.
 RunResult = dict[tuple[str, str], Value]  #: A job's results by variant and key.
 Result = RunResult | str  #: A job's results, or the one line of its failure.
@@ -114,7 +123,7 @@ def gather(
 def files_of(paper: Paper, names: Sequence[str], form: str | None) -> list[str]:
     """Files of a folder of these items; `form` is the figures' format."""
     drawn = [name for name in names if paper.items[name].traces]
-    return [PAGE, SEAL, *figure_files(form, drawn)]
+    return [PAGE, TABLES, SEAL, *figure_files(form, drawn)]
 
 
 def spread(values: Sequence[float | None]) -> str:
@@ -193,14 +202,6 @@ def wrapped(text: str) -> GridCell:
     return GridCell(text, html=f'<div class="words">{escape(text)}</div>')
 
 
-def seeds_line(experiment: Experiment) -> str:
-    """An experiment and its seeds."""
-    title, seeds = experiment.title, experiment.seeds
-    if [*seeds] == [0]:
-        return title
-    return f"{title}: seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}"
-
-
 def write_reproduction(
     folder: OutputFolder,
     paper: Paper,
@@ -209,7 +210,11 @@ def write_reproduction(
     command: str,
     form: str | None = None,
 ) -> None:
-    """Write page, figures if a form is given, and the record."""
+    """Write page, tables, figures if a form is given, and the record."""
+    seeds = [
+        e.title + (f": seeds {', '.join(map(str, e.seeds))}" if any(e.seeds) else "")
+        for e in experiments
+    ]
     drawn = {name: item.chart for name, item in found.items() if item.chart is not None}
     text = page(
         "reproduction.html",
@@ -219,15 +224,16 @@ def write_reproduction(
         overview=overview(found),
         found=found,
         item_grid=item_grid,
-        seeds=[*map(seeds_line, experiments)],
+        seeds=seeds,
     )
     folder.write(PAGE, text)
+    grids = [overview(found)]
+    for item in found.values():
+        grids += [replace(item_grid(item), title=item.heading)] * bool(item.lines)
+    folder.write(TABLES, "\n".join(map(markdown, grids)))
     if form is not None:
         drawings = {
-            name: Drawing(
-                f"{found[name].label}: {found[name].title}",
-                partial(line_figure, plots=plots_of(chart)),
-            )
+            name: Drawing(found[name].heading, partial(line_figure, plots=plots_of(chart)))
             for name, chart in drawn.items()
         }
         write_figures(folder, drawings, form)

@@ -73,6 +73,11 @@ class PaperItem:
     chart: Chart | None = None  #: Its traces, of the first seed.
     failures: Sequence[str] = ()  #: One line for each run that failed.
 
+    @property
+    def heading(self) -> str:
+        """Its name and title."""
+        return f"{self.label}: {self.title}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Paper:
