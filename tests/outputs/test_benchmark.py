@@ -1,5 +1,6 @@
 """What a benchmark says of rows with known sums: errors, lists and shifts that are made up."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,13 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation.scores import LAGS
-from vftcli.outputs.benchmark import Results, arm_texts, dots, list_texts, text_of
+from vftcli.outputs.benchmark import (
+    Results,
+    arm_texts,
+    list_texts,
+    render_benchmark,
+    text_of,
+)
 from vftcli.reproduction.scoring import SCHEMA
 
 COMMON = {
@@ -110,20 +117,21 @@ def test_every_row_has_its_errors_and_its_shift() -> None:
 
 def test_a_difference_within_the_truth_s_own_error_is_marked() -> None:
     rows = [row for row in made().rows if (row["arm"], row["part"]) == ("UR5", "contact")]
-    zero, gmo, best, vendor = arm_texts(rows, 0.3)
+    zero, gmo, best, vendor = arm_texts(rows)
     assert [row["rmse"].text + row["rmse"].mark for row in (zero, gmo, best, vendor)] == [
         "10.0", "2.20~", "2.00", "6.00",
     ]  # fmt: skip
     assert (gmo["interval"], gmo["over_best"], gmo["lag"]) == ("2.2–2.2", "+0.2 to +0.2", "–")
     assert best["over_best"] == "–"
-    assert not arm_texts(rows, 0.1)[1]["rmse"].mark
+    sure = [row | {"truth_error_Nm": 0.1} for row in rows]
+    assert not arm_texts(sure)[1]["rmse"].mark
     rows = {(row["arm"], row["method"], row["part"]): row for row in made().rows}
-    assert arm_texts([rows["UR5", "gmo", "all"]], 0.3)[0]["lag"] == "+0.03 (× 0.50)"
+    assert arm_texts([rows["UR5", "gmo", "all"]])[0]["lag"] == "+0.03 (× 0.50)"
 
 
 def test_lists_are_pooled_by_arm() -> None:
     """95 % intervals: Wilson's of 14 of 15, Poisson's of 2 in .5 h, .5 to 14.4 an hour."""
-    (lists,) = made().lists
+    (lists,) = made().lists()
     ur5, panda = map(list_texts, lists.to_dicts())
     assert (ur5["share"], ur5["rate"]) == ("14/15 (0.70–0.99)", "4 (0–14)")
     # Of .1, .2, .3 and .6 s; of errors of 3 and −1 N.
@@ -143,15 +151,18 @@ def test_every_arm_has_a_table() -> None:
 
 
 def test_dots_lie_at_their_skill_method_by_method() -> None:
-    scales, arms, found = dots(made(), "online")
-    assert arms == ["UR5", "Panda", "Simulated"]
+    record = {"manifest": "m", "manifest_sha256": "0" * 64, "left_out": [], "failures": {}}
+    page = render_benchmark(made(), "title", record | {"logs": []})
+    (figure,) = re.findall("<title>Skill by arm, online</title>.*?</svg>", page, re.DOTALL)
+    dot = r'<title>([^<]*?): ([-.\d]*)</title><path d="M(.*?) .*?H(.*?)".*?cx="(.*?)" cy="(.*?)"'
+    dots = {name: [*map(float, places)] for name, *places in re.findall(dot, figure)}
+    assert [name.partition(",")[0] for name in dots][::3] == ["UR5", "Panda"]
     # 384 of 400 pixels from −.05 to 1.05; 46 a row, of which the dots begin at .4.
     skills = {"UR5, gmo": 0.78, "UR5, best": 0.8, "UR5, vendor": 0.4, "Panda, gmo": 0.86}
-    places = {dot["words"].partition(":")[0]: dot for dot in found}
     for name, skill in skills.items():
         x = 8.0 + 384.0 * (skill + 0.05) / 1.1
-        assert places[name]["places"] == pytest.approx([x, x, x])
+        assert dots[name][:4] == pytest.approx([skill, x, x, x], abs=0.06)
     rows = {"UR5, gmo": 0.4, "UR5, best": 0.4 + 0.55 / 3, "Panda, gmo": 1.4}
     for name, row in rows.items():
-        assert places[name]["y"] == pytest.approx(scales.box.top + 46.0 * row)
-    assert scales.box.height == 46.0 * 3 + 26.0
+        assert dots[name][4] == pytest.approx(8.0 + 46.0 * row, abs=0.06)
+    assert 'viewBox="0 0 400 164"' in page

@@ -1,12 +1,13 @@
 """Manifests: what an entry says, what is refused, and which rows would be unfair."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from vftcli.batch.log_work import digest_of
-from vftcli.reproduction.manifest import Declaration, Manifest, Rival, load_manifest, rival_of
+from vftcli.reproduction.manifest import Manifest, Rival, load_manifest, rival_of
 from vftcli.signals.errors import ParameterError
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -38,7 +39,7 @@ def lines(manifest: Manifest, rivals: tuple[Rival, ...] = ()) -> list[str]:
 
 def test_an_entry_with_pushes_is_two_logs(tmp_path: Path) -> None:
     text = ENTRY + 'robot = "ur5"\ncolumns = "t,q:6"\npushes = [[4, 0.5, [10, 0, 0]]]\n'
-    free, pushed = made(tmp_path, text).logs
+    free, pushed = made(tmp_path, text).logs.values()
     assert (free.name, free.arm, free.pushes) == ("a", "UR5", ())
     assert (pushed.name, pushed.arm) == ("a-pushed", "UR5 (planted)")
     assert dict(pushed.options) == {"robot": "ur5", "columns": "t,q:6"}
@@ -48,7 +49,7 @@ def test_an_entry_has_the_keys_of_its_arm_and_its_own_go_before(tmp_path: Path) 
     arm = '[[arm]]\nname = "UR5"\nrobot = "ur5"\nlicence = "MIT"\nfree = ["0:0.1"]\n'
     theirs, own = made(
         tmp_path, arm + ENTRY + other("b", "tuesday") + 'licence = "GPL-3.0"\n'
-    ).logs
+    ).logs.values()
     assert (dict(theirs.options), theirs.free, theirs.licence) == (
         {"robot": "ur5"},
         ("0:0.1",),
@@ -61,12 +62,13 @@ def test_an_entry_has_the_keys_of_its_arm_and_its_own_go_before(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["sim", "field"])
 def test_built_in_manifests_are_whole(name: str, tmp_path: Path) -> None:
     manifest = load_manifest(name, tmp_path)
-    for log in manifest.logs:
+    logs = manifest.logs.values()
+    for log in logs:
         assert log.source or log.scenario
         assert log.licence or log.scenario
         assert len(log.sha256) == 64 or log.scenario or log.parts
-    assert len(manifest.absent()) == len([x for x in manifest.logs if x.file or x.parts]) - sum(
-        bool(x.pushes) for x in manifest.logs if not x.scenario
+    assert len(manifest.absent()) == len([x for x in logs if x.file or x.parts]) - sum(
+        bool(x.pushes) for x in logs if not x.scenario
     )
 
 
@@ -173,8 +175,8 @@ def test_a_rival_says_what_it_was_trained_on(tmp_path: Path) -> None:
     manifest = made(tmp_path, ENTRY)
     (tmp_path / "est").mkdir()
     (tmp_path / "est" / "a.csv").write_text("t\n")
-    fair = Rival("next", tmp_path / "est", Declaration())
-    unfair = Rival("next", tmp_path / "est", Declaration(training=(digest_of(CIRCLE),)))
+    fair = Rival(name="next", folder=str(tmp_path / "est"))
+    unfair = replace(fair, training=(digest_of(CIRCLE),))
     assert not lines(manifest, (fair,))
     (line,) = lines(manifest, (unfair,))
     assert line.startswith("a: next was trained on it")
@@ -198,4 +200,4 @@ def test_a_wrong_rival_is_refused(tmp_path: Path, words: str, complaint: str) ->
         (tmp_path / name).mkdir()
     (tmp_path / "other" / "zz.csv").write_text("t\n")
     with pytest.raises(ParameterError, match=complaint):
-        rival_of(words.format(tmp_path), ("best",), manifest.logs)
+        rival_of(words.format(tmp_path), manifest.logs)

@@ -65,6 +65,7 @@ def benchmark(
     if what == SPEED:
         unfit = {"--outside": outside, "-o": output, "--anyway": asked.anyway, "--force": force}
         unfit |= {"--open": open_page, "--jobs": asked.of(WorkersChoice) != WorkersChoice()}
+        unfit["--csv"] = form == "csv"
     if what in {SPEED, "sim"}:
         unfit["--data"] = data
     if given := [name for name, value in unfit.items() if value]:
@@ -72,40 +73,19 @@ def benchmark(
     if what == SPEED:
         time_observers(robot or "ur5", asked.of(BenchChoice), form)
         return
-    manifest, rivals = named(what, data, outside)
-    if all(log.missing for log in manifest.logs):
-        say_none(manifest, form)
-        return
-    output = output or Path("benchmark.vft")
-    code = score(manifest, rivals, output, asked, force=force)
-    if open_page and code != 1:
-        open_made(output)
-    raise typer.Exit(code)
-
-
-def named(
-    what: str, data: Path | None, outside: list[str] | None
-) -> "tuple[Manifest, list[Rival]]":
-    """The manifest and the outside estimates of the command line."""
-    from vftcli.observers.table import DEFAULT
-    from vftcli.reproduction.manifest import load_manifest, rival_of
-
     if data is not None and not data.is_dir():
         raise typer.BadParameter(f"--data {data}: there is no such folder")
-    manifest, ours = load_manifest(what, data), ("zero", "vendor", *DEFAULT)
+    from vftcli.reproduction.manifest import load_manifest, rival_of
+
+    manifest, output = load_manifest(what, data), output or Path("benchmark.vft")
     try:
-        return manifest, [rival_of(text, ours, manifest.logs) for text in outside or ()]
+        rivals = [rival_of(text, manifest.logs) for text in outside or ()]
     except ParameterError as error:
         raise typer.BadParameter(str(error)) from None
-
-
-def say_none(manifest: "Manifest", form: str) -> None:
-    """Print that no log of a manifest is there, and their sources."""
-    if form == "json":
-        say_json([], rows=[], left_out=manifest.absent())
-    none = f"Nothing is scored: {manifest.data.absolute()} has none of the logs. Put them there, "
-    for line in (*manifest.absent(), f"{none}or name their folder with --data."):
-        echo(printable(line), err=True)
+    code = score(manifest, rivals, output, asked, force=force)
+    if open_page and code != 1 and output.exists():
+        open_made(output)
+    raise typer.Exit(code)
 
 
 def score(
@@ -121,6 +101,13 @@ def score(
         echo(printable(f"{'warning' if anyway else 'error'}: {line}"), err=True)
     if complaints and not anyway:
         return 1
+    if all(log.missing for log in manifest.logs.values()):
+        if form == "json":
+            say_json([], rows=[], left_out=absent)
+        none = f"Nothing is scored: {manifest.data.absolute()} has none of the logs. "
+        absent.append(f"{none}Put them there, or name their folder with --data.")
+        echo("\n".join(map(printable, absent)), err=True)
+        return 0
     engine.check_closed(anyway=anyway)
     marked = frozenset(name for name, _ in complaints)
     run = BenchmarkRun(manifest, rivals, output, engine, asked.line, marked, say)
@@ -131,7 +118,7 @@ def score(
         echo_data(text_of(results, form, every=True))
     elif len(results.table):
         show(text_of(results, form, every=asked.words["details"]))
-    for name, failure in run.failures:
+    for name, failure in run.failures.items():
         echo(printable(f"error: {name}: {failure.line}"), err=True)
     say("\n".join([*absent, f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
     failed = SOME_FAILED if results.rows else 1
@@ -140,8 +127,6 @@ def score(
 
 def time_observers(robot: str, asked: BenchChoice, form: str) -> None:
     """Print the times of the dynamics and each observer on this machine."""
-    if form == "csv":
-        raise typer.BadParameter("benchmark speed has --json, --markdown and --latex")
     from vftcli.outputs import grid
     from vftcli.outputs.grids import bench_grid
     from vftcli.reproduction.timing import benchmark as measured
@@ -152,12 +137,11 @@ def time_observers(robot: str, asked: BenchChoice, form: str) -> None:
         return
     length = f"{asked.samples} samples, median of {asked.rounds} rounds"
     title = f"{result['robot']}, {length}, NumPy with {result['simd']}"
-    times = bench_grid(result)
+    times = replace(bench_grid(result), title=f"Computing time: {title}")
     if form != "terminal":
-        write = grid.latex if form == "latex" else grid.markdown
-        echo_data(write(replace(times, title=f"Computing time: {title}")))
+        echo_data(grid.latex(times) if form == "latex" else grid.markdown(times))
         return
-    echo(f"{title}\n{grid.terminal(times)}")
+    echo(grid.terminal(times))
     if ratios := [f"{ratio:.2f}" for ratio in result["ratios"].values()]:
         echo(f"Dynamics with four observers take {ratios[0]} of the time of a loop of pin.rnea,")
         echo(f"{ratios[1]} on a clock that jitters by 5 %.")

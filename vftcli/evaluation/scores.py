@@ -121,6 +121,7 @@ class Score(NamedTuple):
         Skill is NaN where the truth is 0, and so are numbers of bands without any.
         """
         drawn, rmse, banded = self.drawn, self.rmse, self.banded.sum()
+        level = np.sqrt(self.mean(self.truth))
         low, high = np.quantile([drawn, drawn - over], [0.025, 0.975], axis=1).tolist()
         return {
             "seconds": float(self.seconds[:, 0].sum()),
@@ -130,7 +131,9 @@ class Score(NamedTuple):
             "rmse_high_Nm": high[0],
             "over_best_high_Nm": high[1],
             "l1_Nm": float(self.mean(self.sizes).mean()),
-            "skill": skill(rmse, np.sqrt(self.mean(self.truth))),
+            "skill": skill(rmse, level),
+            "skill_low": skill(high[0], level),
+            "skill_high": skill(low[0], level),
             "coverage_95": ratio(self.covered.sum(), banded),
             "interval_score_Nm": ratio(self.penalties.sum(), banded),
             "missing": float(self.mean(self.missing).mean()),

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -11,7 +10,7 @@ import polars as pl
 from vftcli.evaluation.scores import LAGS, Score, rate_interval, share_interval
 from vftcli.observers.table import BEST
 from vftcli.outputs import Record, grid
-from vftcli.outputs.charts import REFERENCE, Chart, ChartLine, Span, colours_of_names, paint
+from vftcli.outputs.charts import REFERENCE, Chart, ChartLine, Span, colours_of_names
 from vftcli.outputs.grid import (
     DASH,
     Column,
@@ -23,6 +22,7 @@ from vftcli.outputs.grid import (
     significant,
 )
 from vftcli.outputs.page.shell import Box, Scales, page
+from vftcli.signals.arrays import Array
 
 SILENT = 0.05  #: Share of time without an answer from which it is mentioned.
 LISTS = {"list": "counted", "list with candidates": "all"}
@@ -34,6 +34,12 @@ POOLED = (
     pl.col(*COUNTS, "found_as_load", "split", "peaks_held").sum(),
     pl.col("onset_s", "peak_error_N", "true_peak_N").explode().drop_nulls(),
     pl.col("hardest_false_N").max(),
+)
+#: Of all logs together.
+FACTS = (
+    pl.col(*PLACE, "exact_model").first(),
+    pl.col("observer_us", "command_us").mean(),
+    pl.col("truth_error_Nm").max(),
 )
 #: Key of a row → its column, for every table of rows below the headline.
 ARM_COLUMNS = {
@@ -82,6 +88,15 @@ HEADLINE = {
     "contact": ("skill", Column("skill", form=".2f")),
     "free": ("l1_Nm", Column("free L1", "N·m")),
 }
+SUMS = ("skill", "l1_Nm", "missing", "seconds")
+#: A table of rows of which none is scored.
+EMPTY = pl.DataFrame(
+    schema={
+        **dict.fromkeys(PLACE, pl.String),
+        "exact_model": pl.Boolean,
+        **dict.fromkeys(SUMS, pl.Float64),
+    }
+)
 #: Meaning of a mark behind an RMSE.
 NEAR = "~: nearer to the least RMSE than the truth's own error"
 
@@ -91,81 +106,74 @@ class Results:
 
     def __init__(self, table: pl.DataFrame) -> None:
         self.table = table
-        self.methods, self.protocols = map(self.seen, ("method", "protocol"))
+        self.methods, self.protocols = seen(table, "method"), seen(table, "protocol")
         #: Name → colour of every method but zero, which is grey.
         self.colours = colours_of_names([name for name in self.methods if name != "zero"])
-
-    def seen(self, key: str, *rows: str) -> list[str]:
-        """Values of a column in order, of all rows or those with a set flag."""
-        return self.table.filter(*rows)[key].unique(maintain_order=True).to_list()
-
-    def pooled(self, key: str) -> dict[tuple[str, ...], Score]:
-        """Place → score of its logs together, of torques by "joint", of wrenches by "axis"."""
-        rows = self.table.drop_nulls(key).group_by(*PLACE, key, maintain_order=True)
-        places = rows.agg(pl.col(*Score._fields).explode()).partition_by(
-            *PLACE, maintain_order=True, as_dict=True
+        #: One row an arm, protocol, method and part, for machines and tables.
+        self.rows = [*self.torques()]
+        self.numbers = pl.concat([EMPTY, pl.DataFrame(self.rows)], how="diagonal")
+        exact = pl.col("exact_model")
+        #: Rows of the headline: those of exact models only where all are.
+        self.spoken = self.numbers.filter(
+            pl.col("part").is_in([*HEADLINE]), ~exact | exact.all().over("part", "protocol")
         )
-        return {place: Score.pooled(each.to_dicts()) for place, each in places.items()}
 
-    @cached_property
-    def rows(self) -> list[Record]:
-        """One row an arm, protocol, method and part, for machines and tables."""
-        scores, found = self.pooled("joint"), []
-        facts = pl.col("exact_model").first(), pl.col("observer_us", "command_us").mean()
-        shared = self.table.drop_nulls("joint").group_by(*PLACE, maintain_order=True).agg(*facts)
+    def pooled(self, key: str) -> Iterator[tuple[Record, Score]]:
+        """Place and score of logs together, of torques by "joint", of wrenches by "axis"."""
+        for _, own in self.table.drop_nulls(key).group_by(*PLACE, maintain_order=True):
+            joints = own.group_by(key, maintain_order=True)
+            sums = joints.agg(pl.col(*Score._fields).explode())
+            yield own.select(*FACTS).row(0, named=True), Score.pooled(sums.to_dicts())
+
+    def torques(self) -> Iterator[Record]:
+        """The rows of torques."""
+        best: dict[tuple[str, ...], Array] = {}
         shifts = self.table.drop_nulls("lag_squares")
-        for about, score in zip(shared.to_dicts(), scores.values(), strict=True):
-            place = {key: about[key] for key in PLACE}
-            best = scores.get(tuple((place | {"method": BEST}).values()))
-            over = np.nan if best is None or best is score else best.drawn
-            row: Record = {**about, **score.numbers(over), "lag_s": np.nan, "rmse_at_lag": np.nan}
+        scores = [*self.pooled("joint")]
+        for about, score in scores:
+            if about["method"] == BEST:
+                best[about["arm"], about["protocol"], about["part"]] = score.drawn
+        for about, score in scores:
+            drawn = best.get((about["arm"], about["protocol"], about["part"]), np.nan)
+            row: Record = about | score.numbers(np.nan if about["method"] == BEST else drawn)
             if row["part"] == "free":
-                row["skill"] = np.nan  # zero is perfect there: L1 and false rows speak
+                # Zero is perfect there: L1 and false rows speak.
+                row |= dict.fromkeys(("skill", "skill_low", "skill_high"), np.nan)
+            row |= {"lag_s": np.nan, "rmse_at_lag": np.nan}
+            place = {key: row[key] for key in PLACE}
             if each := shifts.filter(**place)["lag_squares"].to_list():
                 sums = np.sum(each, axis=0)
                 share = np.sqrt(sums.min() / sums[abs(LAGS).argmin()])
                 row |= {"lag_s": float(LAGS[sums.argmin()]), "rmse_at_lag": float(share)}
-            found.append(row)
-        return found
+            yield row
 
-    def of(self, protocol: str, part: str, *, headline: bool = False) -> list[Record]:
-        """Rows of a protocol and part; `headline`: exact models only if all are."""
-        own = [row for row in self.rows if (row["protocol"], row["part"]) == (protocol, part)]
-        return [row for row in own if headline and not row["exact_model"]] or own
-
-    def arms(self, protocol: str, part: str) -> list[str]:
-        """The arms in the headline of a protocol and part."""
-        return list(dict.fromkeys(row["arm"] for row in self.of(protocol, part, headline=True)))
-
-    def headline(self) -> Grid:
-        """Skill in contact and L1 in free motion, by method and protocol."""
-        columns, means = list[Column | str](["method"]), list[dict[str, float]]()
-        for (part, (key, column)), protocol in product(HEADLINE.items(), self.protocols):
-            if arms := self.arms(protocol, part):
-                columns.append(column._replace(head=f"{column.head}, {protocol}"))
-                own: dict[str, list[float]] = {}
-                for row in self.of(protocol, part, headline=True):
-                    own.setdefault(row["method"], []).append(row[key])
-                # A method that lacks an arm has no mean.
-                full = {name: each for name, each in own.items() if len(each) == len(arms)}
-                means.append({name: float(np.mean(each)) for name, each in full.items()})
-        names = [name for name in self.methods if any(name in mean for mean in means)]
-        rows: Rows = [(name, *(mean.get(name) for mean in means)) for name in names]
-        return Grid(columns, rows, "Skill in contact, and L1 in free motion", swatches=True)
-
-    @cached_property
     def lists(self) -> list[pl.DataFrame]:
         """Counts of lists by arm, a frame a protocol and method."""
         lists = self.table.filter(pl.col("part").is_in([*LISTS]))
         pooled = lists.group_by(*BY, "part", maintain_order=True).agg(*POOLED)
         return pooled.partition_by("protocol", "method", maintain_order=True)
 
+    def headline(self) -> Grid:
+        """Skill in contact and L1 in free motion, by method and protocol."""
+        columns, means = list[Column | str](["method"]), list[dict[str, float]]()
+        for (part, (key, column)), protocol in product(HEADLINE.items(), self.protocols):
+            own = self.spoken.filter(part=part, protocol=protocol)
+            if own.height:
+                columns.append(column._replace(head=f"{column.head}, {protocol}"))
+                each = own.group_by("method").agg(pl.col(key).mean(), pl.len())
+                # A method that lacks an arm has no mean.
+                full = each.filter(len=own["arm"].n_unique())
+                means.append(dict(full.select("method", key).iter_rows()))
+        names = [name for name in self.methods if any(name in mean for mean in means)]
+        rows: Rows = [(name, *(mean.get(name) for mean in means)) for name in names]
+        return Grid(columns, rows, "Skill in contact, and L1 in free motion", swatches=True)
+
     def lines(self) -> Iterator[str]:
         """Lines below the headline: lists, arms, methods that use the future."""
-        for rows in self.lists:
+        for rows in self.lists():
             _, protocol, method, *_ = rows.row(0)
-            named = {arm for part in HEADLINE for arm in self.arms(protocol, part)}
-            own = rows.filter(pl.col("arm").is_in(named), part="list")
+            arms = seen(self.spoken.filter(protocol=protocol), "arm")
+            own = rows.filter(pl.col("arm").is_in(arms), part="list")
             found, true, false, hours = own.select(*COUNTS).sum().row(0)
             low, high = rate_interval(false, hours)
             yield (
@@ -176,61 +184,59 @@ class Results:
         if rest := [method for method in self.methods if shown and method not in shown]:
             why = "in no mean, as some arm lacks them (-v and page have their rows)"
             yield f"{why}: {', '.join(rest)}"
-        for p, method in product(self.protocols, self.methods):
-            spoken = (row for part in HEADLINE for row in self.of(p, part, headline=True))
-            each = [(row["missing"], row["seconds"]) for row in spoken if row["method"] == method]
-            share = (
-                np.average([x for x, _ in each], weights=[x for _, x in each]) if each else 0.0
-            )
+        silent = (pl.col("missing") * pl.col("seconds")).sum() / pl.col("seconds").sum()
+        shares = self.spoken.group_by("method", "protocol", maintain_order=True).agg(silent)
+        for method, protocol, share in shares.iter_rows():
             if share > SILENT:
-                yield f"{method}, {p}: no answer for {percent(share)} of the time, read as 0"
-        for p in self.protocols:
-            if arms := self.arms(p, "contact"):
-                yield f"skill, {p}, is the mean of {'; '.join(arms)}"
-        if free := dict.fromkeys(a for p in self.protocols for a in self.arms(p, "free")):
+                yield f"{method}, {protocol}: no answer for {percent(share)} of the time, read as 0"
+        for protocol in self.protocols:
+            if arms := seen(self.spoken.filter(protocol=protocol, part="contact"), "arm"):
+                yield f"skill, {protocol}, is the mean of {'; '.join(arms)}"
+        if free := seen(self.spoken.filter(part="free"), "arm"):
             yield f"free L1 is the mean of {'; '.join(free)}, where the protocol has them"
-        if future := self.seen("method", "future"):
+        if future := seen(self.table.filter("future"), "method"):
             yield f"with the whole log, its future too: {', '.join(future)}"
-        if marked := self.seen("log", "marked"):
+        if marked := seen(self.table.filter("marked"), "log"):
             yield f"in spite of a complaint (--anyway): {', '.join(marked)}"
 
     def grids(self) -> Iterator[Grid]:
         """Every table below the headline."""
-        for rows in self.lists:
-            texts = [list_texts(row) for row in rows.to_dicts()]
+        for lists in self.lists():
+            texts = [*map(list_texts, lists.to_dicts())]
             title = "Contacts listed by {method}, {protocol}; onset: median (90 %)"
             yield keyed_grid(LIST_COLUMNS, texts, title.format(**texts[0]))
-        for arm, protocol, part in dict.fromkeys(
-            (row["arm"], row["protocol"], row["part"]) for row in self.rows
-        ):
-            own = [row for row in self.of(protocol, part) if row["arm"] == arm]
-            logs = self.table.filter(arm=arm, protocol=protocol, part=part)
-            texts = arm_texts(own, max(logs["truth_error_Nm"]))
-            title = f"{arm}, {protocol}, {part} ({own[0]['seconds']:.0f} s)"
+        for own in self.numbers.partition_by("arm", "protocol", "part", maintain_order=True):
+            texts = arm_texts(own.to_dicts())
+            title = "{arm}, {protocol}, {part} ({seconds:.0f} s)".format(**texts[0])
             marked = any(row["rmse"].mark for row in texts)
             shown = keyed_grid(ARM_COLUMNS, texts, title, swatches=True)
             yield replace(shown, notes=(NEAR,) * marked, marked=marked)
-        wrench = []
-        for place, score in self.pooled("axis").items():
-            # Of force and moment, the estimate's error and the truth itself.
-            sizes = (
-                score.mean(x).reshape(2, 3).sum(axis=1) for x in (score.squares, score.truth)
-            )
-            (force, moment), (true_force, true_moment) = map(np.sqrt, sizes)
-            numbers = (force, true_force, moment, true_moment, score.mean(score.missing)[0])
-            wrench.append(dict(zip(WRENCH_COLUMNS, (*place[:3], *numbers), strict=True)))
+        wrench = [wrench_numbers(*pooled) for pooled in self.pooled("axis")]
         weight = self.table.filter(part="weight").to_dicts()
-        for columns, each, title in (
-            (WRENCH_COLUMNS, wrench, "Wrench in contact, rms error"),
-            (WEIGHT_COLUMNS, weight, "A carried weight"),
-        ):
-            if each:
-                yield keyed_grid(columns, each, title)
+        if wrench:
+            yield keyed_grid(WRENCH_COLUMNS, wrench, "Wrench in contact, rms error")
+        if weight:
+            yield keyed_grid(WEIGHT_COLUMNS, weight, "A carried weight")
 
 
-def arm_texts(rows: Sequence[Record], error: float) -> list[Record]:
+def seen(rows: pl.DataFrame, key: str) -> list[str]:
+    """The values of a column in order."""
+    return rows[key].unique(maintain_order=True).to_list()
+
+
+def wrench_numbers(about: Record, score: Score) -> Record:
+    """Of force and moment the estimate's error and the truth itself."""
+    found: Record = {**about, "missing": score.mean(score.missing)[0]}
+    for name, sums in (("", score.squares), ("true_", score.truth)):
+        force, moment = np.sqrt(score.mean(sums).reshape(2, 3).sum(axis=1))
+        found |= {f"{name}force": force, f"{name}moment": moment}
+    return found
+
+
+def arm_texts(rows: Sequence[Record]) -> list[Record]:
     """A table's rows as texts, marked if the truth's error hides a difference."""
     least = min((row["rmse_Nm"] for row in rows if row["method"] != "zero"), default=0.0)
+    error = max(row["truth_error_Nm"] for row in rows)
     found = []
     for row in rows:
         text, lag = significant(row["rmse_Nm"]), row["lag_s"]
@@ -270,31 +276,12 @@ def list_texts(row: Record) -> Record:
     return {**row, **texts, "rows": LISTS[row["part"]], "hardest": hardest}
 
 
-def dots(results: Results, protocol: str) -> tuple[Scales, list[str], list[Record]]:
-    """Skill in contact of every arm, with interval: scales, arms from above, dots.
-
-    A dot has places of the skill and its interval's ends, NaN without one.
-    """
-    own, colours = results.of(protocol, "contact"), results.colours
-    arms, methods = list(dict.fromkeys(row["arm"] for row in own)), [*colours]
+def dots(rows: pl.DataFrame, methods: Sequence[str]) -> tuple[Scales, list[str], list[Record]]:
+    """Skill in contact of methods by arm: scales, arms from above, rows."""
+    arms, own = seen(rows, "arm"), rows.filter(pl.col("method").is_in(methods)).to_dicts()
     low = max(min([0.0, *(row["skill"] for row in own)]), -1.0) - 0.05
     box = Box(height=46.0 * len(arms) + 26.0, width=400.0, left=8.0)
-    scales = Scales(box, Span(low, 1.05), Span(-float(len(arms)), 0.0))
-    found = []
-    for row in own:
-        arm, method, skill = row["arm"], row["method"], row["skill"]
-        if method in colours:
-            # Skill falls as RMSE rises: the interval's ends change places.
-            level = row["rmse_Nm"] / max(1.0 - skill, 1e-12)
-            ends = (1.0 - row[f"rmse_{end}_Nm"] / level for end in ("high", "low"))
-            y = -arms.index(arm) - 0.4 - 0.55 * methods.index(method) / len(methods)
-            found.append({
-                "places": scales.inside([skill, *ends]).tolist(),
-                "y": float(scales.up(y)),
-                "colour": paint(colours[method]),
-                "words": f"{arm}, {method}: {skill:.2f}",
-            })  # fmt: skip
-    return scales, arms, found
+    return Scales(box, Span(low, 1.05), Span(-float(len(arms)), 0.0)), arms, own
 
 
 def text_of(results: Results, form: str, *, every: bool) -> str:
@@ -312,24 +299,28 @@ def text_of(results: Results, form: str, *, every: bool) -> str:
 
 def render_benchmark(results: Results, title: str, record: Record) -> str:
     """The page of a benchmark."""
-    keys, worst = ("recording", "arm", "truth", "truth_error", "licence", "source"), []
+    keys = ("recording", "arm", "truth", "truth_error", "licence", "source")
+    contact = results.numbers.filter(part="contact").partition_by("protocol", maintain_order=True)
     # The worst 10 s of `best` in every log, by the log's first protocol.
     drawn = results.table.filter(part="worst").unique("log", keep="first", maintain_order=True)
-    for row in drawn.iter_rows(named=True):
-        t, truth, best = (np.array(row[f"worst_{k}"]) for k in ("t", "truth", "estimate"))
-        lines = [
-            ChartLine("truth", truth[:, None], REFERENCE),
-            ChartLine(BEST, best[:, None], results.colours[BEST]),
-        ]
-        name = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
-        worst.append(Chart.of_one(row["log"], name, "N·m", t, lines))
     return page(
         "benchmark.html",
         title,
         styles={method: (colour, "") for method, colour in results.colours.items()},
         results=results,
-        plots=[(p, *dots(results, p)) for p in results.protocols if results.arms(p, "contact")],
-        worst=worst,
+        methods=[*results.colours],
+        plots=[dots(own, [*results.colours]) for own in contact],
+        worst=[worst_chart(row, results.colours[BEST]) for row in drawn.to_dicts()],
         logs=keyed_grid(dict(zip(keys, keys, strict=True)), record["logs"]),
         record=record,
     )
+
+
+def worst_chart(row: Record, colour: str) -> Chart:
+    """The truth and `best` over the worst span of a log."""
+    lines = [
+        ChartLine("truth", np.array(row["worst_truth"])[:, None], REFERENCE),
+        ChartLine(BEST, np.array(row["worst_estimate"])[:, None], colour),
+    ]
+    name = f"{row['log']}, {row['protocol']}, J{row['worst_joint']}"
+    return Chart.of_one(row["log"], name, "N·m", np.array(row["worst_t"]), lines)

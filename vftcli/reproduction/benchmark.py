@@ -61,8 +61,8 @@ class BenchmarkRun:
     command: str  #: The command line, for the records.
     marked: frozenset[str]  #: Logs scored in spite of a complaint.
     tell: Tell = field(repr=False)
-    #: Each piece of work by name, and how it ended.
-    ended: list[tuple[str, Outcome[Any]]] = field(default_factory=list)
+    #: Name of each piece of work → how it ended.
+    ended: dict[str, Outcome[Any]] = field(default_factory=dict)
     #: Name → log to score, as its entry has it or with the file that was made of that.
     logs: dict[str, BenchmarkLog] = field(default_factory=dict)
     #: Name → file of each trained robot.
@@ -73,21 +73,20 @@ class BenchmarkRun:
 
     def run(self, *, force: bool) -> Results:
         """Scores of every method, once all is done and written."""
-        logs = [log for log in self.manifest.logs if not log.missing]
+        logs = [log for log in self.manifest.logs.values() if not log.missing]
         marker = {"command": self.command, "do": "benchmark"}
         with self.folder.opened(options_digest("benchmark"), marker, force=force):
             for log in logs:
                 self.make_log(log)
-            for name, robot in self.manifest.robots.items():
-                if name in {log.identified for log in logs}:
-                    self.fit(robot)
+            for name in dict.fromkeys(log.identified for log in logs if log.identified):
+                self.fit(self.manifest.robots[name])
             tasks, done = {task.key: task for task in self.tasks()}, self.folder.keys()
             self.score([task for key, task in tasks.items() if key not in done])
             there = self.folder.keys()
             table = self.folder.read_rows([key for key in tasks if key in there], SCHEMA)
             results, record = Results(table), self.record(logs)
+            ends = [(name, *failure) for name, failure in self.failures.items()]
             columns = dict.fromkeys(("task", "stage", "error", "line"), String)
-            ends = [(name, *failure) for name, failure in self.failures]
             title = f"{counted(len(logs), 'log')} against the truth"
             self.folder.put_gathered(
                 [table],
@@ -98,9 +97,9 @@ class BenchmarkRun:
             return results
 
     @property
-    def failures(self) -> list[tuple[str, Failure]]:
-        """What failed, by name, and why."""
-        return [(name, outcome.failure) for name, outcome in self.ended if outcome.failure]
+    def failures(self) -> dict[str, Failure]:
+        """Name of what failed → why."""
+        return {name: each.failure for name, each in self.ended.items() if each.failure}
 
     def made(
         self, file: str, sources: Sequence[Path], options: object, work: Callable[[Path], object]
@@ -111,30 +110,24 @@ class BenchmarkRun:
         path = self.folder.made(f"{name}-{key[:8]}") / file
         if not path.exists():
             stage(f"making {name}")
-            self.ended.append((name, perform(work, path)))
+            self.ended[name] = perform(work, path)
         return path if path.exists() else None
 
     def make_log(self, log: BenchmarkLog) -> None:
         """Have a log to score: its file, or one that is made for it."""
         base = self.logs.get(log.base) if log.pushes else log
-        if base is None:
-            return  # it could not be made, which is said
-        if log.pushes or log.scenario or log.parts:
+        if base is not None and (log.pushes or log.scenario or log.parts):
             work = partial(write_log, log, base, self.command)
             path = self.made(f"{log.name}.parquet", base.paths, log, work)
-            if path is None:
-                return
-            words = tuple(each for each in log.options if each[0] != "columns")
-            if log.pushes or log.scenario:
-                log = replace(log, truth="torque", truth_file=str(companions(path)[0]))
-            log = replace(log, file=str(path), parts=(), scenario="", options=words)
-        self.logs[log.name] = log
+            base = None if path is None else made_log(log, path)
+        if base is not None:  # else it could not be made, which is said
+            self.logs[log.name] = base
 
     def fit(self, robot: TrainedRobot) -> None:
         """Make a robot file from its training logs, if all are there."""
-        if not self.logs.keys() >= set(robot.train):
+        logs = [self.logs[name] for name in robot.train if name in self.logs]
+        if len(logs) < len(robot.train):
             return
-        logs = [self.logs[name] for name in robot.train]
         paths = [path for log in logs for path in log.paths]
         task = Task(method=robot.method or None, name=robot.name)
         words = {"robot": robot.robot} if robot.robot else {}
@@ -163,40 +156,38 @@ class BenchmarkRun:
                 words["identified"] = {"robot": str(self.robots[log.identified])}
             for protocol in log.protocols:
                 if protocol in words:
-                    yield self.task(log, protocol, log.choice(**words[protocol]), None)
+                    yield self.task(log, protocol, log.choice(**words[protocol]))
         for rival in self.rivals:
             arms = {log.arm for log in logs.values() if rival.file(log) is not None}
             for log in logs.values():
                 if log.arm in arms and log.protocols:
-                    yield self.task(log, rival.declared.protocol, log.choice(), rival)
+                    yield self.task(log, rival.protocol, log.choice(), rival)
 
     def task(
-        self, log: BenchmarkLog, protocol: str, choice: AnalysisChoice, rival: Rival | None
+        self, log: BenchmarkLog, protocol: str, choice: AnalysisChoice, rival: Rival | None = None
     ) -> ScoreTask:
         """The task of a log, with a key of all its inputs."""
-        label, outside = f"{log.name}, {protocol}", list[object]()
-        about = {"protocol": protocol, "marked": log.base in self.marked}
-        if rival is not None:
-            label += f", {rival.name}"
-            outside = [
-                rival.name,
-                rival.declared,
-                rival.file(log),
-                rival.file(log, "contacts.csv"),
-            ]
+        outside = rival and [rival, rival.file(log)]
+        label = ", ".join([log.name, protocol, *([rival.name] if rival else [])])
+        about = {
+            "log": log.name,
+            "arm": log.arm,
+            "protocol": protocol,
+            "exact_model": log.exact_model,
+            "marked": log.base in self.marked,
+            "truth_error_Nm": log.truth_error.tau_Nm,
+        }
         options = options_digest([log, choice, log.truth_path, outside, about])
         key = key_of(content_digest(log.paths), options)
         return ScoreTask(self.folder.path, key, label, log, choice, rival, about)
 
     def score(self, tasks: Sequence[ScoreTask]) -> None:
         """Score some tasks, in the order in which they end."""
-        if not tasks:
-            return
         groups, seen = ([task] for task in tasks), [str(self.folder.path)]
         ended = run_tasks(groups, score_log, self.workers, self.tell, seen)
         with closing(ended):  # type: ignore[type-var]
             for done, outcome in enumerate(ended, 1):
-                self.ended.append((outcome.task.label, outcome))
+                self.ended[outcome.task.label] = outcome
                 stage(f"{done} of {len(tasks)} scored", done / len(tasks))
 
     def record(self, logs: Sequence[BenchmarkLog]) -> dict[str, Any]:
@@ -212,19 +203,24 @@ class BenchmarkRun:
             }
             for log in logs
         ]
+        efforts = {name: each.effort for name, each in self.ended.items() if each.effort}
         found = {
             "manifest": manifest.path.stem,
             "manifest_sha256": digest_of(manifest.path),
             "left_out": manifest.absent(),
-            "failures": {name: failure.line for name, failure in self.failures},
-            "outside": {rival.name: rival.declared for rival in self.rivals},
-            "tasks": [
-                {"task": name, **each.effort._asdict()}
-                for name, each in self.ended
-                if each.effort
-            ],
+            "failures": {name: failure.line for name, failure in self.failures.items()},
+            "outside": {rival.name: rival for rival in self.rivals},
+            "tasks": [{"task": name, **each._asdict()} for name, each in efforts.items()],
         }
         return envelope(self.command, entries, found=found)
+
+
+def made_log(log: BenchmarkLog, path: Path) -> BenchmarkLog:
+    """The log of an entry, read from a file that was made for it."""
+    if log.pushes or log.scenario:
+        log = replace(log, truth="torque", truth_file=str(companions(path)[0]))
+    words = tuple(each for each in log.options if each[0] != "columns")
+    return replace(log, file=str(path), parts=(), scenario="", options=words)
 
 
 def write_log(log: BenchmarkLog, base: BenchmarkLog, command: str, path: Path) -> None:

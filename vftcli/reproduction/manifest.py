@@ -7,15 +7,15 @@ of `vftcli estimate`, in the same words. No log comes with the package and none 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
 from vftcli.batch.log_work import content_digest, digest_of, with_files
 from vftcli.doctor.examination import Examiner
 from vftcli.notebook import OF_ESTIMATE
+from vftcli.observers.table import DEFAULT
 from vftcli.pipeline import AnalysisChoice, choice_of
 from vftcli.readers.reading import Library, absolute
 from vftcli.readers.table import listed
@@ -28,6 +28,7 @@ from vftcli.simulation.scenario import Vector, section_from
 BUILT_IN = ("sim", "field")  #: Manifests that come with the package.
 TRUTHS = ("free", "sensor", "torque", "weight", "contacts", "simulated")
 PROTOCOLS = ("alone", "free", "identified")
+OURS = ("zero", "vendor", *DEFAULT)  #: Names of the tool's own rows.
 PUSHED = "-pushed"  #: Ending of the name of a log with pushes planted.
 APART = 1.0  #: Least time between trained and scored spans of one log. [s]
 SETTLED = 1.0  #: Scored from here on by default: causal filters settle. [s]
@@ -38,10 +39,14 @@ OPTIONS = {
     for word, (*_, option) in kind.options().items()
     if not option.is_setting and word not in {"arm", "free"}
 }
+#: What a truth needs in its entry.
+NEEDS = {"weight": ("weight_N",), "contacts": ("contacts",), "simulated": ("scenario",)}
+is_name = re.compile(r"[\w.+-]+").fullmatch
+
 Spans = tuple[tuple[float, float], ...]
 #: Planted: start [s], length [s], peak force on the flange in base axes [N].
 Pushes = tuple[tuple[float, float, Vector], ...]
-ALWAYS: Spans = ((0.0, 1e9),)  #: All of a log. [s]
+ALWAYS: Spans = ((0.0, np.inf),)  #: All of a log. [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +77,7 @@ class BenchmarkLog:
     truth_file: str = ""  #: Where the truth is, "" for the log's own file.
     truth_columns: str = ""  #: Its columns, as of ``--reference-columns``.
     vendor: str = ""  #: Columns of the controller's own estimate, "" for none.
-    score: Spans = ((SETTLED, 1e9),)  #: Scored spans, from the first sample. [s]
+    score: Spans = ((SETTLED, np.inf),)  #: Scored spans, from the first sample. [s]
     vouched: Spans = ALWAYS  #: Untouched rows are false here; `score` if given. [s]
     #: True contacts: start, end [s], peak [N] if known; by hand.
     contacts: tuple[tuple[float, ...], ...] = ()
@@ -91,23 +96,23 @@ class BenchmarkLog:
         check_known(self.truth, TRUTHS, f"log {self.name}: truth {self.truth!r}")
         for protocol in self.protocols:
             check_known(protocol, PROTOCOLS, f"log {self.name}: protocol {protocol!r}")
-        needs = {"weight": ["weight_N"], "contacts": ["contacts"], "simulated": ["scenario"]}
-        wanted = [*needs.get(self.truth, ()), *(p for p in self.protocols if p != "alone")]
+        wanted = (*NEEDS.get(self.truth, ()), *(p for p in self.protocols if p != "alone"))
+        sources = [self.file, self.parts, self.scenario]
+        ends = [*self.score, *self.vouched]
         rules = {
-            "a name has letters, digits, . + - and _": re.fullmatch(r"[\w.+-]+", self.name),
-            "give one of file, parts, scenario": (
-                bool(self.file) + bool(self.parts) + bool(self.scenario) == 1
-            ),
+            "a name has letters, digits, . + - and _": is_name(self.name),
+            "give one of file, parts, scenario": sum(map(bool, sources)) == 1,
             **{f"{key} is missing": getattr(self, key) for key in wanted},
-            "spans end after their start": all(a < b for a, b in (*self.score, *self.vouched)),
+            "spans end after their start": all(a < b for a, b in ends),
             "a contact is [start, end] or [start, end, peak]": all(
                 len(each) in {2, 3} and each[0] < each[1] for each in self.contacts
             ),
             "a push lasts longer than 0 s": all(length > 0.0 for _, length, _ in self.pushes),
             "parts are as t=time.txt, q=positions.txt": all("=" in each for each in self.parts),
         }
-        if broken := [rule for rule, holds in rules.items() if not holds]:
-            raise ParameterError(f"log {self.name!r}: {broken[0]}")
+        for rule, holds in rules.items():
+            if not holds:
+                raise ParameterError(f"log {self.name!r}: {rule}")
 
     @property
     def base(self) -> str:
@@ -158,25 +163,19 @@ class TrainedRobot:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Declaration:
-    """Declaration of outside estimates by their maker: ``rival.toml``."""
+class Rival:
+    """Outside estimates, a row of their own, as ``rival.toml`` beside them declares."""
 
+    name: str
+    folder: str
     protocol: str = "alone"
     training: tuple[str, ...] = ()  #: sha256 of every file that was trained on.
     causal: bool = False  #: Whether it could run online.
     inputs: str = ""  #: Signals that it reads.
 
-
-class Rival(NamedTuple):
-    """Outside estimates: a row of their own."""
-
-    name: str
-    folder: Path
-    declared: Declaration
-
-    def file(self, log: BenchmarkLog, *endings: str) -> Path | None:
-        """A log's file with one of these endings, or None; its estimates."""
-        tries = (self.folder / f"{log.name}.{end}" for end in endings or ("parquet", "csv"))
+    def file(self, log: BenchmarkLog) -> Path | None:
+        """The estimates of a log, None without any."""
+        tries = (Path(self.folder, f"{log.name}.{end}") for end in ("parquet", "csv"))
         return next(filter(Path.is_file, tries), None)
 
 
@@ -186,42 +185,35 @@ class Manifest:
 
     path: Path
     data: Path
-    logs: tuple[BenchmarkLog, ...]
+    logs: Mapping[str, BenchmarkLog]  #: Name → log.
     robots: Mapping[str, TrainedRobot]  #: Name → robot.
 
     def __post_init__(self) -> None:
-        names = [log.name for log in self.logs]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ParameterError(f"{self.path}: two logs are called {twice[0]}")
+        names = self.logs
         if not names:
             raise ParameterError(f"{self.path}: no [[log]]; docs/benchmark.md shows an entry")
         for robot in self.robots.values():
             for name in robot.train:
                 check_known(name, names, f"robot {robot.name}: no log {name!r} to train on")
-        for log in self.logs:
+        for log in names.values():
             if word := log.identified:
                 check_known(word, self.robots, f"log {log.name}: no [[robot]] {word!r}")
             for word in log.free_logs:
                 check_known(word, names, f"log {log.name}: no free log {word!r}")
 
-    @cached_property
-    def by_name(self) -> dict[str, BenchmarkLog]:
-        """Name → log."""
-        return {log.name: log for log in self.logs}
-
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
         """Reasons for unfair rows of a protocol: a line per training log."""
         training: list[tuple[BenchmarkLog, Spans]] = []
-        key, own = protocol, [digest_of(path) for path in log.paths]
+        key, own = protocol, [*map(digest_of, log.paths)]
         if protocol == "free":
             training = [
-                (log, (interval(word),)) if ":" in word else (self.by_name[word], ALWAYS)
+                (log, (interval(word),)) if ":" in word else (self.logs[word], ALWAYS)
                 for word in log.free
             ]
         if protocol == "identified":
             robot = self.robots[log.identified]
             whole = (interval(robot.interval),) if robot.interval else ALWAYS
-            training = [(self.by_name[name], whole) for name in robot.train]
+            training = [(self.logs[name], whole) for name in robot.train]
             key = f"interval of [[robot]] {robot.name}"
         for other, spans in training:
             what = f"{log.base}, {protocol}: {other.name}"
@@ -234,26 +226,25 @@ class Manifest:
                     )
             elif other.missing:
                 continue
-            elif own and own == [digest_of(path) for path in other.paths]:
+            elif own and own == [*map(digest_of, other.paths)]:
                 yield f"{what} is the scored file under another name"
             elif protocol == "identified" and other.day and other.day == log.day:
                 yield f"{what} is of the same day, {log.day}"
 
     def unfair(self, log: BenchmarkLog, rivals: Sequence[Rival]) -> Iterator[str]:
         """A line on each unfair row of a log, and on another file than the manifest's."""
-        paths = log.paths
-        sha = content_digest(paths)
+        sha = content_digest(log.paths)
         for protocol in log.protocols:
             yield from self.leaks(log, protocol)
-        if log.sha256 and sha != log.sha256 and not log.pushes:
-            yield f"{log.name}: {paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
+        if log.sha256 and sha != log.sha256:
+            yield f"{log.base}: {log.paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
         for rival in rivals:
-            if sha in rival.declared.training and rival.file(log):
+            if sha in rival.training and rival.file(log):
                 yield f"{log.name}: {rival.name} was trained on it (sha256 {sha[:9]}…)"
 
     def complaints(self, rivals: Sequence[Rival]) -> list[tuple[str, str]]:
         """Entry and line of what is unfair or another file, among the logs that are there."""
-        there = (log for log in self.logs if not log.missing)
+        there = (log for log in self.logs.values() if not log.missing)
         lines = ((log.base, line) for log in there for line in self.unfair(log, rivals))
         return list(dict.fromkeys(lines))  # an entry with pushes has every line once
 
@@ -261,7 +252,7 @@ class Manifest:
         """A line on each absent log: its source."""
         return [
             f"{log.name}: no {lacking[0]}" + (f"; source: {log.source}" if log.source else "")
-            for log in self.logs
+            for log in self.logs.values()
             if not log.pushes and (lacking := log.missing)
         ]
 
@@ -271,27 +262,28 @@ def load_manifest(name: str, data: Path | None) -> Manifest:
     path = Path(name)
     if name in BUILT_IN:
         path = Path(__file__).with_name(f"{name}.toml")
+        data = data or Path()
     elif path.suffix != ".toml":
         check_known(name, (*BUILT_IN, "speed"), f"no FILE.toml and no benchmark {name!r}")
+    data = data or path.parent
     tables = toml_file(path, "a manifest")
     for key, rows in tables.items():
         check_known(key, ("log", "arm", "robot"), f"{path}: no table {key!r}")
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             raise ParameterError(f"{path}: {key} is not a list of tables; write [[{key}]]")
-    data = data or (Path() if name in BUILT_IN else path.parent)
-    entries, robots = tables.get("log", []), tables.get("robot", [])
-    arms = [str(entry.get("arm")) for entry in entries]
+    entries = tables.get("log", [])
+    arms = dict.fromkeys(str(entry.get("arm")) for entry in entries)
     shared = {str(row.pop("name", "")): row for row in tables.get("arm", [])}
     for arm in shared:
-        check_known(arm, dict.fromkeys(arms), f"{path}: no log of arm {arm!r}")
-    whole = (shared.get(arm, {}) | entry for arm, entry in zip(arms, entries, strict=True))
-    fits = (section_from(TrainedRobot, row, "robot") for row in robots)
-    return Manifest(
-        path=path,
-        data=data,
-        logs=tuple(log for entry in whole for log in logs_of(entry, data)),
-        robots={fit.name: fit for fit in fits},
-    )
+        check_known(arm, arms, f"{path}: no log of arm {arm!r}")
+    logs: dict[str, BenchmarkLog] = {}
+    for entry in entries:
+        for log in logs_of(shared.get(str(entry.get("arm")), {}) | entry, data):
+            if log.name in logs:
+                raise ParameterError(f"{path}: two logs are called {log.name}")
+            logs[log.name] = log
+    fits = (section_from(TrainedRobot, row, "robot") for row in tables.get("robot", []))
+    return Manifest(path=path, data=data, logs=logs, robots={fit.name: fit for fit in fits})
 
 
 def logs_of(table: Mapping[str, Any], data: Path) -> Iterator[BenchmarkLog]:
@@ -315,32 +307,30 @@ def logs_of(table: Mapping[str, Any], data: Path) -> Iterator[BenchmarkLog]:
 
 def in_words(spans: Spans) -> str:
     """Spans as a complaint names them. [s]"""
-    ends = (
-        (start, "the end" if stop >= ALWAYS[0][1] else f"{stop:g} s") for start, stop in spans
-    )
-    return ", ".join(f"{start:g} s to {end}" for start, end in ends)
+    each = ", ".join(f"{start:g} s to {stop:g} s" for start, stop in spans)
+    return each.replace("inf s", "the end")
 
 
-def rival_of(text: str, ours: Sequence[str], logs: Sequence[BenchmarkLog]) -> Rival:
+def rival_of(text: str, logs: Mapping[str, BenchmarkLog]) -> Rival:
     """The outside estimates of ``NAME=DIR`` for some logs."""
     name, _, place = text.partition("=")
-    if not re.fullmatch(r"[\w.+-]+", name) or not place:
-        raise ParameterError(f"--outside {text!r} is not NAME=DIR")
-    if name in ours:
-        raise ParameterError(f"--outside {text}: {name} is one of our rows; give another name")
-    folder = Path(place)
-    if not folder.is_dir():
-        raise ParameterError(f"--outside {text}: there is no folder {folder}")
-    file = folder / "rival.toml"
+    folder, file = Path(place), Path(place, "rival.toml")
+    rules = {
+        "it is not NAME=DIR": is_name(name) and place,
+        f"{name} is one of our rows; give another name": name not in OURS,
+        f"there is no folder {folder}": folder.is_dir(),
+    }
+    for rule, holds in rules.items():
+        if not holds:
+            raise ParameterError(f"--outside {text}: {rule}")
     table = toml_file(file, "a declaration") if file.is_file() else {}
-    declared = section_from(Declaration, table, "rival.toml")
-    check_known(declared.protocol, PROTOCOLS, f"{file}: protocol {declared.protocol!r}")
-    rival = Rival(name, folder, declared)
-    if not any(map(rival.file, logs)):
-        there = sorted(path.name for path in folder.iterdir())
+    rival = section_from(Rival, {**table, "name": name, "folder": place}, "rival.toml")
+    check_known(rival.protocol, PROTOCOLS, f"{file}: protocol {rival.protocol!r}")
+    if not any(map(rival.file, logs.values())):
+        there = listed(sorted(path.name for path in folder.iterdir())) or "no file"
         raise ParameterError(
-            f"--outside {text}: {folder} has {listed(there) or 'no file'}; LOG.csv or LOG.parquet "
-            f"is looked for, LOG one of {', '.join(log.name for log in logs)}"
+            f"--outside {text}: {folder} has {there}; LOG.csv or LOG.parquet is looked for, "
+            f"LOG one of {', '.join(logs)}"
         )
     return rival
 

@@ -25,11 +25,12 @@ from vftcli.evaluation.scores import (
 )
 from vftcli.free_motion.free_motion import within
 from vftcli.observers.table import BEST, OBSERVERS
+from vftcli.outputs import Record
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.reader import RawLog
 from vftcli.readers.reading import Library
-from vftcli.readers.references import TORQUE, read_list, read_outside, read_reference
+from vftcli.readers.references import TORQUE, read_outside, read_reference
 from vftcli.reproduction.manifest import BenchmarkLog, Rival
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
@@ -74,26 +75,59 @@ class ScoreTask(NamedTuple):
     log: BenchmarkLog
     choice: AnalysisChoice
     rival: Rival | None
-    #: What every row has: protocol, and whether it is scored in spite of a complaint.
-    about: Mapping[str, Any]
+    about: Mapping[str, Any]  #: What every row has.
 
 
 class KnownTruth(NamedTuple):
     """True contact of a log's arm, on the log's clock; None where unknown."""
 
-    tau: Array | None  #: External torque on the robot. (T, n)
-    wrench: Array | None  #: On the flange, base axes. (T, 6)
-    contacts: Sequence[TrueContact] | None
+    tau: Array | None = None  #: External torque on the robot. (T, n)
+    wrench: Array | None = None  #: On the flange, base axes. (T, 6)
+    contacts: Sequence[TrueContact] | None = None
+
+
+class Answer(NamedTuple):
+    """One method's answer for a log."""
+
+    torque: ExternalTorque
+    wrench: Array | None = None
+    #: Whether it uses later samples, and its time on a processor.
+    about: Mapping[str, Any] = {"future": False}
+    lists: Mapping[str, Sequence[ListedRow]] = {}  #: Its contacts by part, one of `LISTS`.
+
+
+def score_log(task: ScoreTask) -> None:
+    """Score a log by a protocol and write its rows, unless they are there."""
+    folder, log, rival = BatchFolder(task.folder), task.log, task.rival
+    if folder.row_file(task.key).exists():
+        return
+    begin("reading")
+    (path,) = log.paths
+    choice = replace(task.choice, library=Library([path]), examiner=Examiner(anyway=True))
+    run = prepared(choice.library.open(path, choice.read), choice)
+    begin("estimating")
+    if rival is None:
+        answers = [*own_answers(run, choice, log)]
+    else:
+        answers = [outside_answer(run.recording, log, rival)]
+    begin("scoring")
+    truth = truth_of(log, run.recording, run.robot)
+    rows = [
+        {**task.about, **answer.about, "method": answer.torque.name, **row}
+        for answer in answers
+        for row in rows_of(answer, truth, log)
+    ]
+    folder.put_rows(task.key, pl.DataFrame(rows, schema=SCHEMA))
 
 
 def truth_of(log: BenchmarkLog, recording: Recording, robot: Robot) -> KnownTruth:
     """The truth of a log, from the manifest or a file."""
     t, path = recording.t, log.truth_path
+    if log.truth == "free":
+        return KnownTruth(np.zeros(recording.q.shape), contacts=[])
     listed: list[Any] | None = [(*c, np.nan)[:3] for c in log.contacts] or None
     if path is None:
-        if log.truth == "free":
-            return KnownTruth(np.zeros(recording.q.shape), None, [])
-        return KnownTruth(None, None, listed)
+        return KnownTruth(contacts=listed)
     table = read_reference(path, log.truth_columns or None)
     table = replace(table, stamps=since_start(table.stamps, recording))
     load = table_reference(table, path, recording, robot, NOTHING)
@@ -107,92 +141,52 @@ def truth_of(log: BenchmarkLog, recording: Recording, robot: Robot) -> KnownTrut
     return KnownTruth(tau, wrench, listed)
 
 
-class Answer(NamedTuple):
-    """One method's answer for a log."""
-
-    torque: ExternalTorque
-    wrench: Array | None = None
-    future: bool = False  #: Whether it uses later samples.
-    lists: Mapping[str, Sequence[ListedRow]] = {}  #: Its contacts by part, one of `LISTS`.
-    #: Time on a processor a sample, of the observer alone and of the whole analysis. [µs]
-    cost: Mapping[str, float] = {}
-
-
-def score_log(task: ScoreTask) -> None:
-    """Score a log by a protocol and write its rows, unless they are there."""
-    folder, log = BatchFolder(task.folder), task.log
-    if folder.row_file(task.key).exists():
-        return
-    begin("reading")
-    (path,) = log.paths
-    choice = replace(task.choice, library=Library([path]), examiner=Examiner(anyway=True))
-    run = prepared(choice.library.open(path, choice.read), choice)
-    begin("estimating")
-    answers = [
-        *(
-            own_answers(run, choice, log)
-            if task.rival is None
-            else [outside_answer(run.recording, log, task.rival)]
-        )
-    ]
-    begin("scoring")
-    truth = truth_of(log, run.recording, run.robot)
-    rows = [
-        {**answer.cost, "method": answer.torque.name, "future": answer.future, **row}
-        for answer in answers
-        for row in rows_of(answer, truth, log)
-    ]
-    about = {"log": log.name, "arm": log.arm, "exact_model": log.exact_model}
-    about |= {"truth_error_Nm": log.truth_error.tau_Nm, **task.about}
-    same = [pl.lit(value, SCHEMA[name]).alias(name) for name, value in about.items()]
-    folder.put_rows(task.key, pl.DataFrame(rows, schema=SCHEMA).with_columns(same))
-
-
 def own_answers(run: Run, choice: AnalysisChoice, log: BenchmarkLog) -> Iterator[Answer]:
     """Answers of zero, the vendor and our observers, `best` with its contacts."""
     recording, t, begun = run.recording, run.t, thread_time()
     made = analyse(run, choice)
     us = 1e6 / len(t)
     whole = us * (thread_time() - begun)
-    wrenches = {wrench.name: wrench.known for wrench in made.wrenches}
-    nothing = np.zeros((recording.samples, 6))
-    yield Answer(ExternalTorque(name="zero", t=t, tau=np.zeros(recording.q.shape)), nothing)
+    zero = ExternalTorque(name="zero", t=t, tau=np.zeros(recording.q.shape))
+    yield Answer(zero, np.zeros((recording.samples, 6)))
     if log.vendor:
         (path,) = log.paths
         there = at_the_logs_times(read_reference(path, log.vendor), recording, path)
         yield Answer(ExternalTorque(name="vendor", t=t, tau=there[TORQUE]))
-    lists: dict[str, Sequence[ListedRow]] = {}
+    lists: dict[str, list[ListedRow]] = {}
     if made.contacts is not None:
-        counted, weak = (
+        listed, weak = (
             [
                 ListedRow(c.start, c.stop, c.peak_force or 0.0, c.peak_band or 0.0, c.is_load)
                 for c in each
             ]
             for each in (made.contacts.contacts, made.contacts.candidates)
         )
-        lists = dict(zip(LISTS, (counted, sorted((*counted, *weak))), strict=True))
+        lists = dict(zip(LISTS, (listed, sorted(listed + weak)), strict=True))
+    wrenches = {wrench.name: wrench.known for wrench in made.wrenches}
     for observer, torque in zip(made.observers, made.estimates, strict=True):
-        name, terms, begun = torque.name, made.motion.log.terms, thread_time()
-        choice.observers.run(observer, terms)
-        cost = {"observer_us": us * (thread_time() - begun), "command_us": whole}
-        own = lists if name == BEST else {}
-        yield Answer(torque, wrenches.get(name), not OBSERVERS[name].online, own, cost)
+        name, begun = torque.name, thread_time()
+        choice.observers.run(observer, made.motion.log.terms)
+        about = {
+            "future": not OBSERVERS[name].online,
+            "observer_us": us * (thread_time() - begun),
+            "command_us": whole,
+        }
+        yield Answer(torque, wrenches.get(name), about, lists if name == BEST else {})
 
 
 def outside_answer(recording: Recording, log: BenchmarkLog, rival: Rival) -> Answer:
     """Another program's answer for a log, at the log's stamps."""
-    path, listed = rival.file(log), rival.file(log, "contacts.csv")
-    there: Mapping[str, Array] = {}
-    if path is not None:
-        read = read_outside(path, rival.name)
-        if (joints := read.signals[TORQUE].shape[1]) != recording.joints:
-            raise LogError(f"{path}: torques of {joints} joints for a log of {recording.joints}")
-        there = at_the_logs_times(read, recording, path)
     # Without estimates for a log it answers nothing there.
-    tau = there.get(TORQUE, np.full(recording.q.shape, np.nan))
+    there: Mapping[str, Array] = {TORQUE: np.full(recording.q.shape, np.nan)}
+    if (path := rival.file(log)) is not None:
+        there = at_the_logs_times(read_outside(path, rival.name), recording, path)
+    tau = there[TORQUE]
+    if tau.shape != recording.q.shape:
+        joints = f"torques of {tau.shape[1]} joints for a log of {recording.joints}"
+        raise LogError(f"{path}: {joints}")
     torque = ExternalTorque(name=rival.name, t=recording.t, tau=tau, error_sd=there.get("band"))
-    lists = {} if listed is None else {LISTS[0]: [ListedRow(*row) for row in read_list(listed)]}
-    return Answer(torque, there.get("wrench"), not rival.declared.causal, lists)
+    return Answer(torque, there.get("wrench"), {"future": not rival.causal})
 
 
 def at_the_logs_times(read: RawLog, recording: Recording, path: Path) -> Mapping[str, Array]:
@@ -203,15 +197,15 @@ def at_the_logs_times(read: RawLog, recording: Recording, path: Path) -> Mapping
     return {name: on_the_logs_clock(t, x, recording, path) for name, x in signals.items()}
 
 
-def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[dict[str, Any]]:
+def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[Record]:
     """Every row of one method on one log."""
-    t, wrench = answer.torque.t, answer.wrench
+    t, wrench, touches = answer.torque.t, answer.wrench, truth.contacts
     w, scored = weights(t), within(t, log.score)
     known = scored if truth.tau is None else scored & np.isfinite(truth.tau).all(axis=1)
-    parts = parts_of(t, known, truth.contacts or ())
+    parts = parts_of(t, known, touches or ())
     touch = parts["contact"]
     if truth.tau is not None and known.any():
-        if not truth.contacts:
+        if not touches:
             del parts["all"]
         if log.pushes:
             del parts["free"]  # it is scored of the log without them
@@ -222,14 +216,14 @@ def rows_of(answer: Answer, truth: KnownTruth, log: BenchmarkLog) -> Iterator[di
             yield {"part": "wrench", "axis": axis, **sums}
     if wrench is not None and log.weight_N:
         yield {"part": "weight", **weighed(-wrench[scored, 2], log.weight_N, w[scored])}
-    if truth.contacts is not None:
+    if touches is not None:
         for part, rows in answer.lists.items():
-            yield {"part": part, **score_list(rows, truth.contacts, log.vouched, float(t[-1]))}
+            yield {"part": part, **score_list(rows, touches, log.vouched, float(t[-1]))}
 
 
 def torque_rows(
     torque: ExternalTorque, truth: Array, parts: Mapping[str, Mask]
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Record]:
     """Rows of a torque: sums by part and joint, shifts, the worst span."""
     for part, inside in parts.items():
         if inside.any():
@@ -243,7 +237,7 @@ def torque_rows(
         yield {"part": "all", "lag_squares": lag_sums(torque, truth, parts["all"])}
 
 
-def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, Any]:
+def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> Record:
     """The `WORST` seconds with the largest Σ w e², and their joint."""
     t, answer = torque.t, np.where(torque.known, torque.tau, 0.0)
     squares = np.where(scored[:, None], weights(t)[:, None] * (answer - truth) ** 2, 0.0)
@@ -252,16 +246,23 @@ def worst_of(torque: ExternalTorque, truth: Array, scored: Mask) -> dict[str, An
     first = int(np.argmax(total[ends] - total[:-1]))
     part = slice(first, int(ends[first]))
     joint = int(squares[part].sum(axis=0).argmax())
-    seen = [np.where(scored, x[:, joint], np.nan)[part].tolist() for x in (truth, answer)]
-    names = ("worst_joint", "worst_t", "worst_truth", "worst_estimate")
-    return dict(zip(names, (joint + 1, t[part].tolist(), *seen), strict=True))
+    true, seen = (np.where(scored, x[:, joint], np.nan)[part].tolist() for x in (truth, answer))
+    return {
+        "worst_joint": joint + 1,
+        "worst_t": t[part].tolist(),
+        "worst_truth": true,
+        "worst_estimate": seen,
+    }
 
 
-def weighed(up: Array, weight: float, w: Array) -> dict[str, float]:
+def weighed(up: Array, weight: float, w: Array) -> Record:
     """Mean and rms error of a carried weight [N], and the share of answered time."""
     known = np.isfinite(up)
     total = float(w[known].sum()) or np.nan
-    mean = float((w * up)[known].sum()) / total
-    square = float((w * (up - weight) ** 2)[known].sum()) / total
-    found = {"weight_N": weight, "mean_N": mean, "rms_error_N": np.sqrt(square)}
-    return {**found, "answered": total / w.sum()}
+    mean, square = (float((w * x)[known].sum()) / total for x in (up, (up - weight) ** 2))
+    return {
+        "weight_N": weight,
+        "mean_N": mean,
+        "rms_error_N": np.sqrt(square),
+        "answered": total / w.sum(),
+    }
