@@ -124,8 +124,9 @@ def test_time_units_are_reported_by_size(path, first, step, seconds):
         assert recording.source.t0_ns == first
 
 
-def test_dates_are_a_clock(path):
-    lines = [f"2024-05-01 12:00:{k / 100:09.6f},0.1,0.2" for k in range(20)]
+@pytest.mark.parametrize("zone", ["", "Z", "+02:00"])
+def test_dates_are_a_clock(path, zone):
+    lines = [f"2024-05-01 12:00:{k / 100:09.6f}{zone},0.1,0.2" for k in range(20)]
     np.testing.assert_allclose(written(path, table(lines)).t, 0.01 * np.arange(20), rtol=1e-9)
 
 
@@ -251,7 +252,7 @@ def test_what_is_no_text_is_refused_by_each_format_of_text(path, name):
 def test_a_text_loads_no_reader_of_another_container(path):
     script = (
         "import sys; from vftcli.readers.reading import read; read(sys.argv[1]); "
-        "heavy = 'h5py', 'mcap', 'pyarrow', 'rosbags', 'scipy'; "
+        "heavy = 'h5py', 'mcap', 'pandas', 'polars', 'rosbags', 'scipy'; "
         "ours = (f'vftcli.readers.{name}' for name in "
         "('arrays', 'bags', 'hdf5', 'lerobot', 'objects', 'parquet')); "
         "sys.exit(str({*heavy, *ours} & set(sys.modules)))"

@@ -119,7 +119,10 @@ def launch() -> None:
 
 
 class NoPandas(MetaPathFinder):
-    """Finds no pandas, which pyarrow imports for .3 s wherever it is; no table here is its."""
+    """Finds no pandas, which pyarrow imports for .3 s wherever it is.
+
+    No table here is its.
+    """
 
     def find_spec(self, fullname: str, *_: object) -> None:
         """Raise for it, as if it were not installed."""

@@ -8,7 +8,7 @@ import typer
 
 from vftcli.admittance import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.console import detail, echo, echo_data, open_made, say, say_json, say_left_out
+from vftcli.cli.console import detail, echo, echo_data, open_made, say, say_json
 from vftcli.signals.option import WRITE, Asked, Option
 
 if TYPE_CHECKING:
@@ -64,7 +64,6 @@ def admit(
         write_admittance(output, found, asked.line, force, figures)
         if not (json or latex):
             say(f"wrote {output}: open {output / 'index.html'}")
-        say_left_out(names)
         if show_made:
             open_made(output)
 

@@ -15,7 +15,7 @@ import typer
 from vftcli.cli.config import WORDS
 from vftcli.cli.progress import STAGES, is_terminal
 from vftcli.signals.errors import VftError
-from vftcli.signals.packages import check_installed
+from vftcli.signals.packages import PACKAGES, check_installed, installed
 from vftcli.signals.parsing import counted, printable
 from vftcli.signals.progress import heard_by, nobody
 
@@ -63,14 +63,6 @@ def say(text: str) -> None:
         echo("\n".join(map(printable, text.split("\n"))), err=True)
 
 
-def say_left_out(names: Iterable[Path | str]) -> None:
-    """Name the written files that lack something for want of a package."""
-    from vftcli.outputs.files import left_out
-
-    for line in left_out(Path(name).name for name in names):
-        say(line)
-
-
 def detail(text: str) -> None:
     """Print words to stderr with --details."""
     if _level.get() == DETAILS:
@@ -89,7 +81,8 @@ def say_written(
     """Print the written files and the page to open, or `run.json` for machines."""
     from vftcli.outputs.screen import written_lines
 
-    say_left_out([*names, *["recording.rrd"] * several])
+    if "recording.rrd" in [*names, *["recording.rrd"] * several] and not installed("rerun"):
+        say(f"recording.rrd not written: {PACKAGES['rerun'][1]}")
     if json:
         echo_data(record)
     else:

@@ -75,11 +75,12 @@ def print_stored(estimates: Path, asked: Asked) -> None:
 def print_lists(found: "list[Analysis]", asked: Asked, failed: "Mapping[str, str]") -> None:
     """Print the lists in the form asked for."""
     from vftcli.outputs.contacts import contacts_csv
-    from vftcli.outputs.report import contacts_envelope
-    from vftcli.outputs.run_record import to_json
     from vftcli.outputs.screen import log_screen, logs_screen
 
     if asked.words["json"]:
+        from vftcli.outputs.report import contacts_envelope
+        from vftcli.outputs.run_record import to_json
+
         echo_data(to_json(contacts_envelope(found, asked.line, failed)))
     elif asked.words["csv"]:
         echo_data(contacts_csv([made.contacts for made in found if made.contacts is not None]))

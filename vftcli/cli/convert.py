@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import command_line, echo, say, say_json, say_left_out
+from vftcli.cli.console import command_line, echo, say, say_json
 from vftcli.readers.reader import ReadChoice
 from vftcli.signals.option import Asked, Option, names_at
 
@@ -37,7 +37,6 @@ def convert_log(
     recording = Library().open(log, replace(choice, derive="none"))
     convert(recording, output, force=force)
     say(health_line(examine(recording)))
-    say_left_out([output])
     if json:
         held = recording.source
         say_json(
@@ -108,7 +107,6 @@ def simulate_log(
     runs = simulate_pair(setup, seed)
     places = dict(zip(paths, runs, strict=True))
     files = [str(f) for f in save(places, log_format, force, command_line())]
-    say_left_out(files)
     if json:
         say_json(
             [],

@@ -181,7 +181,10 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
 
 
 def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list[Contact]:
-    """The rows of a measurement, those of short contacts from finer blocks if these exist."""
+    """The rows of a measurement.
+
+    Those of short contacts come from finer blocks if these exist.
+    """
     found, rows = measurement.found, measurement.rows()
     brief = [k for k, seconds in enumerate(found.lasts) if seconds < SHORT]
     if not brief or free.fine is None:

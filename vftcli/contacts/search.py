@@ -250,7 +250,10 @@ def imm_predict(
 
 
 def imm_update(state: ImmState, d: Array, white: Array, spike: Array, none: Array) -> ImmState:
-    """The states updated by a block's disturbance; a spike, by its log rate, counts a 40th."""
+    """The states updated by a block's disturbance.
+
+    A spike, by its log rate, counts a 40th.
+    """
     own = state.bx + state.xx
     # Covariance of b, as each mode has it, with d. (2, S, n)
     cross = state.bb.copy()

@@ -14,7 +14,6 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact
 from vftcli.doctor.examination import REFUSING, in_words
 from vftcli.doctor.fit import RobotMatch
-from vftcli.evaluation.errors import joint_means
 from vftcli.outputs.contacts import answer, hardest_words
 from vftcli.outputs.examination import command, path_of
 from vftcli.outputs.grid import DASH, percent
@@ -297,9 +296,13 @@ def reference_ground(analysis: Analysis) -> Ground:
     """Whether anything measures the force independently of the observers."""
     if analysis.reference is not None:
         known = ""
-        means = None if analysis.errors is None else joint_means(analysis.errors)
-        if means is not None and np.isfinite(means.floor):
-            known = f"{means.left_out}, its own error {means.floor:.2g} N·m a joint"
+        if analysis.errors is not None:
+            # Polars takes a tenth of the time of a list without a reference.
+            from vftcli.evaluation.errors import joint_means
+
+            means = joint_means(analysis.errors)
+            if np.isfinite(means.floor):
+                known = f"{means.left_out}, its own error {means.floor:.2g} N·m a joint"
         doubts = [sentence(r) for r in analysis.reference.remarks if r.level == "warning"]
         words = "; ".join(doubts) or f"{analysis.reference.name}{known}"
         return Ground("caution" if doubts else "good", "reference", words, of_log=False)

@@ -15,7 +15,7 @@ from vftcli.outputs.files import SEAL, OutputFolder, put_table, table_file
 from vftcli.outputs.run_record import run_record, seal
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
-from vftcli.signals.packages import installed, needed
+from vftcli.signals.packages import needed
 from vftcli.signals.progress import steps
 from vftcli.signals.shown import ALL, frame_of, per_joint
 from vftcli.signals.wrench import per_axis
@@ -82,7 +82,7 @@ def wrench_columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array
 
 def write_estimates(path: Path, analysis: Analysis) -> None:
     """Write the table as Parquet, of a long log in groups of rows."""
-    if len(analysis.t) > LONG and installed("pyarrow"):
+    if len(analysis.t) > LONG:
         starts = range(0, len(analysis.t), GROUP_ROWS)
         write_groups(path, ((analysis, slice(at, at + GROUP_ROWS)) for at in steps(starts)))
         return
@@ -96,7 +96,7 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
 
     The whole table would not fit in memory beside the log.
     """
-    pq = needed("pyarrow.parquet", "the estimates of a long log")
+    from pyarrow.parquet import ParquetWriter
 
     # Measured numbers hardly repeat: a dictionary costs time and room.
     how: Any = {"compression": "zstd", "compression_level": 1, "use_dictionary": False}
@@ -109,7 +109,7 @@ def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -
             table = estimates_table(analysis, rows)
             if schema is None:
                 schema = described_schema(table, frames_of(analysis), doubts_of(analysis))
-                writer = pq.ParquetWriter(file, schema, write_statistics=False, **how)
+                writer = ParquetWriter(file, schema, write_statistics=False, **how)
                 files.enter_context(writer)
                 if csv is not None:
                     text = files.enter_context(csv.open("wb"))

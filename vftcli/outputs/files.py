@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
-from vftcli.signals.packages import PACKAGES, installed
 from vftcli.signals.parsing import whole
 
 if TYPE_CHECKING:
@@ -315,19 +314,6 @@ def check_letters(path: Path) -> None:
     """Raise an OutputError for a name that is not UTF-8, which libraries refuse."""
     if whole(str(path)) != str(path):
         raise OutputError(f"{path} is no name in UTF-8; give another -o")
-
-
-def left_out(names: Iterable[str]) -> list[str]:
-    """Files not written for want of a package, a line each."""
-    return [
-        f"{name} {what}: {PACKAGES[module][1]}"
-        for name in dict.fromkeys(names)
-        for end, module, what in (
-            (".rrd", "rerun", "not written"),
-            (".parquet", "pyarrow", "without units beside its columns"),
-        )
-        if name.endswith(end) and not installed(module)
-    ]
 
 
 def numbered(names: Iterable[str]) -> list[str]:

@@ -99,7 +99,7 @@ def fill(
     record = run_record(analysis, command)
     # The page shows the record beside it.
     analysis = replace(analysis, run=record)
-    # Without the package `left_out` says how to get it.
+    # Without the package the command says how to get it.
     recorded = choice.detail != NONE and installed("rerun")
     for name in steps(["estimates.parquet", *["recording.rrd"] * recorded, "index.html"]):
         path = folder / f"{place}{name}"

@@ -7,7 +7,7 @@ written: forty lines at most.
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from vftcli.outputs.contacts import (
     hardest_rows,
     otherwise,
 )
-from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
 from vftcli.outputs.grid import (
     DASH,
@@ -50,6 +49,9 @@ from vftcli.outputs.grids import contact_grids
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
+
+if TYPE_CHECKING:
+    from vftcli.outputs.error_tables import Block
 
 MOST_LINES = 40
 #: Lines on written files: a blank one, two of names, the page.
@@ -133,8 +135,8 @@ def log_screen(
         force, _ = forces_along(sized, analysis.t)
         bars = force_bars(analysis.t, np.nan_to_num(force), shown, canvas)
     tail, text = doubt_lines(analysis), ""
-    for block in blocks(analysis.errors)[:1]:
-        tail += canvas.wrapped(against(block, analysis), 2)
+    if (leading := leading_block(analysis)) is not None:
+        tail += canvas.wrapped(against(leading, analysis), 2)
     for grid in contact_grids(analysis.errors):
         tail += terminal(grid).splitlines()
     if (printed := analysis.published) is not None:
@@ -247,7 +249,17 @@ def ground_lines(
         yield f"{'':{room}}{printable(ground.remedy)}"
 
 
-def against(block: Block, analysis: Analysis) -> str:
+def leading_block(analysis: Analysis) -> "Block | None":
+    """The first table of errors; None without a reference."""
+    if analysis.errors is None:
+        return None
+    # Polars takes a tenth of the time of a list without a reference.
+    from vftcli.outputs.error_tables import blocks
+
+    return next(iter(blocks(analysis.errors)), None)
+
+
+def against(block: "Block", analysis: Analysis) -> str:
     """One line on the errors: the leading observer, and the others' range."""
     means = block.means
     if not means.errors:
@@ -317,7 +329,8 @@ def log_table(
         line, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
         if line.least is not None and listed is not None and listed.tells_untouched:
             rest = at_least_shown(line.least)
-        errors = [e for block in blocks(analysis.errors)[:1] for e in block.means.errors.values()]
+        leading = leading_block(analysis)
+        errors = [] if leading is None else [*leading.means.errors.values()]
         error = f"{significant(errors[0], 2)} N·m" if errors else DASH
         row = (line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, rest, error)
         state = "sound" if line.standing == "good" else health(all_grounds).subject

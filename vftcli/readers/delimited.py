@@ -7,17 +7,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cached_property
 from itertools import dropwhile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vftcli.readers.opening import HEAD_BYTES, LogFile
-from vftcli.readers.table import Blocks, Column, Names, Places, Table
+from vftcli.readers.table import Arrow, Blocks, Column, Names, Places, Table, numbers_of
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
-
-Series = Any  #: A column of polars, which is imported when a text is read.
 
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
@@ -95,33 +92,44 @@ class TextTable(Table):
 
     def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Parsed columns; a clock of nanoseconds or dates comes as integers."""
-        kinds = dict.fromkeys(columns, "Float64")
+        kinds = dict.fromkeys(columns, "float64")
         if clock is not None:
             row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]
             cells = self.cells(row)
             text = cells[clock] if clock < len(cells) else ""
             # float64 holds nanoseconds since 1970 only to 256 ns.
             if re.fullmatch(r"\d{16,19}", text):
-                kinds[clock] = "Int64"
+                kinds[clock] = "int64"
             elif re.match(r"\d{4}-\d\d-\d\d", text):
-                kinds[clock] = "String"
+                kinds[clock] = "string"
         for found in self._parsed(kinds):
-            yield {c: _numbers(found[c], self.file.path) for c in columns}
+            yield {c: self._numbers(found[c]) for c in columns}
+
+    def _numbers(self, column: Arrow) -> Column:
+        """A parsed column; dates as nanoseconds since 1970."""
+        if column.type != "string":
+            return numbers_of(column)
+        from pyarrow import timestamp
+
+        for zone in (None, "UTC"):  # a zone is in all dates or in none
+            with suppress(ValueError):
+                return numbers_of(column.cast(timestamp("ns", zone)).cast("int64"))
+        raise LogError(f"{self.path}: the clock's column holds no times. Name it: t=…")
 
     def words(self, column: int) -> Names:
         """The different texts that a column holds, in order."""
-        parts = (found[column] for found in self._parsed({column: "String"}))
-        each = (part.unique(maintain_order=True) for part in parts)
+        parts = (found[column] for found in self._parsed({column: "string"}))
+        each = (part.unique().to_pylist() for part in parts)
         words = dict.fromkeys(str(word or "").strip() for part in each for word in part)
         if not words:
             raise self._diagnosed({})
         return tuple(words)
 
-    def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Series]]:
-        """The columns of each piece of the text, by their polars types."""
+    def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Arrow]]:
+        """The columns of each piece of the text, by their types."""
         for text in self._pieces():
             # Most texts parse as they are; mending copies them, so it waits for a
-            # failure, but for doubled blanks, between which polars sees cells.
+            # failure, but for doubled blanks, between which cells are seen.
             doubled = self.separator == " " and re.search(rb"  |\n | \r?\n", text[:HEAD_BYTES])
             found = None if doubled else self._parse(text, kinds)
             found = found or self._parse(self._mended(text), kinds)
@@ -130,27 +138,34 @@ class TextTable(Table):
             yield found
             self.file.release()
 
-    def _parse(self, text: bytes, kinds: Mapping[int, str]) -> dict[int, Series] | None:
-        import polars as pl
+    def _parse(self, text: bytes, kinds: Mapping[int, str]) -> dict[int, Arrow] | None:
+        import pyarrow as pa
+        from pyarrow import csv as arrow
 
-        types = {c: getattr(pl, kind) for c, kind in kinds.items()}
+        if not text:  # a header alone
+            return {c: pa.array([], kind) for c, kind in kinds.items()}
+        quote = '"' if self._is_quoted else False
         try:
-            frame = pl.read_csv(
-                text,
-                has_header=False,
-                separator=self.separator,
-                columns=sorted(kinds),
-                schema={str(c): types.get(c, pl.String) for c in range(self.width)},
-                quote_char='"' if self._is_quoted else None,
-                decimal_comma=self.decimal_comma,
+            table = arrow.read_csv(
+                pa.BufferReader(text),
+                arrow.ReadOptions(
+                    column_names=[str(c) for c in range(self.width)], use_threads=False
+                ),
+                arrow.ParseOptions(
+                    delimiter=self.separator, quote_char=quote, newlines_in_values=bool(quote)
+                ),
+                arrow.ConvertOptions(
+                    column_types={str(c): kind for c, kind in kinds.items()},
+                    include_columns=[str(c) for c in kinds],
+                    null_values=[""],
+                    decimal_point="," if self.decimal_comma else ".",
+                ),
             )
-        except pl.exceptions.NoDataError:  # a header alone, before polars 2
-            return {c: pl.Series(dtype=kind) for c, kind in types.items()}
-        except pl.exceptions.PolarsError:
+        except pa.ArrowException:
             return None
-        found = {c: frame[str(c)] for c in kinds}
-        if all(series.null_count() for series in found.values()):  # as in every blank row
-            blank = np.all([series.is_null() for series in found.values()], axis=0).any()
+        found = {c: table[str(c)].combine_chunks() for c in kinds}
+        if all(column.null_count for column in found.values()):  # as in every blank row
+            blank = np.all([column.is_null() for column in found.values()], axis=0).any()
             return None if blank else found
         return found
 
@@ -166,11 +181,16 @@ class TextTable(Table):
                 return
 
     def _mended(self, text: bytes) -> bytes:
-        """A text with plain line ends, without blank lines and doubled blanks."""
+        """A text with plain line ends and whole rows.
+
+        Blank lines and doubled blanks are left out.
+        """
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if self.separator == " ":
             text = re.sub(rb"[ \t]+", b" ", text).replace(b"\n ", b"\n").replace(b" \n", b"\n")
-        return re.sub(rb"\n\s*\n", b"\n", text.lstrip(b"\n "))
+        rows = re.sub(rb"\n\s*\n", b"\n", text.lstrip(b"\n ")).split(b"\n")
+        between, count = self.separator.encode(), self.width - 1
+        return b"\n".join(row + between * (count - row.count(between)) for row in rows if row)
 
     def _start(self) -> int:
         """Where the first row begins."""
@@ -216,7 +236,7 @@ class TextTable(Table):
                     f"{self.path}: row {number} has {len(cells)} cells, the first line "
                     f"{self.width}. Two logs in one file, or a damaged row: cut it out."
                 )
-            for column in sorted(c for c, kind in kinds.items() if kind != "String"):
+            for column in sorted(c for c, kind in kinds.items() if kind != "string"):
                 cell = cells[column] if column < len(cells) else ""
                 if cell and not self.is_number(cell):
                     name = f" ({self.names[column]})" if self.names else ""
@@ -233,21 +253,6 @@ def decoded(line: bytes) -> str:
         return line.decode("utf-8")
     except UnicodeDecodeError:
         return line.decode("latin-1")
-
-
-def _numbers(series: Series, path: Path) -> Column:
-    """A parsed column: empty cells become NaN, dates nanoseconds since 1970."""
-    import polars as pl
-
-    if series.dtype == pl.String:
-        try:
-            series = series.str.to_datetime(time_unit="ns", time_zone=None).dt.epoch("ns")
-        except pl.exceptions.PolarsError:
-            raise LogError(f"{path}: the clock's column holds no times. Name it: t=…") from None
-    if series.dtype == pl.Int64 and series.null_count():
-        series = series.cast(pl.Float64)
-    values: Column = series.to_numpy()
-    return values
 
 
 #: Columns before the names of ros2 topic echo --csv.

@@ -18,14 +18,11 @@ import numpy as np
 
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
-from vftcli.readers.table import Blocks, Column, Places, Table
+from vftcli.readers.table import Arrow, Blocks, Column, Places, Table, numbers_of
 from vftcli.readers.tables import from_table
 from vftcli.signals.arrays import Indices
 from vftcli.signals.errors import LogError
-from vftcli.signals.packages import needed
 from vftcli.signals.wrench import WrenchFrame
-
-Arrow = Any  #: An array, type or buffer of pyarrow, which has no stubs.
 
 EPISODE = "episode_index"
 #: Rows that are decoded at a time, and bytes of a column that are read for them.
@@ -42,8 +39,9 @@ MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 
 @contextmanager
 def guarded(path: Path) -> Iterator[None]:
     """Turn errors of pyarrow, and Python's own, into a LogError naming the file."""
-    arrow = needed("pyarrow", f"{path}: a Parquet or Arrow file", error=LogError).ArrowException
-    with naming_damage(path, "a damaged Parquet or Arrow file", arrow):
+    from pyarrow import ArrowException
+
+    with naming_damage(path, "a damaged Parquet or Arrow file", ArrowException):
         yield
 
 
@@ -133,12 +131,8 @@ class ColumnarTable(Table):
             raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
         whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
         target = np.int64 if whole else np.float64
-        # Pyarrow's own way imports pandas (50 MB, half a second); it has NaN for what is missing.
-        if values.null_count or values.type.bit_width < 8:
-            numbers = np.asarray(values.to_numpy(zero_copy_only=False))
-        else:
-            numbers = np.from_dlpack(values)
-        numbers = numbers.astype(target, copy=False)  # what is picked of it is copied once more
+        # What is picked of it is copied once more.
+        numbers = numbers_of(values).astype(target, copy=False)
         return numbers if length is None else numbers.reshape(-1, length)
 
     def episodes(self) -> Column:

@@ -31,6 +31,7 @@ Blocks = Iterator[Block]  #: All rows, some thousand at a time.
 Notes = tuple[Remark, ...]  #: What is to be said of a log.
 Signals = dict[str, Array]  #: Signal → a row a sample. (T, k)
 Names = tuple[str, ...]  #: Names of columns, fields or joints, in their order.
+Arrow = Any  #: An array, type or buffer of pyarrow, which has no stubs.
 
 
 class Table(ABC):
@@ -277,6 +278,14 @@ class JoinedRows:
             first = np.frombuffer(mapped, self._kind).reshape(-1, *min(self.shapes))
             self._held.insert(0, first)
         return np.concatenate(self._held) if len(self._held) > 1 else self._held[0]
+
+
+def numbers_of(values: Arrow) -> Column:
+    """A column of Arrow's numbers; NaN for what is missing. (T,)"""
+    # Pyarrow's own way imports pandas (50 MB, half a second); it has NaN for what is missing.
+    if values.null_count or values.type.bit_width < 8:
+        return np.asarray(values.to_numpy(zero_copy_only=False))
+    return np.from_dlpack(values)
 
 
 def joined(parts: Iterable[Signals]) -> Signals:

@@ -7,7 +7,6 @@ Any reader of the file sees unit, meaning, sign and frame beside each column:
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vftcli.signals.packages import installed, needed
 from vftcli.signals.recording import COLUMN_NAMES, SIGNALS
 from vftcli.signals.wrench import AXES, unit_of
 
@@ -77,13 +76,9 @@ def described_schema(
     frames: Mapping[str, StatedFrame] | None = None,
     metadata: Mapping[str, str] | None = None,
 ) -> Any:  # noqa: ANN401 - pyarrow is untyped
-    """The table's pyarrow schema with each column's meaning, for ``write_parquet``.
+    """The table's pyarrow schema with each column's meaning, for ``write_parquet``."""
+    import pyarrow as pa
 
-    None without pyarrow: polars then writes the columns, and nothing beside them.
-    """
-    if not installed("pyarrow"):
-        return None
-    pa = needed("pyarrow", "a schema")
     schema = table.clear().to_arrow().schema
     known = frames or {}
     fields = [field.with_metadata(column_facts(field.name, known)) for field in schema]

@@ -16,7 +16,6 @@ VERSION = "0.3.0"  #: The version that every output states.
 PACKAGES = {
     "pinocchio": ("pin", "pip install pin"),
     "rerun": ("rerun-sdk", "pip install rerun-sdk"),
-    "pyarrow": ("pyarrow", "pip install pyarrow"),
     "h5py": ("h5py", "pip install 'vftcli[hdf5]'"),
     "xacro": ("xacro", "pip install 'vftcli[xacro]'"),
     "xacrodoc": ("xacrodoc", "pip install 'vftcli[xacro]'"),
