@@ -4,11 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import polars as pl
 import pytest
 from example_logs import CIRCLE
-
-from vftcli.readers.reading import read
 
 pytestmark = pytest.mark.statistical  # long: CI does the same in an environment without the two
 
