@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from vftcli.batch.log_work import content_digest, digest_of, with_files
+from vftcli.batch.log_work import content_digest, with_files
 from vftcli.doctor.examination import Examiner
 from vftcli.notebook import OF_ESTIMATE
 from vftcli.observers.table import DEFAULT
@@ -203,50 +203,47 @@ class Manifest:
 
     def leaks(self, log: BenchmarkLog, protocol: str) -> Iterator[str]:
         """Reasons for unfair rows of a protocol: a line per training log."""
-        training: list[tuple[BenchmarkLog, Spans]] = []
-        key, own = protocol, [*map(digest_of, log.paths)]
-        if protocol == "free":
-            training = [
-                (log, (interval(word),)) if ":" in word else (self.logs[word], ALWAYS)
-                for word in log.free
-            ]
+        # The log itself by its spans, others whole.
+        words = [(log.base, word) if ":" in word else (word, "0:") for word in log.free]
+        key, used = protocol, words if protocol == "free" else []
         if protocol == "identified":
             robot = self.robots[log.identified]
-            whole = (interval(robot.interval),) if robot.interval else ALWAYS
-            training = [(self.logs[name], whole) for name in robot.train]
+            used = [(name, robot.interval or "0:") for name in robot.train]
             key = f"interval of [[robot]] {robot.name}"
-        for other, spans in training:
-            what = f"{log.base}, {protocol}: {other.name}"
-            if other.base == log.base:
-                near = (a < d + APART and b > c - APART for a, b in spans for c, d in log.score)
-                if any(near):
+        for name, word in used:
+            other, (start, stop) = self.logs[name], interval(word)
+            what = f"{log.base}, {protocol}: {name}"
+            if name == log.base:
+                if any(start < b + APART and stop > a - APART for a, b in log.score):
                     yield (
-                        f"{log.base}: {key} ({in_words(spans)}) must stay {APART:g} s away from "
-                        f"score ({in_words(log.score)}); change one of them"
+                        f"{log.base}: {key} ({in_words([(start, stop)])}) must stay {APART:g} s "
+                        f"away from score ({in_words(log.score)}); change one of them"
                     )
             elif other.missing:
                 continue
-            elif own and own == [*map(digest_of, other.paths)]:
+            elif log.paths and content_digest(log.paths) == content_digest(other.paths):
                 yield f"{what} is the scored file under another name"
             elif protocol == "identified" and other.day and other.day == log.day:
                 yield f"{what} is of the same day, {log.day}"
 
-    def unfair(self, log: BenchmarkLog, rivals: Sequence[Rival]) -> Iterator[str]:
-        """A line on each unfair row of a log, and on another file than the manifest's."""
-        sha = content_digest(log.paths)
-        for protocol in log.protocols:
-            yield from self.leaks(log, protocol)
-        if log.sha256 and sha != log.sha256:
-            yield f"{log.base}: {log.paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
-        for rival in rivals:
-            if sha in rival.training and rival.file(log):
-                yield f"{log.name}: {rival.name} was trained on it (sha256 {sha[:9]}…)"
-
     def complaints(self, rivals: Sequence[Rival]) -> list[tuple[str, str]]:
         """Entry and line of what is unfair or another file, among the logs that are there."""
-        there = (log for log in self.logs.values() if not log.missing)
-        lines = ((log.base, line) for log in there for line in self.unfair(log, rivals))
-        return list(dict.fromkeys(lines))  # an entry with pushes has every line once
+        found: dict[tuple[str, str], None] = {}  # an entry with pushes has every line once
+        for log in self.logs.values():
+            if log.missing:
+                continue
+            sha = content_digest(log.paths)
+            lines = [line for protocol in log.protocols for line in self.leaks(log, protocol)]
+            if log.sha256 and sha != log.sha256:
+                what = f"{log.paths[0]} has sha256 {sha[:12]}…, not {log.sha256[:12]}…"
+                lines.append(f"{log.base}: {what}")
+            lines += [
+                f"{log.name}: {rival.name} was trained on it (sha256 {sha[:9]}…)"
+                for rival in rivals
+                if sha in rival.training and rival.file(log)
+            ]
+            found |= dict.fromkeys((log.base, line) for line in lines)
+        return list(found)
 
     def absent(self) -> list[str]:
         """A line on each absent log: its source."""
@@ -305,7 +302,7 @@ def logs_of(table: Mapping[str, Any], data: Path) -> Iterator[BenchmarkLog]:
         yield replace(log, name=f"{log.name}{PUSHED}", arm=f"{log.arm} (planted)")
 
 
-def in_words(spans: Spans) -> str:
+def in_words(spans: Sequence[tuple[float, float]]) -> str:
     """Spans as a complaint names them. [s]"""
     each = ", ".join(f"{start:g} s to {stop:g} s" for start, stop in spans)
     return each.replace("inf s", "the end")

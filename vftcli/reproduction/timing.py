@@ -96,39 +96,11 @@ def simd() -> str:
     return str((found.get("SIMD Extensions", {}).get("found") or ["baseline"])[-1])
 
 
-def observers_of(log: Recording, robot: Robot) -> Sequence[Observer]:
-    """The paper's observers for a log."""
-    return ObserverChoice(names=PAPER).build(robot, log.median_step)[0]
-
-
-def our_way(log: Recording, robot: Robot) -> dict[str, Work]:
-    """The dynamics of a log and the paper's observers, each alone."""
-    terms = dynamics_terms(log, robot)
-    work: dict[str, Work] = {"dynamics": partial(dynamics_terms, log, robot)}
-    return work | {each.name: partial(each.estimate, terms) for each in observers_of(log, robot)}
-
-
 def core(log: Recording, robot: Robot, observers: Sequence[Observer]) -> None:
     """Run the dynamics of a log and observers on it."""
     terms = dynamics_terms(log, robot)
     for observer in observers:
         observer.estimate(terms)
-
-
-def printed_way(log: Recording, robot: Robot) -> dict[str, Work]:
-    """The same, sample by sample; both first-order observers run in one loop."""
-    terms, step = dynamics_terms(log, robot), log.median_step
-    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
-    dense = partial(dense_kalman_loop, terms.p, terms.mu, step, kalman)
-    both = partial(first_order_loops, terms.p, terms.mu, step)
-    literal = partial(literal_momentum_terms, robot.model, log.q, log.require("dq"))
-    loops: dict[str, Work] = {
-        "fdo": both,
-        "gmo": both,
-        "kfo-fe": dense,
-        "kfo-zoh": partial(dense, rebuild=True),
-    }
-    return {"dynamics": literal, **loops}
 
 
 def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
@@ -138,12 +110,15 @@ def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
     """
     robot = load_robot(robot_name)
     log = circle(robot, samples)
+    observers, _ = ObserverChoice(names=PAPER).build(robot, log.median_step)
+    terms = dynamics_terms(log, robot)
+    work: dict[str, Work] = {"dynamics": partial(dynamics_terms, log, robot)}
+    work |= {each.name: partial(each.estimate, terms) for each in observers}
+    if installed("pinocchio"):
+        motions = zip(RATIOS, (log, jittering(log)), strict=True)
+        work |= {ratio: partial(core, motion, robot, observers) for ratio, motion in motions}
+        work[RNEA] = partial(rnea_loop, robot.model, log.q, log.require("dq"))
     with one_core():
-        work, observers = our_way(log, robot), observers_of(log, robot)
-        if installed("pinocchio"):
-            motions = zip(RATIOS, (log, jittering(log)), strict=True)
-            work |= {ratio: partial(core, x, robot, observers) for ratio, x in motions}
-            work[RNEA] = partial(rnea_loop, robot.model, log.q, log.require("dq"))
         median_times(work, 1)  # of their first calls
         total = median_times(work, rounds)
 
@@ -165,23 +140,33 @@ def benchmark(robot_name: str, samples: int, rounds: int) -> dict[str, Any]:
 
 def computing_time(_seed: int) -> Iterator[Given]:
     """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
-    log = circle(robot := load_robot("ur5"), SAMPLES)
+    robot, ours = load_robot("ur5"), benchmark("ur5", SAMPLES, ROUNDS)
+    rows = {row["name"]: row["total_s"] for row in ours["observers"]}
     # The printed way runs over fewer samples and is scaled.
-    few = log.between(0.0, float(log.t[SCRIPT_SAMPLES - 1]))
+    few = circle(robot, SCRIPT_SAMPLES)
     with one_core():
-        ways = {CORRECTED: our_way(log, robot), AS_PRINTED: printed_way(few, robot)}
-        work = {(v, name): call for v, calls in ways.items() for name, call in calls.items()}
-        total = median_times(work, ROUNDS)
-    for variant in ways:
-        scale = SAMPLES / few.samples if variant == AS_PRINTED else 1.0
-        cost = {}
-        for name in PAPER:
-            # Each of those that run in one loop is half of it.
-            share = 0.5 if variant == AS_PRINTED and name in {"fdo", "gmo"} else 1.0
-            cost[name] = scale * (total[variant, "dynamics"] + share * total[variant, name])
-            yield variant, f"seconds/{name}", cost[name]
+        printed = median_times(printed_way(few, robot), ROUNDS)
+    scaled = {name: SAMPLES / SCRIPT_SAMPLES * seconds for name, seconds in printed.items()}
+    for name in ("fdo", "gmo"):
+        scaled[name] *= 0.5  # both run in one loop
+    corrected = {"dynamics": ours["dynamics"]["total_s"], **rows}
+    for variant, own in ((AS_PRINTED, scaled), (CORRECTED, corrected)):
+        cost = {name: own["dynamics"] + own[name] for name in PAPER}
+        for name, seconds in cost.items():
+            yield variant, f"seconds/{name}", seconds
         for name in ("fdo", "kfo-fe"):
             yield variant, f"zoh/{name}", cost["kfo-zoh"] / cost[name]
+
+
+def printed_way(log: Recording, robot: Robot) -> dict[str, Work]:
+    """The paper's way, sample by sample; both first-order observers run in one loop."""
+    terms, step = dynamics_terms(log, robot), log.median_step
+    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
+    dense = partial(dense_kalman_loop, terms.p, terms.mu, step, kalman)
+    both = partial(first_order_loops, terms.p, terms.mu, step)
+    literal = partial(literal_momentum_terms, robot.model, log.q, log.require("dq"))
+    loops: dict[str, Work] = {"dynamics": literal, "fdo": both, "gmo": both}
+    return loops | {"kfo-fe": dense, "kfo-zoh": partial(dense, rebuild=True)}
 
 
 def first_order_loops(p: Array, mu: Array, step: float) -> tuple[Array, Array]:
