@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from example_logs import BEARING, CIRCLE, EPISODES, TAPS
 
+from vftcli.cli.console import echo_top, speaking
 from vftcli.cli.progress import Stages, fitted
 from vftcli.signals.progress import heard_by, stage, steps
 
@@ -242,6 +243,16 @@ BRIGHT = "\x1b[32m" + "word " * 3 + "\x1b[0m"
 )
 def test_a_line_is_broken_where_it_does_not_fit(text: str, width: int, lines: list[str]) -> None:
     assert fitted(text, width).split("\n") == lines
+
+
+def test_a_result_is_one_screen_without_details(capsys) -> None:
+    text = "".join(f"{k}\n" for k in range(50))
+    echo_top(text)
+    *_, last, more = capsys.readouterr().out.splitlines()
+    assert (last, more) == ("38", "and 11 lines more: --details")
+    with speaking(details=True, quiet=False):
+        echo_top(text)
+    assert capsys.readouterr().out == text
 
 
 def test_a_dumb_terminal_has_no_line() -> None:

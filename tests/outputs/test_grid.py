@@ -185,6 +185,19 @@ def test_a_table_without_room_leaves_out_what_is_seldom(monkeypatch: pytest.Monk
     assert least.splitlines()[-2:] == ["b         10.0", "No room for: work of all."]
 
 
+def test_a_table_without_room_goes_on_below(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "19")
+    grid = Grid(given=("name", *joint_columns(4)), rows=(("gmo", *["-1.25"] * 4),))
+    assert [line.split() for line in terminal(grid, indent=2).splitlines()] == [
+        ["name", "J1"], ["gmo", "-1.25"], [], ["name", "J2"], ["gmo", "-1.25"], [],
+        ["name", "J3"], ["gmo", "-1.25"], [], ["name", "J4"], ["gmo", "-1.25"],
+    ]  # fmt: skip
+    assert terminal(grid).count("name") == 2  # 18 columns hold two joints
+    # Colours have no width.
+    health = GridCell("", mark="\x1b[32msound\x1b[0m")
+    assert "health" in terminal(Grid(("name", Column("health", words=True)), [("gmo", health)]))
+
+
 def test_a_table_has_rows_or_headings_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     columns = (Column("", words=True), Column("", form=".2f"))
     assert terminal(Grid(given=columns, rows=(("a", 1.0), ("b", 22)))) == "a  1.00\nb    22\n"

@@ -59,7 +59,9 @@ def test_never_more_than_forty_lines(analysis: Analysis, count: int) -> None:
     for made in (analysis, replace(analysis, examinations=(troubled,))):
         for most in (MOST_LINES, MOST_LINES - FILE_LINES):
             text = log_screen(listed(made, count), CANVAS, most=most)
-            assert len(text.splitlines()) <= most
+            lines = text.splitlines()
+            assert len(lines) <= most
+            assert all(len(line) <= CANVAS.width or "vftcli" in line for line in lines)
     assert len(log_screen(listed(analysis, 60), CANVAS, every=True).splitlines()) > MOST_LINES
 
 
@@ -216,7 +218,8 @@ ROW = "  {0}    {0}.00 –   4.78   5{0} ± 7  57–78  +y, down   wrist  fair"
 EACH = [*map(ROW.format, (1, 2, 3))]
 END = [
     "  Nothing else above 6 N. Weaker pushes would not show.",
-    "  (± 95 %; force ON the robot, base axes; range: if it touched another possible place)",
+    "  (± 95 %; force ON the robot, base axes; range: if it touched another",
+    "    possible place)",
 ]
 
 
@@ -265,6 +268,8 @@ def test_bars_are_as_high_as_the_force_and_stand_where_it_is() -> None:
     # Nine steps at most, of 1, 2 or 5 times a power of ten.
     steps = {0.9: "0.1", 2.0: "0.5", 45.0: "5", 600.0: "100"}
     assert {s: seconds(np.array([0.0, s]), 60).split()[1] for s in steps} == steps
+    assert seconds(np.array([0.0, 200.0]), 60).endswith("200 s")
+    assert len(seconds(np.array([0.0, 200.0]), 60)) == 60 + 4
 
 
 def test_every_sample_counts_in_a_column_and_a_gap_is_bridged() -> None:

@@ -8,7 +8,7 @@ import typer
 
 from vftcli.admittance import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.console import detail, echo, echo_data, open_made, say, say_json
+from vftcli.cli.console import detail, echo_data, echo_top, open_made, say, say_json
 from vftcli.signals.option import WRITE, Asked, Option
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def admit(
     force: opt.Force,
     show_made: opt.Open,
 ) -> None:
-    """Replay a log's external force through admittance controllers.
+    """Replay a force through admittance controllers.
 
     The force is that of kfo-fe; a scenario runs with the controller in the loop.
 
@@ -95,6 +95,4 @@ def show(found: "Replayed", *, json: bool, latex: bool) -> None:
         words = words if run.stable else f"the arm ran away at {run.t[-1]:.2f} s"
         timed = run.stable and grid.rows
         say(terminal(grid).rstrip() if timed else f"closed loop: {words}")
-    echo(
-        terminal(comparison_grid(result.rows)).rstrip() if result.rows else "no axis was dragged"
-    )
+    echo_top(terminal(comparison_grid(result.rows)) if result.rows else "no axis was dragged")

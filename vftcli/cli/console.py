@@ -75,6 +75,16 @@ def show(text: str) -> None:
         echo(text, nl=not text.endswith("\n"), colour=True)
 
 
+def echo_top(text: str) -> None:
+    """Print a result to stdout; without --details as many lines as a screen has."""
+    from vftcli.outputs.screen import MOST_LINES
+
+    lines = text.rstrip("\n").split("\n")
+    if (more := len(lines) - MOST_LINES + 1) > 1 and _level.get() < DETAILS:
+        lines[-more:] = [f"and {more} lines more: --details"]
+    echo("\n".join(lines))
+
+
 def say_written(
     record: str, folder: Path, names: Sequence[str], *, json: bool, several: bool = False
 ) -> None:

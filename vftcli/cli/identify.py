@@ -9,8 +9,8 @@ from vftcli.bias import RefinementChoice
 from vftcli.cli import options as opt
 from vftcli.cli.console import (
     detail,
-    echo,
     echo_data,
+    echo_top,
     health_of,
     open_made,
     say,
@@ -104,7 +104,7 @@ def identify_robot(
     if json:
         echo_data(record)
     else:
-        echo(tables_text(found))
+        echo_top(tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))
 
@@ -138,5 +138,5 @@ def find_gains(log: Path, output: Path | None, asked: Asked, figures: str | None
     say_recording(found.run.recording)
     for note in (*found.run.robot.remarks, *notes):
         detail(f"note: {note}")
-    echo(terminal(tuned_grid(found.tuned, found.goal.threshold is not None)).rstrip("\n"))
+    echo_top(terminal(tuned_grid(found.tuned, found.goal.threshold is not None)))
     say(f"wrote {output}: use it with --gains {output}")

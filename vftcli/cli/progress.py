@@ -2,7 +2,6 @@
 
 import atexit
 import os
-import re
 import shutil
 import sys
 import textwrap
@@ -11,6 +10,8 @@ import time
 from typing import TextIO
 
 import typer
+
+from vftcli.signals.parsing import COLOUR
 
 QUICK = 1.0  #: Shorter work shows nothing. [s]
 EVERY = 1.0  #: Time between updates of the line. [s]
@@ -127,8 +128,7 @@ def is_terminal(stream: TextIO | None) -> bool:
     return seen and os.environ.get("TERM") != "dumb"
 
 
-#: Words without width, as colours, and the head of words to copy.
-COLOUR, COMMAND = re.compile(r"\x1b\[[0-9;]*m"), "vftcli "
+COMMAND = "vftcli "  #: Head of words to copy.
 
 
 def fitted(text: str, width: int) -> str:

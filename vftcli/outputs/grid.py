@@ -12,12 +12,13 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vftcli.outputs import Record
-from vftcli.signals.parsing import printable
+from vftcli.signals.parsing import COLOUR, printable
 
 DASH = "–"  #: Sign for an unknown number.
 
@@ -177,37 +178,51 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
     return tuple(Column(f"J{j}", symbol=f"$J_{{{j}}}$", **shape) for j in numbers)
 
 
-def terminal(grid: Grid, letters: Callable[[str], str] = str) -> str:
+def terminal(grid: Grid, letters: Callable[[str], str] = str, indent: int = 0) -> str:
     """A table as text, two blanks between columns, each line ended.
 
-    A table wider than the terminal breaks its headings, then leaves out `seldom` columns,
-    the last first, and names them below.
+    A table wider than the terminal breaks its headings, then leaves out `seldom` columns and
+    names them below; what is still too wide goes on below, beside its first words.
     """
-    width, left_out = shutil.get_terminal_size().columns, list[str]()
-    lines = table_lines(grid, letters)
-    if len(max(lines, key=len, default="")) > width:
-        lines = table_lines(grid, letters, broken=True)
-    while len(max(lines, key=len, default="")) > width and any(c.seldom for c in grid.columns):
-        k = max(k for k, column in enumerate(grid.columns) if column.seldom)
-        left_out.insert(0, grid.columns[k].head)
-        rows = tuple([*row[:k], *row[k + 1 :]] for row in grid.rows)
-        columns = [*grid.columns[:k], *grid.columns[k + 1 :]]
-        grid = replace(grid, given=columns, rows=rows)
-        lines = table_lines(grid, letters, broken=True)
+    width, columns = shutil.get_terminal_size().columns - indent, grid.columns
+    lines, left_out = table_lines(grid, letters), list[str]()
+
+    def fits(lines: list[str]) -> bool:
+        return all(len(COLOUR.sub("", line)) <= width for line in lines)
+
+    if not fits(lines):
+        shown = list[int]()
+        for k in sorted(range(len(columns)), key=lambda k: columns[k].seldom):
+            more = sorted([*shown, k])
+            if columns[k].seldom and not fits(table_lines(grid, letters, more)):
+                left_out.append(columns[k].head)
+            else:
+                shown = more
+        words = [*takewhile(lambda k: columns[k].words, shown)]
+        parts = [[*words]]
+        for k in shown[len(words) :]:
+            if parts[-1] != words and not fits(table_lines(grid, letters, [*parts[-1], k])):
+                parts.append([*words])
+            parts[-1].append(k)
+        lines = [line for part in parts for line in ("", *table_lines(grid, letters, part))][1:]
     above = [grid.caption] if grid.caption else []
     below = [f"No room for: {', '.join(left_out)}."] if left_out else []
     return "".join(f"{line}\n" for line in (*above, *lines, *below))
 
 
-def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = False) -> list[str]:
-    """Lines of headings and rows, summaries below a rule; `broken` headings wrap."""
+def table_lines(
+    grid: Grid, letters: Callable[[str], str], shown: Sequence[int] | None = None
+) -> list[str]:
+    """Lines of headings and rows, summaries below a rule; of some columns, headings wrap."""
     columns, cells = list[list[str]](), grid.cells
-    for k, column in enumerate(grid.columns):
+    every = range(len(grid.columns)) if shown is None else shown
+    for k in every:
+        column = grid.columns[k]
         # Numbers without a mark keep its place.
         room = " " * (grid.marked and not column.words)
         texts = [letters(row[k].text) + (row[k].mark or room) for row in cells]
         heads = [letters(column.heading)]
-        if broken:
+        if shown is not None:
             # The unit does not break: its blanks are hidden from textwrap.
             unit = column.unit.replace(" ", "\N{NO-BREAK SPACE}")
             head = letters(column._replace(unit=unit).heading)
@@ -215,11 +230,10 @@ def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = Fal
             heads = [h.replace("\N{NO-BREAK SPACE}", " ") for h in textwrap.wrap(head, least)]
         columns.append([*(head + room for head in heads), *texts])
     height = max(map(len, columns), default=0)
-    for k, (column, texts) in enumerate(zip(grid.columns, columns, strict=True)):
+    for i, (k, texts) in enumerate(zip(every, columns, strict=True)):
         full = [""] * (height - len(texts)) + texts
-        wide = max(map(len, full))
-        put = str.ljust if column.words else str.rjust
-        columns[k] = [put(text, wide) for text in full]
+        put = str.ljust if grid.columns[k].words else str.rjust
+        columns[i] = [put(text, max(map(len, full))) for text in full]
     lines = ["  ".join(texts).rstrip() for texts in zip(*columns, strict=True)]
     heads = lines[: len(lines) - len(cells)]
     lines = lines if any(heads) else lines[len(heads) :]

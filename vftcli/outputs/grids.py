@@ -28,15 +28,15 @@ SURE = 0.05  #: A difference of two observers is sure below this p.
 CONTACTS = {
     "recording": "recording",
     "observer": "observer",
-    "signal": "seen in",
-    "contacts": "contacts",
-    "listed_contacts": "rows",
-    "found_contacts": "found",
-    "missed_contacts": "missed",
-    "false_alarms": "false",
-    "false_alarms_per_h": "false alarms/h",
-    "detection_delay_s": "mean delay [s]",
-    "longest_delay_s": "longest [s]",
+    "signal": Column("seen in", words=True, seldom=True),
+    "contacts": Column("contacts"),
+    "listed_contacts": Column("rows"),
+    "found_contacts": Column("found"),
+    "missed_contacts": Column("missed"),
+    "false_alarms": Column("false"),
+    "false_alarms_per_h": Column("false alarms/h"),
+    "detection_delay_s": Column("mean delay", "s"),
+    "longest_delay_s": Column("longest", "s", seldom=True),
 }
 
 

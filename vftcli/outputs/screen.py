@@ -206,13 +206,14 @@ def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str
     if not contacts and (most is not None or not found.candidates):
         return [f"  {rest}"] if rest else []
     shown = hardest_rows(contacts, len(contacts) if most is None else most)
-    lines = terminal(contact_grid(shown), canvas.shown).splitlines() if shown else []
+    lines = terminal(contact_grid(shown), canvas.shown, 2).splitlines() if shown else []
     if len(shown) < len(contacts):
         lines.append(f"the {len(shown)} hardest of {len(contacts)}; --details shows all")
     if most is None and found.candidates:
         lines += ["", "Candidates, too little evidence or force to list:"]
-        lines += terminal(contact_grid(found.candidates), canvas.shown).splitlines()
-    lines += [rest] * bool(rest) + [f"({LEGEND})"] * (found.hardest is not None)
+        lines += terminal(contact_grid(found.candidates), canvas.shown, 2).splitlines()
+    below = [rest] * bool(rest) + [f"({LEGEND})"] * (found.hardest is not None)
+    lines += (line for text in below for line in canvas.wrapped(text, 2))
     return [f"  {line}" if line else "" for line in lines]
 
 
@@ -323,16 +324,17 @@ def log_table(
 ) -> list[str]:
     """One line a log: its contacts and its health."""
     judged = any(analysis.errors is not None for analysis, _ in found)
-    heads = ("log", "span", "contacts", "hardest", "else", *["error"] * judged)
+    span, rest = Column("span", seldom=True), Column("else", seldom=True)
+    heads = ("log", span, Column("contacts"), "hardest", rest, *[Column("error")] * judged)
     lines: list[tuple[Sequence[str], Standing, str]] = []
     for analysis, all_grounds in found:
-        line, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
+        line, listed, least = log_line(analysis, all_grounds), analysis.contacts, DASH
         if line.least is not None and listed is not None and listed.tells_untouched:
-            rest = at_least_shown(line.least)
+            least = at_least_shown(line.least)
         leading = leading_block(analysis)
         errors = [] if leading is None else [*leading.means.errors.values()]
         error = f"{significant(errors[0], 2)} N·m" if errors else DASH
-        row = (line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, rest, error)
+        row = (line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, least, error)
         state = "sound" if line.standing == "good" else health(all_grounds).subject
         lines.append((row[: len(heads)], line.standing, state))
     lines += [((name, *[""] * (len(heads) - 1)), "bad", "left out") for name in failed]
@@ -341,8 +343,7 @@ def log_table(
         (*row, GridCell("", mark=canvas.painted(canvas.shown(f"{MARKS[how]} {state}"), how)))
         for row, how, state in lines
     ]
-    columns = [Column(h, words=h in {"log", "hardest", "health"}) for h in (*heads, "health")]
-    return terminal(Grid(columns, rows), canvas.shown).splitlines()
+    return terminal(Grid((*heads, "health"), rows), canvas.shown, 2).splitlines()
 
 
 def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:
@@ -387,7 +388,11 @@ def seconds(t: Array, columns: int) -> str:
     step = next(decade * m for m in (1, 2, 5, 10) if decade * m >= raw)
     each = [k * step for k in range(int(np.floor(span / step + 1e-9)) + 1)]
     share = columns / max(span, 1e-9)
-    return placed(((round(x * share), f"{t[0] + x:g}") for x in each), columns) + " s"
+    texts = ((round(x * share), f"{t[0] + x:g}") for x in each)
+    # The last one and its unit end where the screen does.
+    return (
+        placed(((min(at, columns + 2 - len(text)), text) for at, text in texts), columns) + " s"
+    )
 
 
 def placed(texts: Iterable[tuple[int, str]], columns: int) -> str:

@@ -12,6 +12,8 @@ from vftcli.signals.errors import ParameterError
 
 #: Not UTF-8: bytes of a file name, half a letter of JSON.
 HALVES = re.compile(r"[\ud800-\udfff]")
+#: Words without width, as colours.
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 #: Unicode categories that a terminal acts on or hides: controls, writing direction, line ends.
 HIDDEN = {"Cc", "Cf", "Co", "Zl", "Zp"}
 
