@@ -259,6 +259,7 @@ ROWS = [
     Row("no estimates of", lambda f: [
         "admit", estimated(f, "--observer", "kfo-fe"), "--robot", "ur5", "--observer",
         "kfo-zoh"], "--observer", "kfo-fe"),
+    Row("settle which arm it is of", lambda f: ["admit", estimated(f)], "--robot", "ur5"),
     Row("could each be the positions", arrays({"a/q": (99, 6), "b/q": (99, 6), "a/t": (99,)}),
         "--columns", "t=a/t,q=a/q"),
     Row("which hold no torque", arrays({"obs/robot0_joint_pos": (99, 7), "obs/tau": (99, 7)}),
@@ -438,7 +439,7 @@ WITHOUT_ROW = {
     ),
     "tried in tests/test_remedies_of_analysis.py": ("or take it all with --anyway",),
     "tried in tests/cli/test_benchmark.py": (
-        "--data …: there is no such folder", "benchmark speed has --json",
+        "--data …: there is no such folder",
     ),
 }  # fmt: skip
 """Why a text has no row, and words that only it has."""

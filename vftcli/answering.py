@@ -196,6 +196,8 @@ def replayed(
     words = {"observer": named} if stored is None else {"observer": [DRIVER], "columns": stored}
     choice = choice_of(asked.but(**words))
     anyway = choice.examiner.anyway
+    if stored is not None and choice.robot.name is None:
+        raise ParameterError(f"{log} does not settle which arm it is of; name it with --robot")
     if asked.words.get("frame") not in {None, "base"}:
         raise ParameterError(
             "the replay is in base axes about the flange point; leave --frame away"

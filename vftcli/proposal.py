@@ -65,7 +65,8 @@ def propose(
         yield effort
         if effort.holds:
             choice = replace(choice, read=replace(choice.read, effort=str(effort.value)))
-    yield from of_known_arm(logs, choice)
+    arm = replace(choice.robot, name=choice.robot.name or robot.name)
+    yield from of_known_arm(logs, replace(choice, robot=arm))
 
 
 def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[ProposedOption]:

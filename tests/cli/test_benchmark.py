@@ -432,7 +432,8 @@ def test_pair_writes_two_logs(run, here: Path) -> None:
 
 
 def test_lists_the_scenarios(run) -> None:
-    text = run("simulate", "list")[1]
+    text, record = run("simulate", "list")[1], json.loads(run("simulate", "list", "--json")[1])
+    assert list(record["scenarios"]) == re.findall(r"^[\w-]+", text, re.MULTILINE)
     assert re.search(r"^ur5-circle +UR5 on a horizontal circle", text, re.MULTILINE)
 
 

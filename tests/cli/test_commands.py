@@ -85,6 +85,7 @@ def test_estimates_and_truth_are_forces_too(run, refused, tmp_path: Path) -> Non
     assert peaks["x"] > 0.05  # the guiding hand pulls along +x with 7 N
     error = refused(*estimates, "--observer", "kfo")
     assert "holds no estimates of 'kfo'; it holds best, fdo, gmo" in error
+    assert "does not settle which arm it is of; name it with --robot" in refused(*estimates[:2])
 
 
 # `vftcli annotate` as a user types it.

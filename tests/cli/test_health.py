@@ -274,7 +274,8 @@ SIMULATED = ("simulate", "ur5-circle", "-o")
 REFUSED: tuple[tuple[tuple[object, ...], str, str], ...] = (
     (ZERO, "--robot pnada", "Did you mean panda?"),
     (ZERO, "--observer gmoo", "Did you mean gmo?"),
-    (ZERO, "--set gmo.gain=-3", "must be positive"),
+    (ZERO, "--set gmo.gain=-3", "gmo.gain is [-3.0, "),
+    (ZERO, "--set fdo.omega=-3", "fdo.omega is -3 rad/s; it must be positive"),
     (ZERO, "--set gmo.gain=1,2", "one for each of 6"),
     (ZERO, "--set kfo.noise_convention=white", "there is density"),
     (ZERO, "--interval 100:200", "the log runs from 0 to"),

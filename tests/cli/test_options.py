@@ -51,7 +51,8 @@ OWN = {("simulate", "--set"), ("identify", "--gains"), ("simulate", "--output"),
        ("inspect", "--output"), ("compare", "--output"),
        ("annotate", "--output"), ("batch", "--output"), ("reproduce", "--output"),
        ("benchmark", "--output"),
-       ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
+       ("report", "--csv"), ("estimate", "--csv"), ("compare", "--csv"),
+       ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, the goal of --method gains, what is
 written where, and --csv, which the contract makes a file of `estimate` and a table of the others.
 """
@@ -313,6 +314,10 @@ def test_a_former_option_does_what_its_setting_does(run) -> None:
         "note: --effort is now --set log.effort=…",
         "note: --friction is now --set model.friction=…",
     ]
+    assert (
+        "note: --closed-loop is now the argument x.toml"
+        in run("admit", "--closed-loop=x.toml")[2]
+    )
 
 
 def test_the_command_line_of_run_json_has_today_s_words(run, here: Path) -> None:

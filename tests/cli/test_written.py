@@ -98,6 +98,9 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     for file in ("errors.csv", "estimates.parquet"):
         assert (here / "kept" / file).read_bytes() == (here / "typed" / file).read_bytes()
     assert "note: vftcli.toml" not in err
+    # The arm that the first log settles is the others' too.
+    assert run("inspect", "push_pose.csv", "free_14harm.csv", "--force", "-o", NAME)[0] == 0
+    assert {"robot": "ur10e", "free": ["free_14harm.csv"]}.items() <= options(here).items()
 
 
 def test_an_effort_that_is_not_what_it_is_called_is_written(run, here, samples):
@@ -158,6 +161,8 @@ def test_nothing_is_written_without_a_name(run, here: Path) -> None:
 def test_estimates_go_into_a_folder_here_named_after_the_log(run, refused, here: Path) -> None:
     """What is there stays unless it is forced."""
     words = ("estimate", TAPS, "--robot", "ur5", "--interval", "0:2", "--causal")
+    assert run("report", *words[1:], "--csv", "-q", "-o", "all")[0] == 0
+    assert (here / "all/estimates.csv").is_file()
     code, out, _ = run(*words)
     folder = here / "ur5_taps_ur_rtde.vft"
     assert code == 0

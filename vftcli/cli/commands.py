@@ -95,7 +95,8 @@ def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[
                         f"{name} is now {now.replace('VALUE', '…')}; give a value"
                     )
                 now = now_of(name, value) or now
-            notes.append(f"{name} is now {now.replace('VALUE', '…')}")
+            short = f"the argument {value}" if now == "VALUE" else now.replace("VALUE", "…")
+            notes.append(f"{name} is now {short}")
             if name == "--robot-arg":
                 arguments.append(value.replace("=", ":=", 1))
             else:

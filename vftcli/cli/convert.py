@@ -91,9 +91,12 @@ def simulate_log(
     from vftcli.simulation.writers import usual_format
 
     if scenario == "list":
-        width = max(map(len, scenario_names()))
-        for name in scenario_names():
-            echo(f"{name:<{width}} {load_scenario(name).title}")
+        titles = {name: load_scenario(name).title for name in scenario_names()}
+        if json:
+            say_json([], scenarios=titles)
+        else:
+            width = max(map(len, titles))
+            echo("\n".join(f"{name:<{width}} {title}" for name, title in titles.items()))
         return
     if output is None:
         raise typer.BadParameter("-o PATH says where the log goes")

@@ -10,7 +10,7 @@ command. A command gets the words of all options of its choices at once::
 import inspect
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
@@ -200,18 +200,19 @@ def parameters_of(
         else:  # typer's own context
             yield argument.replace(kind=inspect.Parameter.KEYWORD_ONLY), Option("", "", "")
     if any(option.is_setting for *_, (_, _, option) in every):
-        option = SET._replace(completes=lambda: set_words(choices))
+        # Every setting's name with its equals sign.
+        option = SET._replace(
+            completes=lambda: [
+                f"{word}="
+                for kind in choices
+                for name, (setting, _) in settings_by_name([kind]).items()
+                for word in (setting.values() if name == NUMBERS else [name])
+            ]
+        )
         yield parameter("set", list[str] | None, option), option
 
 
 EMPTY = inspect.Parameter.empty
-
-
-def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:
-    """Possible words after ``--set``, each name with its equals sign."""
-    for kind in choices:
-        for name, (option, _) in settings_by_name([kind]).items():
-            yield from (f"{each}=" for each in (option.values() if name == NUMBERS else [name]))
 
 
 def parameter(name: str, what: Any, option: Option, default: object = EMPTY) -> inspect.Parameter:  # noqa: ANN401

@@ -24,16 +24,15 @@ class PrintChoice(Choice):
     ] = None
 
 
-class Tables(Choice):
-    """Further files of estimates."""
+class Csv(Choice):
+    """Whether estimates are written for spreadsheets too."""
 
     GROUP = WRITE
 
     csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.")]
-    rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.")]
 
 
-@opt.command(ReferenceChoice, *opt.OF_ANALYSIS, opt.Mcap, OutputChoice, PrintChoice)
+@opt.command(ReferenceChoice, *opt.OF_ANALYSIS, opt.Mcap, Csv, OutputChoice, PrintChoice)
 def report(
     logs: opt.Logs,
     output: opt.LogFolder,
@@ -121,11 +120,12 @@ def show_answers(
             show(terminal(print_grid(made.published)) + "".join(remarks))
 
 
-@opt.command(*opt.OF_ANALYSIS, opt.Mcap, OutputChoice, Tables)
+@opt.command(*opt.OF_ANALYSIS, opt.Mcap, Csv, OutputChoice)
 def estimate(
     log: opt.Log,
     output: opt.LogFolder,
     asked: Asked,
+    rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.", group=WRITE)],
     json: opt.Json,
     force: opt.Force,
     show: opt.Open,
@@ -147,7 +147,7 @@ def estimate(
     from vftcli.signals.recording import EXAMINED
 
     output, library = opt.folder_of(output, [log], asked), Library([log])
-    written = opt.outputs_of(asked.but(rrd=asked.words["rrd"] or show))
+    written = opt.outputs_of(asked.but(rrd=rrd or show))
     names = estimate_files(written.extras)
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")

@@ -181,7 +181,6 @@ def build_first_order(setup: Setup, name: str) -> Built:
             rate = 1.0 / kalman.tuning(setup.step, setup.joints).delay
             origin = "gain-from-kalman-delay"
         rate = np.minimum(rate, 2.0 / setup.step)
-    observer: Observer = MomentumObserver(gain=rate, as_printed=setup.as_printed)
     said: dict[str, Any] = {"parameter": full, "gain": rate, "unit": "1/s"}
     if name == "fdo":
         if not origin and np.any(rate != rate[0]):
@@ -189,8 +188,10 @@ def build_first_order(setup: Setup, name: str) -> Built:
                 "fdo.omega takes one cutoff for all joints; gmo.gain takes one each"
             )
         cutoff = float(1.0 / np.mean(1.0 / rate) if origin else rate[0])
-        observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
+        observer: Observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
         said |= {"gain": cutoff, "unit": "rad/s"}
+    else:
+        observer = MomentumObserver(gain=rate, as_printed=setup.as_printed)
     return observer, (fact(origin, **said),) if origin else ()
 
 
