@@ -175,7 +175,7 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "ragged": ("array of numbers", lambda: vft.Recording(t=T, q=[[1, 2], [3]])),
     "t scalar": ("one-dimensional", lambda: vft.Recording(t=1.0, q=Q)),
     "dq": (r"\(11, 6\)", lambda: vft.Recording(t=T, q=Q, dq=Q[:, :5])),
-    "names": ("one a joint", lambda: vft.Recording(t=T, q=Q, joint_names=("a",))),
+    "names": ("one per joint", lambda: vft.Recording(t=T, q=Q, joint_names=("a",))),
     "payload": (r"\(3,\)", lambda: vft.Recording(t=T, q=Q, payload_com=(1.0,))),
     "p": (r"\(T, n\)", lambda: vft.DynamicsTerms(t=T, p=Q[:, 0], mu=Q)),
     "tau": (r"\(T, n\)", lambda: vft.ExternalTorque(name="x", t=T, tau=Q[:, 0])),

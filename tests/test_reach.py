@@ -38,7 +38,7 @@ SIGNALS = ("q", "dq", "current", "torque", "tau_ext", "wrench")
 
 REFUSED = {
     "aloha_episode_0.hdf5": "columns 0-5, right: columns 7-12",
-    "robomimic_low_dim.hdf5": "laid out as robomimic's, which hold no torque",
+    "robomimic_low_dim.hdf5": "has the layout of robomimic, which has no torque",
     "ur5.xlsx": "save the sheet as CSV",
     "ur5_degrees_turned.csv": r"looks like degrees.*q\[deg\]",
 }

@@ -194,7 +194,7 @@ ROWS = [
     Row("can be compared with its", by_jacobian("", "--reference", "vendor"), "reference"),
     Row("no wrench of a sensor to compare", by_jacobian("a", "--reference", "sensor"), "columns",
         "wrench=afx|afy|afz|amx|amy|amz"),
-    Row("leave model.friction=none away", fixture("ur5_circle.csv", "0:8", *MAKE, "--method",
+    Row("leave model.friction=none out", fixture("ur5_circle.csv", "0:8", *MAKE, "--method",
         "targets", "--set", "model.friction=none"), "model.friction", LEFT_OUT),
     Row("has no torque constants", cut(0, 8, *MAKE, "--method", "targets", robot="panda"),
         "method"),
@@ -272,7 +272,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "is not a positive time in seconds", "is not a positive cutoff in Hz",
         "is no list of cycle numbers as", "names no cycle; they begin at 1",
         "is not a cutoff between 0 and", "is neither sensor nor …PATH",
-        "is not a positive number or one a joint"),
+        "is not a positive number or one per joint"),
     "says what cannot be combined, or not here; there is nothing to try": (
         "of the wrench's options it takes only --zero A:B", "is of an arm with … joints",
         "and --force does not overwrite that either"),
@@ -289,7 +289,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "--outside … is not NAME=DIR", "is one of our rows; give another name",
         "--outside …: there is no folder", "is looked for, LOG one of"),
     "tried in tests/test_remedies_of_files.py": (
-        "s force drives the replay", "leave --frame away", "holds still over a span",
+        "s force drives the replay", "leave --frame out", "holds still over a span",
         "the closed loop runs"),
     "no log that provokes it is known": (
         "the fit of physical links did not settle", "equations for … unknowns",

@@ -222,7 +222,7 @@ ROWS = [
         LEFT_OUT),
     Row("s force drives the replay", on(same, "admit", *GMO, "--observer", "kfo-zoh"),
         "--observer", "gmo"),
-    Row("leave --frame away", on(same, "admit", *GMO, "--frame", "tool"), "--frame", LEFT_OUT),
+    Row("leave --frame out", on(same, "admit", *GMO, "--frame", "tool"), "--frame", LEFT_OUT),
     Row("holds still over a span", lambda f: [
         "admit", short_scenario(f), "--zero", "start"], "--zero", "0:1"),
     Row("the closed loop runs", lambda f: ["admit", short_scenario(f), *GMO[2:]], "--observer",
@@ -262,7 +262,7 @@ ROWS = [
     Row("settle which arm it is of", lambda f: ["admit", estimated(f)], "--robot", "ur5"),
     Row("could each be the positions", arrays({"a/q": (99, 6), "b/q": (99, 6), "a/t": (99,)}),
         "--columns", "t=a/t,q=a/q"),
-    Row("which hold no torque", arrays({"obs/robot0_joint_pos": (99, 7), "obs/tau": (99, 7)}),
+    Row("which has no torque", arrays({"obs/robot0_joint_pos": (99, 7), "obs/tau": (99, 7)}),
         "--columns", "t@20Hz,q=obs/robot0_joint_pos,tau=obs/tau"),
     Row("Add timestamp and actual_q", without_clock, "--columns"),
     Row("must count its", converted(same, "--columns", PLAIN, header=False), "--columns", COUNTED),
@@ -291,7 +291,7 @@ ROWS = [
         "convert", ur_binary(f / "log.bin"), "-o", "out.csv", "--columns", PLAIN], "--columns",
         LEFT_OUT),
     # readers: the clock
-    Row("the clock starts anew", converted(
+    Row("the clock restarts", converted(
         lambda table: pl.concat([table.with_columns(t=pl.col("t") - table["t"][0])] * 2)),
         "--columns"),
     Row("which no clock shows", converted(
@@ -330,7 +330,7 @@ ROWS = [
     Row("the log waits", on(
         lambda _: waiting(circle()), "identify", "-o", "my.toml", "--robot", "ur5"), "--interval",
         "0:15"),
-    Row("leave --free away", lambda f: ["compare", written(f, same), *GMO, "--reference", "zero",
+    Row("leave --free out", lambda f: ["compare", written(f, same), *GMO, "--reference", "zero",
                                         "--free", written(f, same)], "--free", LEFT_OUT),
     Row("Record them, or name their columns with --columns….", on(
         renamed({"dq": "speed"}), "estimate", "-o", "out", *GMO, "--set",
@@ -351,7 +351,7 @@ ROWS = [
         "annotate", EPISODES, "-o", written(f, same).parent, "--robot", "panda", "--observer",
         "gmo"], "-o", "out"),
     # doctor
-    Row("With --anyway it goes on all the same.", on(
+    Row("--anyway continues despite this.", on(
         with_columns(pl.col("^current.$") * 0.0), "estimate", "-o", "out", *GMO), "--anyway", FLAG),
 ]  # fmt: skip
 
@@ -419,7 +419,7 @@ WITHOUT_ROW = {
         "--set …=… is not ……",
     ),
     NOTHING: (
-        "is now --robot", "is what an MJCF gives its joints", "makes no use of …; leave it away",
+        "is now --robot", "is what an MJCF gives its joints", "makes no use of …; leave it out",
         "takes one LOG; name free motion",
         "are not named as those of robot", "Say which: --set log.format=NAME.",
     ),

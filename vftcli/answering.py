@@ -155,7 +155,7 @@ def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGai
     found = model(motion, choice)
     if found is None or (spectra := found.plain.spectra) is None:
         why = found.plain.missing if found else "no free part"
-        raise ParameterError(f"nothing to find gains from: {why}")
+        raise ParameterError(f"gains cannot be found: {why}")
     tuned = tune_all(spectra, goal)
     remarks = (*found.remarks, *bounds_reached(tuned, spectra, goal))
     return FoundGains(run, goal, tuned, spectra, remarks, examinations)
@@ -200,7 +200,7 @@ def replayed(
         raise ParameterError(f"{log} does not settle which arm it is of; name it with --robot")
     if asked.words.get("frame") not in {None, "base"}:
         raise ParameterError(
-            "the replay is in base axes about the flange point; leave --frame away"
+            "the replay is in base axes about the flange point; leave --frame out"
         )
     choice = replace(choice, wrench=replace(choice.wrench or WrenchChoice(), frame="base"))
     control = replace(asked.of(ControlChoice), as_printed=choice.observers.as_printed)

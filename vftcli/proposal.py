@@ -90,7 +90,7 @@ def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[Propo
         found = read(run, choice).part.remarks
     except VftError:
         found = ()  # the reference that needs it says why there is none
-    own = "" if free else "; each log's own is found unasked"
+    own = "" if free else "; found in each log"
     yield from (ProposedOption(f"{remark}{own}") for remark in found)
     yield from references(run, choice)
 
@@ -121,8 +121,8 @@ def possible_robots(recording: Recording, error: RobotError) -> Iterator[Propose
         yield ProposedOption(str(error))
     else:
         yield ProposedOption(
-            "the log does not settle which arm it is: take one, then inspect again with --robot. "
-            "What each leaves unexplained:"
+            "the log does not settle which arm it is: choose one, then inspect again with "
+            "--robot. How well each fits:"
         )
     for fit in fits:
         yield ProposedOption(str(fit), "robot", fit.robot, holds=False)
@@ -197,10 +197,9 @@ def reasons(recording: Recording) -> dict[str, str]:
 
 #: Begins a file of options.
 HEADING = """\
-# Options of every command that reads a log, as they are typed, without their dashes. What
-# is typed goes before them; --config none leaves them out. Files are named from this
-# file's folder on. Tables hold what is for one command, as [compare], or settings. More:
-# vftcli help config
+# Options for every command that reads a log, without dashes. Typed options override them;
+# --config none ignores this file. File names are relative to this file's folder. A table
+# holds the options of one command, as [compare], or settings. More: vftcli help config
 """
 WIDTH = 98  #: Letters of a reason's line.
 

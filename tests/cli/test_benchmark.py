@@ -181,7 +181,7 @@ def test_another_file_ends_with_one_line_or_marks_its_rows(run, refused, manifes
     assert not manifest.with_name("out").exists()
     code, out, err = run(*asked(manifest, "--anyway"))
     assert code == 0, err
-    assert "in spite of a complaint (--anyway): circle" in out
+    assert "scored despite a complaint (--anyway): circle" in out
 
 
 EVERY_KIND = """

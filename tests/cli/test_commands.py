@@ -154,7 +154,7 @@ def test_a_reference_is_one_more_line(run) -> None:
     )
     code, out, _ = run(*words)
     assert (code, "no reference" in out) == (0, False)
-    assert "Against two-cycle without J5 (floor " in out
+    assert "Against two-cycle without J5 (own error " in out
 
 
 def test_a_free_part_that_is_not_there_is_refused(refused) -> None:
@@ -309,7 +309,7 @@ def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run) -> 
     assert "robot.set_collision_behavior(" in out
     assert "collision_config:" in out
     assert "pushed.npy: 1 alarm, the weakest at" in out
-    assert "these are extrapolated" in err
+    assert "thresholds are extrapolated" in err
     # The JSON stands alone, and the push is found.
     words = ("--rate", 60, "--check", pushed, "--check", free, "--json")
     code, out, _ = run("thresholds", free, *COLUMNS, *words)

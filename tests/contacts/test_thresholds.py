@@ -164,7 +164,7 @@ LOG = free_log("a", 600.0)
         *(([LOG], rate, "--rate") for rate in (0.0, -1.0, float("nan"), float("inf"))),
         ([free_log("a", 6.0)], 1.0, "at least 27 s"),
         ([LOG, free_log("b", 600.0, joints=7)], 1.0, "logs of one arm"),
-        ([LOG, LOG._replace(of_vendor=False)], 1.0, "recorded alike"),
+        ([LOG, LOG._replace(of_vendor=False)], 1.0, "recorded in one way"),
     ],
 )
 def test_what_tells_no_threshold_is_refused(logs, rate, said):

@@ -155,7 +155,7 @@ def test_shift_rate_and_covered_time_of_a_free_run(
 
 def test_the_log_itself_is_no_free_run(circle: Run) -> None:
     run = FreeRun(run=Run(recording=circle.recording, robot=ROBOT), log=circle)
-    with pytest.raises(ParameterError, match="given as the log or as --free, are the same run"):
+    with pytest.raises(ParameterError, match="given as the log or as --free, are one run"):
         FreeMotion(log=circle, runs=(run,))
 
 

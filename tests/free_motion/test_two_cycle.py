@@ -135,7 +135,7 @@ def test_options_that_do_not_go_with_the_logs(circle, ur5: Robot) -> None:
         two_cycle_difference(circle.recording, (), ur5, FreeChoice(low_pass=80.0))
     source = replace(circle.recording.source, path=Path("other.csv"), t0=1.0)  # another run
     other = replace(circle.recording, source=source)
-    with pytest.raises(ReferenceTorqueError, match="leave them away with --free"):
+    with pytest.raises(ReferenceTorqueError, match="leave them out with --free"):
         two_cycle_difference(circle.recording, other, ur5, FreeChoice(period=4.0))
 
 

@@ -245,7 +245,7 @@ def test_the_wrong_robot_is_refused(name, error):
     ("options", "match"),
     [
         ({"method": "magic"}, "friction, base, targets"),
-        ({"method": "targets", "friction": False}, "leave model.friction=none away"),
+        ({"method": "targets", "friction": False}, "leave model.friction=none out"),
         ({"method": "base", "constants": True}, "--method friction"),
         ({"cutoff": 0.0}, "it must be positive"),
         ({"cutoff": 1e4}, "it must be positive"),

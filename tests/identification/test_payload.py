@@ -134,7 +134,7 @@ def test_another_motion_is_no_pair(prepared):
     t, q, dq = swinging()
     bent = Recording(t=t, q=swinging(bend=0.03)[1], dq=dq, torque=0 * q)
     # .03 rad in one of six joints is .03/√12 = 8.7 mrad rms: more than 5 mrad
-    with pytest.raises(NotSameMotionError, match="not the same motion: positions differ by 8"):
+    with pytest.raises(NotSameMotionError, match="different motions: positions differ by 8"):
         find_time_shift(prepared(t, q=q, dq=dq), bent)
     near = Recording(t=t, q=swinging(bend=0.015)[1], dq=dq, torque=0 * q)
     assert find_time_shift(prepared(t, q=q, dq=dq), near)[1] == pytest.approx(4.3e-3, rel=0.05)

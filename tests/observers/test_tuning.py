@@ -228,7 +228,7 @@ def test_without_spectra_auto_falls_back_and_says_so() -> None:
     observers, remarks = build_observers(("kfo-auto", "rts-auto", "kfo-zoh", "kfo-rts"), setup)
     untuned = [r for r in remarks if r.code == "tuning-without-free-part"]
     assert [r.where.about for r in untuned] == ["kfo-auto", "rts-auto"]
-    assert str(untuned[0]).startswith("kfo-auto: no free part to tune on")
+    assert str(untuned[0]).startswith("kfo-auto: no contact-free part to tune on")
     loaded, _ = pushed(samples=400)
     filtered, smoothed, by_hand, rts = (o.estimate(loaded.run.terms) for o in observers)
     assert filtered.name == "kfo-auto"

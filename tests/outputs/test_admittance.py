@@ -136,7 +136,7 @@ def test_the_page_shows_every_part(release: Replay) -> None:
     assert (
         '<p class="eyebrow">&lt;release&gt; · Universal Robots UR5 (CB3) · 0.000 – 2.000 s · '
         "a release from rest, no force · control period 8 ms · threshold hard</p>"
-        "<h1>The same force through 2 admittance controllers.</h1>"
+        "<h1>One force through 2 admittance controllers.</h1>"
     ) in page
     for controller in release.controllers:  # as in the legend
         assert f'data-swatch="{controller.name}"' in page

@@ -153,7 +153,7 @@ def test_the_clock_tells_gaps_and_repairs(without_reference: Analysis, as_if) ->
     assert ground.sentence.startswith("1 gap, the longest 0.41 s at 3.2 s; left out look & feel")
     assert ground.sentence.endswith("and 1 more")
     (ground,) = of(as_if(without_reference, sound(without_reference)), "clock")
-    assert (ground.standing, ground.sentence) == ("good", "no gap above 8 ms, nothing repaired")
+    assert (ground.standing, ground.sentence) == ("good", "longest step 8 ms, nothing repaired")
 
 
 def sound(analysis: Analysis) -> Recording:
@@ -232,8 +232,8 @@ def test_the_references_error_is_the_mean_that_the_table_prints(analysis: Analys
     errors = analysis.errors.with_columns(reference_trusted=~rests, reference_floor_Nm=floor)
     bare = ExternalTorque(name="sensor", t=analysis.t, tau=np.zeros((len(analysis.t), 6)))
     for made, words in (
-        (analysis, "vendor, its own error 0.5 N·m a joint"),
-        (replace(analysis, errors=errors), "vendor without J5, its own error 0.5 N·m a joint"),
+        (analysis, "vendor, its own error 0.5 N·m per joint"),
+        (replace(analysis, errors=errors), "vendor without J5, its own error 0.5 N·m per joint"),
         (replace(analysis, errors=None, reference=bare), "sensor"),
     ):
         (ground,) = of(made, "reference")

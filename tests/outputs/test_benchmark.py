@@ -82,17 +82,19 @@ def made() -> Results:
 
 
 SCREEN = """\
-method  skill, online  free L1, online [N·m]
-zero             0.00                      0
-gmo              0.82                  0.580
-best             0.85                  0.500
-best lists, online: 14 of 15 true contacts; 2 false, 2 an hour (0 to 7)
+method  skill, online  L1, online [N·m]
+zero             0.00                 0
+gmo              0.82             0.580
+best             0.85             0.500
+best lists, online: 14 of 15 true contacts; 2 false, 2 per hour (95 %: 0 to 7)
 in no mean, as some arm lacks them (-v and page have their rows): vendor
 vendor, online: no answer for 10.0 % of the time, read as 0
+skill: 1 exact, 0 as an estimate of zero; L1: mean |error| without contact
+alone: built-in profile; free: and contact-free motion; identified: own file
 skill, online, is the mean of UR5; Panda
-free L1 is the mean of UR5; Panda, where the protocol has them
-with the whole log, its future too: best
-in spite of a complaint (--anyway): Panda-log
+L1 is the mean of UR5; Panda, where the protocol has them
+uses the whole log, the future too: best
+scored despite a complaint (--anyway): Panda-log
 """
 """Skill 1 − 2.2/10 and 1 − .7/5, 1 − 2/10 and 1 − .5/5; L1 .4 of 2.2 and .7, of 2 and .5."""
 

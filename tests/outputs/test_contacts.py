@@ -45,7 +45,7 @@ def test_the_record_holds_what_scripts_rely_on() -> None:
     assert row["moment_Nm"] == [0.2, 0.1, 0.0]
     assert row["places"] == ["flange", 5, 6]
     assert row["vendor_force_N"] is None
-    assert record["free_part"] == "free part: 0.3 to 4 s, as given"
+    assert record["free_part"] == "contact-free: 0.3 to 4 s, as given"
     assert record["remarks"][0]["code"] == "arm-stopped-abruptly"
 
 

@@ -93,7 +93,7 @@ def test_at_the_floor_is_within_a_fifth_of_it_also_of_one_joint() -> None:
 @pytest.mark.parametrize(
     ("values", "texts"),
     [
-        ((0.5, 12.34, 0.0604, 0.946, 1.0), ["0.500–12.3", "60", "95 %", "best"]),
+        ((0.5, 12.34, 0.0604, 0.946, 1.0), ["0.50–12", "60", "95 %", "best"]),
         ((None, 1.0, 0.0, 1.0, 0.0312), ["–", "0", "100 %", "0.031"]),
         ((0.5, None, None, None, None), ["–"] * 4),
     ],
@@ -107,8 +107,8 @@ def test_a_detail_that_nobody_knows_has_no_table() -> None:
     known = [{"p_vs_best": 1.0, "lag_s": 0.01}] * 4
     titles = [grid.title for grid in error_tables.detail_grids(errors_of(*known))]
     assert len(titles) == 2
-    assert titles[0].startswith("run.csv: lag")
-    assert titles[1].startswith("run.csv: p of being")
+    assert titles[0].startswith("run.csv: delay")
+    assert titles[1].startswith("run.csv: p that")
     assert list(error_tables.detail_grids(errors_of())) == []
 
 
@@ -127,8 +127,8 @@ def test_terminal_table(errors: pl.DataFrame) -> None:
         "gmo        2.00      –    2.00\n"
         "------------------------------\n"
         "floor     0.500   1.00   0.750\n"
-        "floor: RMSE that the reference itself is known to have\n"
-        "*: within 1.2 × the floor; the reference is no more accurate than that\n"
+        "floor: the reference's own error (RMSE)\n"
+        "*: within 1.2 × the floor: may be the reference's own error\n"
         "–: no sample where the reference is known\n"
     )
 
@@ -182,7 +182,7 @@ def test_latex(errors: pl.DataFrame) -> None:
     assert r"fdo\_\%\& & \textbf{0.550}\rlap{$^{*}$} & \textbf{12.3}\phantom{0} & 6.45" in text
     assert text.index(r"\toprule") < text.index(r"\midrule") < text.index(r"\bottomrule")
     assert r"floor & 0.500 & 1.00 & 0.750 \\" in text
-    assert text.index("floor: RMSE that") < text.index(r"\end{table}")
+    assert text.index("floor: the reference") < text.index(r"\end{table}")
 
 
 def test_logs_share_a_latex_table_where_the_same_joints_rest(errors: pl.DataFrame) -> None:
@@ -250,7 +250,7 @@ def test_contacts_are_counted_in_whole_numbers(monkeypatch: pytest.MonkeyPatch) 
     row |= {"longest_delay_s": None}
     (grid,) = contact_grids(pl.DataFrame([row, row | {"contacts": None}]))
     assert terminal(grid).splitlines()[2].split() == [
-        "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "0", "0.0400", "–",
+        "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "0", "0.040", "–",
     ]  # fmt: skip
     assert list(contact_grids(pl.DataFrame({"recording": ["a"]}))) == []
 
@@ -264,5 +264,5 @@ def test_zero_drift_has_five_decimals_as_the_paper_prints_it() -> None:
     assert len(heads) <= 80
     assert line.split() == [
         "kfo-fe", "1–4.5",
-        "-0.43166", "-0.53348", "0.83768", "-0.16294", "0.13407", "0.09103",
+        "−0.43166", "−0.53348", "0.83768", "−0.16294", "0.13407", "0.09103",
     ]  # fmt: skip

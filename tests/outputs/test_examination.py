@@ -53,10 +53,10 @@ def test_how_arms_miss_an_effort_that_is_misread_is_not_said_before_what_it_is()
     miss = RobotMatch(robot="ur10e", misfit=0.624, fits=False, evidence="effort", load=0.0)
     found = [replace(examination(f), robots=(miss,)) for f in (SLOW, WRONG)]
     slow, wrong = map(examination_text, found)
-    assert "fit       ur10e (62 %) by effort: does not fit" in slow
+    assert "fit       ur10e (model error 62 %, by effort): does not fit" in slow
     assert "does not fit" not in wrong
     held = examination_text(replace(found[1], robots=(miss._replace(fits=True),)))
-    assert "fit       ur10e (62 %) by effort" in held
+    assert "fit       --robot ur10e (model error 62 %, by effort)" in held
 
 
 def test_the_record_is_strict_json_with_codes_and_values() -> None:

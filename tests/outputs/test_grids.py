@@ -52,16 +52,18 @@ def test_a_robot_in_full_has_its_gains_notes_sources_and_payloads() -> None:
     *_, friction = (line for line in table if "sigmoid (amplitude 0.54615, " in line)
     assert friction.endswith("; published")
     (note,) = panda.remarks
-    assert lines[:6] == [
+    assert lines[:8] == [
+        "friction: SI units, models in docs/robots.md",
         "",
-        "kfo.r_diag = [0.08, 0.08, 0.08, 0.08, 0.01, 0.01, 0.01]",
-        "kfo.q_p_diag = [0.05, 0.05, 0.05, 0.05, 0.02, 0.02, 0.02]",
-        f"kfo.q_tau_diag = {[100000.0] * 7}",
+        "gains of kfo (vftcli help gains):",
+        "  kfo.r_diag = [0.08, 0.08, 0.08, 0.08, 0.01, 0.01, 0.01]",
+        "  kfo.q_p_diag = [0.05, 0.05, 0.05, 0.05, 0.02, 0.02, 0.02]",
+        f"  kfo.q_tau_diag = {[100000.0] * 7}",
         "",
         f"note: {note}",
     ]
     sources = [f"source {name}" for name in ("gaz2019", "franka_description", "fci")]
-    assert [line.partition(":")[0] for line in lines[6:-1]] == sources
+    assert [line.partition(":")[0] for line in lines[8:-1]] == sources
     assert lines[-1] == "payloads: franka_hand (--payload NAME)"
     assert repr(panda) == "<Robot panda: 7 joints, logs link torque, friction sigmoid>"
     assert "<td>J1 joint1</td>" in panda._repr_html_()

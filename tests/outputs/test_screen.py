@@ -101,7 +101,8 @@ def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> 
     floor = pl.when(first).then(9.0).otherwise(0.2)
     rests = analysis.errors.with_columns(reference_trusted=~first, reference_floor_Nm=floor)
     (left,) = blocks(rests)
-    assert against(left, analysis).startswith("Against vendor without J1 (floor 0.20 N·m): RMSE ")
+    text = against(left, analysis)
+    assert text.startswith("Against vendor without J1 (own error 0.20 N·m): RMSE ")
     paper = replace(analysis, remarks=(fact("paper-gains-measured"),))
     assert "the paper's gains" in against(left, paper)
     assert left.means.errors["best"] == pytest.approx(block.rmse[0, 1:].mean())
@@ -128,13 +129,13 @@ def named(analysis: Analysis, label: str, as_if, count: int = 1) -> Analysis:
 SEVERAL = """\
 6 logs · ur5 · 1 left out
 
-  log        span  contacts  hardest            else  health
-  log0.csv  5.2 s         0  –                   6 N  △ clock
-  log1.csv  5.2 s         1  90 ± 7 N at 0.2 s   6 N  △ clock
-  log2.csv  5.2 s         2  90 ± 7 N at 0.2 s   6 N  ✗ load
-  log3.csv  5.2 s         3  90 ± 7 N at 0.2 s   6 N  △ clock
-  log4.csv  5.2 s         4  90 ± 7 N at 0.2 s   6 N  △ clock
-  bad.csv                                             ✗ left out
+  log        span  contacts  hardest            detects above  health
+  log0.csv  5.2 s         0  –                            6 N  △ clock
+  log1.csv  5.2 s         1  90 ± 7 N at 0.2 s            6 N  △ clock
+  log2.csv  5.2 s         2  90 ± 7 N at 0.2 s            6 N  ✗ load
+  log3.csv  5.2 s         3  90 ± 7 N at 0.2 s            6 N  △ clock
+  log4.csv  5.2 s         4  90 ± 7 N at 0.2 s            6 N  △ clock
+  bad.csv                                                      ✗ left out
 
 Can it be believed?
   ✗ log2.csv: load    the arm carries 1.20 ± 0.20 kg unknown to ur5, perhaps a
@@ -179,8 +180,8 @@ def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis: Ana
     lines = logs_screen([listed(analysis, 1), listed(analysis, 1)], CANVAS, {}).splitlines()
     (block,) = blocks(analysis.errors)
     least = next(iter(block.means.errors.values()))
-    assert lines[2].split()[-2:] == ["error", "health"]
-    assert f" 6 N  {least:.1f} N·m  △ " in lines[3]
+    assert lines[3].split()[-3:] == ["above", "RMSE", "health"]
+    assert f" 6 N  {least:.1f} N·m  △ " in lines[4]
 
 
 def test_only_paths_that_exist_are_printed(tmp_path: Path, monkeypatch) -> None:
@@ -213,13 +214,14 @@ def test_where_room_is_short_good_grounds_share_a_line() -> None:
     assert belief_lines([log], CANVAS, 0)[1].endswith("log is sound")
 
 
-HEADS = "  #  from – to [s]    |F| [N]  range  direction  where  trust"
-ROW = "  {0}    {0}.00 –   4.78   5{0} ± 7  57–78  +y, down   wrist  fair"
+HEADS = "  #  from – to [s]    |F| [N]  range [N]  direction  where  trust"
+ROW = "  {0}    {0}.00 –   4.78   5{0} ± 7      57–78  +y, down   wrist  fair"
 EACH = [*map(ROW.format, (1, 2, 3))]
 END = [
     "  Nothing else above 6 N. Weaker pushes would not show.",
     "  (± 95 %; force ON the robot, base axes; range: if it touched another",
-    "    possible place)",
+    "    possible place; trust in the size: good within 25 %, weak beyond 40 %",
+    "    or with little evidence)",
 ]
 
 
@@ -228,7 +230,12 @@ def test_a_list_is_rows_and_a_word_on_more() -> None:
     found, canvas = contact_list(*rows, candidates=(weak,)), Canvas(width=72)
     more = "  the 2 hardest of 3; --details shows all"
     assert list_lines(found, 2, canvas) == [HEADS, *EACH[1:], more, *END]
-    weaker = ["", "  Candidates, too little evidence or force to list:", HEADS, ROW.format(4)]
+    weaker = [
+        "",
+        "  Candidates, with too little evidence or force to be listed:",
+        HEADS,
+        ROW.format(4),
+    ]
     assert list_lines(found, None, canvas) == [HEADS, *EACH, *weaker, *END]
 
 

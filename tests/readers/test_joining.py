@@ -122,7 +122,7 @@ def test_gaps_and_jitter(path):
         ("q/1", np.where(np.arange(300) == 150, np.nan, 0.3), "nan in sample 151"),
         # what the last tenth says counts
         ("q/1", np.r_[np.full(270, 0.3), np.linspace(0.3, 90.0, 30)], "looks like degrees"),
-        ("t", np.r_[np.arange(270), np.arange(30)] / 100, "the clock starts anew 1×"),
+        ("t", np.r_[np.arange(270), np.arange(30)] / 100, "the clock restarts 1×"),
     ],
 )
 def test_odd_logs_are_refused_in_the_words_of_the_whole(path, column, values, word):

@@ -97,7 +97,7 @@ def test_all_episodes_are_logs_of_their_own(tmp_path):
     assert [log.samples for log in logs] == list(ROWS)
     with pytest.raises(ParameterError, match="commands that take several logs"):
         Library([path]).open(path, ReadChoice(episode=ALL))
-    with pytest.raises(ParameterError, match="are the same run"):
+    with pytest.raises(ParameterError, match="are one run"):
         refuse_repeated_logs(list(Library([path]).open_each([path, path], ReadChoice(episode=1))))
 
 

@@ -122,7 +122,7 @@ def test_states_as_json_lines(path):
     lines = path.read_text().splitlines()
     lines[50] = lines[50].replace('"q": [', '"q": [nan, ', 1)
     path.write_text("\n".join(lines))
-    with pytest.raises(LogError, match="q is not the same numbers in each of the objects"):
+    with pytest.raises(LogError, match="q differs in kind or length between the objects"):
         read(path)
 
 

@@ -53,7 +53,7 @@ def test_ours_stands_over_the_print_and_in_the_terminal(made) -> None:
     assert "1.5 (1.0 … 2.0)" in worked[0]
     assert max(map(len, worked)) <= 80
     assert "nothing moved" in failed
-    assert left_out == "No room for: what it shows, ours."
+    assert left_out == "A wider terminal also shows: what it shows, ours."
 
 
 def test_the_page_has_every_item_and_what_failed(made, cheap, tmp_path: Path) -> None:

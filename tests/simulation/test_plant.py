@@ -298,7 +298,7 @@ def test_an_arm_without_friction_figures_has_those_stated():
     np.testing.assert_array_equal(friction.smooth(np.ones(6))[0], stated.viscous)
     assert not np.any(true_friction(robot, FrictionSpec()).dry(np.ones(6)))
     for wrong in ((1.0,), (-1.0,) * 6, (1e9,) * 6):
-        with pytest.raises(ParameterError, match="one number a joint, 6 of them"):
+        with pytest.raises(ParameterError, match="one number per joint, 6 of them"):
             true_friction(robot, FrictionSpec(coulomb=wrong))
     with pytest.raises(ParameterError, match="'ur5' has some"):
         true_friction(load_robot("ur5"), stated)

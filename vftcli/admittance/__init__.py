@@ -43,12 +43,12 @@ class ControlChoice(Choice):
     #: One of `vftcli.admittance.law.KINDS`, None for both.
     kind: Annotated[
         str | None,
-        Option("admittance.controller", "variable|traditional", "By default both."),
+        Option("admittance.controller", "variable|traditional", "Run one only."),
     ] = None
     #: ``sensor`` or ``file:PATH``; None for an observer's wrench.
     force: Annotated[
         str | None,
-        Option("admittance.force", "sensor|file:PATH", "What drives the replay, if no observer."),
+        Option("admittance.force", "sensor|file:PATH", "Replay this force, no observer's."),
     ] = None
     #: Joints at a release's start; None for the robot file's. (n,) [rad]
     start: Annotated[
@@ -56,7 +56,7 @@ class ControlChoice(Choice):
         Option(
             "admittance.start",
             "Q1,Q2,…",
-            "Joint positions at which a release starts [rad].",
+            "Start a release at these joint positions [rad].",
             lambda text: listed(text, "admittance.start"),
         ),
     ] = None
@@ -67,7 +67,7 @@ class ControlChoice(Choice):
     ] = None
     loop_torque: Annotated[
         str,
-        Option("admittance.loop-torque", "average|instant", "What closed-loop sensors report."),
+        Option("admittance.loop-torque", "average|instant", "Reading of closed-loop sensors."),
     ] = "average"
     #: The user's parameters, each ``AXIS.PARAMETER=VALUE``.
     assignments: Annotated[

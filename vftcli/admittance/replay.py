@@ -280,7 +280,7 @@ def stored_force(
     if choice.solver == SMOOTHER:
         raise ParameterError(
             "virtual-sensor.solver=smoother needs the log itself, not a file of estimates; "
-            "give the log, or leave the setting away"
+            "give the log, or leave the setting out"
         )
     estimate = ExternalTorque(name=observer, t=recording.t, tau=recording.require("tau_ext"))
     sensor = VirtualSensor(

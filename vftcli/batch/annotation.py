@@ -139,7 +139,7 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
             raise LogError(
                 f"{recording.name}: the effort of {joints} is {value[0, same[0] - 1]:g} in every "
                 "frame, so it was not measured: gravity would be written as force. Name the column "
-                "that was measured with --columns. With --anyway it goes on all the same"
+                "that was measured with --columns. --anyway continues despite this"
             )
 
 

@@ -211,7 +211,7 @@ def standing(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
         raise EngineError(
             f"no Dask scheduler answers at {choice.address} within {ANSWER:g} s "
             f"({failure_of(error).line[:120]}); start one with `dask scheduler`, or leave "
-            "cluster.address away"
+            "cluster.address out"
         ) from None
     with client:
         try:
@@ -243,7 +243,7 @@ def check_workers(client: "Client", seen: Sequence[str]) -> None:
                 )
             raise EngineError(
                 f"worker {address} has {name} {there.get(name) or 'not at all'}, here it is "
-                f"{state}: results would differ. Install the same there"
+                f"{state}: results would differ. Install equal versions there"
             )
 
 

@@ -25,11 +25,11 @@ class RefinementChoice(Choice):
         Option(
             "bias.method",
             "|".join(REMOVALS),
-            "Whether the bias fitted to the whole log comes off; auto: for best alone.",
+            "Whether to subtract the fitted model error; auto: from best only.",
         ),
     ] = AUTOMATIC
     contacts: Annotated[
-        bool, Option("contacts.list", "yes|no", "Whether contacts are listed.", is_yes)
+        bool, Option("contacts.list", "yes|no", "Whether to list contacts.", is_yes)
     ] = True
 
     def __post_init__(self) -> None:

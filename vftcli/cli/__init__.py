@@ -62,7 +62,7 @@ def vftcli(
         typer.Option("--version", callback=show_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """External forces from recorded robot logs: disturbance observers, ground truth, errors."""
+    """Forces on a robot arm from its recorded log. Begin with: vftcli LOG --robot NAME."""
 
 
 def main() -> None:

@@ -71,6 +71,7 @@ def admit(
 def show(found: "Replayed", *, json: bool, latex: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.outputs.admittance import (
+        LEGEND,
         comparison_grid,
         latency_grid,
         latex_text,
@@ -91,8 +92,10 @@ def show(found: "Replayed", *, json: bool, latex: bool) -> None:
     for note in result.remarks:
         detail(f"note: {note}")
     if run is not None:
-        grid, words = latency_grid(run), "no force passed a threshold"
+        grid, words = latency_grid(run), "no force passes its threshold"
         words = words if run.stable else f"the arm ran away at {run.t[-1]:.2f} s"
         timed = run.stable and grid.rows
         say(terminal(grid).rstrip() if timed else f"closed loop: {words}")
-    echo_top(terminal(comparison_grid(result.rows)) if result.rows else "no axis was dragged")
+    none = "no force passes its threshold: no axis moves (--details)"
+    echo_top(terminal(comparison_grid(result.rows)) if result.rows else none)
+    say(LEGEND * bool(result.rows))

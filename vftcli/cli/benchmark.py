@@ -120,7 +120,7 @@ def score(
         show(text_of(results, form, every=asked.words["details"]))
     for name, failure in run.failures.items():
         echo(printable(f"error: {name}: {failure.line}"), err=True)
-    say("\n".join([*absent, f"{output / 'index.html'}, {output / 'scores.parquet'}"]))
+    say("\n".join([*absent, f"wrote {output / 'index.html'}, {output / 'scores.parquet'}"]))
     failed = SOME_FAILED if results.rows else 1
     return failed if run.failures else 0
 

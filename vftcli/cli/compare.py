@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vftcli.evaluation.references import JacobianJudgement
     from vftcli.outputs.files import OutputFolder
 
-MORE = "Intervals, lags, pairs of observers: --details"
+MORE = "Intervals, delays, pairs: --details. The observers: vftcli help observers"
 
 
 def figure_folder(figures: str | None, output: Path | None, force: bool) -> "OutputFolder | None":

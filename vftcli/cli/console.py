@@ -88,7 +88,7 @@ def echo_top(text: str) -> None:
 def say_written(
     record: str, folder: Path, names: Sequence[str], *, json: bool, several: bool = False
 ) -> None:
-    """Print the written files and the page to open, or `run.json` for machines."""
+    """Print the written files and the page to open, or `run.json`."""
     from vftcli.outputs.screen import written_lines
 
     if "recording.rrd" in [*names, *["recording.rrd"] * several] and not installed("rerun"):
@@ -214,7 +214,7 @@ def health_of(
 
 
 def say_robots(robots: "Iterable[Robot]") -> None:
-    """Print the limits of the robots' numbers, each once; in details those that are usual."""
+    """Print the limits of the robots' numbers, each once."""
     say_remarks({str(remark): remark for arm in robots for remark in arm.remarks}.values())
 
 

@@ -3,6 +3,7 @@
 Nothing here loads more than the command line, so that help comes at once.
 """
 
+import re
 import shlex
 import shutil
 import textwrap
@@ -61,12 +62,18 @@ class GroupedCommand(TyperCommand):
             if found := getattr(error, "possibilities", None):
                 near = nearest(getattr(error, "option_name", ""), found)
                 vars(error)["possibilities"] = [near] if near else None
+            elif (missing := getattr(error, "param", None)) and not vars(error)["message"]:
+                vars(error)["message"] = missing.help
             raise
         if kept:
             said = shlex.join(kept[1]) or "nothing that this command takes and is not typed"
             words = f"note: {kept[0]} gives {said} (--config none: without it)"
             echo(printable(words), err=True)
         return rest
+
+    def collect_usage_pieces(self, ctx: Click) -> list[str]:
+        """Its usage without typer's braces."""
+        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
 
     def format_help(self, ctx: Click, formatter: Click) -> None:
         """Write its usage, its purpose, and its options by group."""
@@ -137,8 +144,10 @@ def row_of(param: Click, ctx: typer.Context) -> tuple[str, str] | None:
     """A parameter as typed, and its meaning; None if hidden."""
     if param.param_type_name == "argument":
         return (param.metavar or param.name.upper(), param.help) if param.help else None
-    record: tuple[str, str] | None = param.get_help_record(ctx)
-    return record
+    typed, meaning = param.get_help_record(ctx) or ("", "")
+    # Typer adds "[required]" and ranges.
+    plain = re.sub(r"(?<=required\.)  \[required\]|  \[[\dx<>=]+\]", "", meaning)
+    return (typed, plain) if typed else None
 
 
 def two_columns(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
@@ -155,11 +164,17 @@ topics = partial(tables_beside, __file__, "topics.toml")  #: Topic → its summa
 
 #: List → its content.
 LISTS = {
-    "robots": "the robot profiles; NAME or FILE: one robot in full",
-    "observers": "the observers, their equations and their numbers",
-    "formats": "the log formats; NAME: how to record it",
+    "robots": "the built-in arms; robots NAME or FILE: one arm in full",
+    "observers": "the observers, their equations and parameters",
+    "formats": "the log formats; formats NAME: how to record one",
     "settings": "every setting of --set NAME=VALUE and vftcli.toml",
 }
+
+
+#: Below the list of robots.
+ROBOTS = """
+effort: what its logs hold: motor current, drive torque, torque behind the gear.
+vftcli help robots NAME: one arm in full. Another arm: --robot FILE"""
 
 
 @opt.command()
@@ -205,9 +220,9 @@ def show_help(
 def contents() -> Iterator[str]:
     """Topics, lists and commands of help."""
     explained = {name: entry["summary"] for name, entry in topics().items()}
-    yield "vftcli help TOPIC, of"
+    yield "vftcli help TOPIC explains one of these:"
     yield from two_columns([*explained.items(), *LISTS.items()])
-    yield "or of a command:"
+    yield "vftcli help COMMAND shows the options of one of these:"
     yield from two_columns([(name, each.summary) for name, each in COMMANDS.items()])
 
 
@@ -219,7 +234,7 @@ def robots(name: str | None, tip: str | None) -> str:
 
     if name is not None:
         return robot_text(load_robot(name, tip=tip or ""))
-    return terminal(robots_grid(map(load_robot, PROFILES))).rstrip("\n")
+    return terminal(robots_grid(map(load_robot, PROFILES))) + ROBOTS
 
 
 def observers() -> Iterator[str]:
@@ -260,6 +275,6 @@ def settings() -> Iterator[str]:
         kept = f"; default {shown}" if isinstance(shown, str | int | float) else ""
         meaning = name, f"{option.help} ({option.metavar}{kept})"
         rows.append((option.metavar, option.help) if name == NUMBERS else meaning)
-    yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
+    yield "SETTINGS: --set GROUP.NAME=VALUE; in vftcli.toml [GROUP] with NAME = VALUE"
     yield from two_columns(sorted(rows))
-    yield "simulate has a scenario's keys: --set servo.stiffness=soft, --set duration=8."
+    yield "simulate also takes its scenario's keys: --set servo.stiffness=soft"

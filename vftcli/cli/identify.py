@@ -30,7 +30,7 @@ def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str,
     for name, given in others.items():
         if given and (name == "--gains") != (task.method == "gains"):
             raise ParameterError(
-                f"--method {task.method} makes no use of {name}; leave it away"
+                f"--method {task.method} makes no use of {name}; leave it out"
                 if task.method
                 else f"{name} is an option of --method gains"
             )
@@ -69,15 +69,20 @@ def identify_robot(
 ) -> None:
     """Make a robot file: friction, inertia, payload, gains.
 
-    Without --method friction, but base where the robot's links are wrong. A page and run.json
-    are written beside the file. For a payload a LOG may be a dataset; every episode of it counts.
-    Gains are for the goal that --gains states.
+    Default method: friction, or base where the robot's links are wrong. Writes a page and
+    run.json beside the file. For a payload a LOG may be a dataset with all its episodes.
+    For gains, --gains states the goal.
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
     from vftcli.answering import identified
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.identification import files_beside, tables_text, write_identification
+    from vftcli.outputs.identification import (
+        LEGEND,
+        files_beside,
+        tables_text,
+        write_identification,
+    )
     from vftcli.readers.reading import Library
 
     task, free = asked.of(Task), asked.of(FreeChoice)
@@ -100,11 +105,12 @@ def identify_robot(
     for remark in found.remarks:
         detail(f"note: {remark}")
     made_files = map(output.with_name, files_beside(output, None))
-    say(f"wrote {', '.join(map(str, made_files))}")
+    say(f"wrote {', '.join(map(str, made_files))}; use it with --robot {output}")
     if json:
         echo_data(record)
     else:
         echo_top(tables_text(found))
+        say(LEGEND)
     if show:
         open_made(output.with_suffix(".html"))
 

@@ -26,7 +26,7 @@ def inspect_log(
     asked: Asked,
     output: Annotated[
         Path | None,
-        opt.OUT._replace(help="Write here; the options that the log calls for."),
+        opt.OUT._replace(help="Write here; the options that this log needs."),
     ],
     strict: Annotated[
         bool, Option("--strict", "", "Exit with 1 if anything looks wrong, for CI.")
@@ -36,8 +36,8 @@ def inspect_log(
 ) -> None:
     """Show what a log holds and what is wrong with it.
 
-    With -o vftcli.toml robot, columns, reference are written, each with its reason, for the
-    commands in that folder; further LOGs become free motion where nothing touches the arm.
+    With -o vftcli.toml it writes robot, columns and reference, each with its reason, for the
+    commands in that folder. Further LOGs become free motion if nothing touches the arm.
 
     Example: vftcli inspect fixtures/ur5_circle.csv
     """

@@ -54,7 +54,8 @@ def reproduce(
     found = gather(wanted, names, run_jobs(chosen))
     with folder:
         write_reproduction(folder, wanted, found, chosen, asked.line, figures)
-    show(terminal(overview(found)))
+    about = "ours / print: our number over the paper's, median of an item's lines (least … most)"
+    show(terminal(overview(found)) + about)
     say(f"wrote {output}: open {output / 'index.html'}")
     if any(item.failures for item in found.values()):
         raise typer.Exit(1)

@@ -25,9 +25,9 @@ def contact_thresholds(
 ) -> None:
     """Find contact thresholds from contact-free logs.
 
-    The longer the better; of several days the worst counts. Printed as libfranka's call,
-    franka_ros parameters, URScript and TOML. Contacts of a --check log are those of --reference,
-    else of the truth beside a simulated log, else of its sensor; else its alarms are listed.
+    Give long logs of several days: the worst one counts. Prints calls for libfranka, franka_ros,
+    URScript, and TOML. True contacts of a --check log come from --reference, from the truth
+    beside a simulated log, or from its force sensor; without any, its alarms are listed.
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
@@ -72,7 +72,7 @@ def contact_thresholds(
 
 
 def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
-    """Source of true contacts if not named: truth beside the log, or its sensor."""
+    """Default source of contacts: truth beside the log, or sensor."""
     truth = Path(f"{recording.source.path}.truth.parquet")
     if truth.exists():
         return ReferenceChoice(name=f"{FILE}{truth}")

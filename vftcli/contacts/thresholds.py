@@ -93,8 +93,8 @@ class Tail(NamedTuple):
         if due > 0.5 * len(self.maxima):
             most = 0.5 * 3600.0 / BLOCK
             raise ParameterError(
-                f"a rate of {rate:.4g} false alarms per hour of one signal is no alarm's: at most "
-                f"{most:.4g} can be found from maxima of {BLOCK:g} s"
+                f"{rate:.4g} false alarms per hour of one signal are too many: at most {most:.4g} "
+                f"can be found from maxima of {BLOCK:g} s"
             )
         ranks = due + np.array([0.0, 1.0, -1.0]) * Z_95 * np.sqrt(due)
         places = np.rint(ranks).astype(int).clip(1, len(self.maxima)) - 1
@@ -149,9 +149,9 @@ def check_alike(signals: Sequence[ComparedSignals]) -> None:
         kinds = {(one.of_vendor, one.logged_wrench, one.frame) for one in (first, other)}
         if len(kinds) > 1:
             raise ParameterError(
-                f"{other.recording.name} and {first.recording.name} do not hold the same "
-                "estimates of the robot's own, and one set of thresholds serves one of them; "
-                "give logs recorded alike"
+                f"{other.recording.name} and {first.recording.name} hold "
+                "different estimates of the robot's own, and thresholds serve only one of them; "
+                "give logs recorded in one way"
             )
         if other.torque.shape[1] != first.torque.shape[1]:
             raise ParameterError(

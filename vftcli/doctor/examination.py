@@ -263,7 +263,7 @@ def refuse(name: str, findings: Iterable[Remark]) -> None:
     if found := [in_words(finding) for finding in findings]:
         others = ", ".join(dict.fromkeys(other.name for other in found[1:]))
         more = f" Also: {others}." if others else ""
-        raise ExaminationError(f"{name}: {found[0]}{more} With --anyway it goes on all the same.")
+        raise ExaminationError(f"{name}: {found[0]}{more} --anyway continues despite this.")
 
 
 class FindingWords(NamedTuple):

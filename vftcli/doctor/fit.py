@@ -77,7 +77,7 @@ class RobotMatch(NamedTuple):
 
     def __str__(self) -> str:
         """The fit and its evidence."""
-        return f"{self.in_short} by {self.evidence}"
+        return self.in_short.replace("(", "(model error ").replace(")", f", by {self.evidence})")
 
     @property
     def in_short(self) -> str:
@@ -207,7 +207,9 @@ def arm_findings(
             if robot.path in PROFILES.values() or (
                 driven is not None and driven.misfit < ANOTHER * diagnosis.healed.misfit
             ):
-                remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
+                remark = warning(
+                    "other-robot", own=own.in_short, best=str(best), robot=best.robot
+                )
                 return ArmFindings((remark,), (best, own._replace(fits=False), *more))
     others = [other._replace(fits=False) for other in others if other.robot != robot.name]
     robots = (own, *others)

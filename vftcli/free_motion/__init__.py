@@ -79,7 +79,7 @@ class FreeChoice(Choice):
         Option(
             "two-cycle.free-cycles",
             "1|1,2|1-3",
-            "Cycles free of contact; else found.",
+            "Contact-free cycles; default: found.",
             cycle_numbers,
         ),
     ] = ()
@@ -88,7 +88,7 @@ class FreeChoice(Choice):
         Option(
             "two-cycle.alignment",
             "auto|commanded|period|phase|model",
-            "How the free motion is brought under the other; auto: with the smallest error.",
+            "How free and pushed motion are aligned; auto: with the smallest error.",
         ),
     ] = AUTOMATIC
     #: Cutoff of the two-cycle difference [Hz], None for none, or "auto".

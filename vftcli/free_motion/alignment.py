@@ -84,7 +84,7 @@ def align(recording: Recording, free: Recording) -> Alignment:
         raise ReferenceTorqueError(
             f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
             f"shift ({shift:.3f} s) the joint positions still differ by {distance:.3g} rad rms; "
-            "give a log of the same motion with --free"
+            "give a log of this motion with --free"
         )
     raise ReferenceTorqueError(why_slower(recording, free, found.rate))
 
@@ -97,7 +97,7 @@ def is_same_path(recording: Recording, found: Alignment) -> bool:
 
 def why_slower(recording: Recording, free: Recording, rate: float) -> str:
     """Reason of `rate` times the duration: speed or a clock; a remedy."""
-    longer = f"the same motion takes {rate:.4g} times as long in {free.name}"
+    longer = f"this motion takes {rate:.4g} times as long in {free.name}"
     speed = f"{100.0 * abs(rate - 1.0):.2g} % {'slower' if rate > 1.0 else 'faster'}"
     again = (
         "friction and inertia differ with the speed, so record it as fast as the log (on a UR: the "

@@ -98,7 +98,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     )
     raise ReferenceTorqueError(
         f"{recording.name}: no repetition found{wanted}: the joint positions do not return within "
-        f"the log{near if np.isfinite(deviation) else ''}; give a free run of the same motion "
+        f"the log{near if np.isfinite(deviation) else ''}; give a free run of this motion "
         "with --free"
     )
 
@@ -116,7 +116,7 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
     if len(moving) < 8 or np.ptp(q[moving], axis=0).max() < 0.01:
         raise ReferenceTorqueError(
             f"{recording.name}: the arm does not move, so it repeats nothing; the two-cycle "
-            "difference needs a repeated motion, or a free run of the same with --free"
+            "difference needs a repeated motion, or a free run of that motion: --free"
         )
     span = slice(moving[0], moving[-1] + 1)
     return t[span], q[span]
@@ -226,7 +226,7 @@ def segment(recording: Recording, period: Period) -> Cycles:
     if not end - begin > seconds:
         raise ReferenceTorqueError(
             f"{recording.name}: only {max(end - begin, 0.0):.4g} s of the motion repeat, less than "
-            f"the period of {seconds:.4g} s; give a free run of the same motion with --free"
+            f"the period of {seconds:.4g} s; give a free run of this motion with --free"
         )
     return cycles
 

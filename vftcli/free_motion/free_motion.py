@@ -114,12 +114,12 @@ class FreeMotion(Shown):
 
     def __post_init__(self) -> None:
         each = [self.log.recording, *(run.recording for run in self.runs)]
-        again = "give another log; for free cycles within one log leave --free away"
+        again = "give another log; for free cycles within one log leave --free out"
         refuse_repeated_logs(each, "the log or as --free", again)
         if self.runs and (self.choice.cycles or self.choice.period is not None):
             raise ReferenceTorqueError(
                 "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
-                "away with --free"
+                "out with --free"
             )
 
     @property

@@ -139,7 +139,7 @@ def measured_scale(
         if np.count_nonzero(shared) < 2:
             raise ReferenceTorqueError(
                 f"{first.free.name} and {second.free.name} do not overlap, so they measure no "
-                "floor; give two free runs of the same part of the motion"
+                "floor; give two free runs of one part of the motion"
             )
         # One free run with another by way of the log both are paired with.
         rate, shift = np.polyfit(first.times[shared], second.times[shared], 1)

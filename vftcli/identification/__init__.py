@@ -23,13 +23,13 @@ class Task(Choice):
     ] = None
     #: End of the used band. [Hz]
     cutoff: Annotated[
-        float, Option("identify.cutoff", "HZ", "Cutoff of the zero-phase filter.")
+        float, Option("identify.cutoff", "HZ", "Cutoff of the zero-phase filter before a fit.")
     ] = 8.0
     #: Whether the friction method also fits drive constants.
     constants: Annotated[
         bool,
         Option(
-            "identify.constants", "yes|no", "Whether friction fits drive constants K.", is_yes
+            "identify.constants", "yes|no", "Whether friction fits drive constants K too.", is_yes
         ),
     ] = False
     #: The span of the logs for the check, None for all. [s]
@@ -50,7 +50,7 @@ class Task(Choice):
             raise ParameterError("--set identify.constants=yes is for --method friction")
         if self.method == "targets" and not self.friction:
             raise ParameterError(
-                "--method targets reads the controller's friction; leave model.friction=none away"
+                "--method targets reads the controller's friction; leave model.friction=none out"
             )
 
     @property

@@ -238,7 +238,7 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
     left = distance(best)
     if left > SAME_MOTION:
         raise NotSameMotionError(
-            f"{motion.recording.name} and {other.name} are not the same motion: positions differ "
+            f"{motion.recording.name} and {other.name} are different motions: positions differ "
             f"by {1e3 * left:.3g} mrad rms at best; a pair must repeat one trajectory"
         )
     return best, left

@@ -87,7 +87,7 @@ class ObserverChoice(Choice):
         Option(
             NUMBERS,
             "OBSERVER.NUMBER",
-            "A number, or one a joint: gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
+            "One, or one per joint: gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
             settings_of,
             several=True,
             completes=names_at("observers.table:NUMBERS"),
@@ -203,7 +203,7 @@ class ObserverChoice(Choice):
         if self.as_printed:
             raise ParameterError(
                 "--gains tunes the corrected observers; the printed ones have another response. "
-                "Leave --gains or --as-printed away"
+                "Leave --gains or --as-printed out"
             )
         observers, on_match = match_observers(observers, self.match, step, robot.joints)
         return observers, (*remarks, *on_match)
@@ -265,5 +265,5 @@ class GoalChoice(Choice):
     gains: Annotated[str, ObserverChoice.option("gains", reads=None)] = LOG_GAINS
     threshold: Annotated[
         str | None,
-        Option("alarm.threshold", "NUMBER(S)", "Torque of an alarm [N·m], one or one a joint."),
+        Option("alarm.threshold", "NUMBER(S)", "Alarm above this torque [N·m]."),
     ] = None

@@ -201,12 +201,12 @@ def parse_goal(
         level = np.array(numbers(threshold) or [np.nan])
         if not (np.isfinite(level).all() and np.all(level > 0.0)):
             raise ParameterError(
-                f"alarm.threshold={threshold} is not a positive number or one a joint [N·m]"
+                f"alarm.threshold={threshold} is not a positive number or one per joint [N·m]"
             )
     if name == "false-alarms" and level is None:
         raise ParameterError(
             "--gains false-alarms needs to know what raises an alarm: add --set "
-            "alarm.threshold=N·m, one number or one a joint"
+            "alarm.threshold=N·m, one number or one per joint"
         )
     return Goal(name, value, level)
 

@@ -26,8 +26,8 @@ class OutputChoice(Choice):
         Option(
             "recording.detail",
             f"{FULL}|{LEVELS}|{NONE}",
-            "How much of a long log recording.rrd holds; levels: the lowest and highest samples of "
-            "5000 stretches, every sample where the strongest contacts begin.",
+            "How much of a long log recording.rrd holds; levels: lowest and highest samples of "
+            "5000 stretches, and every sample where the strongest contacts begin.",
         ),
     ] = LEVELS
 
@@ -38,7 +38,7 @@ class OutputChoice(Choice):
             )
         if self.detail == NONE and "rrd" in self.extras:
             raise ParameterError(
-                "recording.detail=none writes no recording; leave it or --rrd away"
+                "recording.detail=none writes no recording; leave it or --rrd out"
             )
 
 

@@ -1,9 +1,6 @@
-"""Outputs of an admittance replay: page, motion, comparison, figures, `run.json`.
+"""Outputs of an admittance replay: page, motion, comparison, figures, `run.json`."""
 
-The page has Figs 6/9, 7/10, 12/13 and Tables III/IV of the paper for the user's log.
-"""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +15,7 @@ from vftcli.outputs import Record
 from vftcli.outputs.charts import DASHES, GREY, SPARE, Chart, ChartLine
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
-from vftcli.outputs.grid import Column, Grid, Rows, csv_rows, keyed_grid, latex, minus
+from vftcli.outputs.grid import Column, Grid, Rows, csv_rows, keyed_grid, latex
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import (
     NARROW,
@@ -46,33 +43,26 @@ from vftcli.signals.wrench import per_axis
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TITLE = "The same force through every controller"
+TITLE = "One force through every controller"
 
-
-def number_form(form: str) -> Callable[[float], str]:
-    """Format of a number with a true minus sign."""
-    return lambda value: minus(format(value, form))
-
-
-THIRD = number_form(".3f")
 
 #: Key of a row → its column.
 COLUMNS = {
     "controller": "controller",
-    "alpha": Column("α", form=number_form("g")),
-    "xi": Column("ξ", form=number_form(".3g")),
+    "alpha": Column("α", form="g"),
+    "xi": Column("ξ", form=".3g"),
     "axis": Column("axis"),
     "drag": Column("drag"),
-    "start_s": Column("start", "s", THIRD, seldom=True),
-    "release_s": Column("release", "s", THIRD, seldom=True),
-    "peak": Column("peak", "m, rad", number_form(".4f")),
-    "time_to_peak_s": Column("to peak", "s", THIRD),
-    "peak_advance_s": Column("advance", "s", THIRD, seldom=True),
-    "overshoot": Column("overshoot", "%", lambda share: number_form(".1f")(100.0 * share)),
-    "return_10_s": Column("back to 10 %", "s", THIRD, symbol="$t_{10}$"),
-    "return_2_s": Column("back to 2 %", "s", THIRD, symbol="$t_2$"),
-    "idle_s": Column("idle", "s", THIRD, seldom=True),
-    "work_J": Column("work", "J", THIRD, seldom=True),
+    "start_s": Column("start", "s", ".3f", seldom=True),
+    "release_s": Column("release", "s", ".3f", seldom=True),
+    "peak": Column("peak", "m, rad", ".4f"),
+    "time_to_peak_s": Column("at", "s", ".3f"),
+    "peak_advance_s": Column("advance", "s", ".3f", seldom=True),
+    "overshoot": Column("overshoot", "%", lambda share: f"{100.0 * share:.1f}"),
+    "return_10_s": Column("to 10 %", "s", ".3f", symbol="$t_{10}$"),
+    "return_2_s": Column("to 2 %", "s", ".3f", symbol="$t_2$"),
+    "idle_s": Column("idle", "s", ".3f", seldom=True),
+    "work_J": Column("work", "J", ".3f", seldom=True),
 }
 #: Latency of a contact → its heading.
 LATENCIES = {
@@ -80,9 +70,17 @@ LATENCIES = {
     "detection": "detected",
     "motion": "moved",
     "withdrawal": "withdrawal",
-    "reaction": "detection to motion",
-    "turn": "withdrawal to turn",
+    "reaction": "to motion",
+    "turn": "to turn",
 }
+LATENCY_TITLE = "Latencies; to motion: from detection; to turn: from withdrawal"
+#: Below the table of a replay.
+LEGEND = (
+    "drag: number of the push along that axis; peak: its largest deviation; "
+    "at: time since it began; to 10 %, to 2 %: time from its release until the "
+    "deviation stays within that share of its value at release; –: not in this "
+    "log. α, ξ: docs/admittance.md"
+)
 #: Meaning of headings in LaTeX.
 RETURNS = (
     "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there",
@@ -113,9 +111,9 @@ def latency_grid(run: ClosedLoop) -> Grid:
     columns = {
         "axis": "axis",
         **{f"{name}_s": Column(head, "s", ".3f") for name, head in LATENCIES.items()},
-        "at_rest_before": Column("at rest before"),
+        "at_rest_before": Column("was at rest"),
     }
-    return keyed_grid(columns, latency_rows(run), "Latencies of the closed loop")
+    return keyed_grid(columns, latency_rows(run), LATENCY_TITLE)
 
 
 def parameter_grid(replay: Replay) -> Grid:
@@ -298,7 +296,7 @@ def render_admittance(found: Replayed, record: Record, title: str) -> str:
         charts(replay, run),
         {controller.name: (colour, "") for controller, colour in painted(replay)},
         eyebrow=eyebrow,
-        headline=f"The same force through {controllers}.",
+        headline=f"One force through {controllers}.",
         warnings=[sentence(remark) for remark in replay.remarks if remark.level == "warning"],
         run=run,
         latencies=run and latency_grid(run),
@@ -352,7 +350,7 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
 
 
 def padded(values: Array) -> Array:
-    """Rows with an unknown one more: a deviation follows from the force before it."""
+    """Rows and an unknown one: deviations follow from the force."""
     return np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])
 
 

@@ -214,7 +214,7 @@ def clock_ground(recording: Recording) -> Ground:
     gaps = int(np.count_nonzero(steps > 0.1))
     ranked = sorted(recording.source.remarks, key=lambda remark: remark.level == "fact")
     odd = gaps > 0 or any(remark.level != "fact" for remark in ranked)
-    words = f"no gap above {1e3 * longest:.0f} ms"
+    words = f"longest step {1e3 * longest:.0f} ms"
     if gaps:
         words = f"{counted(gaps, 'gap')}, the longest {longest:.2g} s at {at:.1f} s"
     more = f", and {len(ranked) - 1} more" if len(ranked) > 1 else ""
@@ -302,7 +302,7 @@ def reference_ground(analysis: Analysis) -> Ground:
 
             means = joint_means(analysis.errors)
             if np.isfinite(means.floor):
-                known = f"{means.left_out}, its own error {means.floor:.2g} N·m a joint"
+                known = f"{means.left_out}, its own error {means.floor:.2g} N·m per joint"
         doubts = [sentence(r) for r in analysis.reference.remarks if r.level == "warning"]
         words = "; ".join(doubts) or f"{analysis.reference.name}{known}"
         return Ground("caution" if doubts else "good", "reference", words, of_log=False)

@@ -86,7 +86,7 @@ WEIGHT_COLUMNS = {
 #: Part of the headline → key of a row, its column.
 HEADLINE = {
     "contact": ("skill", Column("skill", form=".2f")),
-    "free": ("l1_Nm", Column("free L1", "N·m")),
+    "free": ("l1_Nm", Column("L1", "N·m")),
 }
 SUMS = ("skill", "l1_Nm", "missing", "seconds")
 #: A table of rows of which none is scored.
@@ -178,7 +178,7 @@ class Results:
             low, high = rate_interval(false, hours)
             yield (
                 f"{method} lists, {protocol}: {found} of {true} true contacts; {false} false, "
-                f"{false / hours if hours else 0:.0f} an hour ({low:.0f} to {high:.0f})"
+                f"{false / hours if hours else 0:.0f} per hour (95 %: {low:.0f} to {high:.0f})"
             )
         shown = {row[0] for row in self.headline().rows}
         if rest := [method for method in self.methods if shown and method not in shown]:
@@ -189,15 +189,17 @@ class Results:
         for method, protocol, share in shares.iter_rows():
             if share > SILENT:
                 yield f"{method}, {protocol}: no answer for {percent(share)} of the time, read as 0"
+        yield "skill: 1 exact, 0 as an estimate of zero; L1: mean |error| without contact"
+        yield "alone: built-in profile; free: and contact-free motion; identified: own file"
         for protocol in self.protocols:
             if arms := seen(self.spoken.filter(protocol=protocol, part="contact"), "arm"):
                 yield f"skill, {protocol}, is the mean of {'; '.join(arms)}"
         if free := seen(self.spoken.filter(part="free"), "arm"):
-            yield f"free L1 is the mean of {'; '.join(free)}, where the protocol has them"
+            yield f"L1 is the mean of {'; '.join(free)}, where the protocol has them"
         if future := seen(self.table.filter("future"), "method"):
-            yield f"with the whole log, its future too: {', '.join(future)}"
+            yield f"uses the whole log, the future too: {', '.join(future)}"
         if marked := seen(self.table.filter("marked"), "log"):
-            yield f"in spite of a complaint (--anyway): {', '.join(marked)}"
+            yield f"scored despite a complaint (--anyway): {', '.join(marked)}"
 
     def grids(self) -> Iterator[Grid]:
         """Every table below the headline."""

@@ -1,7 +1,4 @@
-"""Contacts of a log: the answer, a table, JSON, CSV; also from a `run.json`.
-
-Screen, page, index and batch use equal words.
-"""
+"""Contacts of a log in words, as a table, JSON, CSV; also from a `run.json`."""
 
 import json
 from collections.abc import Sequence
@@ -14,6 +11,8 @@ from vftcli.contacts.contact_list import (
     FIRST_COLUMNS,
     KEYS,
     SURE_NATS,
+    TIGHT,
+    WIDE,
     CarriedLoad,
     Contact,
     ContactList,
@@ -43,7 +42,11 @@ AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")  #: An axis' two dir
 MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 
 #: Meaning of a table's numbers.
-LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
+LEGEND = (
+    "± 95 %; force ON the robot, base axes; range: if it touched another possible "
+    f"place; trust in the size: good within {100 * TIGHT:.0f} %, weak beyond "
+    f"{100 * WIDE:.0f} % or with little evidence"
+)
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
 #: Field of a list, and of its model → its key in the record.
@@ -58,10 +61,7 @@ MODEL_KEYS = {
 
 
 def otherwise(found: ContactList) -> str:
-    """A sentence on the rest of the log without contacts; "" for nothing.
-
-    It is "" with a load, or with too few joints to know a force.
-    """
+    """A sentence on the rest of the log; "" if no force is known."""
     least = found.detectable_force
     if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""
@@ -287,7 +287,7 @@ def by_force(contact: Contact) -> tuple[bool, float, float]:
 def contact_grid(contacts: Sequence[Contact]) -> Grid:
     """The table of contacts; the joints' torques where no force is known."""
     known = any(contact.peak_force is not None for contact in contacts)
-    size = (Column("|F|", "N", symbol="$|F|$"), Column("range"), "direction")
+    size = (Column("|F|", "N", symbol="$|F|$"), Column("range", "N"), "direction")
     columns = (
         Column("#"),
         Column("from – to", "s", words=True),
@@ -310,14 +310,12 @@ def contact_grid(contacts: Sequence[Contact]) -> Grid:
 
 def contacts_latex(found: ContactList) -> str:
     """A log's contacts as a table for a paper."""
-    grid = contact_grid(found.contacts)
-    columns = [c._replace(unit="N") if c.head == "range" else c for c in grid.columns]
     title = f"Contacts in {found.recording}"
-    return latex(replace(grid, given=columns, title=title, notes=(LEGEND,)))
+    return latex(replace(contact_grid(found.contacts), title=title, notes=(LEGEND,)))
 
 
 def stored_record(estimates: Path) -> Record:
-    """The stored contacts in the ``run.json`` beside an ``estimates.parquet``."""
+    """Stored contacts: ``run.json`` beside an ``estimates.parquet``."""
     path = estimates.with_name(SEAL)
     try:
         record = json.loads(path.read_text(encoding="utf-8"))

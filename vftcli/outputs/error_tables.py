@@ -1,8 +1,4 @@
-"""Errors of torques and wrenches as tables for people and rows for machines.
-
-A row is an observer, a column a joint or an axis; forces are in newtons, moments in
-newton-metres.
-"""
+"""Errors of torques [N·m] and wrenches [N, N·m] as tables, an observer a row."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby, starmap
@@ -45,7 +41,7 @@ AT_FLOOR = 1.2
 
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
 OVERRIDDEN = "overridden"  #: Column of the codes of overridden findings.
-RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
+RESTS = "the joint rests most of the time: stiction is in its reference, do not trust it"
 
 
 class Block(NamedTuple):
@@ -106,10 +102,7 @@ def blocks(errors: pl.DataFrame | None) -> tuple[Block, ...]:
 
 
 def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
-    """Rows of each log and reference with a place: a ``joint`` or an ``axis``.
-
-    Two logs of one label stay two tables.
-    """
+    """Rows of each log and reference, by ``joint`` or ``axis``."""
     if place not in errors.columns:
         return
     rows = errors.filter(pl.col(place).is_not_null())
@@ -144,7 +137,7 @@ def block(rows: pl.DataFrame) -> Block:
 
 
 def rmse_grid(table: Block) -> Grid:
-    """One recording's RMSE: observers down, joints and mean across, floor last."""
+    """One recording's RMSE by observer and joint, floor last."""
     rows: Rows = []
     beside = {
         Column(head, form=form, seldom=True): known
@@ -185,9 +178,9 @@ def rmse_grid(table: Block) -> Grid:
 #: Titles of the tables below that of the RMSE.
 DETAILS = (
     "95 % interval of the RMSE, moving-block bootstrap [N·m]",
-    "lag of the estimate behind the reference, best fit [ms]",
+    "delay of the estimate behind the reference, best fit [ms]",
     "samples within the estimate's 95 % band, while the joint moves",
-    "p of being no worse than the best, paired bootstrap",
+    "p that it is no worse than the best, paired bootstrap",
 )
 
 
@@ -196,7 +189,7 @@ def details(row: Record) -> tuple[str, ...]:
     low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
     share, unknown = row.get("coverage_95"), low is None or high is None
     return (
-        DASH if unknown else f"{significant(low)}–{significant(high)}",
+        DASH if unknown else f"{significant(low, 2)}–{significant(high, 2)}",
         DASH if lag is None else minus(f"{round(1e3 * lag)}"),
         DASH if share is None else f"{100 * share:.0f} %",
         DASH if p is None else "best" if p >= 1.0 else f"{p:.3f}",
@@ -221,18 +214,16 @@ def marks_in_words(found: Sequence[Block]) -> list[str]:
     """Meaning of floor, star and dash, a line each, if present."""
     lines = []
     if any(table.has_floor for table in found):
-        lines.append("floor: RMSE that the reference itself is known to have")
+        lines.append("floor: the reference's own error (RMSE)")
     if any(np.isfinite([*table.means.skill.values()]).any() for table in found):
         lines.append("L1: mean |error|; skill: 1 is exact, 0 no better than an estimate of zero")
     if any(np.any(table.at_floor) for table in found):
-        lines.append(
-            f"*: within {AT_FLOOR:g} × the floor; the reference is no more accurate than that"
-        )
+        lines.append(f"*: within {AT_FLOOR:g} × the floor: may be the reference's own error")
     if any(table.untrusted for table in found):
         lines.append(f"{DAGGER}: {RESTS}")
     lines += dict.fromkeys(f"mean:{t.means.left_out}" for t in found if t.means.without)
     lines += dict.fromkeys(
-        f"{name}: no answer in up to {100.0 * share:.2g} % of a joint's samples, each counted as 0"
+        f"{name}: no answer in up to {100.0 * share:.2g} % of its samples, each counted as 0"
         for table in found
         for name, share in table.missing.items()
     )
@@ -327,10 +318,7 @@ def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> st
 
 
 def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
-    """The RMSE as LaTeX tables (needs ``booktabs``).
-
-    Logs with equal joint heads share a table.
-    """
+    """The RMSE as LaTeX tables; equal joint heads share one."""
     lines = [*doubts_of(errors), *nothing_to_compare(errors)]
     doubts = "".join(f"% {printable(line)}\n" for line in lines)
     alike = groupby(blocks(errors), key=lambda table: table.joint_heads)

@@ -90,7 +90,7 @@ def examination_text(examination: Examination) -> str:
     # With a misread effort the misfits of arms mean nothing.
     misread = examination.refusals(fitting=False)
     lines += [
-        f"  fit       {fit}{'' if fit.fits else ': does not fit'}"
+        f"  fit       {'--robot ' if fit.fits else ''}{fit}{'' if fit.fits else ': does not fit'}"
         for k, fit in enumerate(examination.robots)
         if fit.fits or (k < MOST_FITS and not misread)
     ]

@@ -1,10 +1,10 @@
 """Files written whole or not at all, never over an input, nor unasked.
 
-New files are made in a temporary folder beside their places and renamed in the end; such a
-folder of a process that has died is removed by the next one. Several files that belong
-together have a seal: `run.json`, with the digest of every other one. It is removed before
-the first of them changes and written after the last, so that a folder without it is
-incomplete, whenever a run was killed.
+New files are made in a temporary folder beside their places and renamed in
+the end; the next process removes such a folder of one that has died. Files
+that belong together have a seal: `run.json`, with every other one's digest.
+It is removed before the first of them changes and written after the last:
+a folder without it is incomplete, whenever a run was killed.
 """
 
 import hashlib
@@ -36,7 +36,7 @@ _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
 @contextmanager
 def protected(inputs: Iterable[Path]) -> Iterator[None]:
-    """Protect these files, and all files of these folders, from writing in a block."""
+    """Protect these files and folders from writing in a block."""
     token = _inputs.set(tuple(inputs))
     try:
         yield
@@ -311,7 +311,7 @@ def refuse_input(path: Path) -> None:
 
 
 def check_letters(path: Path) -> None:
-    """Raise an OutputError for a name that is not UTF-8, which libraries refuse."""
+    """Raise for a name that is not UTF-8: libraries refuse it."""
     if whole(str(path)) != str(path):
         raise OutputError(f"{path} is no name in UTF-8; give another -o")
 
@@ -403,7 +403,7 @@ def held(folder: Path, *, wait: bool) -> Iterator[None]:
 
 
 def to_disk(paths: Iterable[Path]) -> None:
-    """Flush files and folders to the disk, so that a later rename cannot overtake."""
+    """Flush files and folders to the disk, before a rename."""
     for path in paths:
         # A folder cannot be opened everywhere, nor flushed on every file system.
         with suppress(*([OSError] if path.is_dir() else [])):

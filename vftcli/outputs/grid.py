@@ -125,7 +125,7 @@ class Column(NamedTuple):
             return GridCell("yes" if entry else "no")
         if isinstance(entry, float):
             form = self.form
-            return GridCell(format(entry, form) if isinstance(form, str) else form(entry))
+            return GridCell(minus(format(entry, form)) if isinstance(form, str) else form(entry))
         return GridCell(str(entry))
 
 
@@ -206,7 +206,7 @@ def terminal(grid: Grid, letters: Callable[[str], str] = str, indent: int = 0) -
             parts[-1].append(k)
         lines = [line for part in parts for line in ("", *table_lines(grid, letters, part))][1:]
     above = [grid.caption] if grid.caption else []
-    below = [f"No room for: {', '.join(left_out)}."] if left_out else []
+    below = [f"A wider terminal also shows: {', '.join(left_out)}."] if left_out else []
     return "".join(f"{line}\n" for line in (*above, *lines, *below))
 
 

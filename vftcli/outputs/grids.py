@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
     from vftcli.wrench.sensor import Drift
 
+FRICTION = "friction: SI units, models in docs/robots.md"  #: Below a robot's joints.
 SURE = 0.05  #: A difference of two observers is sure below this p.
 #: Column of the contact table → its heading.
 CONTACTS = {
@@ -34,9 +35,9 @@ CONTACTS = {
     "found_contacts": Column("found"),
     "missed_contacts": Column("missed"),
     "false_alarms": Column("false"),
-    "false_alarms_per_h": Column("false alarms/h"),
-    "detection_delay_s": Column("mean delay", "s"),
-    "longest_delay_s": Column("longest", "s", seldom=True),
+    "false_alarms_per_h": Column("false/h"),
+    "detection_delay_s": Column("delay", "s", ".3f"),
+    "longest_delay_s": Column("longest", "s", ".3f", seldom=True),
 }
 
 
@@ -98,10 +99,11 @@ def robot_text(robot: "Robot") -> str:
     """One robot in full: joints, drives, friction, gains, sources."""
     lines = [
         f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}",
-        *("", *terminal(joints_grid(robot)).splitlines()),
+        *("", *terminal(joints_grid(robot)).splitlines(), FRICTION),
     ]
     for observer, gains in robot.gains.items():
-        lines += ["", *(f"{observer}.{key} = {value}" for key, value in gains.items())]
+        lines += ["", f"gains of {observer} (vftcli help gains):"]
+        lines += [f"  {observer}.{key} = {value}" for key, value in gains.items()]
     lines += ["", *(f"note: {note}" for note in robot.remarks)]
     lines += [
         f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
@@ -129,7 +131,8 @@ def contact_grids(errors: "pl.DataFrame | None") -> Iterator[Grid]:
     if errors is None or "contacts" not in errors.columns:
         return
     if len(rows := errors.drop_nulls("contacts")):
-        yield keyed_grid(CONTACTS, rows.iter_rows(named=True), "contacts against the reference")
+        title = "Contacts against the reference; delay: from their true start"
+        yield keyed_grid(CONTACTS, rows.iter_rows(named=True), title)
 
 
 def drift_grid(drifts: "Iterable[Drift]") -> Grid:

@@ -43,7 +43,7 @@ from vftcli.signals.parsing import counted
 IDENTIFICATION_FIGURES = ("torque", "residuals")
 #: Key of an identified number → its column.
 COLUMNS = {
-    "parameter": "number",
+    "parameter": "parameter",
     "joint": Column("joint"),
     "value": Column("value", form=".5g"),
     "sd": Column("sd", form=".2g"),
@@ -57,6 +57,13 @@ BASE_COLUMNS = {
     "sd": Column("sd", form=signed),
     "determined": Column("determined"),
 }
+RESIDUALS = "RMS of measured less modelled drive torque [N·m]; check: of a --check log"
+#: Below the identified numbers.
+LEGEND = (
+    "profile: the value in your --robot, – if its model has none; sd: standard "
+    "deviation; not determined: the log does not settle it; com: in flange axes. "
+    "More: docs/robots.md"
+)
 DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
 
 
@@ -224,9 +231,10 @@ def residual_grid(found: Identification) -> Grid:
     for (_, *names), part in found.residuals.group_by(*keys, maintain_order=True):
         values = part["rms_Nm"].to_list()
         label = ", ".join(str(name) for name in names if name != "train")
+        label = label.replace(", held-out,", ", check,")
         rows.append((label, *values, sum(values) / len(values)))
-    joints = joint_columns(found.robot.joints, form=".3f")
-    return Grid(("residual rms [N·m]", *joints, Column("mean", form=".3f")), rows)
+    joints = joint_columns(found.robot.joints, form=".2f")
+    return Grid(("log, model", *joints, Column("mean", form=".2f")), rows, RESIDUALS)
 
 
 def parameter_grid(found: Identification) -> Grid:

@@ -1,10 +1,10 @@
 """A Rerun recording: plots, words and the arm in one file that opens arranged.
 
-Every plot is a chart of one panel and one entity, its key, holding one scalar a line, on
-the timeline `t` in seconds from the log's first sample; words are Markdown documents. The
-arm is drawn with the meshes of its description, else with capsules from the chain's
-geometry. A contact's arrow is at its place while it lasts, below `/contacts`, and the
-touched links have its colour.
+Every plot is a chart of one panel and one entity, its key, with one scalar
+per line, on the timeline `t` in seconds from the log's first sample. Words
+are Markdown documents. The arm is drawn with the meshes of its description,
+else with capsules from the chain. A contact's arrow is at its place while
+it lasts, below `/contacts`; the touched links have its colour.
 """
 
 import hashlib
@@ -63,7 +63,7 @@ def rgba(*colours: str) -> Packed:
 
 
 def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:
-    """Poses of all links at about `RATE` samples a second, at most `MOST_POSES`."""
+    """Poses of all links at about `RATE` Hz, at most `MOST_POSES`."""
     # A slow log is drawn as it is.
     every = max(1, int(len(t) / max(float(t[-1] - t[0]) * RATE, 1.0)), -(-len(t) // MOST_POSES))
     t, q = t[::every], np.ascontiguousarray(q[::every])

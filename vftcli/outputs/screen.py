@@ -154,12 +154,10 @@ def log_screen(
 
 def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
     """An earlier list: its log, the answer, the rows."""
-    head = (
-        f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
-    )
+    head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed by the earlier run"
     lines = [canvas.painted(head, "bold"), "", f"  {answer(found)}", ""]
     rows = list_lines(found, None if every else MOST_ROWS, canvas)
-    end = "Whether it can be believed, and |F| over time: vftcli contacts on the log itself"
+    end = "For the reasons to believe it, and |F| over time: vftcli contacts on the log itself"
     return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
 
 
@@ -210,7 +208,7 @@ def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str
     if len(shown) < len(contacts):
         lines.append(f"the {len(shown)} hardest of {len(contacts)}; --details shows all")
     if most is None and found.candidates:
-        lines += ["", "Candidates, too little evidence or force to list:"]
+        lines += ["", "Candidates, with too little evidence or force to be listed:"]
         lines += terminal(contact_grid(found.candidates), canvas.shown, 2).splitlines()
     below = [rest] * bool(rest) + [f"({LEGEND})"] * (found.hardest is not None)
     lines += (line for text in below for line in canvas.wrapped(text, 2))
@@ -266,7 +264,7 @@ def against(block: "Block", analysis: Analysis) -> str:
     if not means.errors:
         return f"Against {block.reference}: no sample in common with the estimates"
     (name, least), *others = means.errors.items()
-    floor = f" (floor {significant(means.floor, 2)} N·m)" if block.has_floor else ""
+    floor = f" (own error {significant(means.floor, 2)} N·m)" if block.has_floor else ""
     text = f"Against {printable(block.reference)}{means.left_out}{floor}: "
     text += f"RMSE {significant(least, 2)} N·m ({name})"
     if others:
@@ -324,8 +322,8 @@ def log_table(
 ) -> list[str]:
     """One line a log: its contacts and its health."""
     judged = any(analysis.errors is not None for analysis, _ in found)
-    span, rest = Column("span", seldom=True), Column("else", seldom=True)
-    heads = ("log", span, Column("contacts"), "hardest", rest, *[Column("error")] * judged)
+    span, rest = Column("span", seldom=True), Column("detects above", seldom=True)
+    heads = ("log", span, Column("contacts"), "hardest", rest, *[Column("RMSE")] * judged)
     lines: list[tuple[Sequence[str], Standing, str]] = []
     for analysis, all_grounds in found:
         line, listed, least = log_line(analysis, all_grounds), analysis.contacts, DASH

@@ -115,7 +115,7 @@ def merged(corners: Array, size: float) -> tuple[Index, Index]:
 
 
 def spot_of(contact: Contact, joints: int) -> tuple[int, int]:
-    """Frames beside a force's place: the flange's twice, or both ends of a link."""
+    """Frames beside a force's place: flange, or a link's ends."""
     if 0 in contact.places or not contact.places:
         return joints + 1, joints + 1
     return contact.places[-1], contact.places[-1] + 1

@@ -22,11 +22,12 @@ from vftcli.signals.parsing import counted
 
 #: Steps a unit: no robot resolves 0.01 N·m.
 SHARES = 100
-#: Columns of a threshold with interval and source tail.
-COLUMNS = (
-    "", Column("threshold"), "", Column("95 %"), Column("tail from"),
-    Column("λ", "1/h", ".0f"), Column("k"), Column("log", "h"), "needed by",
-)  # fmt: skip
+COLUMNS = "", Column("threshold"), "", Column("95 %"), Column("free motion", "h"), "set by"
+#: Below the thresholds.
+LEGEND = (
+    "95 %: interval of the threshold; set by: the log that needs the highest one; "
+    "free motion: its length. Below: thresholds, and upper ends of the intervals\n"
+)
 #: Key of a contact in a check → its column.
 CONTACTS = {
     "number": Column("#"),
@@ -34,7 +35,7 @@ CONTACTS = {
     "stop_s": Column("to", "s", ".2f"),
     "peak_force_N": Column("|F|", "N"),
     "delay_s": Column("delay", "ms", lambda seconds: f"{1e3 * seconds:.0f}"),
-    "by": "by",
+    "by": "alarm by",
 }
 
 
@@ -42,7 +43,7 @@ def thresholds_text(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> str:
     """Tables of thresholds and calls of interfaces, for the terminal."""
-    parts = [terminal(thresholds_grid(thresholds))]
+    parts = [terminal(thresholds_grid(thresholds)) + LEGEND]
     if counted:
         joints = joint_columns(len(counted[0].joints))
         any_of = (Column("any joint"), *joints, Column("any axis"))
@@ -50,27 +51,26 @@ def thresholds_text(
             (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
             for one in counted
         ]
-        title = "each log at the thresholds of the others: false alarms"
-        columns = "log", Column("", "h"), Column("due"), *any_of
+        title = "False alarms of each log at the thresholds of the other logs"
+        columns = "log", Column("length", "h"), Column("expected"), *any_of
         parts.append(terminal(Grid(columns, rows, title)))
     for check in checks:
         contacts = [
             row | {"by": row["by"] or ("on already" if row["alarm_was_on"] else "missed")}
             for row in check_rows(check)
         ]
-        grid = keyed_grid(CONTACTS, contacts, f"{check.log}: what they would have detected")
+        grid = keyed_grid(CONTACTS, contacts, f"{check.log}: contacts at these thresholds")
         parts.append(f"{terminal(grid)}{check_line(check)}\n")
     return "\n".join([*parts, *(f"{name}:\n{text}" for name, text in calls(thresholds).items())])
 
 
 def thresholds_grid(thresholds: Thresholds) -> Grid:
-    """Every threshold with its interval, and the tail it comes from."""
+    """Every threshold with its interval, and the log that it comes from."""
     rows: Rows = []
     for name, unit, level, one in thresholds.named:
         span, t = DASH.join(map(significant, one.interval)), one.tail
-        tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.size), t.hours)
-        rows.append((name, level, unit, span, *tail, one.log))
-    title = f"exceeded without contact {thresholds.rate:g} × an hour by any joint, or any axis"
+        rows.append((name, level, unit, span, t and t.hours, one.log))
+    title = f"Passed without contact {thresholds.rate:g} × an hour by any joint, or by any axis"
     return Grid(COLUMNS, rows, title)
 
 

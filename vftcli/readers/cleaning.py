@@ -278,9 +278,9 @@ def _restarts(raw: RawLog, path: Path, *, examining: bool) -> list[int]:
         )
     if not examining:
         raise ClockError(
-            f"{path}: the clock starts anew {restarts.size}×, first {where}: the file holds "
-            f"{len(lengths)} recordings one after another. Split it, or take one by its number: "
-            "--columns segment=1 (with the other columns, if they need describing)."
+            f"{path}: the clock restarts {restarts.size}×, first {where}: the file holds "
+            f"{len(lengths)} recordings one after another. Split it, or read one: --columns "
+            "segment=1 (with the other columns, if they need describing)."
         )
     return [*restarts.tolist()]
 

@@ -198,7 +198,7 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     for path, project in TORQUELESS.items():
         if any(f"/{name}".endswith(f"/{path}") for name in names):
             raise LogError(
-                f"{table.path}: laid out as {project}'s, which hold no torque. Where you added "
+                f"{table.path}: has the layout of {project}, which has no torque. If you added "
                 "torques, name all: --columns t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
             )
     # The datasets of the one group that has positions by name, and those at the top.

@@ -60,7 +60,7 @@ def columns_of_lines(file: LogFile, lines: Iterable[tuple[int, bytes]]) -> tuple
     if not blocks:
         raise LogError(f"{file.path}: no line holds a JSON object.")
     if any(block.keys() != blocks[0].keys() for block in blocks):
-        raise LogError(f"{file.path}: its lines do not hold the same fields.")
+        raise LogError(f"{file.path}: its lines hold different fields.")
     try:
         columns = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
     except ValueError:
@@ -100,7 +100,7 @@ def columns_of(file: LogFile, objects: list[Object]) -> Columns:
         except (KeyError, ValueError, TypeError, OverflowError):
             shown = printable(name[:40])
             raise LogError(
-                f"{file.path}: {shown} is not the same numbers in each of the objects."
+                f"{file.path}: {shown} differs in kind or length between the objects."
             ) from None
     return columns
 

@@ -87,7 +87,7 @@ class ReadChoice(Choice):
     #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
     format: Annotated[
         str | None,
-        Option("log.format", "NAME", "Read it as this format; by default its content decides."),
+        Option("log.format", "NAME", "Read the log as this format; default: by its content."),
     ] = None
     columns: Annotated[
         str | None,
@@ -105,7 +105,7 @@ class ReadChoice(Choice):
         Option(
             "log.effort",
             "auto|current|torque|torque-without-gravity",
-            "What the log's effort is, whatever its name; auto: what the robot's model explains.",
+            "What the log's effort is; auto: the kind that the robot's model explains.",
         ),
     ] = None
     #: Episode, `ALL`, or None to leave it to the reader.

@@ -124,7 +124,7 @@ class RobotChoice(Choice):
         Option(
             "model.friction",
             "profile|none|model",
-            "Friction of the robot file, none, or what an MJCF gives for simulation.",
+            "Friction of the robot file, none, or that of an MJCF's simulation.",
         ),
     ] = "profile"
     payload: Annotated[

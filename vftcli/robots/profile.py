@@ -240,7 +240,7 @@ ADMITTANCE = {
     "position": TABLE,
     "rotation": TABLE,
     "source": TEXT,
-    "start": ValueKind("one number a joint", several(1).fits),
+    "start": ValueKind("one number per joint", several(1).fits),
     "threshold_mode": TEXT,
 }
 

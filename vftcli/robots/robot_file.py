@@ -82,8 +82,8 @@ TEXTS = ValueKind(
     lambda v: TEXT.fits(v) or (LIST.fits(v) and all(map(TEXT.fits, v))),
 )
 TABLE = ValueKind("a section", is_table)
-PER_JOINT = one_each("a joint", is_finite)
-PER_AXIS = one_each("an axis", lambda v: is_finite(v) or v == math.inf)
+PER_JOINT = one_each("per joint", is_finite)
+PER_AXIS = one_each("per axis", lambda v: is_finite(v) or v == math.inf)
 
 
 class Bound(NamedTuple):

@@ -193,7 +193,7 @@ class Recording(TimeSeries):
         seal(self, "wrench", shape=(self.samples, 6), called=self.name)
         if self.joint_names and len(self.joint_names) != self.joints:
             held = f"{len(self.joint_names)} joint names for {self.joints} joints"
-            raise ShapeError(f"{self.name}: {held}; expected one a joint, or none")
+            raise ShapeError(f"{self.name}: {held}; expected one per joint, or none")
         if self.payload_com is not None:
             check_shape(self.payload_com, (3,), "payload_com", self.name)
 
@@ -352,6 +352,6 @@ def refuse_repeated_logs(
     for a, b in combinations(logs, 2):
         if same_run(a, b):
             raise ParameterError(
-                f"{a.name} and {b.name}, each given as {option}, are the same run (equal sha256), "
-                f"which says nothing new the second time; {remedy}"
+                f"{a.name} and {b.name}, each given as {option}, are one run (equal sha256), so "
+                f"the second adds nothing; {remedy}"
             )

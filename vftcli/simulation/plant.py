@@ -140,7 +140,7 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
             )
         if len(own) != n or min(own) < 0 or out_of_bounds(name, own):
             raise ParameterError(
-                f"friction.{name} must have one number a joint, {n} of them, none negative or "
+                f"friction.{name} must have one number per joint, {n} of them, none negative or "
                 "beyond what robots have"
             )
         table[name] += own if spec.enabled else 0.0

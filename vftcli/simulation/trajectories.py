@@ -279,7 +279,7 @@ class ExcitationSpec(Spec, kind="excitation"):
         if sizes != {robot.joints} or len(self.cosine) != len(self.sine) or self.period <= 0:
             raise ParameterError(
                 f"trajectory.mean and each row of cosine and sine must have {robot.joints} "
-                f"numbers, one a joint of {robot.name!r}, cosine and sine as many rows, and "
+                f"numbers, one per joint of {robot.name!r}, cosine and sine as many rows, and "
                 "trajectory.period must be positive"
             )
         series = (np.array(part) for part in (self.mean, self.cosine, self.sine))

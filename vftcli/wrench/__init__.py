@@ -91,7 +91,7 @@ class WrenchChoice(Choice):
         Option(
             "virtual-sensor.tool",
             "POSE|NAME",
-            "Tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or its [tool.NAME].",
+            "Tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or the name of a [tool.NAME].",
         ),
     ] = None
     #: A pose as text or by name, "fit", or None for the file's own.
@@ -100,7 +100,7 @@ class WrenchChoice(Choice):
         Option(
             "virtual-sensor.sensor",
             "POSE|NAME|fit",
-            "Force/torque sensor on the flange, written alike; fit: estimated from the log.",
+            "Pose of the force/torque sensor on the flange; fit: estimated from the log.",
         ),
     ] = None
     #: The zero.

@@ -87,7 +87,7 @@ def find_mounting(
     if frame.axes != "sensor":
         raise ParameterError(
             f"virtual-sensor.sensor=fit: the log's wrench is in {frame}, not in sensor axes; name "
-            "it with --columns wrench[sensor]=…, or leave the setting away"
+            "it with --columns wrench[sensor]=…, or leave the setting out"
         )
     ours = VirtualSensor(frame="flange").wrench(disturbance, recording.q, robot.chain)
     fit = fit_pose(ours.known, frame.factor * reading)

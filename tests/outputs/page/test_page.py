@@ -103,7 +103,7 @@ def test_nothing_is_said_twice(pushed: Analysis) -> None:
 
 
 def test_values_at_the_floor_are_marked(analysis: Analysis) -> None:
-    note = "*: within 1.2 × the floor; the reference is no more accurate than that"
+    note = "*: within 1.2 × the floor: may be the reference&#39;s own error"
     assert note not in render(analysis)
     near = analysis.errors.with_columns(reference_floor_Nm=pl.col("rmse_Nm") / 1.1)
     page = render(replace(analysis, errors=near))

@@ -22,7 +22,7 @@ def files_below(folder: Path) -> list[Path]:
 
 
 class Hdf5Dataset:
-    """HDF5 files of one or many episodes (DROID, ALOHA, any), or a folder of them."""
+    """HDF5 files of episodes (DROID, ALOHA, any), or their folder."""
 
     has_statistics = False
 

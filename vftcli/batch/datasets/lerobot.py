@@ -63,7 +63,7 @@ class LeRobotDataset:
                 )
 
     def write(self, file: DataFile, columns: ForceColumns, forces: Forces, target: Path) -> None:
-        """Write a data file with the columns behind its own; row groups stay as they are."""
+        """Write a data file with the columns behind its own."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -127,7 +127,7 @@ class LeRobotDataset:
     def _finish_episodes(
         self, path: Path, columns: ForceColumns, statistics: OfEpisodes, copy: Path
     ) -> None:
-        """Write a table of episodes, with the columns' statistics if it has statistics."""
+        """Write a table of episodes, with the columns' statistics."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -190,7 +190,7 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON hold
 
 
 def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dict[bytes, bytes]:
-    """A Parquet schema's metadata, with the columns among the `datasets` features."""
+    """A Parquet schema's metadata with the columns' features."""
     try:
         library = json.loads(metadata.get(METADATA, b"null"))
         features = library["info"]["features"]

@@ -31,7 +31,7 @@ FREE, LOADED = "#3b7ea1", "#c2410c"
 
 
 def torque_chart(analysis: Analysis) -> Chart:
-    """External torque by joint: the best estimate with its band, the reference below."""
+    """External torque by joint: the best estimate, the reference."""
     n, reference, below = analysis.recording.joints, analysis.reference, list[ChartLine]()
     if reference is not None:
         # A broad line below the others; dotted where not to be trusted.
@@ -101,10 +101,7 @@ def reference_name(analysis: Analysis) -> str:
 
 
 def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
-    """Gain, phase and delay of every observer up to half the sample rate.
-
-    If joints differ, an observer's first joint is drawn.
-    """
+    """Gain, phase and delay of every observer's first joint."""
     step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
     styles, lines = observer_styles(analysis), []
@@ -139,7 +136,7 @@ def joint_panels(joints: int) -> tuple[str, ...]:
 
 
 def wrench_chart(analysis: Analysis) -> Chart | None:
-    """Force and moment by axis: the first wrench with its band, the reference below."""
+    """Force and moment by axis: the first wrench, the reference."""
     given = {wrench.name: wrench for wrench in analysis.wrenches}
     reference = given.pop("reference", None)
     if not given:
@@ -164,7 +161,7 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
 
 
 def force_chart(analysis: Analysis, found: ContactList) -> Chart | None:
-    """|F| of every contact with its band, the log's own wrench below; None if empty."""
+    """|F| of every contact and of the log's wrench; None if empty."""
     if found.hardest is None and found.detectable_force is None:
         return None
     t = analysis.t
@@ -192,7 +189,7 @@ def highest(found: ContactList, others: Sequence[ChartLine] = ()) -> float:
 
 
 def spectra_chart(found: Spectra) -> Chart:
-    """Spectra of the raw disturbance over both parts of the log, without 0 Hz."""
+    """Spectra of the disturbance over both parts of the log."""
     # In decibels; the least number above 0 replaces zero.
     lines = [
         ChartLine(

@@ -141,7 +141,7 @@ def largest(values: Array) -> float:
 def page_data(
     charts: Sequence[Chart], stage: Callable[[PageClock], Record] | None = None
 ) -> Record:
-    """The script's data: charts over time, each on the clock of its own samples."""
+    """The script's data: charts over time, each with its clock."""
     blob, clocks, drawn = Blob(), dict[int, PageClock](), []
     for chart in charts:
         # Charts of one log share its array of times.

@@ -174,7 +174,7 @@ def least_error(means: JointMeans) -> str:
 
 
 def contact_details(found: ContactList) -> tuple[Grid, ...]:
-    """Moments, impulses, evidence and joint torques of the contacts, `MOST` at most."""
+    """Moments, impulses, evidence and torques of `MOST` contacts."""
     if not found.contacts:
         return ()
     contacts = hardest_rows(found.contacts, MOST)
@@ -235,9 +235,7 @@ def observers_view(analysis: Analysis) -> Record:
             meant.append(tuning.parameter_count)
         rows.append((name, what, *meant))
     heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
-    title = (
-        "What the parameters mean at this log's sample time; one value a joint where they differ"
-    )
+    title = "What the gains mean at this log's sample time; one value per joint where they differ"
     grid = Grid(("observer", "What", *map(Column, heads)), rows, title, swatches=True)
     return {"grid": grid, "names": ", ".join(used), "parameters": used}
 

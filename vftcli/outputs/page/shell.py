@@ -51,7 +51,7 @@ def worst_first(remarks: Iterable[Remark]) -> list[str]:
 
 @cache
 def templates() -> "Environment":
-    """The templates: they escape outside texts; an undefined name is an error."""
+    """The templates: they escape texts; an undefined name raises."""
     from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
     from jinja2.bccache import Bucket
     from markupsafe import Markup
@@ -106,7 +106,7 @@ def templates() -> "Environment":
 
 
 def part(name: str, /, *values: object, **named: object) -> str:
-    """HTML of a small part of the pages: a macro of a template, as ``parts/top``."""
+    """HTML of a part of the pages: a macro, as ``parts/top``."""
     file, macro = name.split("/")
     module = templates().get_template(f"{file}.html").module
     return str(getattr(module, macro)(*values, **named)).strip()

@@ -170,7 +170,7 @@ def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
 def stage_data(
     analysis: Analysis, view: View, surfaces: Mapping[int, Surface], clock: PageClock
 ) -> Record:
-    """The script's data on arm and contacts, beside the charts; `surfaces` by link."""
+    """The script's data on arm and contacts; `surfaces` by link."""
     found, chain, sensed = analysis.contacts, analysis.robot.chain, analysis.virtual_sensor
     least = found.detectable_force if found is not None else None
     hardest = found.hardest if found is not None else None
@@ -214,7 +214,7 @@ def stage_data(
 
 
 def contact_words(contact: Contact) -> str:
-    """A contact's name, place, direction, and the angle if it is too wide for a cone."""
+    """A contact's name, place, direction, and a wide cone's angle."""
     said = [contact_name(contact), place_words(contact)]
     if contact.wrench is not None:
         cone = cone_of(contact)
