@@ -43,6 +43,8 @@ def test_a_log_and_a_robot_may_be_files_or_objects() -> None:
     named = vft.contacts(TAPS, "ur5", free=["0.3:4"], interval="0:6").to_polars()
     held = vft.contacts(recording, robot, free=["0.3:4"], interval="0:6").to_polars()
     assert named.equals(held)
+    free = vft.read(CIRCLE, interval="0:4")
+    assert vft.contacts(recording, robot, free=free, interval="5:6").basis == "free motion"
 
 
 @pytest.mark.slow
@@ -63,6 +65,10 @@ def test_a_report_answers_everything(analysis: vft.Analysis) -> None:
     codes = analysis.remarks.to_polars()["code"].to_list()
     assert {"free-cycles-found", "floor-propagated", "wrench-smoothed"} <= set(codes)
     assert len(codes) == len(analysis.remarks)
+    estimates, wrenches = analysis.estimates.to_polars(), analysis.wrenches.to_polars()
+    assert estimates["tau_ext/gmo/1"].to_numpy() == pytest.approx(analysis.estimates[1].tau[:, 0])
+    assert wrenches.equals(analysis.wrench.to_polars())
+    assert estimates.columns.count("t") == 1
 
 
 def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> None:
@@ -149,7 +155,7 @@ def test_robots_scenarios_and_replays_are_asked_for(tmp_path: Path) -> None:
     examined = vft.inspect(log)
     assert examined.robots[0].robot == "ur5"
     assert len(examined.remarks.to_polars()) == len(examined.remarks)
-    rows = vft.admit(None, "ur5", alpha=[1, 1.6], release="x=0.3")
+    rows = vft.admit(robot="ur5", alpha=[1, 1.6], release="x=0.3")
     assert rows["alpha"].to_list() == [None, 1.0, 1.6]
     mine = vft.identify(ROOT / "fixtures" / "ur5_table1.csv", "ur5", "friction")
     mine.save(tmp_path / "mine.toml")

@@ -15,7 +15,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import counted
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks
-from vftcli.signals.shown import Shown, joined, record
+from vftcli.signals.shown import Several, Shown, joined, record
 
 if TYPE_CHECKING:
     import polars as pl
@@ -61,6 +61,7 @@ class Analysis(Shown):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "remarks", Remarks(self.remarks))
+        object.__setattr__(self, "estimates", Several(self.estimates))
 
     def _headline(self) -> str:
         names = ", ".join(estimate.name for estimate in self.estimates) or "no observer"
@@ -113,14 +114,13 @@ class Analysis(Shown):
         return (*self.estimates, self.reference)
 
     @property
-    def wrenches(self) -> "tuple[Wrench, ...]":
+    def wrenches(self) -> "Several[Wrench]":
         """One an observer, and last the reference's as "reference", if there is one."""
         if self.virtual_sensor is None:
-            return ()
+            return Several()
         reference = self.virtual_sensor.reference
-        if reference is None:
-            return self.virtual_sensor.wrenches
-        return (*self.virtual_sensor.wrenches, replace(reference, name="reference"))
+        last = () if reference is None else (replace(reference, name="reference"),)
+        return Several((*self.virtual_sensor.wrenches, *last))
 
     def plot(
         self,

@@ -12,7 +12,8 @@ from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import NoneType
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import polars as pl
 
@@ -89,6 +90,8 @@ def call(
 
     def of(function: Callable[..., R]) -> Callable[..., R]:
         first, _, *own = signature(function).parameters.values()
+        if NoneType in get_args(first.annotation):
+            first = first.replace(default=None)
         robot = first.replace(name="robot", default=None, annotation=NamedRobot)
         named = [Parameter(w, Parameter.KEYWORD_ONLY, default=None) for w in (*words, "settings")]
         placed = [each.replace(kind=first.kind) if each.name in also else each for each in named]
@@ -108,7 +111,7 @@ def call(
                 raise ParameterError(f"vft.{name}: {error}") from None
             values = dict(bound.arguments)
             said = ", ".join(f"{word}={value!r}" for word, value in values.items())
-            log, arm = checked(values.pop(first.name), values.pop("robot", None))
+            log, arm = checked(values.pop(first.name, None), values.pop("robot", None))
             settings = settings_as_typed(values.pop("settings", None) or {}, kinds)
             typed = {w: options[w].keyword(values.pop(w)) for w in words if w in values}
             if typed.get("columns") is not None and isinstance(log, Recording):

@@ -252,6 +252,8 @@ def test_an_arm_that_is_not_settled_is_asked_for(run) -> None:
     said = r"error: Which arm\? Best fits: ur5 .*%\), .*%\)\. Add --robot ur5\n"
     assert re.fullmatch(said, err)
     assert run(*words, "--json") == (code, "", err)
+    Path("vftcli.toml").write_text("json = true\n")
+    assert run(*words)[1] == ""
 
 
 # Words of the release before do what they did, each with a note that says today's words.

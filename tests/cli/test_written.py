@@ -153,6 +153,9 @@ def test_nothing_is_written_without_a_name(run, here: Path) -> None:
     code, out, _ = run("inspect", *logs, "--json")
     assert (code, list(here.iterdir())) == (0, [])
     assert [one["joints"] for one in json.loads(out)["logs"]] == [7, 6]
+    code, out, err = run("inspect", *logs, "nowhere.csv", "--json")
+    assert (code, len(json.loads(out)["logs"])) == (3, 2)
+    assert err.startswith("error: nowhere.csv left out: ")
 
 
 # Where a command writes that is not given -o, seen by what it refuses to write over.
@@ -275,7 +278,7 @@ def pair(tmp_path: Path) -> list[Path]:
     return paths
 
 
-def test_a_table_has_the_rows_of_both_logs(run, pair: list[Path]) -> None:
+def test_a_table_has_the_rows_of_both_logs(run, pair: list[Path], monkeypatch) -> None:
     words = ("--robot", "ur5", "--reference", f"file:{CIRCLE}.truth.parquet", "--json")
     code, out, err = run("compare", *pair, *words)
     assert code == 0, err
@@ -283,6 +286,10 @@ def test_a_table_has_the_rows_of_both_logs(run, pair: list[Path]) -> None:
     assert samples["a/log.csv"] == ROWS["a"] - 1
     assert samples["b/log.csv"] == ROWS["b"] - 1
     assert samples.keys() == {"a/log.csv", "b/log.csv", "pooled"}
+    monkeypatch.setattr("vftcli.outputs.screen.MOST_LINES", 20)
+    first, *_, each, _ = run("compare", *pair, *words[:-1])[1].splitlines()
+    assert first.startswith("pooled against file:")
+    assert each == "Each log by itself: --details"
 
 
 @pytest.mark.slow

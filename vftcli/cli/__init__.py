@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import typer
 
 from vftcli.cli.commands import COMMANDS, with_command
+from vftcli.cli.config import WORDS
 from vftcli.cli.help import GroupedCommand, JourneyGroup
 from vftcli.cli.progress import STAGES, echo
 from vftcli.signals.errors import UnsettledRobotError, VftError
@@ -45,6 +46,8 @@ def make_app(load: Collection[str] = COMMANDS) -> typer.Typer:
 
 
 HELP = {"help_option_names": ["-h", "--help"]}
+#: Options that make the output one for programs.
+FOR_PROGRAMS = frozenset({"--json", "--csv", "--markdown", "--latex"})
 
 
 def show_version(asked: bool) -> None:
@@ -76,7 +79,8 @@ def main() -> None:
         words = with_command(sys.argv[1:])[:2]
         make_app(COMMANDS if "_VFTCLI_COMPLETE" in os.environ else words)(prog_name="vftcli")
     except VftError as error:
-        if isinstance(error, UnsettledRobotError) and not {"--json", "--csv"} & set(sys.argv):
+        # Those of a file of options too.
+        if isinstance(error, UnsettledRobotError) and not FOR_PROGRAMS & set(WORDS.get()):
             from vftcli.outputs.examination import holdings
 
             echo("\n".join(holdings(error.recording)))

@@ -42,12 +42,17 @@ def terminal_text(rows: "pl.DataFrame", analyses: "Sequence[Analysis]", *, detai
     """The errors for the terminal; with details the pairs of observers below."""
     import polars as pl
 
+    from vftcli.evaluation.errors import POOLED
     from vftcli.evaluation.intervals import paired_significance
     from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.grids import pairs_text
+    from vftcli.outputs.screen import MOST_LINES
 
     text = to_terminal(rows, analyses, every=details)
     if not details:
+        pooled = rows.filter(recording=POOLED)
+        if text.count("\n") >= MOST_LINES and len(pooled):
+            text = f"{to_terminal(pooled, every=False)}Each log by itself: --details\n"
         return text + MORE
     pairs = [
         paired_significance(a.recording.name, a.estimates, a.reference)

@@ -10,7 +10,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.config import NAME
-from vftcli.cli.console import echo, say, say_json, say_robots
+from vftcli.cli.console import LeftOut, echo, say, say_json, say_robots
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import RobotChoice
 from vftcli.signals.option import Asked, Option
@@ -45,20 +45,26 @@ def inspect_log(
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.outputs.files import check_file
     from vftcli.outputs.run_record import log_entry
-    from vftcli.readers.reading import read_chosen
+    from vftcli.readers.reading import Library
+    from vftcli.signals.errors import VftError
 
     if output is not None:
         check_file(output, force)
     choice = replace(asked.of(ReadChoice), examining=True)
     chosen, examiner = asked.of(RobotChoice), Examiner()
-    examinations = []
+    library, examinations = Library(logs), []
+    left_out = LeftOut(library, logs)
     for log in logs:
-        recording, arm = read_chosen(log, choice), None
-        recording = choice.within(choice.with_stated_effort(recording))
-        if chosen.name or choice.effort == "auto":
-            arm = examiner.robot(recording, chosen)
-            recording = examiner.read_as(recording, arm, choice)
-        examinations.append(examine(recording, arm))
+        try:
+            recording, arm = library.open(log, choice), None
+            if chosen.name or choice.effort == "auto":
+                arm = examiner.robot(recording, chosen)
+                recording = examiner.read_as(recording, arm, choice)
+            examinations.append(examine(recording, arm))
+        except VftError as error:
+            left_out.add(log, error)
+    if not examinations:
+        left_out.end(0)
     say_robots(examiner.robots)
     if not json:
         echo("\n\n".join(map(examination_text, examinations)))
@@ -70,6 +76,7 @@ def inspect_log(
     if strict and warnings:
         echo(f"{counted(warnings, 'warning')} (--strict)", err=True)
         raise typer.Exit(1)
+    left_out.end(len(examinations))
 
 
 def write_options(

@@ -135,10 +135,9 @@ class FreeChoice(Choice):
     ) -> Self:
         """The choice by a command's options, each the word after its option.
 
-        A word of `free` is a log or a span ``A:B``.
+        A word of `free` is a log or a span ``A:B``; a notebook's may be a `Recording`.
         """
-        spans = []
-        logs = []
+        spans, logs = [], list[Any]()
         for word in free or ():
             # What reads as a span is one: a file of such a name can be given as ./A:B.
             try:
@@ -146,5 +145,5 @@ class FreeChoice(Choice):
             except ParameterError:
                 if SPAN.fullmatch(str(word)):
                     raise
-                logs.append(Path(word))
+                logs.append(Path(word) if isinstance(word, str) else word)
         return replace(super().parsed(**words), logs=tuple(logs), spans=tuple(spans))

@@ -82,7 +82,9 @@ def write_report(
         logs = [log_entry(a.recording, {"folder": place}) for place, a in pages]
         left_out = {"left_out": dict(failed)}
         seal(folder, SEAL, envelope(command, logs, found=left_out))
-        return to_json(envelope(command, list(map(json.loads, records)), found=left_out))
+        each = zip(records, logs, strict=True)
+        full = [json.loads(record) | {"folder": log["folder"]} for record, log in each]
+        return to_json(envelope(command, full, found=left_out))
 
 
 def fill(

@@ -101,6 +101,7 @@ def read(
     label: str = "",
     episode: int | None = None,
     arm: str | None = None,
+    interval: str | None = None,
 ) -> Recording:
     """Read a log, recognising its format by content unless one is named.
 
@@ -112,6 +113,7 @@ def read(
         label: What to call it in tables; its file's name if "".
         episode: Which episode of a file that holds several; its first, said in a remark, if None.
         arm: Which arm of a log of two, ``left`` or ``right``.
+        interval: Seconds ``A:B`` from its first sample, None for all.
 
     Raises:
         UnknownFormatError: If no format fits, or more than one.
@@ -119,8 +121,15 @@ def read(
         ClockError: If its clock stops, runs backwards or holds no samples.
     """
     wanted = frozenset(signals) if signals is not None else None
-    choice = ReadChoice(format=format, columns=columns, signals=wanted, episode=episode, arm=arm)
-    return read_chosen(path, choice, label)
+    choice = ReadChoice(
+        format=format,
+        columns=columns,
+        signals=wanted,
+        episode=episode,
+        arm=arm,
+        interval=ReadChoice.option("interval").read(interval),
+    )
+    return choice.within(read_chosen(path, choice, label))
 
 
 def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Recording:

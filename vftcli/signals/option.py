@@ -86,8 +86,15 @@ class Option(NamedTuple):
             raise ParameterError(f"{self.word} is {value!r}; expected True or False")
         if not self.several:
             return text_of(value, self.word)
+        from vftcli.signals.recording import Recording
+
         each = value if isinstance(value, list | tuple) else [value]
-        return [text_of(one, self.word) for one in each]
+        # A log may be read already.
+        is_log = "LOG" in self.metavar
+        return [
+            one if is_log and isinstance(one, Recording) else text_of(one, self.word)
+            for one in each
+        ]
 
     @property
     def is_setting(self) -> bool:

@@ -117,6 +117,20 @@ def frame_of(columns: Iterable[tuple[str, Any]]) -> "pl.DataFrame":
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
 
 
+class Several(tuple[Kind, ...]):
+    """What was made of one log several times, whose tables are one."""
+
+    __slots__ = ()
+
+    def to_polars(self) -> "pl.DataFrame":
+        """Their tables side by side, with one ``t``."""
+        import polars as pl
+
+        frames: list[Any] = [each.to_polars() for each in self]  # type: ignore[attr-defined]
+        later = (frame.drop("t") for frame in frames[1:])
+        return pl.concat([*frames[:1], *later], how="horizontal") if frames else pl.DataFrame()
+
+
 class TimeSeries(Shown):
     """Columns along a clock."""
 
