@@ -113,7 +113,9 @@ def call(
             said = ", ".join(f"{word}={value!r}" for word, value in values.items())
             log, arm = checked(values.pop(first.name, None), values.pop("robot", None))
             settings = settings_as_typed(values.pop("settings", None) or {}, kinds)
-            typed = {w: options[w].keyword(values.pop(w)) for w in words if w in values}
+            typed = {
+                w: options[w].keyword(values.pop(w), Recording) for w in words if w in values
+            }
             if typed.get("columns") is not None and isinstance(log, Recording):
                 raise ParameterError("columns are those of a file; this log is read already")
             asked = Asked(typed | {"robot": arm}, settings, f"vftcli.{name}({said})")

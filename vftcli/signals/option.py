@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from inspect import get_annotations
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
 from vftcli.signals.errors import ParameterError
@@ -74,8 +74,8 @@ class Option(NamedTuple):
         """The value of a typed text, None if nothing was typed."""
         return self.reads(typed) if self.reads and typed is not None else typed
 
-    def keyword(self, value: object) -> object:
-        """A keyword's value as it would be typed, several as a list; None as it is.
+    def keyword(self, value: object, log: type = NoneType) -> object:
+        """A keyword's value as it would be typed, several as a list; None, a `log` as it is.
 
         Raises:
             ParameterError: If it is of another kind.
@@ -86,15 +86,9 @@ class Option(NamedTuple):
             raise ParameterError(f"{self.word} is {value!r}; expected True or False")
         if not self.several:
             return text_of(value, self.word)
-        from vftcli.signals.recording import Recording
-
         each = value if isinstance(value, list | tuple) else [value]
-        # A log may be read already.
-        is_log = "LOG" in self.metavar
-        return [
-            one if is_log and isinstance(one, Recording) else text_of(one, self.word)
-            for one in each
-        ]
+        held = log if "LOG" in self.metavar else ()
+        return [one if isinstance(one, held) else text_of(one, self.word) for one in each]
 
     @property
     def is_setting(self) -> bool:
