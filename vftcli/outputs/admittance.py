@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,14 +65,14 @@ COLUMNS = {
     "idle_s": Column("idle", "s", ".3f", seldom=True),
     "work_J": Column("work", "J", ".3f", seldom=True),
 }
-#: Latency of a contact → its heading.
+#: Key of a latency → its column; behind the name of its field is the unit.
 LATENCIES = {
-    "force": "force",
-    "detection": "detected",
-    "motion": "moved",
-    "withdrawal": "withdrawal",
-    "reaction": "to motion",
-    "turn": "to turn",
+    "force_s": Column("force", "s", ".3f"),
+    "detection_s": Column("detected", "s", ".3f"),
+    "motion_s": Column("moved", "s", ".3f"),
+    "withdrawal_s": Column("withdrawal", "s", ".3f"),
+    "reaction_s": Column("to motion", "s", ".3f"),
+    "turn_s": Column("to turn", "s", ".3f"),
 }
 LATENCY_TITLE = "Latencies; to motion: from detection; to turn: from withdrawal"
 #: Below the table of a replay.
@@ -99,7 +100,7 @@ def latency_rows(run: ClosedLoop) -> list[Record]:
     return [
         {
             "axis": AXES[entry.axis],
-            **{f"{name}_s": getattr(entry, name) for name in LATENCIES},
+            **{key: getattr(entry, key.removesuffix("_s")) for key in LATENCIES},
             "at_rest_before": entry.rested,
         }
         for entry in latencies(run)
@@ -108,11 +109,7 @@ def latency_rows(run: ClosedLoop) -> list[Record]:
 
 def latency_grid(run: ClosedLoop) -> Grid:
     """The latencies of a closed loop."""
-    columns = {
-        "axis": "axis",
-        **{f"{name}_s": Column(head, "s", ".3f") for name, head in LATENCIES.items()},
-        "at_rest_before": Column("was at rest"),
-    }
+    columns = {"axis": "axis", **LATENCIES, "at_rest_before": Column("was at rest")}
     return keyed_grid(columns, latency_rows(run), LATENCY_TITLE)
 
 
@@ -142,13 +139,11 @@ def stability_grid(replay: Replay) -> Grid:
     """Stability numbers before any motion: the worst axis of each kind."""
     rows: Rows = []
     kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
-    for controller in replay.controllers:
-        for axes, part, unit in kinds:
-            bound = np.min(controller.escape[part])
-            each = controller.drag, controller.recovery
-            numbers = (np.max(values[part]) for values in each)
-            escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
-            rows.append((controller.name, axes, *numbers, escape))
+    for controller, (axes, part, unit) in product(replay.controllers, kinds):
+        bound = np.min(controller.escape[part])
+        worst = (np.max(values[part]) for values in (controller.drag, controller.recovery))
+        escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
+        rows.append((controller.name, axes, *worst, escape))
     phases = (Column(head, form=".3g") for head in ("drag phase", "recovery, at the limit"))
     columns = "controller", "axes", *phases, Column("escape bound")
     return Grid(columns, rows, "2TsB/M + Ts²K/M, stable below 4", swatches=True)

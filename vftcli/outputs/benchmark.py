@@ -22,7 +22,6 @@ from vftcli.outputs.grid import (
     significant,
 )
 from vftcli.outputs.page.shell import Box, Scales, page
-from vftcli.signals.arrays import Array
 
 SILENT = 0.05  #: Share of time without an answer from which it is mentioned.
 LISTS = {"list": "counted", "list with candidates": "all"}
@@ -127,22 +126,19 @@ class Results:
 
     def torques(self) -> Iterator[Record]:
         """The rows of torques."""
-        best: dict[tuple[str, ...], Array] = {}
         shifts = self.table.drop_nulls("lag_squares")
-        scores = [*self.pooled("joint")]
-        for about, score in scores:
-            if about["method"] == BEST:
-                best[about["arm"], about["protocol"], about["part"]] = score.drawn
-        for about, score in scores:
-            drawn = best.get((about["arm"], about["protocol"], about["part"]), np.nan)
-            row: Record = about | score.numbers(np.nan if about["method"] == BEST else drawn)
+        each = [*self.pooled("joint")]
+        scores = {tuple(about[key] for key in PLACE): score for about, score in each}
+        for about, score in each:
+            place = {key: about[key] for key in PLACE}
+            best = scores.get(tuple((place | {"method": BEST}).values()), score)
+            row: Record = about | score.numbers(np.nan if best is score else best.drawn)
             if row["part"] == "free":
                 # Zero is perfect there: L1 and false rows speak.
                 row |= dict.fromkeys(("skill", "skill_low", "skill_high"), np.nan)
             row |= {"lag_s": np.nan, "rmse_at_lag": np.nan}
-            place = {key: row[key] for key in PLACE}
-            if each := shifts.filter(**place)["lag_squares"].to_list():
-                sums = np.sum(each, axis=0)
+            if squares := shifts.filter(**place)["lag_squares"].to_list():
+                sums = np.sum(squares, axis=0)
                 share = np.sqrt(sums.min() / sums[abs(LAGS).argmin()])
                 row |= {"lag_s": float(LAGS[sums.argmin()]), "rmse_at_lag": float(share)}
             yield row

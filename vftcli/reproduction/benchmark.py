@@ -116,12 +116,18 @@ class BenchmarkRun:
     def make_log(self, log: BenchmarkLog) -> None:
         """Have a log to score: its file, or one that is made for it."""
         base = self.logs.get(log.base) if log.pushes else log
-        if base is not None and (log.pushes or log.scenario or log.parts):
+        if base is None:
+            return  # it could not be made, which is said
+        if log.pushes or log.scenario or log.parts:
             work = partial(write_log, log, base, self.command)
             path = self.made(f"{log.name}.parquet", base.paths, log, work)
-            base = None if path is None else made_log(log, path)
-        if base is not None:  # else it could not be made, which is said
-            self.logs[log.name] = base
+            if path is None:
+                return
+            if log.pushes or log.scenario:
+                log = replace(log, truth="torque", truth_file=str(companions(path)[0]))
+            words = tuple(each for each in log.options if each[0] != "columns")
+            log = replace(log, file=str(path), parts=(), scenario="", options=words)
+        self.logs[log.name] = log
 
     def fit(self, robot: TrainedRobot) -> None:
         """Make a robot file from its training logs, if all are there."""
@@ -213,14 +219,6 @@ class BenchmarkRun:
             "tasks": [{"task": name, **each._asdict()} for name, each in efforts.items()],
         }
         return envelope(self.command, entries, found=found)
-
-
-def made_log(log: BenchmarkLog, path: Path) -> BenchmarkLog:
-    """The log of an entry, read from a file that was made for it."""
-    if log.pushes or log.scenario:
-        log = replace(log, truth="torque", truth_file=str(companions(path)[0]))
-    words = tuple(each for each in log.options if each[0] != "columns")
-    return replace(log, file=str(path), parts=(), scenario="", options=words)
 
 
 def write_log(log: BenchmarkLog, base: BenchmarkLog, command: str, path: Path) -> None:

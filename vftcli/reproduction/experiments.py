@@ -106,16 +106,15 @@ def gather(
     for name in names:
         item = paper.items[name]
         own = [result for experiment, result in results if experiment in item.experiments]
-        values: dict[str, Any] = {key: defaultdict(list) for key, *_ in item.lines}
-        charts = []
-        for result in own:
-            for (variant, key), value in () if isinstance(result, str) else result.items():
-                if isinstance(value, Chart):
-                    charts += [value._replace(key=name, title=item.traces)] * (key == name)
-                elif key in values:
-                    values[key][variant].append(value)
         failures = [result for result in own if isinstance(result, str)]
-        chart = charts[-1] if charts else None
+        worked = [result for result in own if not isinstance(result, str)]
+        values: dict[str, Any] = {key: defaultdict(list) for key, *_ in item.lines}
+        chart = None
+        for (variant, key), value in chain.from_iterable(result.items() for result in worked):
+            if isinstance(value, Chart) and key == name:
+                chart = value._replace(key=name, title=item.traces)
+            elif key in values:
+                values[key][variant].append(value)
         found[name] = replace(item, values=values, chart=chart, failures=failures)
     return found
 
@@ -148,7 +147,7 @@ def short_number(value: float) -> str:
 def item_grid(item: PaperItem) -> Grid:
     """The print, ours in every variant, and the floor, if any."""
     floors = any(FLOOR in values for values in item.values.values())
-    kinds = (*item.variants, *[FLOOR] * floors)
+    kinds = [*item.variants, FLOOR] if floors else item.variants
     rows: Rows = []
     for line in item.lines:
         values = item.values[line.key]
@@ -227,10 +226,9 @@ def write_reproduction(
         seeds=seeds,
     )
     folder.write(PAGE, text)
-    grids = [overview(found)]
-    for item in found.values():
-        grids += [replace(item_grid(item), title=item.heading)] * bool(item.lines)
-    folder.write(TABLES, "\n".join(map(markdown, grids)))
+    shown = [item for item in found.values() if item.lines]
+    grids = (replace(item_grid(item), title=item.heading) for item in shown)
+    folder.write(TABLES, "\n".join(map(markdown, [overview(found), *grids])))
     if form is not None:
         drawings = {
             name: Drawing(found[name].heading, partial(line_figure, plots=plots_of(chart)))
