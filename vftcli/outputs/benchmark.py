@@ -87,15 +87,6 @@ HEADLINE = {
     "contact": ("skill", Column("skill", form=".2f")),
     "free": ("l1_Nm", Column("L1", "N·m")),
 }
-SUMS = ("skill", "l1_Nm", "missing", "seconds")
-#: A table of rows of which none is scored.
-EMPTY = pl.DataFrame(
-    schema={
-        **dict.fromkeys(PLACE, pl.String),
-        "exact_model": pl.Boolean,
-        **dict.fromkeys(SUMS, pl.Float64),
-    }
-)
 #: Meaning of a mark behind an RMSE.
 NEAR = "~: nearer to the least RMSE than the truth's own error"
 
@@ -110,7 +101,10 @@ class Results:
         self.colours = colours_of_names([name for name in self.methods if name != "zero"])
         #: One row an arm, protocol, method and part, for machines and tables.
         self.rows = [*self.torques()]
-        self.numbers = pl.concat([EMPTY, pl.DataFrame(self.rows)], how="diagonal")
+        # The columns of the headline are there without a row, too.
+        floats = (pl.col("l1_Nm").alias(x) for x in ("l1_Nm", "skill", "missing", "seconds"))
+        empty = table.clear().select(*PLACE, "exact_model", *floats)
+        self.numbers = pl.concat([empty, pl.DataFrame(self.rows)], how="diagonal")
         exact = pl.col("exact_model")
         #: Rows of the headline: those of exact models only where all are.
         self.spoken = self.numbers.filter(
@@ -164,18 +158,23 @@ class Results:
         rows: Rows = [(name, *(mean.get(name) for mean in means)) for name in names]
         return Grid(columns, rows, "Skill in contact, and L1 in free motion", swatches=True)
 
-    def lines(self) -> Iterator[str]:
-        """Lines below the headline: lists, arms, methods that use the future."""
+    def list_lines(self) -> Iterator[str]:
+        """Lines on the lists of contacts of the headline's arms."""
         for rows in self.lists():
             _, protocol, method, *_ = rows.row(0)
             arms = seen(self.spoken.filter(protocol=protocol), "arm")
             own = rows.filter(pl.col("arm").is_in(arms), part="list")
             found, true, false, hours = own.select(*COUNTS).sum().row(0)
             low, high = rate_interval(false, hours)
-            yield (
-                f"{method} lists, {protocol}: {found} of {true} true contacts; {false} false, "
-                f"{false / hours if hours else 0:.0f} per hour (95 %: {low:.0f} to {high:.0f})"
-            )
+            if own.height:
+                yield (
+                    f"{method} lists, {protocol}: {found} of {true} true contacts; {false} false, "
+                    f"{false / hours if hours else 0:.0f} per hour (95 %: {low:.0f} to {high:.0f})"
+                )
+
+    def lines(self) -> Iterator[str]:
+        """Lines below the headline: lists, arms, methods that use the future."""
+        yield from self.list_lines()
         shown = {row[0] for row in self.headline().rows}
         if rest := [method for method in self.methods if shown and method not in shown]:
             why = "in no mean, as some arm lacks them (-v and page have their rows)"
