@@ -267,8 +267,9 @@ OF_ANALYSIS = (
 #: third of the time of an hour's report, and its peak was no lower.
 LARGE = 1 << 24
 
-#: The C library's number of the size from which memory is mapped.
-MMAP_THRESHOLD = -3
+#: The C library's numbers of the size from which memory is mapped, and of the freed memory
+#: that it keeps: with less of it, arrays of a minute's log are cleared anew each time.
+MMAP_THRESHOLD, TRIM_THRESHOLD = -3, -1
 
 
 def give_back() -> None:
@@ -281,7 +282,8 @@ def give_back() -> None:
     import ctypes
 
     try:
-        ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, LARGE)
+        for number, size in ((MMAP_THRESHOLD, LARGE), (TRIM_THRESHOLD, 2 * LARGE)):
+            ctypes.CDLL(None).mallopt(number, size)
     except (AttributeError, OSError, TypeError):  # another C library
         return
 
