@@ -22,7 +22,6 @@ from vftcli.signals.arrays import (
     Array,
     Indices,
     Mask,
-    integral,
     root_mean_square,
     root_mean_squares,
 )
@@ -112,16 +111,15 @@ class Windows:
     recording: Recording  #: The log.
     robot: Robot  #: The arm with its payload.
     ignored: tuple[int, ...]  #: Joints without evidence in the effort, from zero.
-    first: Indices  #: First sample of each window. (W,)
-    last: Indices  #: Last sample of each window. (W,)
-    t: Array  #: Those instants. (W, K) [s]
-    q: Array  #: Positions at a few instants of each window. (W, K, n) [rad]
+    samples: Indices  #: All samples of each window. (W, L)
+    t: Array  #: A few instants of each window. (W, K) [s]
+    q: Array  #: Positions there. (W, K, n) [rad]
     dq: Array  #: Velocities there. (W, K, n) [rad/s]
     motion: Array  #: Mean direction and mean speed of every joint. (W, 2, n) [-, rad/s]
 
     def exchanged(self, i: int, j: int, few: Indices) -> "Windows":
         """Some of the windows, all signals of two joints in them exchanged."""
-        names = ("first", "last", "t", "q", "dq", "motion")
+        names = ("samples", "t", "q", "dq", "motion")
         some = {name: getattr(self, name)[few] for name in names}
         for values in (some["q"], some["dq"], some["motion"]):
             values[:, :, [i, j]] = values[:, :, [j, i]]
@@ -185,7 +183,7 @@ class Windows:
 
     def mean(self, value: Array) -> Array:
         """Mean of a signal over each window, of all its samples. (W, n)"""
-        return means(self.recording.t, value, self.first, self.last)
+        return means(self.recording.t[self.samples], value[self.samples])
 
 
 def windows_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> Windows:
@@ -194,18 +192,17 @@ def windows_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) 
     length = max(1, min(round(WINDOW / recording.median_step), (recording.samples - 1) // 3))
     first = np.arange(0, recording.samples - length, max(1, length // 2))
     first = first[spread(len(first), WINDOWS)]
-    last = first + length
-    at = first[:, None] + np.linspace(0, length, POINTS).round().astype(int)
+    samples = first[:, None] + np.arange(length + 1)
+    few, speed = samples[:, np.linspace(0, length, POINTS).round().astype(int)], dq[samples]
     return Windows(
         recording=recording,
         robot=robot,
         ignored=tuple(ignored),
-        first=first,
-        last=last,
-        t=t[at],
-        q=recording.q[at],
-        dq=dq[at],
-        motion=np.stack([means(t, x, first, last) for x in (np.tanh(dq / SLOW), dq)], axis=1),
+        samples=samples,
+        t=t[few],
+        q=recording.q[few],
+        dq=dq[few],
+        motion=np.stack([means(t[samples], x) for x in (np.tanh(speed / SLOW), speed)], axis=1),
     )
 
 
@@ -223,10 +220,9 @@ def trapezoids(t: Array) -> Array:
     return np.pad(steps, ((0, 0), (0, 1))) + np.pad(steps, ((0, 0), (1, 0)))
 
 
-def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
-    """Mean of a signal from some samples to others, by trapezoids. (W, n)"""
-    area = integral(t, value)
-    return np.asarray((area[last] - area[first]) / (t[last] - t[first])[:, None])
+def means(t: Array, value: Array) -> Array:
+    """Mean of a signal over windows (W, K, n) by trapezoids, t (W, K) [s]. (W, n)"""
+    return np.asarray(np.einsum("wk,wkn->wn", trapezoids(t), value))
 
 
 def up_axes(gravity: Array) -> Array:
