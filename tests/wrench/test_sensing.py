@@ -34,7 +34,7 @@ from vftcli.wrench.sensing import (
     torque_error,
 )
 from vftcli.wrench.sensor import SensorReading
-from vftcli.wrench.smoother import WrenchPrior, deviations, smooth_wrench
+from vftcli.wrench.smoother import WrenchPrior, smooth_wrench
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
@@ -155,8 +155,7 @@ def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion):
     sensed = reading(CIRCLE, "gmo", "fdo", frame="base", settings=SMOOTHED, **FIRST_SECONDS)
     assert sensed.solver == "smoother"
     log, (piece,) = motion.log, motion.part.pieces
-    values, covariance = smooth_wrench(log, [piece]).at(log.t)
-    sd = deviations(covariance)
+    values, sd = smooth_wrench(log, [piece]).at(log.t)
     for wrench in sensed.wrenches:
         np.testing.assert_allclose(wrench.values, values, atol=1e-12)
         np.testing.assert_allclose(wrench.sd, sd, atol=1e-12)

@@ -31,7 +31,6 @@ from vftcli.wrench.smoother import (
     WrenchPrior,
     block_length,
     contact_block,
-    deviations,
     gated,
     hidden_by_blocks,
     smooth_wrench,
@@ -95,8 +94,7 @@ def test_pushes_are_followed_in_short_blocks():
     found = smooth_wrench(simulated(robot, q, push, t), [untouched(robot, q, t)])
     assert not found.prior.is_steady
     assert found.seconds == pytest.approx(0.024)
-    moved, covariance = found.at(t)
-    sd = deviations(covariance)
+    moved, sd = found.at(t)
     inside = np.abs(moved - push) <= 1.96 * sd
     # widened beyond the model's own 95 %, but 25 N come and go within one sample, 20 times
     assert np.all(inside.mean(axis=0) >= 0.9)
@@ -152,8 +150,7 @@ def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing():
     push = load(t) * (np.sin(1.3 * t) > 0.3)[:, None]
     free = untouched(robot, q, t)
     found = smooth_wrench(simulated(robot, q, push, t), [free], prior=WrenchPrior(1, 30))
-    moved, covariance = found.at(t)
-    sd = deviations(covariance)
+    moved, sd = found.at(t)
     assert np.isfinite(moved).all()
     assert np.isfinite(sd).all()
     clear = sigma > 2 * LEAST_SIGMA
@@ -171,8 +168,7 @@ def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows():
     p = whole.p[there] + 50.0 * (t[there] > 12)[:, None]
     cut = DynamicsTerms(t=t[there], p=p, mu=whole.mu[there])
     found = smooth_wrench(run_of(cut, q[there]), [untouched(robot, q, t)], prior=prior)
-    values, covariance = found.at(np.array([5.0, 10.0, 15.0]))
-    sd = deviations(covariance)
+    values, sd = found.at(np.array([5.0, 10.0, 15.0]))
     assert np.isfinite(values).all()
     assert np.all(sd[1] > 1.5 * sd[[0, 2]])
     assert np.all(np.abs(values - load(t[:3])) <= 3.0 * sd)
@@ -227,8 +223,7 @@ def test_a_circle_under_pushes_reads_its_truth():
     path = FIXTURES / "ur5_circle.csv"
     recording, robot = Library([path]).open(path, ReadChoice()), load_robot("ur5")
     run, t = Run(recording=recording, robot=robot), recording.t
-    moved, covariance = smooth_wrench(run, [RunSamples(run, (t > 0.3) & (t < 4.0))]).at(t)
-    sd = deviations(covariance)
+    moved, sd = smooth_wrench(run, [RunSamples(run, (t > 0.3) & (t < 4.0))]).at(t)
     table = pl.read_parquet(f"{path}.truth.parquet")
     truth = table.select([f"wrench/{axis}" for axis in AXES]).to_numpy()
     error = moved - truth
@@ -249,8 +244,7 @@ def test_a_real_payload_is_read_in_every_pose(logs):
     run, other = (Run(recording=recording, robot=robot) for recording in (log, free))
     found = smooth_wrench(run, [RunSamples(other, np.ones(free.samples, dtype=bool))])
     assert found.prior.is_steady
-    moved, covariance = found.at(log.t)
-    sd = deviations(covariance)
+    moved, sd = found.at(log.t)
     error = moved[:, :3] - [0.0, 0.0, -27.52]
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) <= 4.0)
     assert np.all(np.abs(error.mean(axis=0)) <= 1.5)

@@ -42,7 +42,6 @@ from vftcli.wrench.sensor import (
 from vftcli.wrench.smoother import (
     SmoothedWrench,
     WrenchPrior,
-    deviations,
     prior_of,
     smooth_wrench,
 )
@@ -159,14 +158,18 @@ def smoothed_wrench(
     smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, log: Run
 ) -> Wrench:
     """A wrench with the smoother's values and band in the sensor's frame, unmasked."""
-    values, sd = np.empty((2, len(wrench.t), 6))
+
+    def to_frame(q: Array) -> Array:
+        flange = link_poses(log.robot.chain, q).rotation[:, -1]
+        return from_base(sensor.frame, flange, sensor.mounting)
+
+    # The arm hardly turns within a block: its band is turned with it.
+    X = to_frame(resample_columns(smoothed.t, log.t, log.q))
+    turned = smoothed._replace(covariance=X @ smoothed.covariance @ X.swapaxes(1, 2))
+    values, sd = turned.at(wrench.t)
     for start in range(0, len(values), CHUNK):
         span = slice(start, start + CHUNK)
-        flange = link_poses(log.robot.chain, log.q[span]).rotation[:, -1]
-        X = from_base(sensor.frame, flange, sensor.mounting)
-        there, covariance = smoothed.at(wrench.t[span])
-        values[span] = np.squeeze(X @ there[:, :, None], axis=2)
-        sd[span] = deviations(X @ covariance @ X.swapaxes(1, 2))
+        values[span] = np.squeeze(to_frame(log.q[span]) @ values[span, :, None], axis=2)
     return replace(
         wrench,
         values=handed_over(values),

@@ -253,9 +253,9 @@ class SmoothedWrench(NamedTuple):
         return ~self.inside[np.minimum(block, len(self.t) - 1)]
 
     def at(self, t: Array) -> tuple[Array, Array]:
-        """Values and covariance at other times, straight between blocks. (T, 6), (T, 6, 6)"""
-        flat = resample_columns(t, self.t, self.covariance.reshape(len(self.t), 36))
-        return resample_columns(t, self.t, self.values), flat.reshape(-1, 6, 6)
+        """Values and SDs at other times, variances straight between blocks. (T, 6)"""
+        variance = resample_columns(t, self.t, deviations(self.covariance) ** 2)
+        return resample_columns(t, self.t, self.values), np.sqrt(variance)
 
     @property
     def record(self) -> dict[str, object]:
