@@ -161,6 +161,9 @@ def test_arrays_of_objects_are_refused(tmp_path):
     np.save(tmp_path / "x.npy", np.array([[1, "a"]], dtype=object), allow_pickle=True)
     with pytest.raises(LogError, match=r"not a readable|cut, damaged"):
         read(tmp_path / "x.npy", columns="t,q")
+    np.savez(tmp_path / "x.npz", log={"q": [1.0]})
+    with pytest.raises(LogError, match=r"no arrays of numbers \(.*by name: np\.savez\(FILE, t="):
+        read(tmp_path / "x.npz")
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import fact
 
 #: What to do where NumPy cannot read an array.
-RESAVE = ". Save it with np.save or np.savez."
+RESAVE = ". Save arrays of numbers by name: np.savez(FILE, t=…, q=…)."
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
 
 
@@ -143,7 +143,9 @@ def _arrays_of(file: LogFile, log: Mapping[Any, Any]) -> Columns:
 
 def _npz_arrays(file: LogFile) -> Columns:
     with (
-        naming_damage(file.path, "a damaged .npz file", zipfile.BadZipFile, remedy=RESAVE),
+        naming_damage(
+            file.path, "damaged, or no arrays of numbers", zipfile.BadZipFile, remedy=RESAVE
+        ),
         np.load(BytesIO(file.content), allow_pickle=False) as bundle,
     ):
         total = sum(member.file_size for member in bundle.zip.infolist())
