@@ -428,7 +428,9 @@ def test_pair_writes_two_logs(run, here: Path) -> None:
     _, out, _ = run("simulate", "payload-pair", "-o", "p.csv", *lossy, "--json")
     rows = {p.name: p.read_text().count("\n") - 1 for p in here.glob("*.csv")}
     assert rows.keys() == {"p.csv", "p.free.csv"}
-    assert json.loads(out)["samples"] == rows["p.csv"] != rows["p.free.csv"]
+    printed, record = json.loads(out), json.loads((here / "p.csv.run.json").read_text("utf-8"))
+    assert printed["samples"] == rows["p.csv"] != rows["p.free.csv"]
+    assert printed.keys() == record.keys()
 
 
 def test_lists_the_scenarios(run) -> None:

@@ -8,7 +8,7 @@ import typer
 
 from vftcli.admittance import ControlChoice
 from vftcli.cli import options as opt
-from vftcli.cli.console import detail, echo_data, echo_top, open_made, say, say_json
+from vftcli.cli.console import detail, echo_data, echo_top, open_made, say
 from vftcli.signals.option import WRITE, Asked, Option
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def admit(
         OutputFolder(output, force, names).check()
     choice_of = partial(opt.choice_for, library=Library([log] if log else []))
     found = replayed(log, asked, choice_of, release or (), seed)
-    show(found, json=json, latex=latex)
+    show(found, asked.line, json=json, latex=latex)
     if output is not None:
         write_admittance(output, found, asked.line, force, figures)
         if not (json or latex):
@@ -68,21 +68,22 @@ def admit(
             open_made(output)
 
 
-def show(found: "Replayed", *, json: bool, latex: bool) -> None:
+def show(found: "Replayed", command: str, *, json: bool, latex: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.outputs.admittance import (
         LEGEND,
+        admittance_record,
         comparison_grid,
         latency_grid,
         latex_text,
         parameter_grid,
     )
     from vftcli.outputs.grid import terminal
+    from vftcli.outputs.run_record import to_json
 
     result, run = found.replay, found.run
     if json:
-        logs = [found.recording] if found.recording is not None else []
-        say_json(logs, result.remarks, rows=result.rows)
+        echo_data(to_json(admittance_record(found, command)))
         return
     if latex:
         echo_data(latex_text(result))
@@ -91,11 +92,13 @@ def show(found: "Replayed", *, json: bool, latex: bool) -> None:
     detail(terminal(parameter_grid(result)).rstrip())
     for note in result.remarks:
         detail(f"note: {note}")
+    none = "no force passes its threshold: no axis moves (--details)"
+    shown = terminal(comparison_grid(result.rows)) if result.rows else none
     if run is not None:
         grid, words = latency_grid(run), "no force passes its threshold"
         words = words if run.stable else f"the arm ran away at {run.t[-1]:.2f} s"
         timed = run.stable and grid.rows
-        say(terminal(grid).rstrip() if timed else f"closed loop: {words}")
-    none = "no force passes its threshold: no axis moves (--details)"
-    echo_top(terminal(comparison_grid(result.rows)) if result.rows else none)
+        first = terminal(grid) if timed else f"closed loop: {words}\n"
+        shown = f"{first}\n{shown}"
+    echo_top(shown)
     say(LEGEND * bool(result.rows))

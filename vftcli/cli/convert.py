@@ -106,7 +106,8 @@ def simulate_log(
     if setup.pair:  # its free run: ``log.csv`` → ``log.free.csv``
         paths.append(output.with_name(f"{output.stem}.free{output.suffix}"))
     log_folder(paths, force)
-    usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
+    # Refused before the run.
+    form = usual_format(setup, load_robot(setup.robot), log_format)
     runs = simulate_pair(setup, seed)
     places = dict(zip(paths, runs, strict=True))
     files = [str(f) for f in save(places, log_format, force, command_line())]
@@ -118,6 +119,7 @@ def simulate_log(
             files=files,
             samples=len(runs[0].measured.rows),
             robot=setup.robot,
+            format=form,
         )
         return
     for file in files:
