@@ -74,7 +74,7 @@ def test_several_logs_get_folders(analysis: Analysis, as_if: Callable, tmp_path:
     assert folders == ["run", "run-2"]
     for folder in folders:
         assert sorted(p.name for p in (tmp_path / "out" / folder).iterdir()) == sorted(FILES)
-    assert len(json.loads(text)["logs"]) == 2
+    assert [log["folder"] for log in json.loads(text)["logs"]] == folders
     errors = pl.read_csv(tmp_path / "out/errors.csv")
     assert errors["recording"].unique(maintain_order=True).to_list() == labels
     assert len(errors) == 2 * len(pl.read_csv(tmp_path / "out" / folders[0] / "errors.csv"))
