@@ -84,7 +84,7 @@ def test_a_failure_stands_for_every_log_of_equal_bytes_and_names_it_once(run, fo
         (folder / name).write_text("a,b,c\n1,2,3\n4,5,6\n")
     code, _, err = run("batch", folder, *HERE, "-o", tmp_path / "out")
     assert code == 3
-    assert "5 logs: 3 done now, 0 before, 2 failed" in err
+    assert "5 logs: 3 done now, 0 earlier, 2 failed" in err
     failures = pl.read_parquet(tmp_path / "out" / "failures.parquet")
     assert failures["log"].to_list() == ["bad.csv", "worse.csv"]
     assert all(line.startswith("no joint positions") for line in failures["line"])
@@ -158,7 +158,7 @@ def test_ten_failures_are_told_the_others_counted(run, tmp_path: Path) -> None:
     for k in range(12):
         (tmp_path / f"{k:02}.csv").write_text(f"a,b,c\n1,2,{k}\n")
     words = ("--do", "contacts", "--robot", "ur5", "--jobs", "0", "-o")
-    told = "… 2 more in failures.parquet\n12 logs: 0 done now, 0 before, 12 failed; "
+    told = "… 2 more in failures.parquet\n12 logs: 0 done now, 0 earlier, 12 failed; "
     for some, more in (("0?", ""), ("??", told)):
         logs = sorted(tmp_path.glob(f"{some}.csv"))
         code, _, err = run("batch", *logs, *words, tmp_path / f"of {len(logs)}")

@@ -89,7 +89,7 @@ def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
         force = f"{column['units']}, {column['frame']}"
         lines.append(f"  {name}: {column['sign'] if column['units'] == '1' else force}")
     if delay := record["transient_frames"]:
-        lines.append(f"  the first {delay} frames of an episode still show the observer's start")
+        lines.append(f"  the observer settles in the first {delay} frames of each episode")
     clocks = dict.fromkeys(one["clock"] for one in record["episodes"] if "clock" in one)
     lines += [f"  clock: {clock}" for clock in clocks]
     overridden = sorted(

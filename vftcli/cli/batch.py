@@ -92,7 +92,7 @@ def batch(
     if failures.height > MOST_NAMED:
         say(f"… {failures.height - MOST_NAMED} more in failures.parquet")
     say(
-        f"{counted(count.logs, 'log')}: {count.done} done now, {count.before} before, "
+        f"{counted(count.logs, 'log')}: {count.done} done now, {count.before} earlier, "
         f"{count.failed} failed; {output / 'index.html'}, {output / 'batch.parquet'}"
     )
     if count.failed:

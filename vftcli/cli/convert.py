@@ -54,7 +54,7 @@ def convert_log(
         say(f"repair: {repair}")
     for warning in recording.source.warnings:
         say(f"note: {warning}")
-    say(f"wrote {recording.samples} samples of {', '.join(recording.signals)}")
+    say(f"wrote {output}: {recording.samples} samples of {', '.join(recording.signals)}")
 
 
 @opt.command()

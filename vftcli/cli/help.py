@@ -255,7 +255,7 @@ def formats(name: str | None) -> Iterator[str]:
 
     if name is None:
         yield from two_columns([(form.name, form.title) for form in FORMATS.values()])
-        yield "\nvftcli help formats NAME: how to record one. It reads .gz and .zst too."
+        yield "\nvftcli help formats NAME: how to record one. Any may be packed as .gz or .zst."
     elif name in FORMATS:
         form = FORMATS[name]
         yield f"{form.name}: {form.title}"
