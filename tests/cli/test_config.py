@@ -353,3 +353,16 @@ def test_only_the_command_that_is_asked_for_is_loaded(monkeypatch) -> None:
         main()
     each = [some & {*COMMANDS} for some in loaded]
     assert each == [{"help", "report"}, {"report"}, {"contacts"}, set()]
+
+
+def test_a_missing_option_says_what_it_takes(run) -> None:
+    code, _, err = run("compare", FIXTURES / "ur5_circle.csv")
+    assert code == 2
+    assert "Usage: vftcli compare [OPTIONS] LOG...\n" in err
+    assert "'--reference'. Compare with two-cycle, sensor, vendor, zero, file." in err
+
+
+def test_help_says_once_that_an_option_is_required(helped) -> None:
+    text = helped("help", "batch")
+    assert "Write here; required.\n" in text
+    assert "at most 8.\n" in text
