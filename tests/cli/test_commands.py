@@ -102,7 +102,7 @@ def test_it_says_what_was_written(run, tmp_path: Path) -> None:
     assert "3 episodes (3 done), 540 frames, panda, kfo-zoh, causal" in err
     assert "wrench: N, N·m, flange axes" in err
     assert "contact: 1 in a contact of the list, else 0" in err
-    assert "the first 4 frames of an episode still show" in err
+    assert "the observer settles in the first 4 frames" in err
     again = run(*words, "--force", "--json", "--observer", "kfo-rts")
     assert json.loads(again[1])["causal"] is False
 

@@ -359,7 +359,7 @@ def test_a_missing_option_says_what_it_takes(run) -> None:
     code, _, err = run("compare", FIXTURES / "ur5_circle.csv")
     assert code == 2
     assert "Usage: vftcli compare [OPTIONS] LOG...\n" in err
-    assert "'--reference'. Compare with two-cycle, sensor, vendor, zero, file." in err
+    assert "  Compare with two-cycle, sensor, vendor, zero, file.\n" in err
 
 
 def test_help_says_once_that_an_option_is_required(helped) -> None:

@@ -63,7 +63,7 @@ class GroupedCommand(TyperCommand):
                 near = nearest(getattr(error, "option_name", ""), found)
                 vars(error)["possibilities"] = [near] if near else None
             elif (missing := getattr(error, "param", None)) and not vars(error)["message"]:
-                vars(error)["message"] = missing.help
+                vars(error)["message"] = f"\n  {missing.help}"
             raise
         if kept:
             said = shlex.join(kept[1]) or "nothing that this command takes and is not typed"
