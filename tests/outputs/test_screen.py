@@ -117,6 +117,8 @@ def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     made = replace(analysis, examinations=(replace(own, findings=(bad,)),))
     doubt = "MEANINGLESS if this finding is right (you chose --anyway): effort-sign"
     assert doubt in log_screen(made, CANVAS)
+    broken = "\n  ".join(doubt.rsplit(" ", 1))  # its lines count
+    assert broken in log_screen(made, Canvas(width=72))
     assert "MEANINGLESS" in short_screen(made, CANVAS)
 
 

@@ -120,7 +120,7 @@ class Canvas(NamedTuple):
 
 def short_screen(analysis: Analysis, canvas: Canvas) -> str:
     """Facts and the answer."""
-    lines = [*head_lines(analysis, canvas), *doubt_lines(analysis)]
+    lines = [*head_lines(analysis, canvas), *doubt_lines(analysis, canvas)]
     return canvas.shown("\n".join(lines)) + "\n"
 
 
@@ -134,7 +134,7 @@ def log_screen(
         shown = [] if analysis.listed[0].is_load else hardest_rows(analysis.listed)
         force, _ = forces_along(sized, analysis.t)
         bars = force_bars(analysis.t, np.nan_to_num(force), shown, canvas)
-    tail, text = doubt_lines(analysis), ""
+    tail, text = doubt_lines(analysis, canvas), ""
     if (leading := leading_block(analysis)) is not None:
         tail += canvas.wrapped(against(leading, analysis), 2)
     for grid in contact_grids(analysis.errors):
@@ -178,10 +178,10 @@ def facts(analysis: Analysis) -> str:
     return printable(f"{recording.name} · {analysis.robot.name}{fit} · {span}")
 
 
-def doubt_lines(analysis: Analysis) -> list[str]:
+def doubt_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """Warning on meaningless results made anyway."""
     codes = ", ".join(refused_codes(analysis.examinations))
-    return [doubt(codes)] if codes else []
+    return canvas.wrapped(doubt(codes), 2) if codes else []
 
 
 def written_lines(
