@@ -286,11 +286,10 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "no free part to learn the band",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
     "tried in tests/reproduction/test_manifest.py": (
-        "--outside … is not NAME=DIR", "is one of our rows; give another name",
-        "--outside …: there is no folder", "is looked for, LOG one of"),
+        "--outside …: …", "is looked for, LOG one of"),
     "tried in tests/test_remedies_of_files.py": (
         "s force drives the replay", "leave --frame out", "holds still over a span",
-        "the closed loop runs"),
+        "the closed loop runs", "settle which arm it is of"),
     "no log that provokes it is known": (
         "the fit of physical links did not settle", "equations for … unknowns",
         "or let --method base identify the links too"),

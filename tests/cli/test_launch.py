@@ -401,6 +401,7 @@ def test_the_c_library_knows_it_once_it_can(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setenv("ARROW_DEFAULT_MEMORY_POOL", "mimalloc")
     monkeypatch.setattr(ctypes, "CDLL", lambda _: Library())
     give_back()
-    assert reported == [(-3, LARGE)]  # M_MMAP_THRESHOLD of malloc.h
+    # M_MMAP_THRESHOLD and M_TRIM_THRESHOLD of malloc.h.
+    assert reported == [(-3, LARGE), (-1, 2 * LARGE)]
     monkeypatch.setattr(ctypes, "CDLL", lambda _: object())  # one without mallopt
     give_back()
