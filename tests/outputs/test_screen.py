@@ -118,7 +118,7 @@ def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     doubt = "MEANINGLESS if this finding is right (you chose --anyway): effort-sign"
     assert doubt in log_screen(made, CANVAS)
     broken = "\n  ".join(doubt.rsplit(" ", 1))  # its lines count
-    assert broken in log_screen(made, Canvas(width=72))
+    assert broken in log_screen(made, Canvas(width=71))
     assert "MEANINGLESS" in short_screen(made, CANVAS)
 
 
@@ -221,9 +221,9 @@ ROW = "  {0}    {0}.00 –   4.78   5{0} ± 7      57–78  +y, down   wrist  fa
 EACH = [*map(ROW.format, (1, 2, 3))]
 END = [
     "  Nothing else above 6 N. Weaker pushes would not show.",
-    "  (± 95 %; force ON the robot, base axes; range: if it touched another",
-    "    possible place; trust in the size: good within 25 %, weak beyond 40 %",
-    "    or with little evidence)",
+    "  (± 95 %; force ON the robot, base axes; range: over all possible",
+    "    places; trust: good within 25 % of |F|, weak beyond 40 % or by little",
+    "    evidence)",
 ]
 
 

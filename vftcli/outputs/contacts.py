@@ -43,9 +43,9 @@ MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 
 #: Meaning of a table's numbers.
 LEGEND = (
-    "± 95 %; force ON the robot, base axes; range: if it touched another possible "
-    f"place; trust in the size: good within {100 * TIGHT:.0f} %, weak beyond "
-    f"{100 * WIDE:.0f} % or with little evidence"
+    "± 95 %; force ON the robot, base axes; range: over all possible places; "
+    f"trust: good within {100 * TIGHT:.0f} % of |F|, weak beyond {100 * WIDE:.0f} % "
+    "or by little evidence"
 )
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
