@@ -50,6 +50,55 @@ def test_a_table_reads_the_same_however_it_is_dressed(path, name):
     np.testing.assert_allclose(recording.q[:, 0], 0.1 + 0.001 * np.arange(30), rtol=1e-12)
 
 
+LATE = {
+    "quoted numbers": lambda row: f'"{row}"'.replace(",", '","') + ",ok",
+    "a quoted note with a comma": lambda row: f'{row},"pushed, twice"',
+    "blanks about the numbers": lambda row: f" {row} ,ok".replace(",", " , "),
+    "a note of 3 MB": lambda row: f"{row},{'x' * 3_000_000}",
+    "a quoted note of 3 MB": lambda row: f'{row},"{"x" * 3_000_000}"',
+    "a short row": lambda row: row,
+}
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_what_begins_after_the_first_lines_loses_no_row(path, name):
+    lines = [f"{row},ok" for row in rows(400)]
+    lines[300] = LATE[name](rows(400)[300])
+    recording = written(path, "\n".join([f"{HEAD},note", *lines]) + "\n")
+    np.testing.assert_allclose(recording.t, 0.01 * np.arange(400), rtol=1e-12)
+    np.testing.assert_allclose(recording.q[:, 0], 0.1 + 0.001 * np.arange(400), rtol=1e-12)
+
+
+def test_a_quote_that_is_not_closed_takes_no_rows(path):
+    lines = [f"{row},ok" for row in rows(400)]
+    lines[300], lines[310], lines[320] = (
+        f"{rows(400)[k]},{note}" for k, note in ((300, '"far'), (310, '"near'), (320, '"a, b"'))
+    )
+    with pytest.raises(LogError, match="cannot be parsed"):
+        written(path, "\n".join([f"{HEAD},note", *lines]) + "\n")
+
+
+def test_short_rows_of_a_wide_table_are_not_filled_up(path):
+    names = ",".join(f"x{k}" for k in range(6000))
+    with pytest.raises(LogError, match="cannot be parsed"):
+        written(path, "\n".join([f"{HEAD},{names}", *rows(4000)]) + "\n")
+
+
+@pytest.mark.parametrize("cell", ["", " ", "   "])
+def test_a_blank_cell_is_a_missing_number(path, cell):
+    lines = rows(200)
+    lines[150] = f"1.500,{cell},0.2"
+    with pytest.raises(LogError, match="q of joint 1 is nan in sample 151"):
+        written(path, table(lines))
+
+
+def test_long_quoted_cells_at_the_end_are_read(path):
+    note = '"' + "x" * 200_000 + '"'
+    lines = [*rows(28), *(f"{row},{note}" for row in rows(30)[28:])]
+    lines = [line if k > 27 else f"{line},ok" for k, line in enumerate(lines)]
+    assert written(path, "\n".join([f"{HEAD},note", *lines]) + "\n").samples == 30
+
+
 def test_rows_longer_than_the_names_are_counted_by_the_separator_of_the_names(path):
     for separator in (",", " "):
         text = table([f"{row},7" for row in rows()]).replace(",", separator)

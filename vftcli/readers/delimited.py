@@ -34,7 +34,8 @@ def is_number(text: str) -> bool:
 def split_cells(line: str, separator: str) -> list[str]:
     """The cells of one line, without quotes and blanks around them."""
     if '"' in line:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+        with suppress(csv.Error):  # a line end inside of it, or a cell over 128 KiB
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
     return [cell.strip() for cell in line.split(separator)]
 
 
@@ -132,24 +133,29 @@ class TextTable(Table):
             # failure, but for doubled blanks, between which cells are seen.
             doubled = self.separator == " " and re.search(rb"  |\n | \r?\n", text[:HEAD_BYTES])
             found = None if doubled else self._parse(text, kinds)
-            found = found or self._parse(self._mended(text), kinds)
+            found = found or self._parse(self._mended(text), kinds, mended=True)
             if found is None:
                 raise self._diagnosed(kinds)
             yield found
             self.file.release()
 
-    def _parse(self, text: bytes, kinds: Mapping[int, str]) -> dict[int, Arrow] | None:
+    def _parse(
+        self, text: bytes, kinds: Mapping[int, str], *, mended: bool = False
+    ) -> dict[int, Arrow] | None:
         import pyarrow as pa
         from pyarrow import csv as arrow
 
         if not text:  # a header alone
             return {c: pa.array([], kind) for c, kind in kinds.items()}
-        quote = '"' if self._is_quoted else False
+        quote = '"' if self._is_quoted or (mended and b'"' in text) else False
         try:
             table = arrow.read_csv(
                 pa.BufferReader(text),
                 arrow.ReadOptions(
-                    column_names=[str(c) for c in range(self.width)], use_threads=False
+                    column_names=[str(c) for c in range(self.width)],
+                    use_threads=False,
+                    # A row has to fit into a block; larger ones than pyarrow's are slower.
+                    block_size=min(len(text), 1 << 30) if mended else None,
                 ),
                 arrow.ParseOptions(
                     delimiter=self.separator, quote_char=quote, newlines_in_values=bool(quote)
@@ -158,11 +164,14 @@ class TextTable(Table):
                     column_types={str(c): kind for c, kind in kinds.items()},
                     include_columns=[str(c) for c in kinds],
                     null_values=[""],
+                    strings_can_be_null=True,
                     decimal_point="," if self.decimal_comma else ".",
                 ),
             )
         except pa.ArrowException:
             return None
+        if quote and not self._is_quoted and table.num_rows <= text.count(b"\n"):
+            return None  # a quote that is not closed took lines for a cell
         found = {c: table[str(c)].combine_chunks() for c in kinds}
         if all(column.null_count for column in found.values()):  # as in every blank row
             blank = np.all([column.is_null() for column in found.values()], axis=0).any()
@@ -183,13 +192,17 @@ class TextTable(Table):
     def _mended(self, text: bytes) -> bytes:
         """A text with plain line ends and whole rows.
 
-        Blank lines and doubled blanks are left out.
+        Blank lines, doubled blanks and those before a cell are left out.
         """
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if self.separator == " ":
             text = re.sub(rb"[ \t]+", b" ", text).replace(b"\n ", b"\n").replace(b" \n", b"\n")
+        else:
+            text = re.sub(rb"(?<=[,;\t\n]) +", b"", text)
         rows = re.sub(rb"\n\s*\n", b"\n", text.lstrip(b"\n ")).split(b"\n")
         between, count = self.separator.encode(), self.width - 1
+        if count * len(rows) - text.count(between) > len(text) + BLOCK_BYTES:
+            count = 0  # a wide table of short rows would fill the memory
         return b"\n".join(row + between * (count - row.count(between)) for row in rows if row)
 
     def _start(self) -> int:
