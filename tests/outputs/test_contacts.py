@@ -209,7 +209,9 @@ def test_what_can_be_said_of_the_rest(changed: dict[str, object], words: str) ->
 
 
 def test_a_list_survives_its_record() -> None:
-    record = json.loads(to_json(contacts.contacts_record(contact_list(contact(), BARE, free=()))))
+    rows = contact(), BARE, contact(number=3, inferred=True)
+    assert [rows[0].trust, rows[2].trust] == ["good", "fair"]
+    record = json.loads(to_json(contacts.contacts_record(contact_list(*rows, free=()))))
     assert json.loads(to_json(contacts.contacts_record(contacts.stored_list(record)))) == record
 
 

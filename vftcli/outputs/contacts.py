@@ -367,6 +367,7 @@ def stored_contact(row: Record) -> Contact:
     return Contact(
         **given,
         is_load=row["kind"] == "load",
+        inferred=row["trust"] != "good",
         anywhere=row["anywhere_N"] and tuple(row["anywhere_N"]),
         places=tuple(0 if place == "flange" else place for place in row["places"]),
         remarks=tuple(map(stored_remark, row["remarks"])),
