@@ -9,6 +9,7 @@ import pytest
 
 from vftcli.readers.references import (
     estimates_columns,
+    read_list,
     read_outside,
     read_reference,
 )
@@ -66,6 +67,18 @@ def test_a_band_is_one_deviation_of_the_error(tmp_path, inner):
     assert found.signals.keys() == {"tau_ext", "band"}
     assert np.array_equal(found.signals["band"][:, 0], [0.5, 0.25])
     np.testing.assert_allclose(found.stamps, [0.0, 0.1])
+
+
+def test_a_list_needs_no_forces(tmp_path):
+    path = tmp_path / "a.contacts.csv"
+    path.write_text("start_s,stop_s\n1,2.5\n")
+    assert read_list(path) == [(1.0, 2.5, 0.0, 0.0, False)]
+    path.write_text("start_s,stop_s,kind,peak_force_N,peak_force_band_N\n1,2,load,30,4\n3,4,,,\n")
+    assert read_list(path) == [(1.0, 2.0, 30.0, 4.0, True), (3.0, 4.0, 0.0, 0.0, False)]
+    for text in ("start_s\n1\n", "start_s,stop_s,peak_force_N\n1,2,hard\n"):
+        path.write_text(text)
+        with pytest.raises(LogError, match="a list has columns start_s, stop_s, peak_force_N"):
+            read_list(path)
 
 
 def test_the_columns_of_an_observer_are_reported_of_our_own_files_alone(tmp_path):

@@ -218,12 +218,15 @@ def test_stamps_within_a_microsecond_are_the_logs_own(
     t = 0.01 * np.arange(50)
     steps = np.where(np.arange(50)[:, None] % 2, 1.0, 0.0) * np.ones(6)
     said = RawLog(stamps=t + apart, tick=1.0, clock="t", signals={"tau_ext": steps})
+    listed = [ListedRow(0.1, 0.2, 3.0, 1.0)]
     monkeypatch.setattr(scoring, "read_outside", lambda *_: said)
+    monkeypatch.setattr(scoring, "read_list", lambda _: listed)
     rival = Rival(name="theirs", folder=str(tmp_path), causal=True)
-    (tmp_path / "a.csv").touch()
+    for name in ("a.csv", "a.contacts.csv"):
+        (tmp_path / name).touch()
     answer = scoring.outside_answer(Recording(t=t, q=np.zeros((50, 6))), LOG, rival)
     assert np.array_equal(answer.torque.tau, steps) == own
-    assert answer.about == {"future": False}
+    assert (answer.about, answer.lists) == ({"future": False}, {"list": listed})
 
 
 def test_the_lists_of_the_best_estimate_keep_peaks_and_bands(

@@ -92,6 +92,26 @@ def read_outside(path: Path, name: str) -> RawLog:
     return replace(raw, stamps=program_clock(raw, path), tick=1.0)
 
 
+def read_list(path: Path) -> list[tuple[float, float, float, float, bool]]:
+    """A list of contacts from CSV: start, stop [s], peak, band [N], whether a load."""
+    import polars as pl
+
+    try:
+        rows = pl.read_csv(path, infer_schema_length=None).to_dicts()
+        return [
+            (
+                float(row["start_s"]),
+                float(row["stop_s"]),
+                float(row.get("peak_force_N") or 0.0),
+                float(row.get("peak_force_band_N") or 0.0),
+                row.get("kind") == "load",
+            )
+            for row in rows
+        ]
+    except (OSError, KeyError, TypeError, ValueError, pl.exceptions.PolarsError):
+        raise LogError(f"{path}: a list has columns start_s, stop_s, peak_force_N") from None
+
+
 def _stated(table: Table, columns: str) -> Picks:
     picks = picks_of(table, parse_columns(columns, log=False))
     if picks.keys().isdisjoint({TORQUE, "wrench"}):

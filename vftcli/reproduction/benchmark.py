@@ -173,7 +173,7 @@ class BenchmarkRun:
         self, log: BenchmarkLog, protocol: str, choice: AnalysisChoice, rival: Rival | None = None
     ) -> ScoreTask:
         """The task of a log, with a key of all its inputs."""
-        outside = rival and [rival, rival.file(log)]
+        outside = rival and [rival, rival.file(log), rival.file(log, "contacts.csv")]
         label = ", ".join([log.name, protocol, *([rival.name] if rival else [])])
         about = {
             "log": log.name,

@@ -170,9 +170,10 @@ class Rival:
     causal: bool = False  #: Whether it could run online.
     inputs: str = ""  #: Signals that it reads.
 
-    def file(self, log: BenchmarkLog) -> Path | None:
-        """The estimates of a log, None without any."""
-        tries = (Path(self.folder, f"{log.name}.{end}") for end in ("parquet", "csv"))
+    def file(self, log: BenchmarkLog, *endings: str) -> Path | None:
+        """A log's file with one of these endings, or None; its estimates."""
+        names = (f"{log.name}.{end}" for end in endings or ("parquet", "csv"))
+        tries = (Path(self.folder, name) for name in names)
         return next(filter(Path.is_file, tries), None)
 
 

@@ -30,7 +30,7 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.reader import RawLog
 from vftcli.readers.reading import Library
-from vftcli.readers.references import TORQUE, read_outside, read_reference
+from vftcli.readers.references import TORQUE, read_list, read_outside, read_reference
 from vftcli.reproduction.manifest import BenchmarkLog, Rival
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
@@ -186,7 +186,9 @@ def outside_answer(recording: Recording, log: BenchmarkLog, rival: Rival) -> Ans
         joints = f"torques of {tau.shape[1]} joints for a log of {recording.joints}"
         raise LogError(f"{path}: {joints}")
     torque = ExternalTorque(name=rival.name, t=recording.t, tau=tau, error_sd=there.get("band"))
-    return Answer(torque, there.get("wrench"), {"future": not rival.causal})
+    path = rival.file(log, "contacts.csv")
+    lists = {} if path is None else {LISTS[0]: [ListedRow(*row) for row in read_list(path)]}
+    return Answer(torque, there.get("wrench"), {"future": not rival.causal}, lists)
 
 
 def at_the_logs_times(read: RawLog, recording: Recording, path: Path) -> Mapping[str, Array]:
