@@ -17,7 +17,7 @@ from vftcli.bias.refine import (
     limits_remark,
     with_band,
 )
-from vftcli.bias.whole_log import WholeLogBias
+from vftcli.bias.whole_log import WholeLogBias, stride_of
 from vftcli.evaluation.references import paper_gap
 from vftcli.free_motion import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
@@ -43,13 +43,13 @@ def found() -> Baseline:
 
 def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Baseline:
     """The baseline with a correction off that changes nothing but says this of the log."""
-    shape = found.of(found.motion.log).terms.p.shape
+    shape, t = found.of(found.motion.log).terms.p.shape, found.motion.log.t
     off = WholeLogBias(
         weight=np.zeros(6),
         bias=np.zeros(shape),
         sd=np.full(shape, sd),
         free=free,
-        load=np.full(shape, load),
+        load=np.full((len(t[:: stride_of(t)]), 6), load),
         remarks=(),
     )
     return replace(found, correction=off)

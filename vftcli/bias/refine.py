@@ -10,7 +10,12 @@ import numpy as np
 
 from vftcli.bias import AUTOMATIC
 from vftcli.bias.baseline import Baseline, Baselines, FreeReading, free_reading
-from vftcli.bias.model_error import error_columns, friction_alone, smooth_motion
+from vftcli.bias.model_error import (
+    error_columns,
+    friction_alone,
+    smooth_motion,
+    without_waits,
+)
 from vftcli.bias.whole_log import stride_of
 from vftcli.free_motion.free_motion import SIGN_SPEED
 from vftcli.observers.observer import Observer
@@ -84,7 +89,8 @@ def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
     if off is None or np.count_nonzero(off.free) < ENOUGH:
         return None
     if off.load.any():
-        tau = tau - off.load
+        t = without_waits(run.t)
+        tau = tau - resample_columns(t, t[:: stride_of(t)], off.load)
     elif found.load is not None:
         tau = tau - found.load.torque(run)
     return free_error(tau[off.free], run.rests[off.free], run.dry_friction)

@@ -81,7 +81,8 @@ class WholeLogBias:
     sd: Array
     #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
     free: Mask
-    #: External torque of the fit's slow loads, kept in estimates; or zero. (T, n) [N·m]
+    #: External torque of the fit's slow loads, kept in estimates; or zero. At the samples
+    #: of the fit, by `stride_of`. (S, n) [N·m]
     load: Array
     remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
     fitted: bool = (
@@ -204,9 +205,7 @@ def bias_of(
     """The bias on the log's own clock, with its uncertainty and remarks."""
     t, n = motion.t, run.robot.joints
     free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
-    load = handed_over(np.broadcast_to(0.0, run.q.shape))
-    if (carried := fit.rows.loads.torque_of(found.loads)).any():
-        load = handed_over(resample_columns(t, t[::stride], -carried))
+    load = -fit.rows.loads.torque_of(found.loads)
     if found.solution is None:
         said = remarks_of(found, np.zeros(n), fit.free.mean())
         bare = untouched(run.terms, said[0])
