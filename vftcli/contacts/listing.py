@@ -41,6 +41,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Z_95, Array, covered
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.progress import passed
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, REST, faster
@@ -71,9 +72,11 @@ def list_contacts(
     log = motion.log
     check_log(log)
     bias = bias or whole_log_bias(log)
+    passed(0.25)
     free = free_statistics(motion, bias) or inferred_statistics(log, bias)
     if free is None:
         return without_list(log)
+    passed(0.5)
     found = by_smoother(free, proven=referenced or free.basis == "free motion")
     if log.robot.joints < 6:
         return found.without_forces()
@@ -118,15 +121,16 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
         [k for k, (a, b) in enumerate(found.runs) if t[b - 1] >= first and t[a] <= last]
     )
     at_rest = np.array([rests_around(run, found, span) for span in found.runs], bool)
-    passed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
+    listed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
     if not named:
-        passed |= at_rest & np.array(found.beyond, bool)
-    seen = np.flatnonzero(passed | (found.best > LEAST_EVIDENCE)).tolist()
+        listed |= at_rest & np.array(found.beyond, bool)
+    seen = np.flatnonzero(listed | (found.best > LEAST_EVIDENCE)).tolist()
     spans = {k: times_of(found.log.blocks, found.runs[k]) for k in seen}
     halted = [k for k in seen if follows_stop(run.recording, spans[k], seconds)]
-    stops = tuple(t[found.runs[k][0]] for k in halted if passed[k])
+    stops = tuple(t[found.runs[k][0]] for k in halted if listed[k])
     going = [k for k in seen if k not in halted]
-    kept, others = ([k for k in going if passed[k] == wanted] for wanted in (True, False))
+    kept, others = ([k for k in going if listed[k] == wanted] for wanted in (True, False))
+    passed(0.75)
     measurement = ContactMeasurement.of(found.kept(kept), free)
     rows = measured_rows(free, measurement)
     groups = adjoining(measurement.found.runs, rows)
@@ -140,7 +144,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     if not named and shown.any():
         rows = measured_rows(free, replace(measurement, tail=TAIL))
         shown &= [shows_force(row, smallest) for row in rows]
-    listed, weak = ([rows[k] for k in np.flatnonzero(some)] for some in (shown, ~shown))
+    contacts, weak = ([rows[k] for k in np.flatnonzero(some)] for some in (shown, ~shown))
     if others:
         beside = ContactMeasurement.of(found.kept(others), free, measurement)
         weak = [*measured_rows(free, beside), *weak]
@@ -148,7 +152,7 @@ def by_smoother(free: FreeStatistics, *, proven: bool) -> ContactList:
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
-        contacts=numbered(listed, inferred=not proven),
+        contacts=numbered(contacts, inferred=not proven),
         candidates=numbered(weak, inferred=True),
         basis=free.basis,
         free=free.remarks,

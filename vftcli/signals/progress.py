@@ -34,6 +34,12 @@ def stage(name: str, begin: float = 0.0, end: float = 1.0) -> None:
     _hearer.get()(name, begin)
 
 
+def passed(share: float) -> None:
+    """Report that so much of the current work is done."""
+    begin, width = _part.get()
+    _hearer.get()("", begin + width * share)
+
+
 def steps(items: Sequence[Item]) -> Iterator[Item]:
     """The items of a loop; before each its share is reported."""
     begin, width = _part.get()
