@@ -244,14 +244,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 50_848,
+    "lines of Python": 50_820,
     "files": 210,
-    "functions": 2715,
+    "functions": 2713,
     "functions over 60 lines": 8,
-    "names, operators, numbers": 365_906,
-    "characters a line that is not blank": 50.19,
+    "names, operators, numbers": 365_273,
+    "characters a line that is not blank": 50.16,
     "noqa": 70,
-    "lines of TOML, JavaScript, CSS": 7290,
+    "lines of TOML, JavaScript, CSS": 7269,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 
