@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from example_logs import BEARING, EPISODES, FIXTURES, TAPS
+from example_logs import BEARING, CIRCLE, EPISODES, FIXTURES, TAPS
 from typer.testing import CliRunner
 
 from vftcli.cli import make_app
@@ -201,6 +201,18 @@ def test_a_log_becomes_a_robot_that_estimate_uses(run, excitation, here: Path) -
     assert load_robot("my_robot.toml").document["identification"]["base_parameters"]
     assert run("estimate", excitation, "--robot", "my_robot.toml", "-o", "out")[0] == 0
     assert Path("out/estimates.parquet").is_file()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("here")
+def test_a_fit_says_without_being_asked_that_something_touched_the_arm(run) -> None:
+    code, _, err = run(
+        "identify", CIRCLE, "--robot", "ur5", "--method", "friction", "-o", "r.toml"
+    )
+    assert code == 0
+    (said,) = [line for line in err.splitlines() if "suspected contacts" in line]
+    assert said.endswith("are left out of the fit")
+    assert "presliding" not in err  # a fact: with --details
 
 
 @pytest.mark.slow

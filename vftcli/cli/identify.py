@@ -103,7 +103,7 @@ def identify_robot(
     )
     say_robots(examiner.robots)
     for remark in found.remarks:
-        detail(f"note: {remark}")
+        (detail if remark.level == "fact" else say)(f"note: {remark}")
     made_files = map(output.with_name, files_beside(output, None))
     say(f"wrote {', '.join(map(str, made_files))}; use it with --robot {output}")
     if json:
