@@ -61,5 +61,7 @@ def test_a_log_given_twice_is_refused_by_both_names():
     with pytest.raises(ParameterError, match=r"a\.csv and c\.csv, each given as LOG"):
         refuse_repeated_logs(logs)
     refuse_repeated_logs(logs[:2])
-    with pytest.raises(ParameterError, match=r"given as --free, are one run .* adds nothing; do that"):
+    with pytest.raises(
+        ParameterError, match=r"given as --free, are one run .* adds nothing; do that"
+    ):
         refuse_repeated_logs(logs[::2], "--free", "do that")
