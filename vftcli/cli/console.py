@@ -91,7 +91,7 @@ def say_written(
     """Print the written files and the page to open, or `run.json`."""
     from vftcli.outputs.screen import written_lines
 
-    if "recording.rrd" in [*names, *["recording.rrd"] * several] and not installed("rerun"):
+    if (several or "recording.rrd" in names) and not installed("rerun"):
         say(f"recording.rrd not written: {PACKAGES['rerun'][1]}")
     if json:
         echo_data(record)

@@ -86,8 +86,8 @@ def identify_robot(
     from vftcli.readers.reading import Library
 
     task, free = asked.of(Task), asked.of(FreeChoice)
-    others = {"--check": check, "--open": show, "--gains": asked.words["gains"]}
-    check_uses(task, free, logs, others)
+    gains = asked.words["gains"]
+    check_uses(task, free, logs, {"--check": check, "--open": show, "--gains": gains})
     if task.method == "gains":
         find_gains(logs[0], output, asked, figures)
         return

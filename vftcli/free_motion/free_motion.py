@@ -273,11 +273,11 @@ def without_load(run: Run, load: FreeLoad | None) -> Run:
     if load is None:
         return run
     body = Payload(mass=load.mass, com=load.moment / load.mass, inertia=np.zeros((3, 3)))
-    chain = run.robot.loaded_chain
+    chain, terms = run.robot.loaded_chain, run.terms
     arms = (momentum_terms(each, run.q, run.dq) for each in (chain.with_payload(body), chain))
     p, coriolis, gravity = map(np.subtract, *arms)
-    p, mu = (handed_over(x) for x in (run.terms.p + p, run.terms.mu + coriolis - gravity))
-    return run.holding(terms=replace(run.terms, p=p, mu=mu))
+    p, mu = map(handed_over, (terms.p + p, terms.mu + coriolis - gravity))
+    return run.holding(terms=replace(terms, p=p, mu=mu))
 
 
 def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
