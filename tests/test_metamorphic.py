@@ -146,7 +146,7 @@ def convert(folder: Path, log: Path, *words: object) -> Numbers:
 
 
 def admit(_: Path, log: Path, *words: object) -> Numbers:
-    return dict(flat(json.loads(run("admit", log, "--robot", "ur5", "--json", *words))))
+    return dict(flat(json.loads(run("admit", log, "--robot", "ur5", "--json", *words))["rows"]))
 
 
 COMMANDS: dict[str, Callable[..., Numbers]] = {
