@@ -158,8 +158,8 @@ def test_ten_failures_are_told_the_others_counted(run, tmp_path: Path) -> None:
     for k in range(12):
         (tmp_path / f"{k:02}.csv").write_text(f"a,b,c\n1,2,{k}\n")
     words = ("--do", "contacts", "--robot", "ur5", "--jobs", "0", "-o")
-    told = "… 2 more in failures.parquet\n12 logs: 0 done now, 0 earlier, 12 failed; "
-    for some, more in (("0?", ""), ("??", told)):
+    rest = "… 2 more in failures.parquet\n12 logs: 0 done now, 0 earlier, 12 failed; "
+    for some, more in (("0?", ""), ("??", rest)):
         logs = sorted(tmp_path.glob(f"{some}.csv"))
         code, _, err = run("batch", *logs, *words, tmp_path / f"of {len(logs)}")
         assert (code, err.count("error: "), "more" in err) == (1, 10, bool(more))

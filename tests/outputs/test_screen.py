@@ -301,7 +301,7 @@ def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
 
 
 def risen(start: float, stop: float, peak: float) -> Contact:
-    """A contact whose force rises to a peak and falls."""
+    """A contact: its force rises to a peak and falls."""
     t, force = np.array([start, (start + stop) / 2, stop]), np.array([0.0, peak, 0.0])
     course = ForceCourse(t, force, 0.1 * force)
     return contact(start=start, stop=stop, peak=t[1], peak_force=peak, course=course)

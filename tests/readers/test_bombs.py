@@ -198,7 +198,7 @@ OF_HDF5: Hostile = {
     # Some rows in a chunk of ten million, which is unpacked whole.
     "large_chunk": (lambda p: one_chunk(p, zlib.compress(b""), rows=10_000_000),
                     "its chunks unpack to 457 MiB each"),
-    # A chunk of the rows that are there, whose content inflates to 480 MB.
+    # A chunk of the rows that are there; it inflates to 480 MB.
     "lying_chunk": (lambda p: one_chunk(p, inflating(480)), "a chunk unpacks to more than"),
     # Some kilobytes that inflate to half a megabyte, and these to 480 MB.
     "deflated_twice": (lambda p: one_chunk(p, zlib.compress(inflating(480)), deflated=2),

@@ -272,7 +272,7 @@ def against(block: "Block", analysis: Analysis) -> str:
         sizes = sorted(value for _, value in others)
         ends = dict.fromkeys(significant(sizes[k], 2) for k in (0, -1))
         group = "the paper's gains" if paper else "the others"
-        text += f"; {group} {'–'.join(ends)}"
+        text += f"; {group} {'–'.join(ends)} N·m"
     return f"{text} → --details"
 
 

@@ -118,7 +118,7 @@ def frame_of(columns: Iterable[tuple[str, Any]]) -> "pl.DataFrame":
 
 
 class Several(tuple[Kind, ...]):
-    """What was made of one log several times, whose tables are one."""
+    """Series of one log, with one table."""
 
     __slots__ = ()
 
